@@ -99,7 +99,7 @@ class AccessStore:
         return name
 
     def rotate(self, name: str, password: str = "") -> str:
-        """Another token (returned) or this password; the old one lets nobody in any more. Raises LookupError."""
+        """Another token (returned) or this password; the old one is no longer valid. Raises LookupError."""
         kind = self._kind(name)
         if kind is Kind.PERSON:
             self._set("UPDATE identity SET password=? WHERE name=?", (password_hash(password), name))

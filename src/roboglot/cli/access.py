@@ -47,7 +47,7 @@ def add(
     ] = None,
     data: Data = None,
 ) -> None:
-    """Let somebody in; a machine's token is printed, and known this once."""
+    """Add an account; a machine's token is printed, and known this once."""
     with _store(data) as store:
         grants = _grants(rights, robots, until, lasts)
         if person:
@@ -79,14 +79,14 @@ def allow(
 
 @app.command()
 def revoke(name: Name, data: Data = None) -> None:
-    """Let somebody in no more; what it had robots do ends."""
+    """Remove an account; what it had robots do ends."""
     with _store(data) as store:
         store.revoke(name)
 
 
 @app.command()
 def rotate(name: Name, data: Data = None) -> None:
-    """Give a machine another token, or a person another password; the old one lets nobody in any more."""
+    """Give a machine another token, or a person another password; the old one is no longer valid."""
     with _store(data) as store:
         person = any(entry.name == name and entry.kind is Kind.PERSON for entry in store.identities())
         if token := store.rotate(name, _password() if person else ""):

@@ -26,7 +26,7 @@ from roboglot.protocols.door import DoorType
 from roboglot.storage.database import Database
 
 BODIES = ("universal", "robomaster_ep", "cyberdog2", "hermes")
-# Name to a URL where nobody is, and what the driver announces.
+# Name to a URL where no robot is, and what the driver announces.
 DRIVERS: Mapping[str, tuple[str, Mapping[type[Component], str]]] = {
     "slamware://": ("slamware://127.0.0.1:9", SLAMWARE),
     "robomaster://": ("robomaster://127.0.0.1:9", ROBOMASTER),
@@ -60,7 +60,7 @@ def command(write: Annotated[bool, typer.Option("--write", help="Write docs/capa
 
 
 def _tell(done: int, name: str) -> None:
-    """Progress, for whoever sits at a terminal: each kind of robot is built, which takes seconds."""
+    """Progress on a terminal: each kind of robot is built, which takes seconds."""
     if sys.stderr.isatty():
         total = len(BODIES) + len(DRIVERS)
         words = f"{done} of {total} kinds of robots; building {name} …" if name else ""

@@ -126,7 +126,7 @@ class Sightings:
                 self._viewers.append(detector.subscribe())
 
     def close(self) -> None:
-        """Switch them off, unless somebody else looks."""
+        """Switch them off, unless another client looks."""
         for viewer in self._viewers:
             viewer.close()
         self._viewers = []

@@ -28,7 +28,7 @@ def drawings_of(robot: Robot) -> dict[str, Any]:
 
 
 def name_of(id: str, metadata: dict[str, str]) -> str:
-    """How people call a place; its id if nobody gave it a name."""
+    """How people call a place; its id if it has no name."""
     return next((metadata[key] for key in NAMES if metadata.get(key)), id)
 
 

@@ -95,7 +95,7 @@ class Console:
         self._tasks.append(loop.create_task(self._beat(self._application), name="console beat"))
 
     async def _beat(self, application: Application) -> None:
-        """Have every page look again; robots are read only while somebody looks."""
+        """Have every page look again; robots are read only while a page is open."""
         number = 0
         while True:
             await asyncio.sleep(BEAT)

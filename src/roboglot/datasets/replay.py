@@ -50,7 +50,7 @@ class ReplayedLidar(Lidar):
 
 
 class Replay:
-    """Plays scans to whoever listens to ``events``; the drive's first odometry pose becomes the origin of odom."""
+    """Plays scans to the listeners of ``events``; the drive's first odometry pose becomes the origin of odom."""
 
     def __init__(self, events: EventStream) -> None:
         self.odometry, self.lidar = ReplayedOdometry(), ReplayedLidar()

@@ -32,7 +32,7 @@ class LocalServer:
             self._path.unlink(missing_ok=True)  # left by a program that was killed; the folder is ours alone
             if len(bytes(self._path)) > PATH_MAX:
                 raise OSError("its path is too long")
-            os.fchmod(listening.fileno(), 0o600)  # before it has a name, so that nobody else ever can
+            os.fchmod(listening.fileno(), 0o600)  # before it has a name, so that no other user ever can
             listening.bind(bytes(self._path))
             self._server = await asyncio.start_unix_server(self._receive, sock=listening, limit=LINE_MAX)
         except OSError as error:

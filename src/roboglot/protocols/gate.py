@@ -1,6 +1,6 @@
 """Before a robot's ports: counts and meters connections, lets in by address, and cuts off who may no more.
 
-Where nobody is asked (``admission.asks``), nothing stands before a port but TLS, if there is to be any.
+With open access (``admission.asks`` is false), nothing stands before a port but TLS, if there is to be any.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Gate:
         return lambda: _Gatekeeper(self, factory, port)
 
     def close(self) -> None:
-        """Cut off nobody any more."""
+        """Stop cutting clients off."""
         if self._leave is not None:
             self._leave()
             self._leave = None
@@ -75,7 +75,7 @@ class Gate:
 
         if port.right is not None:
             try:
-                copy_context().run(check, port.right)  # the loop's own context stays nobody's
+                copy_context().run(check, port.right)  # the loop's own context stays without a client
             except Forbidden:
                 return None
         if not port.connections.enter(peer[0], admission.connections_max):

@@ -32,7 +32,7 @@ class Request(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class Control(msgspec.Struct):
-    """Of one robot: who moves it now and by what, who alone may (empty: nobody, whoever comes), who moved it last.
+    """Of one robot: who moves it now and by what, who alone may (empty: any client), who moved it last.
 
     ``link`` is how the link to a real robot is; empty for a simulated one. ``seconds`` are robot time.
     """

@@ -1,4 +1,4 @@
-"""TLS in front of any protocol, on a port that takes plain connections, too: the first byte tells which it is.
+"""TLS in front of any protocol, on a port that takes plain connections, too: the first byte decides.
 
 The handshake is asked for before it costs anything, and ends within HANDSHAKE_SECONDS_MAX. Works over every loop's
 transports, and needs none of their own TLS, which begins before anything can be asked.
@@ -82,7 +82,7 @@ class TlsPort(asyncio.Protocol):
         return False
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Tell the inner protocol."""
+        """Notify the inner protocol."""
         self._calm_down()
         if self.inner is not None:
             self.inner.connection_lost(exc)
@@ -105,7 +105,7 @@ class TlsPort(asyncio.Protocol):
             self._flush()
 
     def say_goodbye(self) -> None:
-        """Tell the client that nothing follows."""
+        """Signal the end to the client."""
         if self._tunnel is not None and not self._transport.is_closing():
             with contextlib.suppress(ssl.SSLError):
                 self._tunnel.unwrap()

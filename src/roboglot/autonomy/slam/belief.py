@@ -14,7 +14,7 @@ from roboglot.model.events import LostReason
 from roboglot.model.geometry import ORIGIN, Pose
 
 SURE = (0.003**2, 0.003**2, 0.002**2)  # m2, m2, rad2: the smallest variances ever believed
-TOLD = (0.15**2, 0.15**2, 0.1**2)  # variances of a pose that somebody told us
+TOLD = (0.15**2, 0.15**2, 0.1**2)  # variances of a pose that a client gave
 
 
 def _sure() -> NDArray[np.float64]:
@@ -56,15 +56,15 @@ class Belief:
         """Believe that base_link was at ``pose`` when odometry said ``odometry``."""
         self.map_to_odom = pose.compose(odometry.inverse())
 
-    def be_told(self, pose: Pose) -> None:
-        """Somebody says where we are now."""
+    def take_pose(self, pose: Pose) -> None:
+        """Use a pose that a client gave."""
         self.move_to(pose, self.odometry.reading.pose)
         self.covariance = np.diag(TOLD)
         self.search = True
 
     def take_map(self, grid: EvidenceGrid, pose: Pose) -> None:
-        """Use ``grid`` from now on; somebody says that we are at ``pose`` in it."""
-        self.be_told(pose)
+        """Use ``grid`` from now on; the client says that the robot is at ``pose`` in it."""
+        self.take_pose(pose)
         self.map = grid
         self.revision += 1
 

@@ -53,9 +53,9 @@ class LidarLocalization(Localization):
     def set_pose(self, pose: Pose) -> None:
         if not (math.hypot(pose.x, pose.y) <= POSITION_MAX and math.isfinite(pose.yaw)):
             raise InvalidGoal(f"not a place on this map: {pose}")
-        told = Pose(pose.x, pose.y, wrap_angle(pose.yaw))
-        self._belief.be_told(told)
-        self._robot.events.publish(PoseJumped(stamp=self._robot.clock.time(), pose=told, given=True))
+        given = Pose(pose.x, pose.y, wrap_angle(pose.yaw))
+        self._belief.take_pose(given)
+        self._robot.events.publish(PoseJumped(stamp=self._robot.clock.time(), pose=given, given=True))
 
     def relocalize(self, region: Region | None = None, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
         if region is not None and not (

@@ -38,7 +38,7 @@ PLACE_SHARE_MIN = 0.35  # of the highest score
 PLACE_AGREEMENT = 0.7  # share of the points that must fit, of those that the map supports or denies
 PLACE_SUPPORTED, PLACE_KNOWN = 0.85, 0.75  # … by the map's walls and floor; share of all points that it must explain
 PLACE_HIDDEN = 0.06  # … whose rays may pass through walls
-PLACES_MAX = 5  # that look alike are told apart
+PLACES_MAX = 5  # that look alike are compared
 APART, TURNED = 8, 10  # cells, headings between two of them
 SAME, SAME_YAW = 0.3, math.radians(10.0)  # m, rad: nearer ones are one place
 RIVAL_SCORE, RIVAL_FIT = 0.85, 0.9  # of the best: rough score, points that fit, from which a place is a rival
@@ -58,8 +58,8 @@ class Support:
     @property
     def agreement(self) -> float:
         """Share of what the map explains of all that it has an opinion on; 1 where it has none."""
-        told = self.fitting + self.hidden + self.floating
-        return self.fitting / told if told else 1.0
+        judged = self.fitting + self.hidden + self.floating
+        return self.fitting / judged if judged else 1.0
 
     @property
     def known(self) -> float:

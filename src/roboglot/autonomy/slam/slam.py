@@ -69,7 +69,7 @@ LOST_QUALITY, LOST_PERIOD = 0.4, 1.0  # below this it looks around, once in so m
 WIDE, NARROW = (0.5, math.radians(20.0)), (0.2, math.radians(5.0))  # m, rad around the belief that are searched
 DOUBT_SHARE, DOUBT_SIGMAS = 0.85, 3.0  # a worse fit than usual, or a pose so far from odometry's: match without it
 DISPLACED_QUALITY = 0.15  # of a robot that was shoved, until the next scans
-JUMP, JUMP_YAW = 0.2, math.radians(10.0)  # corrections beyond this are told as a jump
+JUMP, JUMP_YAW = 0.2, math.radians(10.0)  # corrections beyond this are reported as a jump
 
 
 class Slam:
@@ -318,7 +318,7 @@ class Slam:
         return found if found.fit >= best.fit else best
 
     def _is_due(self, pose: Pose, stamp: float) -> bool:
-        """Whether a scan taken at ``pose`` tells the map something new, and may."""
+        """Whether a scan taken at ``pose`` adds something new to the map, and may."""
         if not self._belief.map.scans:
             return True
         if self._belief.localizing and (

@@ -57,9 +57,9 @@ class Whereabouts:
 
     def judge(self, support: Support, stamp: float) -> None:
         """The map said this of a scan at the believed pose."""
-        told = support.fitting + support.hidden + support.floating
+        judged = support.fitting + support.hidden + support.floating
         denied = support.hidden >= DENIED_HIDDEN * support.points or (
-            support.agreement < DENIED_AGREEMENT and told >= DENIED_SHARE * support.points
+            support.agreement < DENIED_AGREEMENT and judged >= DENIED_SHARE * support.points
         )
         good = support.agreement >= GOOD_AGREEMENT and support.fitting >= GOOD_SHARE * support.points
         self._good = self._good + 1 if good else 0
@@ -71,7 +71,7 @@ class Whereabouts:
                 self.lose(LostReason.NO_FIT, stamp)
             return
         self._doubts, self._doubted_at = 0, math.inf
-        new_ground = told < DENIED_SHARE * support.points
+        new_ground = judged < DENIED_SHARE * support.points
         if self._good >= CONFIRMED and not self._belief.confirmed:
             self._belief.confirmed = True
             self._events.publish(PoseConfirmed(stamp=stamp, pose=self._belief.pose))
@@ -101,7 +101,7 @@ class Whereabouts:
         self._events.publish(LocalizationRecovered(stamp=stamp, means=means, pose=belief.pose, seconds=seconds))
 
     def be_given(self, stamp: float) -> None:
-        """Somebody gave the pose: the map has to confirm it before anything is added there."""
+        """Take a pose from a client: the map has to confirm it before anything is added there."""
         self.find(RecoveryMeans.GIVEN, stamp)
         self.be_displaced(stamp)
 

@@ -50,7 +50,7 @@ DOOR = DoorType(
     ports=(PortSetting("CyberDog", "port"), PortSetting("CyberDog app", "app_port", PortKind.APP)),
     open=_open,
     options=(
-        Option("--app", "app", "HOST:PORT of the CyberDog app to call; else whoever called last."),
+        Option("--app", "app", "HOST:PORT of the CyberDog app to call; else the one that called last."),
         Option("--plaintext", "plaintext", "CyberDog without TLS, on loopback only.", True),
     ),
 )

@@ -76,7 +76,7 @@ class AppLink:
         self._tap = tap
         self._target = self._configured or (f"{last}:{app_port}" if last else "")
         self._host, self._on_host = last, on_host
-        self._news = asyncio.Event()  # the address changed, or somebody called: worth dialling at once
+        self._news = asyncio.Event()  # the address changed, or a client called: worth dialling at once
         self._stub: Any = None
         self._outboxes: dict[int, Outbox] = {}
         self._task: asyncio.Task[None] | None = None
@@ -195,7 +195,7 @@ class AppLink:
         if connected == self.connected:
             return
         self.connected = connected
-        self._news.clear()  # whoever called has been answered
+        self._news.clear()  # pending calls have been answered
         log.info("app at %s %s", self._target or "a forgotten address", "connected" if connected else "lost")
         if connected:
             self._remember(self._target.rpartition(":")[0])
@@ -213,7 +213,7 @@ class AppLink:
             self._on_host(host)
 
     async def send(self, code: int, text: str) -> Delivery:
-        """One push; what goes wrong with it concerns nobody else. Returns when it is acknowledged or given up."""
+        """One push; its failure affects no other. Returns when it is acknowledged or given up."""
         if self._stub is None:
             return Delivery.FAILED
         if self._tap is not None and self._tap.watched:

@@ -2,7 +2,7 @@
 
 Real robots carry RSA-4096 keys; making three of those takes two to five seconds, a P-256 key takes none, and every
 TLS library that gRPC clients are built on accepts it. The CA's own key is thrown away when both certificates are
-signed: nobody can make further ones.
+signed: no further ones can be made.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ class CertificateStore:
         apps = self._folder / APPS / CA_CERT
         try:
             return tuple(file.stat().st_mtime_ns for file in (*files, *([apps] if apps.exists() else [])))
-        except OSError:  # somebody is about to replace them
+        except OSError:  # they are about to be replaced
             return ()
 
 

@@ -49,10 +49,10 @@ class Dog:
     profile: Profile = Profile.SPEC
     owner: str = ""  # who the app showed to be, where that is asked
     survey: Survey = field(default_factory=Survey)  # of the map that is made now
-    pursuit: Pursuit | ThingPursuit | None = None  # while somebody or something is followed, or to be chosen
+    pursuit: Pursuit | ThingPursuit | None = None  # while a person or a thing is followed, or to be chosen
 
     def map_replaced(self) -> None:
-        """Another map is in use now, whoever began it: neither its name nor localization in it is known."""
+        """Another map is in use now, no matter who began it: neither its name nor localization in it is known."""
         self.stored_map, self.map_deleted = "", False
         self.tasks.leave()
 

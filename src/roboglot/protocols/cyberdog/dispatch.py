@@ -1,4 +1,4 @@
-"""From one request to its answers: reads, calls the handler, tells errors in-band. Knows no gRPC."""
+"""From one request to its answers: reads, calls the handler, reports errors in-band. Knows no gRPC."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from roboglot.protocols.cyberdog.chapters.system import (  # noqa: F401
     update_jobs,
     upkeep,
 )
-from roboglot.protocols.cyberdog.errors import told
+from roboglot.protocols.cyberdog.errors import codes_of
 from roboglot.protocols.cyberdog.table import Call, operations, unread
 from roboglot.wire.contracts import contract
 from roboglot.wire.cyberdog.codes import SILENT_WITHOUT_SERVICE, TEXT_ONLY, UNPUBLISHED, InBandError
@@ -38,7 +38,7 @@ KNOWN = (_NAMES.keys() | UNPUBLISHED) - TEXT_ONLY
 
 
 def error(code: InBandError) -> dict[str, int]:
-    """The answer that tells ``code``."""
+    """The answer that carries ``code``."""
     return {"error_code": int(code)}
 
 
@@ -115,7 +115,7 @@ async def _answered(call: Call) -> object | None:
         log.info("%d: %s", call.code, refused)
         if isinstance(refused, ComponentMissing) and call.code in SILENT_WITHOUT_SERVICE:
             return None
-        return error(told(refused).in_band)
+        return error(codes_of(refused).in_band)
     except NotJson:
         raise
     except Exception as broken:
@@ -136,7 +136,7 @@ def _status(answered: object) -> str:
 def _not_there(code: int) -> dict[str, int] | None:
     """As a real robot answers whose service for ``code`` is not running; unknown codes get no answer at all."""
     if code not in KNOWN:
-        log.info("nobody knows code %d", code)
+        log.info("code %d is not supported", code)
         return None
     log.warning("%d (%s): no robot of this program does that; it is refused", code, _NAMES.get(code, "not in the text"))
     return None if code in SILENT_WITHOUT_SERVICE else error(InBandError.UNAVAILABLE)

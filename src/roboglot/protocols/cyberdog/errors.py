@@ -1,4 +1,4 @@
-"""How the model's errors are told in this protocol: one table. Knows no handler."""
+"""Maps the model's errors to this protocol's codes in one table. Knows no handler."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from roboglot.wire.cyberdog.motions import MotionCode
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class ErrorCodes:
     """One error as an answer's ``error_code``, as a motion's ``code``, as navigation's ``feedback_code``."""
 
     in_band: InBandError
@@ -19,19 +19,22 @@ class Told:
 
 
 # The first row whose class fits counts.
-TABLE: tuple[tuple[type[errors.RobotError], Told], ...] = (
-    (errors.ComponentMissing, Told(InBandError.UNAVAILABLE, MotionCode.UNSUPPORTED, Feedback.ACTIVATION_FAILED)),
-    (errors.InvalidGoal, Told(InBandError.BAD_PARAMETERS, MotionCode.PARAMETERS, Feedback.NO_PATH)),
-    (errors.EmergencyStopped, Told(InBandError.UNAVAILABLE, MotionCode.EMERGENCY_STOPPED, Feedback.NAVIGATION_FAILED)),
-    (errors.Refused, Told(InBandError.UNAVAILABLE, MotionCode.STATE, Feedback.NAVIGATION_FAILED)),
-    (errors.Busy, Told(InBandError.UNAVAILABLE, MotionCode.OTHER_SOURCE, Feedback.NAVIGATION_FAILED)),
-    (errors.Blocked, Told(InBandError.UNAVAILABLE, MotionCode.STUCK, Feedback.NAVIGATION_FAILED)),
-    (errors.Unreachable, Told(InBandError.UNAVAILABLE, MotionCode.EXECUTION, Feedback.NO_PATH)),
-    (errors.Expired, Told(InBandError.TIMEOUT, MotionCode.EXECUTION_TIMEOUT, Feedback.NAVIGATION_FAILED)),
-    (errors.RobotError, Told(InBandError.UNAVAILABLE, MotionCode.EXECUTION, Feedback.NAVIGATION_FAILED)),
+TABLE: tuple[tuple[type[errors.RobotError], ErrorCodes], ...] = (
+    (errors.ComponentMissing, ErrorCodes(InBandError.UNAVAILABLE, MotionCode.UNSUPPORTED, Feedback.ACTIVATION_FAILED)),
+    (errors.InvalidGoal, ErrorCodes(InBandError.BAD_PARAMETERS, MotionCode.PARAMETERS, Feedback.NO_PATH)),
+    (
+        errors.EmergencyStopped,
+        ErrorCodes(InBandError.UNAVAILABLE, MotionCode.EMERGENCY_STOPPED, Feedback.NAVIGATION_FAILED),
+    ),
+    (errors.Refused, ErrorCodes(InBandError.UNAVAILABLE, MotionCode.STATE, Feedback.NAVIGATION_FAILED)),
+    (errors.Busy, ErrorCodes(InBandError.UNAVAILABLE, MotionCode.OTHER_SOURCE, Feedback.NAVIGATION_FAILED)),
+    (errors.Blocked, ErrorCodes(InBandError.UNAVAILABLE, MotionCode.STUCK, Feedback.NAVIGATION_FAILED)),
+    (errors.Unreachable, ErrorCodes(InBandError.UNAVAILABLE, MotionCode.EXECUTION, Feedback.NO_PATH)),
+    (errors.Expired, ErrorCodes(InBandError.TIMEOUT, MotionCode.EXECUTION_TIMEOUT, Feedback.NAVIGATION_FAILED)),
+    (errors.RobotError, ErrorCodes(InBandError.UNAVAILABLE, MotionCode.EXECUTION, Feedback.NAVIGATION_FAILED)),
 )
 
 
-def told(error: errors.RobotError) -> Told:
-    """How ``error`` is told."""
-    return next(told for kind, told in TABLE if isinstance(error, kind))
+def codes_of(error: errors.RobotError) -> ErrorCodes:
+    """Return the codes for ``error``."""
+    return next(codes for kind, codes in TABLE if isinstance(error, kind))

@@ -97,7 +97,7 @@ class FrameQueue:
         self._go_on()
 
     def shut(self) -> None:
-        """The app is lost: nobody waits for it any more, but answers are kept for a while."""
+        """The app is lost: nothing waits for it any more, but answers are kept for a while."""
         self._there = False
         self._forget(lambda frame: frame.rank is _Rank.NEWS, "is for an app that was lost")
         self._update_room()
@@ -144,7 +144,7 @@ class FrameQueue:
             self._waiting = sorted(frame for frame in self._waiting if not unwanted(frame))  # sorted, it is a heap
 
     def _go_on(self) -> None:
-        """Send as much as may be under way, and let whoever waited for that go on."""
+        """Send as much as may be under way, and let the waiting sender go on."""
         while self._waiting and self._may_send(self._waiting[0]):
             frame = heappop(self._waiting)
             self._count(frame, -1)

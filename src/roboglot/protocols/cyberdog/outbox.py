@@ -25,7 +25,7 @@ class Outbox:
         self._wakeup.set()
 
     def clear(self) -> None:
-        """Forget what waits: whoever it was meant for is gone."""
+        """Forget what waits: its receiver is gone."""
         self._waiting.clear()
 
     async def close(self) -> None:

@@ -37,12 +37,12 @@ MESSAGES: dict[str, tuple[tuple[str, int, int | str, bool], ...]] = {
         ("error_response", 7, "ErrorResponse", False),
     ),
 }
-# Fields of which at most one is there; set, they are told from those that are not.
+# Fields of which at most one is there; their presence is explicit.
 CHOICES = frozenset({"file_by_filename", "file_containing_symbol", "list_services"})
 
 
 def add_reflection(server: Any) -> None:
-    """Let ``server`` tell what it serves."""
+    """Let ``server`` list its services."""
     for package in VERSIONS:
         kinds = _kinds(package)
         request, response = kinds["ServerReflectionRequest"], kinds["ServerReflectionResponse"]

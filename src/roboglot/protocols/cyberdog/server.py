@@ -333,10 +333,10 @@ def _greet(dog: Dog) -> None:
     """A dog that lies about gets up when its app connects for the first time, unless it hangs on a cable."""
     robot = dog.robot
     if Legs in robot and robot[Legs].posture is Posture.LYING and not status_of(dog).wired_charging:
-        with contextlib.suppress(RobotError):  # not now: it gets up when it is told to
+        with contextlib.suppress(RobotError):  # not now: it gets up on command
             robot[Legs].stand(source=SOURCE)
 
 
 def _leave_stairs(robot: Robot) -> None:
-    """Nobody is left who could stop it; what another client asked for goes on."""
+    """No client is left that could stop it; what another client asked for goes on."""
     call_off(robot, "the app is lost", SOURCE)

@@ -1,4 +1,4 @@
-"""What work that takes long tells: one stream reads it at a time, and others may take it over. Knows no work."""
+"""Feedback of work that takes long: one stream reads it at a time, and others may take it over. Knows no work."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ Reader = asyncio.Queue[object]  # None ends it
 
 
 class Stream:
-    """At most one reads; who joins later takes it over. The same feedback twice in a row is told once."""
+    """At most one reads; who joins later takes it over. The same feedback twice in a row is sent once."""
 
     def __init__(self) -> None:
         self._last: object = None
         self._reader: Reader | None = None
 
     def tell(self, feedback: object) -> None:
-        """To whoever reads, and first of all to who joins later."""
+        """Send to the reader; one that joins later gets it first."""
         if feedback != self._last:
             self._last = feedback
             self._pass_on(feedback)
 
     def end(self, result: object) -> None:
-        """Tell the result and let the reader go."""
+        """Send the result and let the reader go."""
         self._pass_on(result)
         self.unbind()
 

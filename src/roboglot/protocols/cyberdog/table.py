@@ -35,7 +35,7 @@ class Call:
 class Push:
     """A message from the robot to the app; ``depth`` may wait, then the oldest is dropped.
 
-    ``partial`` says in plain words what it cannot tell yet; empty when it is whole.
+    ``partial`` says in plain words what it cannot report yet; empty when it is whole.
     """
 
     code: int
@@ -45,7 +45,7 @@ class Push:
 
 pushes: dict[int, Push] = {}
 files: set[int] = set()  # what ``getFile`` serves beside the requests
-unread: set[int] = set()  # requests whose params somebody else reads, JSON or not
+unread: set[int] = set()  # requests whose params another module reads, JSON or not
 
 
 def push(code: int, *, depth: int = 10, partial: str = "") -> Push:

@@ -14,7 +14,7 @@ class RoboMasterConfig:
 
     ``profile`` is the build whose habits the robot has: ``spec`` (the manual's), ``fw60`` or ``fw70``. ``lenient`` also
     runs text that came without its ``;``. ``uart``: path of a pseudo-terminal to be made, "-" and the robot's name are
-    appended; empty: none. ``explanation_port`` tells teaching tools why commands were refused, ``pilot_port`` takes the
+    appended; empty: none. ``explanation_port`` gives teaching tools the reasons of refusals, ``pilot_port`` takes the
     pilot's keyboard and mouse as text; None: it is closed.
     """
 

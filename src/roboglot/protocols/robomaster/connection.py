@@ -129,7 +129,7 @@ class ControlConnection(asyncio.Protocol):
             self._resting = asyncio.get_running_loop().call_later(LEFT_PERIOD, self._look)
 
     def _go_on(self, finished: asyncio.Task[None] | None = None) -> None:
-        """See to it that somebody works while there are commands."""
+        """Keep a worker task alive while there are commands."""
         if finished is not None:
             self._worker = None
         if self._commands and self._worker is None and not self.transport.is_closing():
@@ -153,17 +153,17 @@ class ControlConnection(asyncio.Protocol):
         await late(self._session.robot)
         self.transport.write(result.reply + self._line_end)
         if result.explain:
-            told = cache(lambda: self._refusal(text, result))
-            self._explain(told)
+            explained = cache(lambda: self._refusal(text, result))
+            self._explain(explained)
             if self._explained < EXPLANATIONS_MAX:
                 self._explained += 1
-                log.warning("robomaster: %s", told())
+                log.warning("robomaster: %s", explained())
 
     def _refusal(self, text: str | None, result: Answer) -> str:
         shown = "(a text)" if text is None else repr(text[:TEXT_SHOWN_MAX])
         return f"{self.host} asked {shown}: {result.reply.decode()} ({result.why})"
 
     def _join(self) -> None:
-        """Whoever speaks while the robot is in SDK mode keeps it there."""
+        """A command while the robot is in SDK mode keeps it there."""
         if self._session.active:
             self._session.join(self, self.host)

@@ -62,7 +62,7 @@ MESSAGES = frozenset(
 class Answer:
     """The bytes for the client and, if it was refused, why, in plain words for the log.
 
-    ``explain`` is asked only when somebody wants to know: to look for what was meant takes longer than all the rest.
+    ``explain`` is called only when a listener needs it: to look for what was meant takes longer than all the rest.
     """
 
     reply: bytes
@@ -83,7 +83,7 @@ class _Asked:
 
 
 class _Refusal(Exception):
-    """Anything that isn't done: the fixed answer, and what tells why."""
+    """Anything that isn't done: the fixed answer, and the reason."""
 
     def __init__(self, reply: Reply, why: Callable[[], str]) -> None:
         super().__init__(reply)

@@ -16,7 +16,7 @@ CLAPS_MIN = 2  # a single bang is no applause
 
 
 class EventSwitches:
-    """Off until told; each one listens only while it is on. Twice on is no matter."""
+    """Off by default; each one listens only while it is on. Twice on is no matter."""
 
     def __init__(self, session: Session) -> None:
         self._session, self._robot = session, session.robot

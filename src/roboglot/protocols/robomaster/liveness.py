@@ -1,4 +1,4 @@
-"""Notices that whoever drives the robot has vanished without a word, and stops what it commanded.
+"""Notices that a driving client has vanished without a word, and stops what it commanded.
 
 While a client's motion runs, its host is asked ten times and more a second for a sign of life: by echo requests (ICMP)
 where the kernel lets ordinary programs send them, and always by the kernel's own probes of the control connection,
@@ -29,7 +29,7 @@ GREETINGS = 3  # requests to a host before its client drives
 
 
 class Echoes:
-    """Asks hosts whether they are there; ``heard`` tells from whom an answer came since it was last asked."""
+    """Asks hosts whether they are there; ``heard`` lists those that answered since the last call."""
 
     def __init__(self) -> None:
         self._heard: set[str] = set()
@@ -70,7 +70,7 @@ class Driver:
 
     @property
     def askable(self) -> bool:
-        """Whether it is on another host; on this one the kernel tells of every end."""
+        """True for remote peers; the kernel reports every loopback disconnect."""
         with contextlib.suppress(ValueError):
             return self._connection is not None and not IPv4Address(self.host).is_loopback
         return False

@@ -10,7 +10,7 @@ from itertools import groupby
 from roboglot.model.clock import Clock
 from roboglot.wire.robomaster.replies import Number, Profile
 
-RATE = 5  # Hz, until told otherwise
+RATE = 5  # Hz, by default
 ROBOTS_TICK = 50  # Hz at which robots sample; what has another rate goes out every so many ticks
 
 Read = Callable[[], tuple[Number, ...]]
@@ -45,7 +45,7 @@ class Pushes:
     _attributes: dict[tuple[str, str], _Attribute] = field(default_factory=dict)
 
     def offer(self, module: str, reads: Iterable[tuple[str, Read]]) -> None:
-        """Declare a module's attributes in the order in which they are told."""
+        """Declare a module's attributes in the order in which they are sent."""
         attributes = [_Attribute(module, name, read) for name, read in reads]
         for attribute in attributes:
             self._attributes[module, attribute.name] = attribute

@@ -16,14 +16,14 @@ from roboglot.protocols.gate import Gate
 from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.connection import ControlConnection
 from roboglot.protocols.robomaster.datagrams import Datagrams, broadcast_address
-from roboglot.protocols.robomaster.discovery import announce
 from roboglot.protocols.robomaster.dispatch import implemented, key_of
-from roboglot.protocols.robomaster.event_port import Readers
 from roboglot.protocols.robomaster.limits import CONTROL_CONNECTIONS_MAX, MEDIA_CONNECTIONS_MAX, PILOTS_MAX
 from roboglot.protocols.robomaster.liveness import Vigil
-from roboglot.protocols.robomaster.media_port import MediaPort
-from roboglot.protocols.robomaster.pilot_port import Pilots
-from roboglot.protocols.robomaster.serial_line import LINE_END, SerialLine
+from roboglot.protocols.robomaster.ports.discovery import announce
+from roboglot.protocols.robomaster.ports.event_port import Readers
+from roboglot.protocols.robomaster.ports.media_port import MediaPort
+from roboglot.protocols.robomaster.ports.pilot_port import Pilots
+from roboglot.protocols.robomaster.ports.serial_line import LINE_END, SerialLine
 from roboglot.protocols.robomaster.session import Session
 from roboglot.wire.robomaster.replies import PROFILES
 
@@ -98,7 +98,7 @@ class RoboMasterDoor:
             )
 
     async def close(self) -> None:
-        """Stop listening, drop the clients, tell the robot to stop what they began (its braking isn't waited for)."""
+        """Stop listening, drop the clients, cancel what they began (its braking isn't waited for)."""
         if self._announcing:
             self._announcing.cancel()
         self._leave_stand_in()

@@ -20,7 +20,7 @@ from roboglot.model.errors import RobotError
 from roboglot.model.geometry import ORIGIN
 from roboglot.model.robot import Robot
 from roboglot.protocols.robomaster import readings
-from roboglot.protocols.robomaster.media_port import MediaPort
+from roboglot.protocols.robomaster.ports.media_port import MediaPort
 from roboglot.protocols.robomaster.pushes import Pushes
 from roboglot.wire.robomaster.replies import Profile
 
@@ -106,7 +106,7 @@ class Session:
             self.origin = self.robot[Odometry].reading.pose
 
     def end(self, reason: str) -> list[Action]:
-        """Leave SDK mode; returns the actions that were told to stop and may still be braking."""
+        """Leave SDK mode; returns the actions that were cancelled and may still be braking."""
         if not self.active:
             return []
         stopping = [action for action in self.robot.actions.running() if action.source.startswith(f"{self._name} ")]

@@ -61,7 +61,7 @@ def with_reason(head: bytes) -> bytes:
 
 
 class HeadTooLong(Exception):
-    """Ends the parsing of a request; nobody sees it."""
+    """Ends the parsing of a request; never leaves this module."""
 
 
 class HttpConnection(HttpToolsProtocol):

@@ -19,7 +19,7 @@ DESCRIPTION = "/openapi.json"
 
 
 class Pages:
-    """The files by path; the description is made when somebody asks for it first."""
+    """The files by path; the description is made at the first request."""
 
     def find(self, path: str) -> tuple[str, bytes] | None:
         """Content type and content, if there is something at ``path``."""

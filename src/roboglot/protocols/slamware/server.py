@@ -125,7 +125,7 @@ class SlamwareDoor:
         self.port = self._server.sockets[0].getsockname()[1]
 
     def _fall_silent(self) -> None:
-        """The robot goes down: nobody listens any more, and who is connected is cut off once he has his answer."""
+        """The robot goes down: stop listening, and cut clients off once they have their answers."""
         if self._server is not None:
             self._server.close()
             self._server = None
@@ -148,7 +148,7 @@ class SlamwareDoor:
             await self._listen()
 
     async def close(self) -> None:
-        """Stop listening, let answers under way go out, tell the robot to stop what clients asked for."""
+        """Stop listening, let answers under way go out, cancel what clients asked for."""
         for end in self._endings:
             end()
         if self._opening is not None:

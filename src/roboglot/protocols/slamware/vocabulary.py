@@ -15,7 +15,7 @@ from roboglot.wire.slamware.motion import ActionState, Result, State
 
 PREFIXES = ("slamtec.agent.actions.", "agent.actions.")  # firmware up to 5, firmware 6: both are understood
 
-# Reasons that clients have seen on robots; whatever else goes wrong is told in plain words.
+# Reasons that clients have seen on robots; other errors have plain words.
 REASONS: dict[type[RobotError], str] = {
     Unreachable: "CANNOT_REACH_TARGET",
     Blocked: "PATH_OCCUPIED",

@@ -12,7 +12,7 @@ class VisualConfig:
     """Block programs. ``port`` of the WebSocket, if there is to be one. ``origins`` and ``hosts`` are as in [slamware].
 
     ``time_zone`` is the one that conditions and programs' clocks are meant in, by its IANA name. ``cloud`` is the
-    address of a cloud that is told what happens and has favourites; empty: none. ``cloud_token`` is an account's there.
+    address of a cloud that keeps records and favourites; empty: none. ``cloud_token`` is an account's there.
     ``without_filter`` runs programs also where the kernel cannot filter their system calls: trusted ones only.
     """
 

@@ -69,17 +69,17 @@ class Ai:
     async def _push(self) -> None:
         vision, profile = self._robot[Vision], self._session.profile
         async for _ in self._robot.clock.every(LOOKING):
-            told: list[tuple[str, Numbers]] = []
+            attributes: list[tuple[str, Numbers]] = []
             for name in tuple(self._open):
                 sighting = _detector(vision, name).latest
                 if sighting is not None and self._told.get(name) != sighting.stamp:
                     self._told[name] = sighting.stamp
                     word = ROBOTS_NAMES.get(name, name) if profile.as_robots else name
-                    told.append((word, self._numbers(name, sighting.seen)))
-            if profile.as_robots and told:  # one datagram, and no `;` between the kinds
-                self._session.send(profile.push("AI", *told, separator=" "))
-            elif told:
-                for attribute in told:
+                    attributes.append((word, self._numbers(name, sighting.seen)))
+            if profile.as_robots and attributes:  # one datagram, and no `;` between the kinds
+                self._session.send(profile.push("AI", *attributes, separator=" "))
+            elif attributes:
+                for attribute in attributes:
                     self._session.send(profile.push("AI", attribute))
 
     def _numbers(self, name: str, seen: Sequence[Any]) -> Numbers:

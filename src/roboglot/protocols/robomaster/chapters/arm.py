@@ -27,7 +27,7 @@ def _scale(session: Session) -> tuple[float, ArmPosition]:
 
 
 def _go(session: Session, goal: ArmPosition, command: str, start: ArmPosition) -> Action:
-    """Go to ``goal``; out of reach, InvalidGoal tells the nearest ``command`` (which counts from ``start``)."""
+    """Go to ``goal``; out of reach, InvalidGoal names the nearest ``command`` (which counts from ``start``)."""
     arm = session.robot[Arm]
     try:
         return arm.move_to(goal, source=session.source)

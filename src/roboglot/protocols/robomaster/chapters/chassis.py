@@ -41,7 +41,7 @@ def _drive(session: Session, command: Twist | WheelSpeeds) -> None:
 
 @TABLE.on("chassis speed", right=Right.DRIVE, needs=(Driving,))
 async def set_speed(session: Session, *, x: SpeedXY = 0.0, y: SpeedXY = 0.0, z: SpeedZ = 0.0) -> None:
-    """Drive at x, y m/s and z degrees/s until told otherwise; a missing axis is 0 (3.2.3.1).
+    """Drive at x, y m/s and z degrees/s until the next command; a missing axis is 0 (3.2.3.1).
 
     In gimbal_lead z is ignored: the chassis turns after the gimbal.
     """

@@ -11,7 +11,7 @@ from roboglot.protocols.robomaster.limits import KEYS_MAX
 from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
 
-PERIOD = 0.1  # s between two datagrams while nothing changes; a change is told at once
+PERIOD = 0.1  # s between two datagrams while nothing changes; a change is sent at once
 KEYS_AND_MOUSE = 0  # cmd_id; others carry a match's score, and there is no match
 BUTTONS = {MouseButton.RIGHT: 1, MouseButton.LEFT: 2, MouseButton.MIDDLE: 4}
 # Codes as clients of 2024's robots read them; the manual prints a single one, 199 for w, that none of them knows.

@@ -31,7 +31,7 @@ THERE = math.radians(0.5)
 
 @TABLE.on("gimbal speed", right=Right.DRIVE, needs=(Gimbal,))
 async def set_speed(session: Session, *, p: GimbalSpeed = 0.0, y: GimbalSpeed = 0.0) -> None:
-    """Turn at p and y degrees/s until told otherwise (3.2.4.1); in chassis_lead y does nothing, and robots say so."""
+    """Turn at p and y degrees/s until the next command (3.2.4.1); in chassis_lead y does nothing, and robots say so."""
     idle_yaw = session.mode is FollowMode.CHASSIS_LEAD
     gimbal = session.robot[Gimbal]
     gimbal.set_speed(-math.radians(p), 0.0 if idle_yaw else -math.radians(y), source=session.source)
@@ -51,7 +51,7 @@ async def move(
 ) -> None:
     """Turn by p and y from where it is, at up to vp and vy degrees/s (3.2.4.2).
 
-    Answers at the end unless told ``wait_for_complete false``, as robots do. In chassis_lead y does nothing.
+    Answers at the end unless ``wait_for_complete`` is false, as robots do. In chassis_lead y does nothing.
     """
     turn = 0.0 if session.mode is FollowMode.CHASSIS_LEAD else y
     action = session.robot[Gimbal].move_by(

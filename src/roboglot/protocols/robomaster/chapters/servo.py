@@ -14,7 +14,7 @@ from roboglot.protocols.robomaster.waiting import ended
 
 @TABLE.on("servo angle", right=Right.DRIVE, needs=(Servos,))
 async def set_angle(session: Session, *, id: ServoId, angle: ServoAngle, wait_for_complete: bool = False) -> None:
-    """Turn a servo to an angle in degrees (3.2.12.1); answers at once unless told ``wait_for_complete true``."""
+    """Turn a servo to an angle in degrees (3.2.12.1); answers at once unless ``wait_for_complete`` is true."""
     action = session.robot[Servos].move_to(id, math.radians(angle), source=session.source)
     if wait_for_complete:
         await ended(session, action)

@@ -1,4 +1,4 @@
-"""``robot ip A.B.C.D`` for whoever looks for the robot, while nobody holds it in SDK mode (manual 3.2.19)."""
+"""``robot ip A.B.C.D`` for clients that look for the robot, while none holds it in SDK mode (manual 3.2.19)."""
 
 from __future__ import annotations
 

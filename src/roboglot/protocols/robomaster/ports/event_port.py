@@ -1,4 +1,4 @@
-"""The event port: clients connect and only read what the session tells; what they write is thrown away.
+"""The event port: clients connect and only read the session's events; what they write is thrown away.
 
 Explanations for teaching tools go out on a port of the same kind.
 """

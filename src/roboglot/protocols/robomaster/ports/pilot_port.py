@@ -1,4 +1,4 @@
-"""A port for whoever plays the pilot: keyboard and mouse as text lines, for ``game_msg`` (manual 3.2.20).
+"""A port for a simulated pilot: keyboard and mouse as text lines, for ``game_msg`` (manual 3.2.20).
 
 ``press w``, ``release w``, ``click left right`` (the buttons held from now on), ``mouse 0.5 -0.2``; each is answered
 with ``ok`` or with what is wrong. What a connection held is let go when it ends. Not the vendor's, and closed unless

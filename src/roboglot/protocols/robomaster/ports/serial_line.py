@@ -37,7 +37,7 @@ class SerialLine(asyncio.Transport):
         asyncio.get_running_loop().add_reader(self._master, self._read)
 
     def write(self, data: bytes | bytearray | memoryview) -> None:
-        """Lost when nobody reads and the line is full, as on a wire."""
+        """Lost when there is no reader and the line is full, as on a wire."""
         with contextlib.suppress(BlockingIOError):
             os.write(self._master, data)
 

@@ -115,7 +115,7 @@ class CloudFolder:
 
 
 def _mark(path: Path, refused: str = "") -> None:
-    """The file's ending tells what became of the task."""
+    """The file's ending shows how the task ended."""
     try:
         if refused:
             path.with_suffix(".why").write_text(f"{refused}\n", encoding="utf-8")

@@ -167,7 +167,7 @@ class EventLog:
             if stands_in_something(self._robot):
                 self.note(GeneralEvent.CURRENT_POSE_OCCUPIED, event.stamp)
         if action.source == PART:
-            return  # its errand tells
+            return  # its errand reports it
         if action.status is ActionStatus.ABORTED and action_word(self._actions.name_of(action)) in HOMING:
             match action.error:
                 case DockNotFound():

@@ -152,7 +152,7 @@ def _round(context: Context, order: Order) -> IndustryTask:
 
 
 def _stage_of(order: Order) -> str:
-    """Where nobody said how long it takes, the robot waits for somebody to end the operation."""
+    """Without a duration the robot waits until a client ends the operation."""
     number = order.request.stops.index(order.stop) if order.stop in order.request.stops else len(order.request.stops)
     standing = order.stage in (OrderStage.AT_STOP, OrderStage.AT_TARGET)
     return "WAIT_OPERATION" if standing and not order.request.waits[number] else STAGES[order.stage]

@@ -22,7 +22,7 @@ MOVED = 0.05  # m from where the stored map has the dock: from when on the map i
 async def dock(dog: Dog, task: Task) -> TaskResult:
     """Drive onto the charging contacts; the text leaves the feedback open, robots in the field send these two.
 
-    A dock whose place is unknown is looked for nearby. Why the robot does not charge is told in ``feedback_msg``.
+    A dock whose place is unknown is looked for nearby. ``feedback_msg`` says why the robot does not charge.
     """
     task.feedback(Feedback.ACTIVATING)
     try:

@@ -21,7 +21,7 @@ FIX_PERIOD = 1.0  # s between two looks at the satellites
 async def build_map(dog: Dog, task: Task, *, outdoor: bool) -> TaskResult:
     """Begin an empty map where the robot stands and add what the lidar sees, until the task is stopped.
 
-    Outdoors the satellites' fixes on the way are kept with it: they tell where on the globe it lies.
+    Outdoors the satellites' fixes on the way are kept with it: they give its place on the globe.
     """
     mapping = dog.robot[Mapping]
     enabled = mapping.enabled

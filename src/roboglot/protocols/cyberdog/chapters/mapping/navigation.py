@@ -20,7 +20,7 @@ from roboglot.protocols.cyberdog.chapters.mapping.labels import newest_map
 from roboglot.protocols.cyberdog.chapters.mapping.task_state import Task
 from roboglot.protocols.cyberdog.chapters.motion.gait import SOURCE
 from roboglot.protocols.cyberdog.context import Dog
-from roboglot.protocols.cyberdog.errors import told
+from roboglot.protocols.cyberdog.errors import codes_of
 from roboglot.wire.cyberdog.codes import Feedback, TaskResult
 
 GOOD_FIT = 0.5  # localization's quality from which the robot counts as localized
@@ -74,7 +74,7 @@ async def relocalize(dog: Dog, task: Task, *, outdoor: bool) -> TaskResult:
 async def _still_there(robot: Robot, task: Task, place: GlobeAnchor | None) -> bool:
     """Whether what the lidar sees now fits where the robot believes to be; how well it fitted before says nothing.
 
-    Somebody may have carried it away a moment ago.
+    It may have been carried away a moment ago.
     """
     localization = robot[Localization]
     if localization.quality < GOOD_FIT:
@@ -110,7 +110,7 @@ async def _search(robot: Robot, task: Task, place: GlobeAnchor | None) -> bool:
             raise
         except NotLocalized:
             task.feedback(Feedback.LOCALIZATION_TRYING)
-        except RobotError:  # somebody else searches now
+        except RobotError:  # another client searches now
             task.feedback(Feedback.LOCALIZATION_FAILED)
             return False
         finally:
@@ -136,13 +136,13 @@ async def navigate(dog: Dog, task: Task, *, goal: Goal) -> TaskResult:
         action = task.action = navigation.navigate_to([Point(goal.x, goal.y)], options, source=SOURCE)
         return await _arrive(dog, task, action)
     except RobotError as error:
-        return task.fail(told(error).navigation, error)
+        return task.fail(codes_of(error).navigation, error)
     finally:
         dog.reports.show_path(Path())
 
 
 async def _arrive(dog: Dog, task: Task, action: Action) -> TaskResult:
-    """Tell how ``action`` goes on until it has ended; cancelled if the task is."""
+    """Report the progress of ``action`` until it has ended; cancelled if the task is."""
     shown_at = -PATH_PERIOD
     clock = dog.robot.clock
 

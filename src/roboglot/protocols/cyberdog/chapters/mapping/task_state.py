@@ -82,7 +82,7 @@ class Task:
             self.stream.tell({"feedback_code": int(code), "feedback_msg": message})
 
     def fail(self, code: Feedback, error: Exception) -> TaskResult:
-        """Tell why the task failed, to the stream and in the log."""
+        """Report why the task failed, to the stream and in the log."""
         log.info("task %s failed: %s", self.kind.name, error)
         self.feedback(code, str(error))
         return TaskResult.FAILED

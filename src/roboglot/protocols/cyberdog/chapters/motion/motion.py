@@ -86,5 +86,7 @@ async def motion(
         code = await call.dog.robot.clock.wait_for(call.dog.gaits.carry_out(motion_id, wish), ANSWER_MAX)
     except TimeoutError:
         return {"error_code": int(InBandError.TIMEOUT)}
-    told = call.dog.gaits.motion if call.dog.profile is Profile.ROBOT else motion_id  # robots tell what they do then
-    return {"motion_id": int(told), "result": code is MotionCode.DONE, "code": int(code)}
+    motion = (
+        call.dog.gaits.motion if call.dog.profile is Profile.ROBOT else motion_id
+    )  # robots report what they do then
+    return {"motion_id": int(motion), "result": code is MotionCode.DONE, "code": int(code)}

@@ -28,9 +28,9 @@ POSES: Mapping[int, tuple[bool, bool]] = {
 }
 SERVO_POSES = frozenset({201, 202})  # those that frames of a servo may ask for
 SEEING = frozenset({343, 344, 345})  # walks that lift the feet over what they see ahead
-# States that the board enters by itself: nobody can ask for them.
+# States that the board enters by itself: not for clients.
 STATES = frozenset({Motion.LIFTED, Motion.ON_ITS_BACK})
-PRESETS = frozenset(range(180, 200))  # places for gaits that somebody puts on the dog; it comes with none
+PRESETS = frozenset(range(180, 200))  # places for gaits that users put on the dog; it comes with none
 USERS = frozenset({Motion.USER_SEQUENCE, Motion.USER_GAIT})
 DANCED = USERS | {Motion.POSE_ONE_FOOT}  # those that are steps of a choreography here
 WALK_STANDS = frozenset({Motion.WALK_STAND, Motion.WALK_STAND_OTHER})

@@ -41,14 +41,14 @@ async def align_with_stairs(call: Call, *, data: bool) -> dict[str, object]:
     try:
         await robot.clock.wait_for(_begun(robot, action), ANSWER_MAX)
     except TimeoutError:
-        action.cancel("nobody was told that it begins")
+        action.cancel("its begin could not be reported")
         return {"error_code": int(InBandError.TIMEOUT)}
     return {"success": action.feedback in BEGUN}
 
 
 @operations.on(Code.END_STAIR_ALIGNMENT, right=Right.DRIVE, needs=(StairAlignment,))
 async def end_stair_alignment(call: Call) -> dict[str, bool]:
-    """Stand still, whoever had it align; nothing to do if it does not. Answered when it stands."""
+    """Stand still, no matter which client had it align; nothing to do if it does not. Answered when it stands."""
     call.dog.robot[StairAlignment]
     for action in call_off(call.dog.robot, "stopped by the app"):
         await action.done()

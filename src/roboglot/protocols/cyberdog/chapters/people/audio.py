@@ -1,6 +1,6 @@
 """Chapter "audio": the voice board's account (3001, 3002), voiceprints (3011 to 3014).
 
-Nobody here talks to the maker's cloud: of a token, only whose it is and until when it holds are kept.
+This door does not talk to the maker's cloud: of a token, only whose it is and until when it holds are kept.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def activated(robot: Robot, uid: str | None = None) -> bool:
 
 @operations.on(Code.TRAIN_VOICE, right=Right.EDIT, needs=(Members,))
 async def train_voice(call: Call, *, nick_name: str, voiceprint_id: str = "") -> dict[str, Any]:
-    """Learn whoever speaks next as that member's voice; push 3013 tells the outcome within 30 s."""
+    """Learn the next speaker's voice as that member's; push 3013 reports the outcome within 30 s."""
     call.dog.robot[Hearing]
     call.dog.voice.train(nick_name, voiceprint_id[:ID_MAX])
     return {}
@@ -73,7 +73,7 @@ async def train_voice(call: Call, *, nick_name: str, voiceprint_id: str = "") ->
 
 @operations.on(Code.CANCEL_VOICE, right=Right.EDIT, needs=(Hearing,))
 async def cancel_voice(call: Call) -> dict[str, Any]:
-    """Learn nobody's voice."""
+    """Stop learning a voice."""
     call.dog.robot[Hearing]
     call.dog.voice.stop_training()
     return {}

@@ -24,7 +24,7 @@ from roboglot.wire.cyberdog.text import Int32
 log = logging.getLogger(__name__)
 ENTERED = push(Code.FACE_ENTERED)
 RECOGNISED = push(Code.FACE_RECOGNISED)
-ENTERING_MAX = 30.0  # s until somebody's face must have been seen
+ENTERING_MAX = 30.0  # s until a face must have been seen
 AGAIN = 1.0  # s between two reports of the same person
 SECONDS_MAX = 300
 EMOTIONS = tuple(Emotion)
@@ -101,23 +101,23 @@ class Faces:
         raise RobotError("the camera is gone")
 
     async def _recognise(self, name: str, id: int, seconds: float) -> None:
-        told: dict[str, float] = {}
+        reported: dict[str, float] = {}
         try:
-            await self._robot.clock.wait_for(self._tell(name, id, told), seconds)
+            await self._robot.clock.wait_for(self._tell(name, id, reported), seconds)
         except TimeoutError:
-            if not told:
+            if not reported:
                 self._app.push(RECOGNISED, _recognised(FaceResult.TIMEOUT, name, id, 0.0, 0.0))
         except RobotError as error:
             log.info("face recognition: %s", error)
 
-    async def _tell(self, wanted: str, id: int, told: dict[str, float]) -> None:
+    async def _tell(self, wanted: str, id: int, reported: dict[str, float]) -> None:
         with self._robot[Vision].faces.subscribe() as sightings:
             async for sighting in sightings:
                 for face in sighting.seen:
-                    again = sighting.stamp - told.get(face.name, -AGAIN) < AGAIN
+                    again = sighting.stamp - reported.get(face.name, -AGAIN) < AGAIN
                     if not face.name or again or wanted not in ("", face.name):
                         continue
-                    told[face.name] = sighting.stamp
+                    reported[face.name] = sighting.stamp
                     emotion = float(EMOTIONS.index(face.emotion))
                     self._app.push(RECOGNISED, _recognised(FaceResult.DONE, face.name, id, face.age, emotion))
 

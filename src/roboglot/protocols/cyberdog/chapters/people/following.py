@@ -81,7 +81,7 @@ async def _pursue(dog: Dog, task: Task, pursuit: Pursuit | ThingPursuit, follow:
     except NotFound:
         task.feedback(Feedback.TARGET_LOST if task.last is not Feedback.FOLLOW_CHOSEN else Feedback.TARGET_NOT_LOCKED)
     except RobotError:
-        pass  # somebody else drives now
+        pass  # another client drives now
     finally:
         dog.pursuit = None
         watching.cancel()
@@ -89,7 +89,7 @@ async def _pursue(dog: Dog, task: Task, pursuit: Pursuit | ThingPursuit, follow:
 
 
 async def follow_tag(dog: Dog, task: Task, manner: Manner) -> TaskResult:
-    """Follow whoever wears the connected bracelet until stopped or it is heard no more."""
+    """Follow the wearer of the connected bracelet until stopped or it is heard no more."""
     task.feedback(Feedback.ACTIVATING)
     try:
         action = task.action = dog.robot[Following].follow_tag(

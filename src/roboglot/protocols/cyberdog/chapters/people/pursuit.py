@@ -24,7 +24,7 @@ OVERLAP_MIN = 0.1  # of the union of two boxes from which one means the other
 
 
 class Pursuit:
-    """Watches from ``watch`` on; ``chosen`` is done when the app has chosen somebody: their number."""
+    """Watches from ``watch`` on; ``chosen`` is done when the app has chosen a person: their number."""
 
     def __init__(self, robot: Robot, app: AppLink) -> None:
         self.chosen: asyncio.Future[int] = asyncio.get_running_loop().create_future()
@@ -33,16 +33,16 @@ class Pursuit:
 
     async def watch(self) -> None:
         """Push who is seen, until cancelled."""
-        told = -PERIOD
+        reported_at = -PERIOD
         with self._robot[Vision].people.subscribe() as sightings:
             async for sighting in sightings:
                 self._seen = sighting.seen
-                if sighting.stamp - told >= PERIOD:
-                    told = sighting.stamp
+                if sighting.stamp - reported_at >= PERIOD:
+                    reported_at = sighting.stamp
                     self._app.push(TRACKING, self._boxes())
 
     def choose(self, x: int, y: int, width: int, height: int) -> bool:
-        """The person whose box fits this one best (pixels) is the one; False if nobody does, or one is chosen."""
+        """The person whose box fits this one best (pixels) is the one; False if none does, or one is chosen."""
         if self.chosen.done() or width <= 0 or height <= 0:
             return False
         box = _box(x, y, width, height)

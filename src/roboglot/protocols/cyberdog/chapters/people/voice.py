@@ -1,6 +1,6 @@
 """The voice board: hears its wake word and does what is said then; learns members' voices. Knows no message.
 
-Hears only while somebody wants something of it and the microphone is on.
+Hears only while a feature needs it and the microphone is on.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from roboglot.protocols.cyberdog.chapters.system.stored_settings import (
 from roboglot.wire.cyberdog.motions import Motion, MotionCode
 
 log = logging.getLogger(__name__)
-TRAINING_MAX = 30.0  # s until somebody must have spoken
+TRAINING_MAX = 30.0  # s until a person must have spoken
 ATTENTIVE = 8.0  # s that it waits for an order after its wake word
 HERE, CANNOT = "我在", "现在不行"
 ORDERS = {
@@ -72,13 +72,13 @@ class Voice:
             self.stop_training()
 
     def train(self, member: str, voiceprint: str) -> None:
-        """Learn who speaks next as ``member``'s voice, instead of whoever was to be learned before."""
+        """Learn the next speaker's voice as ``member``'s; replaces an earlier request."""
         self.stop_training()
         self.training = member
         self._learning = asyncio.get_running_loop().create_task(self._learn(member, voiceprint), name="voiceprint")
 
     def stop_training(self) -> None:
-        """Learn nobody's voice."""
+        """Stop learning a voice."""
         if self._learning:
             self._learning.cancel()
         self._learning, self.training = None, ""
@@ -104,7 +104,7 @@ class Voice:
             log.info("voiceprint of %r: %s", member, error)
             code = UNKNOWN
         finally:
-            if self._learning is asyncio.current_task():  # nobody cancelled it
+            if self._learning is asyncio.current_task():  # it was not cancelled
                 self._learning, self.training = None, ""
                 self._trained(code, voiceprint)
 

@@ -40,7 +40,7 @@ class WireDevice(msgspec.Struct):
 async def scan(call: Call, *, scan_seconds: float = 0.0) -> dict[str, Any]:
     """What is heard in ``scan_seconds`` and was not connected before; 0: what was connected once.
 
-    While a device is connected nothing is scanned: the last scan's devices are told.
+    While a device is connected nothing is scanned: the last scan's devices are returned.
     """
     radio = call.dog.robot[Bluetooth]
     here = radio.connected.address if radio.connected else ""
@@ -57,7 +57,7 @@ async def scan(call: Call, *, scan_seconds: float = 0.0) -> dict[str, Any]:
 
 
 def _under_way(robot: Robot) -> Action | None:
-    """The scan of another request: whoever scans meanwhile waits for that one."""
+    """The scan of another request: later requests wait for that one."""
     return next((action for action in robot.actions.running(BLUETOOTH) if isinstance(action.goal, float)), None)
 
 
@@ -117,7 +117,7 @@ async def forget(call: Call, *, mac: str = "") -> dict[str, bool]:
 
 @operations.on(Code.UPDATE_BLUETOOTH, right=Right.ADMIN, needs=(Bluetooth,))
 async def update_device(call: Call) -> dict[str, Any]:
-    """Begin to bring the newer firmware to the connected device; push 8010 tells how it goes on."""
+    """Begin to bring the newer firmware to the connected device; push 8010 reports the progress."""
     radio = call.dog.robot[Bluetooth]
     if radio.connected is None:
         return {"success": False, "message": "no device is connected"}

@@ -1,4 +1,4 @@
-"""What the app is told of the bracelet without asking: lost and found, newer firmware, its update, its gear.
+"""Pushes to the app about the bracelet: lost and found, newer firmware, its update, its gear.
 
 Pushes 8003, 8008, 8010, 8012.
 """
@@ -45,11 +45,11 @@ class Bracelet:
         return self._update is not None and not self._update.status.ended
 
     def follow(self, update: Action) -> None:
-        """Tell how ``update`` goes on, until it has ended."""
+        """Report the progress of ``update`` until it has ended."""
         self._update, self._told = update, -1.0
 
     def offer(self) -> None:
-        """Tell of newer firmware, if there is a device for it."""
+        """Report newer firmware, if there is a device for it."""
         if Bluetooth not in self._robot:
             return
         radio = self._robot[Bluetooth]

@@ -69,7 +69,7 @@ class WireModule(msgspec.Struct):
 
 
 class Updates:
-    """Tells the app how updates go on, whoever began them. Lives as long as the door is open."""
+    """Reports updates to the app, no matter who began them. Lives as long as the door is open."""
 
     def __init__(self, robot: Robot, app: AppLink) -> None:
         self.digests: frozenset[str] = frozenset()  # of all files of what was downloaded
@@ -77,14 +77,14 @@ class Updates:
         self._failed = 0  # what the progress of the last download says after it failed
         self._word = "idle"
         self._state = FirmwareState.IDLE
-        self._told: dict[str, int] = {}  # the progress that was pushed last
-        self._told_at = -PROGRESS_PERIOD
+        self._sent: dict[str, int] = {}  # the progress that was pushed last
+        self._sent_at = -PROGRESS_PERIOD
         self._working: asyncio.Task[None] | None = None
         self._leave = robot.events.listen(FirmwareChanged, lambda event: self._changed(event.progress))
         app.on_found.append(self._tell_result)
 
     def progress(self) -> dict[str, int]:
-        """As 5005 tells it."""
+        """As in 5005."""
         progress = self._robot[Firmware].progress
         share = round(100 * progress.share)
         match progress.state:
@@ -134,12 +134,12 @@ class Updates:
             self._working.cancel()
 
     async def _install(self) -> None:
-        with contextlib.suppress(RobotError):  # which the app was told
+        with contextlib.suppress(RobotError):  # reported to the app
             await self.installed()
             self.restart()
 
     async def installed(self) -> None:
-        """Install what was downloaded; the app is told if that fails, and whoever waits by RobotError."""
+        """Install what was downloaded; a failure is reported to the app, and raised as RobotError."""
         firmware = self._robot[Firmware]
         package = firmware.progress.package
         if package is None:
@@ -155,15 +155,15 @@ class Updates:
             await self._robot[Settings].put(UPDATE, package.version)
 
     def restart(self) -> None:
-        """Tell the app, then go."""
+        """Notify the app, then go."""
         self._app.push(REBOOTS, {})
         self._robot[Firmware].reboot(after=NOTICE, source=SOURCE)
 
     def _changed(self, progress: FirmwareProgress) -> None:
-        told, now = self.progress(), self._robot.clock.time()
-        if told != self._told and (progress.state is not self._state or now - self._told_at >= PROGRESS_PERIOD):
-            self._told, self._told_at = told, now
-            self._app.push(PROGRESS, told)
+        content, now = self.progress(), self._robot.clock.time()
+        if content != self._sent and (progress.state is not self._state or now - self._sent_at >= PROGRESS_PERIOD):
+            self._sent, self._sent_at = content, now
+            self._app.push(PROGRESS, content)
         self._state = progress.state
         word = WORDS.get(progress.state, "idle")
         if word != self._word:
@@ -217,7 +217,7 @@ async def update_version(call: Call) -> dict[str, Any]:
 
 @operations.on(Code.DOWNLOAD_UPDATE, right=Right.ADMIN, needs=(Firmware,))
 async def download_update(call: Call, *, modules: object) -> dict[str, Any]:
-    """Fetch the files of some modules; push 5005 tells how it goes on."""
+    """Fetch the files of some modules; push 5005 reports the progress."""
     firmware = call.dog.robot[Firmware]
     try:
         package, digests = package_of(modules)

@@ -1,6 +1,6 @@
 """The self check of heartbeat and 10001: what of the robot has failed, in the words of ``SelfCheckStatus``.
 
-Warnings (a battery at a tenth, a step ahead) are no failures of parts: they are told by the charge and the sensors.
+Warnings (a battery at a tenth, a step ahead) are no failures of parts: the charge and the sensors show them.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ NOT_YET, GOOD, BROKEN = -1, 0, 1
 LIDAR_ERROR, BATTERY_ERROR = 2109, 1409
 CRITICAL = frozenset({"base", "battery"})  # without these the robot goes nowhere
 
-# The parts that the message names, by what tells that the robot has them.
+# The parts that the message names, by the component that stands for them.
 SHOWN: Mapping[tuple[str, str], type[Component]] = {
     ("motion_manager", ""): Base,
     ("algorithm_manager", ""): Localization,
     ("device", "bms"): Battery,
     ("sensor", "lidar"): Lidar,
 }
-# Where a fault of a component is told, and as which number; all others are other devices.
+# Where a fault of a component is reported, and as which number; all others are other devices.
 PLACES: Mapping[str, tuple[str, str, int]] = {
     "base": ("motion_manager", "", BROKEN),
     "localization": ("algorithm_manager", "", BROKEN),

@@ -92,7 +92,7 @@ async def set_eye_light(call: Call, *, eyelight: Int32) -> dict[str, bool]:
 
 @operations.on(Code.STOP_SOUND, right=Right.DRIVE, needs=(Speaker,))
 async def stop_sound(call: Call) -> dict[str, bool]:
-    """Be quiet, whoever let the robot speak."""
+    """Be quiet, no matter which client let the robot speak."""
     call.dog.robot[Speaker]
     await call.dog.robot.actions.cancel(resource=SPEAKER, reason="silenced by the app")
     return {}

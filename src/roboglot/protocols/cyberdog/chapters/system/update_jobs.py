@@ -99,20 +99,20 @@ class UpdateJobs:
         leave = self._robot.events.listen(
             FirmwareChanged, lambda event: stream.tell({**named, **_progress(event.progress)})
         )
-        code, told, data = GOOD, "", {}
+        code, message, data = GOOD, "", {}
         try:
             data = await OPERATIONS[goal.operate](self, goal)
         except Unable as unable:
-            code, told = unable.code, str(unable)
+            code, message = unable.code, str(unable)
         except (RobotError, BadParameters) as error:
-            code, told = next(code for kind, code in CODES if isinstance(error, kind)), str(error)
+            code, message = next(code for kind, code in CODES if isinstance(error, kind)), str(error)
         except Exception:
             log.exception("5010 %s broke", goal.operate)
-            code, told = FAILED, "internal error"
+            code, message = FAILED, "internal error"
         finally:
             leave()
             self.stream = self._running = None
-        stream.end({**named, "code": code, "message": told, "data": data})
+        stream.end({**named, "code": code, "message": message, "data": data})
 
     # -- what can be wanted; each returns the result's data ----------------------------------------------------------
 

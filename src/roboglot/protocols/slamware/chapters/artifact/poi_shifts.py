@@ -20,7 +20,7 @@ class Shift:
 
 
 class PoiShifts:
-    """Watches loops being closed; a place that somebody moves meanwhile is left alone."""
+    """Watches loops being closed; a place that a client moves meanwhile is left alone."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot

@@ -202,7 +202,7 @@ async def get_delivery_settings(context: Context) -> WrappedSettings:
 
 @OPERATIONS.on(f"PUT {API}/settings/timeout", right=Right.EDIT, needs=(Delivery,))
 async def set_timeout_settings(context: Context, body: TimeoutChange) -> None:
-    """How long the robot waits until somebody takes his food."""
+    """How long the robot waits for a guest to take the food."""
     await _set(context, replace(context.robot[Delivery].policy, food_seconds=float(body.food_pickup_timeout)))
 
 

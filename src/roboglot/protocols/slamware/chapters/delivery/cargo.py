@@ -61,7 +61,7 @@ async def get_cargo_box(context: Context, cargo_id: str, box_id: int) -> Box:
 
 @OPERATIONS.on(f"PUT {BOXES}/{{box_id}}/{{op}}", right=Right.DRIVE, needs=(CargoComponent,))
 async def operate_box(context: Context, cargo_id: str, box_id: int, op: Literal[":open", ":close"]) -> None:
-    """Begin to open or close; the door moves in its own time, ``operation_result`` tells how it went."""
+    """Begin to open or close; the door moves in its own time, ``operation_result`` has the outcome."""
     cargo, id = context.robot[CargoComponent], _box_id(context, cargo_id, box_id)
     if op == ":open":
         cargo.open_box(id, source=SOURCE)
@@ -71,7 +71,7 @@ async def operate_box(context: Context, cargo_id: str, box_id: int, op: Literal[
 
 @OPERATIONS.on(f"GET {BOXES}/{{box_id}}/operation_result", right=Right.SEE, needs=(CargoComponent,))
 async def get_operation_result(context: Context, cargo_id: str, box_id: int) -> OperationResult:
-    """The last opening or closing of the box, whoever asked for it; 404 while there was none."""
+    """The last opening or closing of the box; 404 while there was none."""
     id = _box_id(context, cargo_id, box_id)
     if (action := context.boxes.last(id)) is None:
         raise NotFound(f"nobody has operated box {id}")

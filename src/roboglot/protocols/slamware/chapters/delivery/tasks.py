@@ -68,7 +68,7 @@ def is_asked(status: OrderStatus, asked: StatusFilter | None) -> bool:
 
 @OPERATIONS.on(f"POST {TASKS}", right=Right.DRIVE, needs=(Delivery,))
 async def create_task(context: Context, body: TaskRequest) -> TaskCreated:
-    """Queue a task; what stands against it is told with ``result`` false."""
+    """Queue a task; a refusal is an answer with ``result`` false."""
     orders, errors = await _accept(context, [request_of(body)])
     return TaskCreated(bool(orders), orders[0].number if orders else "", errors)
 
@@ -130,14 +130,14 @@ async def end_task(context: Context) -> NoContent:
 
 @OPERATIONS.on(f"PUT {TASKS}/:start_pickup", right=Right.DRIVE, needs=(Delivery,))
 async def start_pickup(context: Context) -> NoContent:
-    """Somebody begins to take his goods; 403 unless the robot stands at the target."""
+    """Begin to take goods out; 403 unless the robot stands at the target."""
     await context.robot[Delivery].start_pickup()
     return NO_CONTENT
 
 
 @OPERATIONS.on(f"PUT {TASKS}/:end_pickup", right=Right.DRIVE, needs=(Delivery,))
 async def end_pickup(context: Context) -> NoContent:
-    """This box is done: its door shuts, and the next one opens. 403 while nobody picks up."""
+    """This box is done: its door shuts, and the next one opens. 403 unless goods are being taken out."""
     await context.robot[Delivery].end_pickup()
     return NO_CONTENT
 

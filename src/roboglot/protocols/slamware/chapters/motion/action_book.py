@@ -61,7 +61,7 @@ class ActionBook:
         return ActionGravestone(action.id, state_of(action)) if action.status.ended else self._info(action)
 
     def abort(self) -> None:
-        """Stop whatever moves the robot, whoever asked for it; it brakes from now on."""
+        """Stop whatever moves the robot, no matter who asked for it; it brakes from now on."""
         actions = self._robot.actions
         for action in [*actions.running(ERRAND), *actions.running(BASE)]:
             action.cancel("aborted by a client")

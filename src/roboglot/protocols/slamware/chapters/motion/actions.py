@@ -53,7 +53,7 @@ async def get_current_action(context: Context) -> ActionInfo:
 
 @OPERATIONS.on(f"DELETE {API}/actions/:current", right=Right.DRIVE)
 async def abort_current_action(context: Context) -> None:
-    """Stop, whoever asked for the motion; fine when nothing moves."""
+    """Stop, no matter who asked for the motion; fine when nothing moves."""
     context.actions.abort()
 
 

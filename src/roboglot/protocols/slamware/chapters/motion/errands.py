@@ -1,7 +1,7 @@
 """Actions made of several of the robot's own, one after the other: a way and then the dock, a search and then a turn.
 
-An errand is an action of the model like any other; it holds no wheel itself, its parts do. Whoever takes the wheels
-from a part ends the errand. Knows no wire format.
+An errand is an action of the model like any other; it holds no wheel itself, its parts do. Another action that
+takes the wheels from a part ends the errand. Knows no wire format.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Errand:
     async def do(self, part: Action, *, within: float | None = None) -> None:
         """Wait for ``part``, which shows as the errand's progress, and raise its error.
 
-        After ``within`` s it is cancelled, with Expired. If somebody else stops it, the errand is cancelled too.
+        After ``within`` s it is cancelled, with Expired. If another client stops it, the errand is cancelled too.
         """
         self._action.report(part)
         stop = self.robot.events.listen(ActionChanged, lambda event: self._pass_on(event, part))

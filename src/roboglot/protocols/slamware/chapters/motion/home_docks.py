@@ -19,7 +19,7 @@ Docks = tuple[PointOfInterest, ...]
 
 
 def known_docks(robot: Robot) -> Docks:
-    """The docks on the map; the one that the robot knows by itself if nobody entered any."""
+    """The docks on the map; the one that the robot found by itself if none was entered."""
     docking, entered = robot[Docking], robot[MapAnnotations].current.docks
     if entered or docking.home is None:
         return entered

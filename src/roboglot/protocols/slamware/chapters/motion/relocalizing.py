@@ -1,4 +1,4 @@
-"""Chapter "motion", POST actions: finding out where the robot is, by itself or while somebody pushes it."""
+"""Chapter "motion", POST actions: finding out where the robot is, by itself or while a person pushes it."""
 
 from __future__ import annotations
 

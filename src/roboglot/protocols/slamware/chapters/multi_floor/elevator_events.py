@@ -28,7 +28,7 @@ FAILURES = {
 
 
 class RideEvents:
-    """Follows one ride after the other; each stage is told once."""
+    """Follows one ride after the other; each stage is reported once."""
 
     def __init__(self) -> None:
         self._told: tuple[int, RideStage | None] = (0, None)

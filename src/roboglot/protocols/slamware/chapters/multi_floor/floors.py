@@ -120,7 +120,7 @@ async def get_current_floor(context: Context) -> CurrentFloorInfo:
 
 @OPERATIONS.on(f"PUT {MAP}/floors/:current", right=Right.DRIVE)
 async def set_current_floor(context: Context, body: FloorChoice) -> None:
-    """Somebody carried the robot: use the map of that floor. 404 if it is not loaded."""
+    """Use the map of the floor to which the robot was carried. 404 if it is not loaded."""
     context.actions.abort()
     await context.maps.enter(body.building, body.floor, pose_of(body.pose) if body.pose else None)
 

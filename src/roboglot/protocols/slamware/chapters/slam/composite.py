@@ -63,7 +63,7 @@ class FloorName:
 
 @dataclass(frozen=True, slots=True)
 class FloorMap:
-    """One floor: its grid, what is drawn on it, and the layers that nobody here understands."""
+    """One floor: its grid, what is drawn on it, and the layers of unknown kinds."""
 
     name: FloorName = field(default_factory=FloorName)
     grid: OccupancyGrid | None = None

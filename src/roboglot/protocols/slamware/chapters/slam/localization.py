@@ -45,7 +45,7 @@ async def get_pose(context: Context) -> Pose3D:
 
 @OPERATIONS.on(f"PUT {API}/localization/pose", right=Right.DRIVE, needs=(Localization,))
 async def set_pose(context: Context, body: Pose3D) -> None:
-    """Tell the robot where it is in the map."""
+    """Set the robot's pose in the map."""
     context.robot[Localization].set_pose(pose_of(body))
 
 

@@ -1,7 +1,7 @@
 """The robot's two maps: the one in memory, which it uses and draws on, and the one on disk, which survives.
 
 In memory are the grid, places and annotations. The file on disk is kept as it came, and loaded when the robot starts
-or is told to. What multi-floor operations know (floors, their places and docks) is what was loaded last.
+or on request. What multi-floor operations know (floors, their places and docks) is what was loaded last.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class MapKeeper:
         self._robot, self._cloud, self._synced = robot, cloud, synced
         self._turn = asyncio.Lock()
         self._loading = False
-        self._layers: tuple[Layer, ...] = ()  # of the map in memory that nobody here understands
+        self._layers: tuple[Layer, ...] = ()  # of the map in memory, of unknown kinds
         self.status = MapLoadStatus.NOT_LOADED
         self.floors: tuple[FloorMap, ...] = ()  # loaded from disk
         self._loaded = ""  # the digest of that file
@@ -128,7 +128,7 @@ class MapKeeper:
             settings = {BASIS: {_digest(data): NOT_MOVED}, FLOOR: self.current.map_id}
 
             def edit(now: Drawings) -> Replacement:
-                docks = known_docks(self._robot)  # as the file has them, also the one that nobody entered
+                docks = known_docks(self._robot)  # as the file has them, also the robot's own
                 return Replacement(_with_docks(now, docks), settings, {FILE: data, DRAWN: None})
 
             await self._robot[MapMemory].replace(edit)
@@ -196,7 +196,7 @@ class MapKeeper:
         self.floors, self.status, self.current = (), MapLoadStatus.NOT_LOADED, FloorName()
 
     async def _parse(self, data: bytes) -> list[FloorMap]:
-        """The floors in a file, which may take seconds for a hostile one: nobody else waits for that."""
+        """The floors in a file, which may take seconds for a hostile one: other requests do not wait for it."""
         if isinstance(self._robot.clock, LockstepClock):
             return _parsed(data)
         return await asyncio.to_thread(_parsed, data)

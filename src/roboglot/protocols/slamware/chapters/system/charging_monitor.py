@@ -44,7 +44,7 @@ class ChargingWatch:
             self._timer = self._robot.clock.call_later(PATIENCE, self._tell)
 
     def _tell(self) -> None:
-        """The timer stays until the robot charges or leaves: told once is enough."""
+        """The timer stays until the robot charges or leaves: once is enough."""
         if self._starves():
             self._failed()
 

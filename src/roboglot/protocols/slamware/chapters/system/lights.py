@@ -12,7 +12,7 @@ from roboglot.protocols.slamware.errors import HttpError
 from roboglot.protocols.slamware.table import OPERATIONS
 from roboglot.wire.slamware.devices import Channel, Half, LightColour, LightControl, Mode
 
-STEP_MIN = 0.02  # s; faster, nobody sees a difference
+STEP_MIN = 0.02  # s; faster makes no visible difference
 
 
 ZONES = {
