@@ -1,6 +1,7 @@
 """Settings for all tests: examples are the same in every run, and a slow machine is no failure."""
 
 import fcntl
+import gc
 import importlib.util
 import socket
 import sys
@@ -19,6 +20,37 @@ settings.load_profile("same")
 # httpx's pool tries to import it at every request: a third of a request's time went into looking for what isn't there.
 if importlib.util.find_spec("sniffio") is None:
     sys.modules["sniffio"] = None  # type: ignore[assignment]
+
+TESTS = Path(__file__).parent
+PROCESSES = (
+    "access",
+    "browser",
+    "cli",
+    "cloud",
+    "console",
+    "drivers",
+    "end_to_end",
+    "shards",
+)  # folders that start some
+WORLDS = {"world", "robot", "fleet", "door", "client", "engine", "screen"}
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Set the markers that follow from where a test stands and from the fixtures that it uses."""
+    for item in items:
+        folder = item.path.relative_to(TESTS).parts[0]
+        if folder in PROCESSES or folder.endswith(".py"):
+            item.add_marker("process")
+        if WORLDS & set(getattr(item, "fixturenames", ())):
+            item.add_marker("simulated")
+
+
+def pytest_collection_finish() -> None:
+    """Leave all modules that were imported out of garbage collections: they stay."""
+    gc.collect()
+    gc.freeze()
+
 
 VENDOR_PORTS = (40924, 40926)  # UDP
 PATIENCE = 10.0  # real s

@@ -116,8 +116,8 @@ async def test_a_lift_out_of_service_is_not_boarded(tour: Tour) -> None:
     ("fault", "options", "stage", "floor"),
     [
         ("lift_occupied", {}, RideStage.BOARDING, 0),
-        ("lift_door_blocked", {}, RideStage.BOARDING, 0),
-        ("lift_door_blocked", {"floor": 1}, RideStage.LEAVING, 1),
+        pytest.param("lift_door_blocked", {}, RideStage.BOARDING, 0, marks=pytest.mark.slow),
+        pytest.param("lift_door_blocked", {"floor": 1}, RideStage.LEAVING, 1, marks=pytest.mark.slow),
     ],
 )
 async def test_a_ride_that_is_in_somebodys_way(

@@ -41,6 +41,7 @@ def kinds(tour: Tour) -> list[Callable[[], Action]]:
     ]
 
 
+@pytest.mark.slow
 async def test_ended_actions_keep_nothing(tour: Tour) -> None:
     sizes: list[int] = []
     starts = kinds(tour)

@@ -23,8 +23,10 @@ from tests.drivers.chain import EP_ADDRESS, Drive, ep_config, free_port, url_of
 from tests.drivers.fronts import Front, front
 
 STEP, PAUSE = 0.02, 0.003  # robot s, real s: gRPC has threads of its own
+# Every driver and every door once; the other cells are slow.
+QUICK = {("robomaster", "visual"), ("cyberdog", "robomaster"), ("slamware", "cyberdog"), ("robomaster", "slamware")}
 CELLS = [
-    (back, door)
+    pytest.param(back, door, marks=() if (back, door) in QUICK else pytest.mark.slow)
     for back in ("slamware", "robomaster", "cyberdog")
     for door in ("slamware", "robomaster", "cyberdog", "visual")
     if back != door

@@ -51,6 +51,7 @@ def kill(robot: ServedRobot) -> None:
     robot.process.wait()
 
 
+@pytest.mark.slow
 async def test_the_robot_is_killed_in_the_middle(tmp_path: Path) -> None:
     data = tmp_path / "data"
     async with talking(data) as (robot, dog):

@@ -9,6 +9,7 @@ import gc
 import os
 from pathlib import Path
 
+import pytest
 import soak
 
 ROUNDS, SETTLED = 4, 1  # the first rounds fill caches and histories
@@ -16,6 +17,7 @@ CONNECTIONS, PROGRAMS = 12, 3  # a round
 GROWTH_MAX = 1.002  # of 200,000 objects: a round may keep 200 of them, some ten for each connection and program
 
 
+@pytest.mark.slow
 async def test_connections_and_programs_keep_nothing(tmp_path: Path) -> None:
     objects, descriptors = [], []
     async with soak.born(tmp_path) as life:

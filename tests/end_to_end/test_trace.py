@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from roboglot.testing.process import child
 
 SCENARIO = """
@@ -41,6 +43,7 @@ asyncio.run(main())
 """
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_trace() -> None:
     with child(SCENARIO, "5") as one, child(SCENARIO, "5") as again, child(SCENARIO, "6") as another:
         first, second, other = (run.communicate()[0] for run in (one, again, another))

@@ -24,16 +24,16 @@ async def test_an_old_battery_holds_less(robot):
 @pytest.mark.world("empty")
 async def test_time_left_follows_what_the_robot_does(robot, world, forward):
     world.hands.place("a", Pose(5, 5))
-    await forward(seconds=90)
+    await forward(seconds=60)
     idle = robot[Battery].state.remaining
     robot[Base].set_velocity(Twist(0.6, yaw=0.9))
     await forward(seconds=60)
     assert robot[Battery].state.remaining < 0.95 * idle
     before = robot[Battery].state
     robot[Base].set_velocity(Twist())
-    await forward(seconds=600)
+    await forward(seconds=200)
     used = before.percentage - robot[Battery].state.percentage
-    assert used * idle == pytest.approx(before.percentage * 600, rel=0.15)
+    assert used * idle == pytest.approx(before.percentage * 200, rel=0.15)
 
 
 async def test_on_the_dock_no_time_runs_out(robot, forward):

@@ -14,7 +14,7 @@ from roboglot.media.audio import AudioStream
 from roboglot.media.video import VideoStream
 from roboglot.model.clock import LockstepClock
 from roboglot.protocols.robomaster.dispatch import answer
-from roboglot.protocols.robomaster.media_port import MediaPort
+from roboglot.protocols.robomaster.ports.media_port import MediaPort
 from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.storage.database import Database

@@ -247,6 +247,7 @@ async def test_into_a_car_that_others_command_and_out_again(
     ]
 
 
+@pytest.mark.slow
 async def test_orders_on_two_floors_and_the_dock_below(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward, origin: Pose
 ) -> None:
@@ -287,6 +288,7 @@ async def test_orders_on_two_floors_and_the_dock_below(
     assert (await client.get(f"{MULTI}/floors/:current")).json()["floor"] == "ground"
 
 
+@pytest.mark.slow
 async def test_home_from_the_other_floor_after_an_order(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward, origin: Pose
 ) -> None:

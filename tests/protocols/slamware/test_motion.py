@@ -256,7 +256,7 @@ async def test_go_home(robot: Robot, client: httpx.AsyncClient, world: World, fo
     ]
 
 
-async def test_the_dock_can_be_told(robot: Robot, client: httpx.AsyncClient) -> None:
+async def test_the_dock_can_take_pose(robot: Robot, client: httpx.AsyncClient) -> None:
     reply = await client.put("/api/core/slam/v1/homepose", json={"x": 1.0, "y": 2.0, "yaw": 3.0})
     assert reply.json() is True
     assert robot[Docking].home == Pose(1.0, 2.0, 3.0)

@@ -92,7 +92,9 @@ async def test_a_dock_without_current(robot: Robot, client: httpx.AsyncClient, w
 
 
 @pytest.mark.world("office", body="hermes")
-@pytest.mark.parametrize("helped_by", ["reset", "pose", "dock"])
+@pytest.mark.parametrize(
+    "helped_by", ["reset", *(pytest.param(help, marks=pytest.mark.slow) for help in ("pose", "dock"))]
+)
 async def test_a_lost_robot_lets_orders_wait(
     screen: Screen, robot: Robot, world: World, forward: Forward, monkeypatch: pytest.MonkeyPatch, helped_by: str
 ) -> None:

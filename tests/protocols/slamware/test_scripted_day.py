@@ -162,6 +162,7 @@ async def restart(day: Day) -> None:
 
 
 @pytest.mark.world(str(Path(__file__).with_name("tower.toml")), body="hermes")
+@pytest.mark.slow
 async def test_a_day(day: Day, robot: Robot, world: World) -> None:  # noqa: PLR0915 - one day
     await day.forward(seconds=2)
     await day.prepare()
