@@ -13,8 +13,8 @@ from typing import Annotated
 import msgspec
 import typer
 
-from roboglot.cli.map_merge import merged
-from roboglot.cli.map_survey import RADIUS, first_pose, surveyed
+from roboglot.cli.maps.merge import merged
+from roboglot.cli.maps.survey import RADIUS, first_pose, surveyed
 from roboglot.media.ros_map import encode_ros_map
 from roboglot.model.maps import OccupancyGrid
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, composite_of, floors_of
@@ -64,7 +64,7 @@ def command(
     """Give a robot a map, write its map to a file, build one from a log, or merge the maps of several floors."""
     try:
         if way is Way.BUILD:
-            from roboglot.cli.map_build import build  # it needs the kernels
+            from roboglot.cli.maps.build import build  # it needs the kernels
 
             build(ros_map, out, relations)
         elif way is Way.MERGE:

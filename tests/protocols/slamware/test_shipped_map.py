@@ -8,7 +8,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from roboglot.cli.map_survey import surveyed
+from roboglot.cli.maps.survey import surveyed
 from roboglot.config import RobotConfig
 from roboglot.fleet import Fleet, build_fleet
 from roboglot.model.clock import LockstepClock

@@ -1,0 +1,1 @@
+"""What `roboglot map` does with ROS maps and recorded drives. Knows no robot."""
