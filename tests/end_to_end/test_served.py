@@ -142,9 +142,9 @@ def test_it_stops_cleanly_on_a_signal(tmp_path: Path) -> None:
 
 STUCK = """
 import time
-from roboglot.cli import up
-up.LAST_SECONDS = 0.1
-up._end_in_any_case()
+from roboglot.hosting import process
+process.LAST_SECONDS = 0.1
+process.end_in_any_case()
 print("stuck", flush=True)
 time.sleep(60)
 """
