@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import time
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +13,7 @@ from roboglot.model.robot import Robot
 from roboglot.runtime import Runtime
 
 ADDRESS = f"127.0.91.{1 + int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0')[2:])}"  # one for each process
+PATIENCE = 60.0  # s of the machine's time
 STRANGER, FRIEND, REBOUND = "evil.example", "studio.example", "rebound.example"
 
 
@@ -26,7 +28,8 @@ class Served:
 
 async def until(page: Any, expression: str) -> None:
     """Wait until an expression holds; Playwright's own way needs eval, which the page's policy forbids."""
-    for _ in range(1200):
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
         if await page.evaluate(f"Boolean({expression})"):
             return
         await asyncio.sleep(0.05)

@@ -47,7 +47,7 @@ FOREVER = {
         "languageVersion": 0,
         "blocks": [
             {"type": "forever", "id": "always", "x": 30, "y": 30, "inputs": {"DO": {"block": {
-                "type": "math_change", "id": "count", "fields": {"VAR": {"name": "n"}}, "inputs": {"DELTA": number}}}}}
+                "type": "wait", "id": "count", "inputs": {"SECONDS": number}}}}}  # of robot time, which stands
         ],
     }
 }  # fmt: skip
@@ -159,8 +159,10 @@ async def test_a_program_is_built_run_broken_stepped_and_mended_by_keyboard_alon
     await until(page, "document.activeElement.classList.contains('blocklyPath')")
     await page.keyboard.press("Enter")
     await until(page, "studio.editor.workspace.isDragging()")
-    while await page.evaluate("studio.editor.workspace.isDragging()"):  # the first may come before it listens
-        await page.keyboard.press("Enter")
+    for _ in range(20):
+        if not await page.evaluate("studio.editor.workspace.isDragging()"):
+            break
+        await page.keyboard.press("Enter")  # the first may come before it listens
         await asyncio.sleep(0.3)
     await until(page, "studio.editor.code.value.includes('print(')")
     await page.keyboard.press("i")
