@@ -74,7 +74,7 @@ def run(core: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 @pytest.fixture(scope="module")
 def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """A robot of this environment that the other one's commands talk to; its address."""
-    address = "127.0.0.77"
+    address = "127.0.0.177"
     with served(tmp_path_factory.mktemp("up") / "data", "--no-console", address=address):
         yield address
 

@@ -91,7 +91,7 @@ async def test_the_text_client_drives_and_listens(tmp_path: Path, vendor_ports: 
 
 
 async def test_the_rest_client_goes_and_looks(tmp_path: Path) -> None:
-    async with terminal(tmp_path, "127.0.0.77") as user:
+    async with terminal(tmp_path, "127.0.0.176") as user:
         printed = await user.run(snippet("SlamwareClient"))
         assert printed, "progress"
         assert_pose(user.moved, x=1.0, y=0.5, deg=90)

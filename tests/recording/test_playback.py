@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import dataclasses
 import json
+import os
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
@@ -25,7 +26,8 @@ from roboglot.recording.playback import open_playback
 from roboglot.recording.reader import read_recording
 from roboglot.runtime import Runtime
 
-ADDRESS = "127.0.0.84"
+WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])  # files of this folder run side by side
+ADDRESS, SECOND = f"127.0.193.{1 + WORKER}", f"127.0.193.{101 + WORKER}"
 SPEED = 4.0
 PROGRAM = "cyberdog.task.block('one');\ncyberdog.task.block('two');\n"
 Script = Callable[[str], Awaitable[Any]]
@@ -160,9 +162,9 @@ async def test_unrecorded_requests_get_each_protocols_own_error(tmp_path: Path) 
 
 async def test_a_file_with_several_robots_needs_a_name(tmp_path: Path) -> None:
     base = config(tmp_path, "universal", str(tmp_path / "r.mcap"))
-    started = Runtime(dataclasses.replace(base, robots=(*base.robots, RobotConfig("b", "universal", "127.0.0.85"))))
+    started = Runtime(dataclasses.replace(base, robots=(*base.robots, RobotConfig("b", "universal", SECOND))))
     await started.start()
-    for address in (ADDRESS, "127.0.0.85"):
+    for address in (ADDRESS, SECOND):
         await by_pose(address)
     await started.close()
     assert read_recording(tmp_path / "r.mcap").robots == ["a", "b"]

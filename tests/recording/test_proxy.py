@@ -17,7 +17,7 @@ from roboglot.recording.reader import pair, read_recording
 from tests.recording.test_playback import ADDRESS, by_frames, by_rest, run, whole_closing
 
 assert whole_closing  # a fixture of these tests, too
-BETWEEN = "127.0.0.88"
+BETWEEN = ADDRESS.replace("127.0.193.", "127.0.195.")
 
 
 async def between(url: str, path: Path, script: Any) -> Any:
@@ -52,6 +52,7 @@ async def by_text(address: str) -> list[bytes]:
         (f"robomaster://{ADDRESS}", by_text),
         (f"visual://{ADDRESS}", by_frames),
     ],
+    ids=["slamware", "robomaster", "visual"],
 )
 async def test_what_passes_is_what_the_robots_own_tap_says(url: str, script: Any, tmp_path: Path) -> None:
     own, passed = tmp_path / "own.mcap", tmp_path / "passed.mcap"

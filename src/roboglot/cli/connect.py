@@ -7,9 +7,10 @@ import errno
 import itertools
 import os
 import sys
+from collections.abc import Coroutine
 from ipaddress import IPv4Address, IPv4Network
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -48,18 +49,26 @@ def command(
         if not is_loopback(place):
             print(f"roboglot connect: everyone who reaches {place} uses your token", file=sys.stderr)
     known = KnownGateways(_settings() / "gateways.json")
-    import uvloop
-
     connectors = {
         (name, place): Connector(host.strip("[]"), int(port), name, token.strip(), place, known)
         for name, place in zip(names, places, strict=True)
     }
     try:
-        uvloop.run(_keep_all(connectors, once))
+        _run(_keep_all(connectors, once))
     except KeyboardInterrupt:
         sys.exit(130)
     except (NotTrusted, Refused, Unusable) as refused:
         sys.exit(f"roboglot connect: {refused}")
+
+
+def _run(work: Coroutine[Any, Any, None]) -> None:
+    """Run ``work`` on uvloop, or on asyncio's own loop in an installation without it."""
+    try:
+        import uvloop
+    except ImportError:
+        asyncio.run(work)
+    else:
+        uvloop.run(work)
 
 
 class Unusable(Exception):
