@@ -279,5 +279,5 @@ class Machine(RuleBasedStateMachine):
 
 
 PHASES = (Phase.explicit, Phase.reuse, Phase.generate)  # shrinking would take minutes
-Machine.TestCase.settings = settings(max_examples=15, stateful_step_count=50, deadline=None, phases=PHASES)
+Machine.TestCase.settings = settings(max_examples=30, stateful_step_count=50, deadline=None, phases=PHASES)
 TestMachine = Machine.TestCase
