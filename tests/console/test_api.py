@@ -10,14 +10,17 @@ from pathlib import Path
 import pytest
 
 from roboglot.config import AccessConfig, ConsoleConfig, RobotConfig, load_config
+from roboglot.console.resend import resend
 from roboglot.console.verbs import VERBS
 from roboglot.console.world_verbs import WORLD_VERBS
 from roboglot.model.clock import LockstepClock, RealClock
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.system.lease import Lease
+from roboglot.model.errors import Unconnected
 from roboglot.model.tap import Direction, Exchange
 from roboglot.operations import BadParameters
+from roboglot.protocols.door import Endpoint
 from roboglot.runtime import Runtime
 from roboglot.simulation.world.world_files import load_world
 from tests.console.conftest import ADDRESS, Shown
@@ -197,4 +200,17 @@ async def test_a_request_is_sent_again_as_it_was(
     assert status is None or answer["answers"][0][0] == status
     again = [entry.exchange for entry in wire.after(1, 50) if entry.exchange.direction is Direction.REQUEST]
     assert again[-1].payload.rstrip(b";") == payload
+    wire.close()
+
+
+async def test_a_closed_door_and_too_many_at_once_are_refused(shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = Exchange(0.0, "a", "robomaster", "127.0.0.1:1", "x", Direction.REQUEST, "version", b"version")
+    with pytest.raises(Unconnected, match="did not answer"):
+        await resend(asked, Endpoint("RoboMaster text SDK", "tcp 127.0.0.1:9"))
+    monkeypatch.setattr("roboglot.console.resend.RESENDS_MAX", 0)
+    wire = shown.desk.view("a").wire
+    wire.open()
+    wire._note(asked)
+    status, answer = await shown.ask(f"/api/robots/a/wire/{wire.last}/resend", {})
+    assert (status, "a moment ago" in answer["error"]) == (409, True)
     wire.close()

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
+from urllib.parse import quote
 
-from roboglot.console.settings import EXCERPT_MAX, PAYLOAD_MAX, RESEND_HOLD, RESEND_SECONDS
+from roboglot.console.settings import EXCERPT_MAX, PAYLOAD_MAX, RESEND_HOLD, RESEND_SECONDS, RESENDS_MAX
 from roboglot.console.wire_log import readable
 from roboglot.model.clock import RealClock
-from roboglot.model.errors import InvalidGoal, Unconnected
+from roboglot.model.errors import Busy, InvalidGoal, Unconnected
 from roboglot.model.tap import Direction, Exchange
 from roboglot.protocols.door import Endpoint
 from roboglot.recording.lines import Answers, ClientError, Line, Target
@@ -21,20 +22,27 @@ async def resend(exchange: Exchange, endpoint: Endpoint) -> Sequence[tuple[str, 
     """Return (status, answer) of each answer to ``exchange``, sent to ``endpoint`` again.
 
     The connection stays for ``RESEND_HOLD`` s: what it had the robot do ends with it. Raises InvalidGoal for what
-    cannot be sent, Unconnected where the door gave no answer.
+    cannot be sent, Busy for too many at a time, Unconnected where the door gave no answer.
     """
     if exchange.direction is not Direction.REQUEST:
         raise InvalidGoal("only a request can be sent again")
     if len(exchange.payload) >= PAYLOAD_MAX:
         raise InvalidGoal(f"a request of more than {PAYLOAD_MAX} bytes is not kept whole")
+    if len(_holding) >= RESENDS_MAX:
+        raise Busy(f"{RESENDS_MAX} requests were sent again a moment ago; wait {RESEND_HOLD:g} s")
     line = _target(exchange.door, endpoint).line(RealClock(), lambda _operation, _payload: None)
+    opened = False
     try:
         async with asyncio.timeout(RESEND_SECONDS):
             await line.open()
+            opened = True
             answers = await _ask(line, exchange)
-    except (ClientError, TimeoutError) as error:
-        await line.close()
-        raise Unconnected(f"the door did not answer: {error}") from None
+    except BaseException as error:
+        if opened:
+            await line.close()
+        if isinstance(error, (ClientError, TimeoutError)):
+            raise Unconnected(f"the door did not answer: {error}") from None
+        raise
     held = asyncio.get_running_loop().create_task(_hold(line), name="console resend")
     _holding.add(held)
     held.add_done_callback(_holding.discard)
@@ -57,5 +65,5 @@ async def _hold(line: Line) -> None:
 def _target(door: str, endpoint: Endpoint) -> Target:
     address = endpoint.address.removeprefix("tcp ").partition("://")
     where = (address[2] or address[0]).partition("/")[0]
-    certificates = f"?certs={endpoint.certificates}" if endpoint.certificates else ""
+    certificates = f"?certs={quote(str(endpoint.certificates))}" if endpoint.certificates else ""
     return Target(f"{door}://{where}{certificates}")

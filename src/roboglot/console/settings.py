@@ -27,6 +27,7 @@ WIRE_MAX = 20_000  # exchanges kept
 WIRE_BYTES_MAX = 16 * 1024 * 1024  # of payload kept
 PAYLOAD_MAX = 64 * 1024  # bytes kept of one payload
 RESEND_SECONDS = 20.0  # in which a request that is sent again is answered
+RESENDS_MAX = 16  # such connections at a time
 RESEND_HOLD = 10.0  # s that its connection stays, so that what it began goes on
 EXCERPT_MAX = 2_000  # characters of a payload that a list shows
 BATCH_MAX = 200  # exchanges in one message to a page
