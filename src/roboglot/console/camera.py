@@ -10,9 +10,10 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from roboglot.console.http import Problem, Receive, Send, answer
-from roboglot.console.settings import CALL_SECONDS, CALLS_MAX, JPEG_QUALITY, OFFER_MAX
+from roboglot.console.settings import CALL_SECONDS, CALLS_MAX, JPEG_QUALITY, OFFER_MAX, REVOKED_SECONDS
 from roboglot.media.stills import jpeg
 from roboglot.media.video import VideoStream, beside
+from roboglot.model.admission import Right
 from roboglot.model.components.sensing.camera import Camera
 from roboglot.model.components.sensing.detector import Detector
 from roboglot.model.components.sensing.vision import Vision
@@ -47,6 +48,8 @@ async def send_film(robot: Robot, receive: Receive, send: Send) -> None:
         gone.add_done_callback(lambda _: viewer.close())
         try:
             async for first in viewer:
+                if not robot.admission.may(Right.SEE):  # it was revoked meanwhile
+                    break
                 frame = (viewer.drain() or [first])[-1]
                 picture = await asyncio.to_thread(jpeg, frame, JPEG_QUALITY)
                 head = b"--%s\r\ncontent-type: image/jpeg\r\ncontent-length: %d\r\n\r\n" % (BOUNDARY, len(picture))
@@ -79,12 +82,22 @@ class Calls:
         call: VideoCall = webrtc.VideoCall(stream, robot.clock, lambda state: self._changed(call, late, state))
         late: asyncio.TimerHandle = asyncio.get_running_loop().call_later(CALL_SECONDS, self._end, call)
         self._calls.add(call)
+        self._look_after(robot, call)
         try:
             return await call.answer(offer)
         except webrtc.BadOffer as bad:
             late.cancel()
             self._end(call)
             raise Problem(400, f"the offer cannot be answered: {bad}") from None
+
+    def _look_after(self, robot: Robot, call: VideoCall) -> None:
+        """Hang up once the client that called may not see the robot any more; runs in that client's context."""
+        if call not in self._calls:
+            return
+        if robot.admission.may(Right.SEE):
+            asyncio.get_running_loop().call_later(REVOKED_SECONDS, self._look_after, robot, call)
+        else:
+            self._end(call)
 
     def _changed(self, call: VideoCall, late: asyncio.TimerHandle, state: str) -> None:
         if state == "connected":

@@ -10,6 +10,7 @@ NAME_MAX = 40  # characters of a person's name
 WISHES_MAX = 32  # commands of one page under way
 CALLS_MAX = 8  # pages that show live video by WebRTC
 CALL_SECONDS = 20.0  # in which such a call is connected
+REVOKED_SECONDS = 0.5  # between two looks at whether a caller may still see the robot
 OFFER_MAX = 64 * 1024  # characters of a page's offer of a call
 JPEG_QUALITY = 75
 THUMBNAIL_SIDE = 96  # pixels of the longer side of a map in the grid of robots
