@@ -15,11 +15,12 @@ async def test_a_call_ends_when_its_caller_may_see_no_more(monkeypatch: pytest.M
     monkeypatch.setattr("roboglot.console.camera.REVOKED_SECONDS", 0.0)
     answers, closed = iter([True, True, False]), asyncio.Event()
 
-    async def close() -> None:
-        closed.set()
+    class Call:
+        async def close(self) -> None:
+            closed.set()
 
     robot: Any = SimpleNamespace(admission=SimpleNamespace(may=lambda _right: next(answers)))
-    call: Any = SimpleNamespace(close=close)
+    call: Any = Call()
     calls = Calls()
     calls._calls.add(call)
     calls._look_after(robot, call)
