@@ -1,6 +1,6 @@
 """What recording costs and loses: share of a core for robots with lidars, bytes a minute, seconds lost by kill -9.
 
-.venv/bin/python -m benchmarks.recording [robots] [seconds] [kills]
+scripts/bench recording [robots] [seconds] [kills]
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from benchmarks._claim import Claims
+from _claim import Claims
 from roboglot.config import ConsoleConfig, RobotConfig, load_config, with_addresses
 from roboglot.recording.reader import read_messages
 from roboglot.runtime import Runtime

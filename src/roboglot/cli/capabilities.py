@@ -97,7 +97,7 @@ def page(tell: Callable[[int, str], None] = lambda _done, _name: None) -> str:
         "",
         "Made by `roboglot capabilities --write` from the code; do not edit. Columns are simulated bodies and drivers",
         "of real robots, rows the chapters of a protocol. A cell counts the requests that such a robot has the parts",
-        "for, as the handlers' sources name them: `12/14` is twelve of fourteen, `(5≈)` five of the twelve by a part",
+        "for, as its handlers declare them: `12/14` is twelve of fourteen, `(5≈)` five of the twelve by a part",
         "that is only nearly the model's. The others answer the protocol's own error, and so may a request that itself",
         "asks whether a part is there: it counts as done. What real robots refuse, and for want of which part, is",
         "listed below each table. What a protocol lacks on every robot is on [the coverage page](coverage.md).",

@@ -83,14 +83,14 @@ async def test_blocks_breakpoints_and_ends(bare_caller: Caller) -> None:
         await bare_caller("cyberdog.task.block", "\ud800")
 
 
-async def test_a_failed_call_colours_the_blocks_until_one_succeeds(bare_caller: Caller) -> None:
-    await bare_caller("cyberdog.motion.turn", 400)
-    await bare_caller("cyberdog.task.block", "a")
-    assert field(bare_caller.session.last_state, "code") == 1
-    await bare_caller("cyberdog.motion.set_log", True)
-    assert field(bare_caller.session.last_state, "code") == 1
-    await bare_caller("cyberdog.motion.turn", 0)
-    assert field(bare_caller.session.last_state, "code") == 0
+async def test_a_failed_call_colours_the_blocks_until_one_succeeds(caller: Caller) -> None:
+    await caller("cyberdog.motion.turn", 400)
+    await caller("cyberdog.task.block", "a")
+    assert field(caller.session.last_state, "code") == 1
+    await caller("cyberdog.motion.set_log", True)
+    assert field(caller.session.last_state, "code") == 1
+    await caller("cyberdog.motion.turn", 0)
+    assert field(caller.session.last_state, "code") == 0
 
 
 async def test_time_is_the_robots(bare_caller: Caller) -> None:

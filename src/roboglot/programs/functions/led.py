@@ -89,21 +89,21 @@ class HeldLights:
             self.free(zone)
 
 
-@ABILITIES.on("cyberdog.led.play")
+@ABILITIES.on("cyberdog.led.play", needs=(Light,))
 async def play(session: Session, target: int, effect: int) -> Record:
     """Show one of the system's effects until the next request, or until the program ends."""
     shown = (SYSTEM_EYES if ZONES.get(target) == "eyes" else SYSTEM_LINE).get(effect)
     return _show(session, target, *shown) if shown else _show(session, target, None, Colour())
 
 
-@ABILITIES.on("cyberdog.led.play_rgb")
+@ABILITIES.on("cyberdog.led.play_rgb", needs=(Light,))
 async def play_rgb(session: Session, target: int, effect: int, r: int, g: int, b: int) -> Record:
     """Show an effect in a colour of one's own (0 to 255 each) until the next request, or until the program ends."""
     look = (EYES if ZONES.get(target) == "eyes" else LINE).get(effect)
     return _show(session, target, look, Colour(r, g, b))
 
 
-@ABILITIES.on("cyberdog.led.freed")
+@ABILITIES.on("cyberdog.led.freed", needs=(Light,))
 async def freed(session: Session, target: int) -> Record:
     """Give the light back: it shows again what it did before the program took it."""
     if target not in ZONES:

@@ -43,11 +43,10 @@ async def turn(session: Session, angle: float = 0.0, duration: float = 1.0) -> R
     rate = min(abs(angle) / duration, top) if duration > 0 else top
 
     async def do() -> None:
+        driving = session.robot[Driving]
         if angle:
             yaw, speed = math.radians(angle), math.radians(rate)
-            await session.complete(
-                session.robot[Driving].move_by(Pose(yaw=yaw), yaw_speed=speed, source=session.source)
-            )
+            await session.complete(driving.move_by(Pose(yaw=yaw), yaw_speed=speed, source=session.source))
 
     return await servo(session, VARIABLE, do(), wrong)
 

@@ -68,7 +68,7 @@ class GestureWatch:
         return {name for name, stamp in self._seen.items() if stamp >= since}
 
 
-@ABILITIES.on("cyberdog.gesture.turn_on_recognition")
+@ABILITIES.on("cyberdog.gesture.turn_on_recognition", needs=(Vision,))
 async def turn_on_recognition(session: Session, duration: int = 60) -> Record:
     """Look for gestures for ``duration`` s (30 to 300), while the program goes on."""
     return _switched(lambda: session.part(GestureWatch).open(_seconds("duration", duration)))
@@ -80,7 +80,7 @@ async def turn_off_recognition(session: Session) -> Record:
     return _switched(lambda: session.part(GestureWatch).close())
 
 
-@ABILITIES.on("cyberdog.gesture.recognized")
+@ABILITIES.on("cyberdog.gesture.recognized", needs=(Vision,))
 async def recognized(session: Session, duration: int = 60, sensitivity: int = 1) -> Record:
     """Look for gestures for ``duration`` s and wait for any; one of the last ``sensitivity`` s counts, too."""
     try:
@@ -90,13 +90,13 @@ async def recognized(session: Session, duration: int = 60, sensitivity: int = 1)
     return await _wait(session, duration, sensitivity)
 
 
-@ABILITIES.on("cyberdog.gesture.recognized_any_gesture")
+@ABILITIES.on("cyberdog.gesture.recognized_any_gesture", needs=(Vision,))
 async def recognized_any_gesture(session: Session, timeout: int = 60, sensitivity: int = 1) -> Record:
     """Wait for any gesture (30 to 300 s) once recognition is on; none in time is all False, and no failure."""
     return await _wait(session, timeout, sensitivity)
 
 
-@ABILITIES.on("cyberdog.gesture.recognized_designated_gesture")
+@ABILITIES.on("cyberdog.gesture.recognized_designated_gesture", needs=(Vision,))
 async def recognized_designated_gesture(session: Session, timeout: int = 60, gesture_type: int = 0) -> Record:
     """Wait for one gesture (1 to 300 s) once recognition is on; none in time is all False, and no failure."""
     if not 1 <= gesture_type <= len(GESTURES):

@@ -106,7 +106,7 @@ async def get_training_words_set(session: Session) -> Record:
     return Record("TrainingWordsRecognizedSeviceResponse", fields)
 
 
-@ABILITIES.on("cyberdog.train.training_words_recognized")
+@ABILITIES.on("cyberdog.train.training_words_recognized", needs=(Hearing,))
 async def training_words_recognized(session: Session, timeout: int = 5) -> Record:
     """Wait until one of them is said (5 to 300 s); none in time is an empty one, and no failure."""
     outcome, word = state(), Record("MsgTrainingWords")

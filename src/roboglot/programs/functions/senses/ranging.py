@@ -73,7 +73,7 @@ class RangesOn:
             self._sensors.measure(False)
 
 
-@ABILITIES.on("cyberdog.ultrasonic.data")
+@ABILITIES.on("cyberdog.ultrasonic.data", needs=(RangeSensors,))
 async def ultrasonic(session: Session) -> Record:
     """Range now (attribute): m, inf where nothing came back; the defaults before the first measurement."""
     reading = session.part(RangesOn).reading()
@@ -92,7 +92,7 @@ async def ultrasonic(session: Session) -> Record:
     )
 
 
-@ABILITIES.on("cyberdog.ultrasonic.get_data")
+@ABILITIES.on("cyberdog.ultrasonic.get_data", needs=(RangeSensors,))
 async def next_ultrasonic(session: Session, timeout: int = 5) -> Record:
     """The next Range, or the last known one after ``timeout`` seconds."""
     ranges = session.part(RangesOn)

@@ -94,7 +94,7 @@ class ExerciseWatch:
             self._viewer.close()  # which ends the watching, too
 
 
-@ABILITIES.on("cyberdog.skeleton.turn_on_recognition")
+@ABILITIES.on("cyberdog.skeleton.turn_on_recognition", needs=(Vision,))
 async def turn_on_recognition(session: Session, sport_type: int, counts: int, timeout: int = 100) -> Record:
     """Count a sport (SkeletonType) up to ``counts`` (a plank's seconds) for at most ``timeout`` s, 5 to 300."""
     try:
@@ -117,7 +117,7 @@ async def instant_recognized(session: Session) -> Record:
     return _message(session, state())
 
 
-@ABILITIES.on("cyberdog.skeleton.blocking_recognized")
+@ABILITIES.on("cyberdog.skeleton.blocking_recognized", needs=(Vision,))
 async def blocking_recognized(session: Session, timeout: int = 100) -> Record:
     """Wait for the next repetition, second of a plank, or end of counting; at most ``timeout`` s, 5 to 300."""
     watch = session.part(ExerciseWatch)
@@ -131,7 +131,7 @@ async def blocking_recognized(session: Session, timeout: int = 100) -> Record:
     return _message(session, state())
 
 
-@ABILITIES.on("cyberdog.skeleton.sports_recognition", needs=(Speaker,))
+@ABILITIES.on("cyberdog.skeleton.sports_recognition", needs=(Speaker, Vision))
 async def sports_recognition(
     session: Session,
     sport_type: int,
