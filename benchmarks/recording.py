@@ -16,6 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from _claim import Claims
+
 from roboglot.config import ConsoleConfig, RobotConfig, load_config, with_addresses
 from roboglot.recording.reader import read_messages
 from roboglot.runtime import Runtime
