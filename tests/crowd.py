@@ -208,7 +208,7 @@ def _look(fleet: Fleet, walker: Walker) -> None:
 def _judge(fleet: Fleet, walker: Walker, outcome: Outcome) -> None:
     robot, name = walker.robot, f"{walker.robot.id} ({walker.robot.description.model}, {walker.role})"
     outcome.presses += walker.presses
-    if walker.shoved > SHOVED and not walker.told and Localization in robot:
+    if walker.shoved > SHOVED and not walker.told:
         outcome.silent.append(f"{name}: shoved by {walker.shoved:.2f} m")
     if walker.shoved > outcome.shoved:
         outcome.shoved, outcome.worst = walker.shoved, name

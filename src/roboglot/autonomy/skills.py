@@ -24,6 +24,7 @@ from roboglot.autonomy.navigation.navigation import GridNavigation
 from roboglot.autonomy.navigation.restricted import RestrictedAreas
 from roboglot.autonomy.navigation.sweeping import LaneSweeping
 from roboglot.autonomy.slam.belief import Belief
+from roboglot.autonomy.slam.inertial_displacement import InertialDisplacement
 from roboglot.autonomy.slam.localization import LidarLocalization
 from roboglot.autonomy.slam.mapping import LidarMapping
 from roboglot.autonomy.stairs.alignment import SeenStairAlignment
@@ -48,11 +49,13 @@ from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.motion.following import Following
+from roboglot.model.components.motion.legs import Legs
 from roboglot.model.components.motion.navigation import Navigation
 from roboglot.model.components.motion.stair_alignment import StairAlignment
 from roboglot.model.components.motion.sweeping import Sweeping
 from roboglot.model.components.motion.tag_docking import TagDocking
 from roboglot.model.components.sensing.hearing import Hearing
+from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.sensing.reflectors import Reflectors
@@ -94,6 +97,7 @@ class Autonomy:
         self._slam: Slam | None = None
         self._stop_treading: Callable[[], None] = lambda: None
         self._localization: LidarLocalization | None = None
+        self._shoves: InertialDisplacement | None = None
         if Hearing in robot and Settings in robot:
             robot.add(TrainingWords, HeardWords(robot))
         if Base not in robot or Odometry not in robot or Driving in robot:
@@ -104,6 +108,8 @@ class Autonomy:
             robot.add(StairAlignment, SeenStairAlignment(robot))
         if Lidar in robot:
             self._add_mapped(robot, driving)
+        elif Imu in robot and robot[Imu].averages and Legs not in robot:
+            self._shoves = InertialDisplacement(robot)
 
     def _add_mapped(self, robot: Robot, driving: OdometryDriving) -> None:
         """Add what a map makes possible."""
@@ -150,6 +156,8 @@ class Autonomy:
 
     async def start(self, *, wait: bool) -> None:
         """Load the kernels; return at once, or with ``wait`` when all is ready."""
+        if self._shoves is not None:
+            self._shoves.start()
         if self._course is None:
             return
         if self._loading is None:
@@ -166,7 +174,15 @@ class Autonomy:
         self._stop_treading()
         if self._slam is not None:
             self._slam.close()
-        for part in (self._delivery, self._docking, self._area_watch, self._landmarks, self._restricted, self._carried):
+        for part in (
+            self._delivery,
+            self._docking,
+            self._area_watch,
+            self._landmarks,
+            self._restricted,
+            self._carried,
+            self._shoves,
+        ):
             if part is not None:
                 part.close()
 

@@ -46,6 +46,8 @@ class ImuSection(Struct, frozen=True, forbid_unknown_fields=True):
 class SimulatedImu(Imu):
     """Sits in the torso, above base_link."""
 
+    averages = True
+
     def __init__(
         self,
         section: ImuSection,
