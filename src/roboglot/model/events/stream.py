@@ -73,28 +73,41 @@ class EventStream:
     def __init__(self) -> None:
         self._subscriptions: list[Subscription[Event]] = []
         self._listeners: list[tuple[type[Event], Callable[[Event], None]]] = []
+        self._receivers: dict[type[Event], tuple[Callable[[Event], None], ...]] = {}  # by what was published before
 
     def publish(self, event: Event) -> None:
         """Deliver ``event`` at once: listeners are called, subscriptions get it queued."""
-        for kind, listener in tuple(self._listeners):
-            if isinstance(event, kind):
-                listener(event)
-        for subscription in self._subscriptions:
-            if isinstance(event, subscription.types):
-                subscription.push(event)
+        receivers = self._receivers.get(type(event))
+        if receivers is None:
+            receivers = self._receivers[type(event)] = self._receivers_of(type(event))
+        for receive in receivers:
+            receive(event)
+
+    def _receivers_of(self, kind: type[Event]) -> tuple[Callable[[Event], None], ...]:
+        listeners = (listener for wanted, listener in self._listeners if issubclass(kind, wanted))
+        return (*listeners, *(s.push for s in self._subscriptions if issubclass(kind, s.types)))
 
     def subscribe(self, *types: type[E_], maxlen: int = QUEUE_MAX) -> Subscription[E_]:
         """A queue of all events of these types from now on; close it (or use ``with``)."""
         subscription = Subscription(self, types, maxlen)
         self._subscriptions.append(subscription)  # type: ignore[arg-type]
+        self._receivers.clear()
         return subscription
 
     def listen(self, kind: type[E_], listener: Callable[[E_], None]) -> Callable[[], None]:
         """Call ``listener`` on every event of ``kind``, in place; returns what ends it. Listeners must be quick."""
         entry: tuple[type[Event], Callable[[Event], None]] = (kind, listener)  # type: ignore[assignment]
         self._listeners.append(entry)
-        return lambda: self._listeners.remove(entry) if entry in self._listeners else None
+        self._receivers.clear()
+
+        def end() -> None:
+            if entry in self._listeners:
+                self._listeners.remove(entry)
+                self._receivers.clear()
+
+        return end
 
     def _forget(self, subscription: Subscription[E_]) -> None:
         if subscription in self._subscriptions:
             self._subscriptions.remove(subscription)  # type: ignore[arg-type]
+            self._receivers.clear()

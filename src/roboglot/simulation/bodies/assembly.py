@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from types import MethodType
 from typing import Any, TypeVar
 
 from roboglot.model.client_context import context_of
 from roboglot.simulation.bodies.part import Fitting, Part, ordered, parts
+from roboglot.simulation.bodies.schedule import Job, Schedule
 
 P = TypeVar("P")
-Sense = Callable[[float, float], None]
 
 
 class SimulatedRobot:
@@ -32,8 +32,10 @@ class SimulatedRobot:
             fitted.append((part, component))
         made = {part.name: component for part, component in fitted}
         controlled = ordered((part for part, _ in fitted if part.control), lambda part: part.control_after)
-        self._controls = [MethodType(part.control, made[part.name]) for part in controlled if part.control]
-        self._senses = [_sense_of(part, component) for part, component in fitted if part.sense]
+        tick = fitting.tick
+        self._controls = Schedule([_job(part, made[part.name], part.control) for part in controlled], tick)
+        sensed = [_job(part, component, part.sense, periodic=True) for part, component in fitted if part.sense]
+        self._senses = Schedule(sensed, tick)
         self._displaced = [MethodType(part.displaced, component) for part, component in fitted if part.displaced]
         self._detach = [MethodType(part.detach, component) for part, component in fitted if part.detach]
 
@@ -41,18 +43,21 @@ class SimulatedRobot:
         """Return the part of this class, if the body has one."""
         return self._fitting.find(kind)
 
-    def control(self, seconds: float) -> None:
+    def control(self) -> None:
         """Run before the physics of a tick."""
-        self._context.run(self._run_all, self._controls, seconds)
+        self._context.run(self._control)
 
-    def sense(self, stamp: float, seconds: float) -> None:
+    def sense(self, stamp: float) -> None:
         """Run after it."""
-        self._context.run(self._run_all, self._senses, stamp, seconds)
+        self._context.run(self._sense, stamp)
 
-    @staticmethod
-    def _run_all(parts: Sequence[Callable[..., None]], *times: float) -> None:
-        for part in parts:
-            part(*times)
+    def _control(self) -> None:
+        for _, control, seconds in self._controls.due():
+            control(seconds)
+
+    def _sense(self, stamp: float) -> None:
+        for _, sense, seconds in self._senses.due():
+            sense(stamp, seconds)
 
     def displaced(self) -> None:
         """Notify the parts that the robot was lifted and put elsewhere."""
@@ -65,26 +70,10 @@ class SimulatedRobot:
             detach()
 
 
-def _sense_of(part: Part[Any], component: Any) -> Sense:
-    sense: Sense = MethodType(part.sense, component) if part.sense else _nothing
-    return sense if part.every == 1 else Periodic(sense, part.every, part.first)
-
-
-def _nothing(stamp: float, seconds: float) -> None:
-    pass
-
-
-class Periodic:
-    """Runs a ``sense`` once in so many ticks, with the time since the last run."""
-
-    def __init__(self, sense: Sense, every: int, first: int) -> None:
-        self._sense, self._every, self._left = sense, every, first
-        self._since = 0.0
-
-    def __call__(self, stamp: float, seconds: float) -> None:
-        self._since += seconds
-        self._left -= 1
-        if not self._left:
-            self._left = self._every
-            seconds, self._since = self._since, 0.0
-            self._sense(stamp, seconds)
+def _job(part: Part[Any], component: Any, method: Callable[..., None] | None, *, periodic: bool = False) -> Job:
+    assert method is not None
+    duty = part.duty(component) if part.duty is not None else None
+    if not periodic:
+        return Job(MethodType(method, component), duty=duty)
+    every = part.every if isinstance(part.every, int) else part.every(component)
+    return Job(MethodType(method, component), every, part.first or every, duty)

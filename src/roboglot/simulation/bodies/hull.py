@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from roboglot.model.geometry import LEVEL as STRAIGHT
 from roboglot.model.geometry import Point, Pose, Twist, wrap_angle
 from roboglot.simulation.bodies.body import Body
+from roboglot.simulation.bodies.schedule import Duty
+from roboglot.simulation.bodies.support import GRAVITY, SETTLED, EdgeWatch, Support
 from roboglot.simulation.building.terrain import Ground
 
-GRAVITY = 9.81
 DRIVE_GAIN = 150.0  # 1/s: how fast the body takes on the wheels' velocity: in one step of physics, or it swings
 LEG_GAIN = 8000.0  # N/m, of the servo that holds the torso
 TORSO = 0.4  # of the mass; the rest is the chassis
@@ -66,7 +67,6 @@ class Hull:
         self._model, self._data, self._elevations, self._ground = model, data, elevations, ground
         self.name, self.body = name, body
         self._q, self._v = int(model.joint(f"{name} x").qposadr[0]), int(model.joint(f"{name} x").dofadr[0])
-        self._qpos, self._qvel = data.qpos, data.qvel
         first = model.actuator(f"{name} x").id
         self._drive = slice(first, first + 3)
         self._ctrl, self._applied = data.ctrl, data.qfrc_applied
@@ -74,6 +74,7 @@ class Hull:
         self._solid = [model.geom(f"{name} {part}").id for part in ("chassis", "torso")]
         self._tilts = ground.uneven
         self.wheels = [model.geom(f"{name} wheel {index}").id for index in range(4 if ground.uneven else 1)]
+        self.support = Support(model, name, self.mass, self.wheels)
         own = model.body_rootid[model.geom_bodyid] == model.body(name).id
         self.shape: list[int] = np.flatnonzero(own).tolist()  # all geoms, also those that bump into nothing
         self._forces = model.actuator_forcerange[self._drive].copy()
@@ -111,6 +112,8 @@ class Hull:
         self.before = self.motion  # the same a step ago
         self.gaze = LEVEL  # pitch and yaw of the gimbal, rad; a robot without looks straight ahead
         self.touches: list[Touch] = []  # what touches the hull now, docks left out
+        self.when_touched: list[Duty] = []  # begin when something touches the hull
+        self.edges = EdgeWatch(body.hull.radius)
 
     @property
     def geoms(self) -> list[int]:
@@ -121,13 +124,14 @@ class Hull:
 
     def place(self, pose: Pose, floor: int) -> None:
         """Put it there, standing still."""
+        self.support.release()
         height = self._elevations[floor]
         if self._tilts:
             wheels = [pose.compose(Pose(x, y)) for x, y in wheel_places(self.body)]
             height += max(self._ground.height(wheel.x, wheel.y, floor) for wheel in wheels)
-            self._qpos[self._q + 4 : self._q + 6] = 0.0
-        self._qpos[self._q : self._q + 4] = (pose.x, pose.y, height, pose.yaw)
-        self._qvel[self._rates] = 0.0
+            self._data.qpos[self._q + 4 : self._q + 6] = 0.0
+        self._data.qpos[self._q : self._q + 4] = (pose.x, pose.y, height, pose.yaw)
+        self._data.qvel[self._rates] = 0.0
         self.hand, self.overturned, self.tilt = None, False, LEVEL
         self.floor = floor
         self.look()
@@ -135,19 +139,20 @@ class Hull:
     def halt_at(self, pose: Pose) -> None:
         """Something stops it dead over the ground, here."""
         turned = self.turned + wrap_angle(pose.yaw - self.turned)
-        self._qpos[self._q], self._qpos[self._q + 1], self._qpos[self._q + 3] = pose.x, pose.y, turned
-        self._qvel[self._v], self._qvel[self._v + 1], self._qvel[self._v + 3] = 0.0, 0.0, 0.0
+        self._data.qpos[self._q], self._data.qpos[self._q + 1], self._data.qpos[self._q + 3] = pose.x, pose.y, turned
+        self._data.qvel[self._v], self._data.qvel[self._v + 1], self._data.qvel[self._v + 3] = 0.0, 0.0, 0.0
         self.look()
 
     def look(self) -> None:
         """Read from the physics where it is and how it moves."""
-        self.see(self._qpos.tolist(), self._qvel.tolist())
+        self.see(self._data.qpos.tolist(), self._data.qvel.tolist())
 
     def see(self, positions: list[float], velocities: list[float]) -> None:
         """Take where it is and how it moves from all that the physics has: once after every step."""
         place, way = self._level
         self.x, self.y, z, self.turned = positions[place]
         vx, vy, vz, turn = velocities[way]
+        rising = vz
         self._pose, self.before = None, self.motion
         if self._tilts and not self.overturned:
             q, v = self._q, self._v
@@ -162,6 +167,14 @@ class Hull:
         if not -0.05 <= z - self._counted <= 0.05:
             self._counted = z
             self.floor = max((i for i, height in enumerate(self._elevations) if height <= z + 0.5), default=0)
+        self.edges.look(self.x, self.y, self.floor)
+        support, edge = self.support, self.edges.near
+        if support.sprung:
+            self.loose = False
+            if edge or support.lifted(z):
+                support.release()
+        elif not (edge or self.loose or self.overturned) and -SETTLED <= rising <= SETTLED:
+            support.rest(z)
 
     @property
     def pose(self) -> Pose:
@@ -240,19 +253,22 @@ class Hull:
 
     def lift(self, height: float | None) -> None:
         """Hold it so high above where it is (m), or let go (None)."""
+        self.support.release()
         self.hand = None if height is None else self.elevation + height
         self.loose = True
         self._applied[self._rates] = 0.0
 
     def push(self, x: float, y: float, z: float) -> None:
         """Give it a blow (N s, base_link)."""
+        self.support.release()
         c, s = math.cos(self.turned), math.sin(self.turned)
         mass = self.mass
-        self._qvel[self._v : self._v + 3] += ((c * x - s * y) / mass, (s * x + c * y) / mass, z / mass)
+        self._data.qvel[self._v : self._v + 3] += ((c * x - s * y) / mass, (s * x + c * y) / mass, z / mass)
         self.loose = True
 
     def overturn(self, roll: float) -> None:
         """Lay it on a side or its back (rad; 0: on its wheels): the attitude changes, the shape in the physics not."""
+        self.support.release()
         self.overturned = abs(roll) > TIPPED
         self.tilt, self.tilting = (roll, 0.0), LEVEL
         self.loose = True
@@ -288,7 +304,7 @@ class Hull:
 
     def put_belly(self, height: float) -> None:
         """Have the torso at ``height`` m at once."""
-        self._qpos[self._belly] = height
+        self._data.qpos[self._belly] = height
         self.look()
         self.hold_belly(height)
 
@@ -304,13 +320,14 @@ class Hull:
 
     def leap(self, x: float, y: float, turn: float, airtime: float) -> None:
         """Take off at this velocity (base_link, m/s, rad/s) and fly for ``airtime`` s if the ground is level."""
+        self.support.release()
         c, s = math.cos(self.turned), math.sin(self.turned)
         up = GRAVITY * (airtime + float(self._model.opt.timestep)) / 2  # Euler's steps fall a little too fast
-        self._qvel[self._rates] = 0.0  # the torso has no way of its own any more: it takes the rest along
-        self._qvel[self._v : self._v + 4] = (c * x - s * y, s * x + c * y, up, turn)
+        self._data.qvel[self._rates] = 0.0  # the torso has no way of its own any more: it takes the rest along
+        self._data.qvel[self._v : self._v + 4] = (c * x - s * y, s * x + c * y, up, turn)
         self.loose = True
 
     def stop(self) -> None:
         """The feet catch it: no more motion over the ground from now on."""
-        self._qvel[self._v : self._v + 2] = 0.0
-        self._qvel[self._v + 3] = 0.0
+        self._data.qvel[self._v : self._v + 2] = 0.0
+        self._data.qvel[self._v + 3] = 0.0

@@ -21,6 +21,7 @@ from roboglot.model.components.component import Component
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.body import Body
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.schedule import Duty
 from roboglot.simulation.world.randomness import stream
 
 if TYPE_CHECKING:
@@ -68,8 +69,9 @@ class Part(Generic[P]):
     fit: makes the part, or returns None where it makes no sense.
     after: parts that are fitted, and whose ``sense`` runs, before this one's.
     control: called before the physics of every tick with its length (s), after the control of ``control_after``.
-    sense: called after the physics with the stamp and the time since the last call (s), every ``every`` ticks, the
-        first time in tick ``first``.
+    sense: called after the physics with the stamp and the time since the last call (s), every ``every`` ticks (or
+        as many as this answers for the part), the first time in tick ``first`` (0: when ``every`` have passed).
+    duty: answers whether the part has something to do; without one ``control`` and ``sense`` are always called.
     displaced: called when the robot was lifted and put elsewhere. ``detach``: called when the world ends.
     """
 
@@ -82,8 +84,9 @@ class Part(Generic[P]):
     control: Callable[[P, float], None] | None = None
     control_after: tuple[str, ...] = ()
     sense: Callable[[P, float, float], None] | None = None
-    every: int = 1
+    every: int | Callable[[P], int] = 1
     first: int = 1
+    duty: Callable[[P], Duty] | None = None
     displaced: Callable[[P], None] | None = None
     detach: Callable[[P], None] | None = None
 

@@ -15,7 +15,7 @@ from roboglot.model.components.motion.motions import MotionSpec, Sway
 from roboglot.model.components.motion.posture import Posture
 from roboglot.model.geometry import LEVEL, STILL, Orientation, Point, Pose, Twist
 from roboglot.simulation.bodies.footfalls import Order, Swings, lifted
-from roboglot.simulation.bodies.hull import GRAVITY
+from roboglot.simulation.bodies.support import GRAVITY
 
 CROUCH, PUSH, RECOVER = 0.20, 0.08, 0.25  # s: bending before a jump, stretching, straightening after it
 DIP = 0.08  # m of bending

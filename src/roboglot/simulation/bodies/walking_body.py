@@ -11,8 +11,9 @@ from roboglot.model.components.motion.gaits import GaitSpec
 from roboglot.model.components.motion.legs import FootLift, Posture
 from roboglot.model.errors import Refused
 from roboglot.model.geometry import Orientation, Twist
-from roboglot.simulation.bodies.hull import GRAVITY, Hull
+from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.performing import Body, Frame, Stance, Track, fall
+from roboglot.simulation.bodies.support import GRAVITY
 
 
 def swayed(body: Body, spec: GaitSpec, strides: float, velocity: Twist, stance: Stance) -> Body:

@@ -38,6 +38,10 @@ class Building:
         if world.lift is not None:
             self.lift = LiftCar(world, physics, Passengers(physics.hulls.values(), walkers, self._props))
         self.footing = Footing(world, self.lift)
+        if not physics.ground.uneven:
+            for hull in physics.hulls.values():
+                hull.edges.learn(self.footing.room)
+                hull.look()
 
     def move_dock(self, front: Pose, index: int, floor: int) -> None:
         """Have a dock stand with the middle of its front there. Raises NotFound."""

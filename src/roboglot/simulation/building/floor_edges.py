@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -33,6 +34,16 @@ class Footing:
         if not self._holes[floor] and (self._shaft is None or self._shaft.distance_to(x, y) > reach):
             return False
         return any(gap.distance_to(x, y) <= reach for gap in self._gaps(floor, elevation))
+
+    def room(self, x: float, y: float, floor: int) -> float:
+        """Metres to the nearest place where the floor may end, wherever the lift's car is."""
+        gaps = [*self._holes[floor], *([self._shaft] if self._shaft else [])]
+        nearest = min((gap.distance_to(x, y) for gap in gaps), default=math.inf)
+        edge = self._edges[floor]
+        if edge is not None:
+            inside = min(x - edge.x, edge.x + edge.width - x, y - edge.y, edge.y + edge.depth - y)
+            nearest = min(nearest, inside)
+        return nearest
 
     def carries(self, elevation: float) -> bool:
         """True if the lift's car is what one stands on who stands so high (m), between two floors."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.model.errors import NotFound
-from roboglot.simulation.bodies.hull import GRAVITY
+from roboglot.simulation.bodies.support import GRAVITY
 from roboglot.simulation.world.description import Thing as ThingSection
 from roboglot.simulation.world.description import WorldDescription
 

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.simulation.bodies.hull import GRAVITY, Hull
+from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.support import GRAVITY
 
 if TYPE_CHECKING:
     from roboglot.simulation.world.rays import Rays

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import mujoco
+import numpy as np
 
 from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Pose
@@ -36,6 +37,10 @@ class Physics:
             name: Hull(model, self._data, name, body, self._elevations, self.ground) for name, body in bodies.items()
         }
         self._hull_of = {geom: hull for hull in self.hulls.values() for geom in hull.geoms}
+        self._hulls_of = np.isin(np.arange(model.ngeom), list(self._hull_of))  # whether a geom is a hull's
+        self._shape_of = np.full(model.ngeom, -1)  # the first geom of the robot that a geom belongs to
+        for hull in self.hulls.values():
+            self._shape_of[hull.shape] = hull.shape[0]
         self._docks = {geom for geom in range(model.ngeom) if model.geom(geom).name.startswith("dock ")}
         self._persons = {
             int(model.body(f"person {n} {i}").geomadr[0])
@@ -78,13 +83,16 @@ class Physics:
                 meanwhile(TIMESTEP)
         positions, velocities = self._data.qpos.tolist(), self._data.qvel.tolist()
         loose = []
+        standing = self._feet
         for hull in self.hulls.values():
+            if hull.support.sprung:
+                standing -= len(hull.wheels)
             hull.see(positions, velocities)
             if hull.loose:
                 loose.append(hull)
         if loose:
             self._note_wheels(loose)
-        self._note_touches()
+        self._note_touches(standing)
 
     def _note_wheels(self, loose: list[Hull]) -> None:
         """Update which wheels of tilting hulls touch the ground."""
@@ -128,8 +136,11 @@ class Physics:
         assert self._car is not None
         self._data.ctrl[self._car[1]] = lift
 
-    def _note_touches(self) -> None:
-        """Update where something other than a dock presses on each hull, and until it is clear of that again."""
+    def _note_touches(self, feet: int) -> None:
+        """Update where something other than a dock presses on each hull, and until it is clear of that again.
+
+        ``feet``: how many may stand on floors.
+        """
         before = self._touched
         for hull in before:
             hull.touches = []
@@ -137,19 +148,27 @@ class Physics:
         data = self._data
         # A caster's contact is frictionless: one constraint. Only a touching hull makes more constraints than contacts
         # (limp legs do too, which costs a useless look) or more contacts than there are feet, and looking is dear.
-        if data.nefc <= data.ncon <= self._feet and not before:
+        if data.nefc <= data.ncon <= feet and not before:
             return
-        contact, hull_of = data.contact, self._hull_of
-        places: list[list[float]] = []
-        for i, (a, b) in enumerate(contact.geom.tolist()):
-            for mine, other in ((a, b), (b, a)):
-                if mine not in hull_of or other in self._docks:
-                    continue
-                touched = hull_of[mine]
-                if contact.dist[i] > 0.0 and touched not in before:
-                    continue
-                places = places or contact.pos.tolist()
-                x, y, _ = places[i]
-                where = touched.seen_from(x, y)
-                touched.touches.append(Touch(*where, other in self._persons, other in self._light))
-                self._touched.add(touched)
+        geoms, near = data.contact.geom, data.contact.dist <= 0.0
+        mine = self._hulls_of[geoms]
+        known = [hull.shape[0] for hull in before]
+        near |= np.isin(self._shape_of[geoms], known).any(axis=1) if known else False
+        pairs = np.flatnonzero(near & mine.any(axis=1))
+        if not len(pairs):
+            return
+        places = data.contact.pos[pairs].tolist()
+        distances = data.contact.dist[pairs].tolist()
+        for (a, b), (x, y, _), distance in zip(geoms[pairs].tolist(), places, distances, strict=True):
+            self._note_touch(a, b, (x, y), distance, before)
+            self._note_touch(b, a, (x, y), distance, before)
+
+    def _note_touch(self, mine: int, other: int, at: tuple[float, float], distance: float, before: set[Hull]) -> None:
+        touched = self._hull_of.get(mine)
+        if touched is None or other in self._docks or (distance > 0.0 and touched not in before):
+            return
+        if not touched.touches:
+            for duty in touched.when_touched:
+                duty.begin()
+        touched.touches.append(Touch(*touched.seen_from(*at), other in self._persons, other in self._light))
+        self._touched.add(touched)

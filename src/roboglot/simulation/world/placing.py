@@ -17,6 +17,7 @@ CONTACT_GAP = 0.005  # m between hull and dock at the start
 BESIDE = 0.3  # m between robots that start side by side
 SEARCH = 40.0  # m around the first robot
 SAME_ROOM = 5.0  # m around it that are looked through for a good place
+CLEAR = 0.3, 0.05  # m around a robot in a crowd, as long as there are such places
 AHEAD = 0.6  # m that a good place leaves free
 
 
@@ -90,7 +91,12 @@ class Places:
         near = (around.compose(Pose(i * step, j * step)) for i, j in rows if math.hypot(i, j) * step <= SAME_ROOM)
         return _Search(
             good=((place, floor) for place in near if self._good(place, around, floor, radius)),
-            rest=((around.compose(Pose(i * step, j * step)), floor) for i, j in rows),
+            rest=(
+                (place, floor)
+                for room in (*CLEAR, 0.0)
+                for place in (around.compose(Pose(i * step, j * step)) for i, j in rows)
+                if self.free(place, floor, radius + room)
+            ),
         )
 
     def _good(self, place: Pose, around: Pose, floor: int, radius: float) -> bool:

@@ -13,13 +13,8 @@ from typing import Any
 import mujoco
 
 from roboglot.simulation.bodies.body import Body
-from roboglot.simulation.bodies.hull import (
-    DRIVE_GAIN,
-    GRAVITY,
-    LEG_GAIN,
-    TORSO,
-    wheel_places,
-)
+from roboglot.simulation.bodies.hull import DRIVE_GAIN, LEG_GAIN, TORSO, wheel_places
+from roboglot.simulation.bodies.support import FOOT, GRAVITY
 from roboglot.simulation.building.blueprint import (
     Kind,
     Rectangle,
@@ -202,7 +197,7 @@ def _add_foot(body: Any, name: str, radius: float, at: tuple[float, float]) -> N
         type=mujoco.mjtGeom.mjGEOM_SPHERE,
         size=[radius, 0, 0],
         pos=[*at, radius],
-        contype=2,
+        contype=FOOT,
         conaffinity=0,
         condim=1,
         priority=1,

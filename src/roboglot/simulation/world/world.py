@@ -206,7 +206,7 @@ class World:
         stamp = self._origin + self._ticks * TICK
         robots = self._population.simulated.values()
         for robot in robots:
-            robot.control(TICK)
+            robot.control()
         self.faults.step(stamp)
         self.building.step(stamp, TICK)
         self._walk()
@@ -214,7 +214,7 @@ class World:
         beads = self._environment.beads
         self._physics.step(TICK, beads.fly if beads.flying else None)
         for robot in robots:  # all of one robot together: its data are in the cache then
-            robot.sense(stamp, TICK)
+            robot.sense(stamp)
 
     def _walk(self) -> None:
         if not self._walkers:

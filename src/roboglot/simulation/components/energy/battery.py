@@ -11,9 +11,10 @@ from msgspec import Meta, Struct
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.events import BatteryChanged, EventStream
 from roboglot.model.sensing import BatteryState, Supply
-from roboglot.simulation.bodies.hull import GRAVITY, Hull
+from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Fraction, NotNegative, Positive
+from roboglot.simulation.bodies.support import GRAVITY
 from roboglot.simulation.components.energy.dock_contact import SimulatedDockContact
 from roboglot.simulation.components.motion.base import SimulatedBase
 

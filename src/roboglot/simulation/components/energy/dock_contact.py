@@ -13,7 +13,9 @@ from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Positive
 
-FAR = 4  # ticks that pass until a robot 1 m away is looked at again
+NEAR = 1.0  # m along an axis from which a dock is felt for in every tick
+SELDOM = 0.5  # s until a robot far from docks is looked at again: a dock may be moved
+FASTEST = 5.0  # m/s that a robot may come nearer to a dock
 
 
 class DockContactSection(Struct, frozen=True, forbid_unknown_fields=True):
@@ -30,8 +32,8 @@ class SimulatedDockContact(DockContact):
         self, section: DockContactSection, hull: Hull, docks: Sequence[Sequence[Pose]], events: EventStream
     ) -> None:
         self._section, self._hull, self._docks, self._events = section, hull, docks, events
-        self._far = 0  # ticks that a dock is out of reach at least
-        self._docked = self._touches()
+        self._far = 0.0  # stamp up to which docks are out of reach
+        self._docked, _ = self._touches()
 
     @property
     def docked(self) -> bool:
@@ -39,26 +41,31 @@ class SimulatedDockContact(DockContact):
 
     def sense(self, stamp: float, _seconds: float) -> None:
         """Feel for a dock; while none is near, not in every tick."""
-        if self._far:
-            self._far -= 1
+        if stamp < self._far:
             return
-        touches = self._touches()
+        touches, away = self._touches()
+        self._far = stamp + away / FASTEST
         if touches != self._docked:
             self._docked = touches
             self._events.publish(DockContactChanged(stamp=stamp, docked=touches))
 
-    def _touches(self) -> bool:
-        hull = self._hull
+    def displaced(self) -> None:
+        """The robot was lifted and put elsewhere."""
+        self._far = 0.0
+
+    def _touches(self) -> tuple[bool, float]:
+        """Whether it touches a dock, and how far the next one is out of reach at least, m."""
+        hull, away = self._hull, SELDOM * FASTEST
         x, y, radius, near = hull.x, hull.y, hull.body.hull.radius, self._section.distance
-        self._far = FAR
         for dock in self._docks[hull.floor]:
-            if not (-1.0 <= x - dock.x <= 1.0 and -1.0 <= y - dock.y <= 1.0):
+            off = max(abs(x - dock.x), abs(y - dock.y)) - NEAR
+            away = min(away, max(0.0, off))
+            if off > 0.0:
                 continue
-            self._far = 0
             seen = hull.pose.relative_to(dock)
             if abs(seen.x - radius) <= near and abs(seen.y) <= near and abs(seen.yaw) <= self._section.angle:
-                return True
-        return False
+                return True, 0.0
+        return False, away
 
 
 def _fit(fit: Fitting) -> SimulatedDockContact:
@@ -71,4 +78,5 @@ PART = Part(
     section=DockContactSection,
     fit=_fit,
     sense=SimulatedDockContact.sense,
+    displaced=SimulatedDockContact.displaced,
 )

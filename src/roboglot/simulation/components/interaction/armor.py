@@ -22,6 +22,7 @@ from roboglot.model.events import ArmorHit, EventStream
 from roboglot.simulation.bodies.hull import Hull, rotation
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import NotNegative, Positive
+from roboglot.simulation.bodies.schedule import Duty
 from roboglot.simulation.components.motion.gimbal import SimulatedGimbal
 
 PROUD = 0.005  # m that plates stand out of the hull
@@ -63,6 +64,8 @@ class SimulatedArmor(Armor):
         self._sensitivity = 5
         self._deaf: dict[PlatePlace, float] = {}  # until when, robot time
         self._hits: list[tuple[PlatePlace, HitKind]] = []
+        self.duty = Duty()  # while something touches the hull or hit a plate
+        hull.when_touched.append(self.duty)
 
     @property
     def sensitivity(self) -> int:
@@ -132,6 +135,8 @@ class SimulatedArmor(Armor):
             hits, self._hits = self._hits, []
             for place, kind in hits:
                 self._events.publish(ArmorHit(stamp=stamp, place=place, kind=kind))
+        elif not self.hull.touches:
+            self.duty.end()
 
     def _feel(self, stamp: float, seconds: float) -> None:
         hull = self.hull
@@ -157,6 +162,7 @@ class SimulatedArmor(Armor):
     def _note(self, place: PlatePlace, kind: HitKind) -> None:
         if len(self._hits) < HIT_MAX:
             self._hits.append((place, kind))
+            self.duty.begin()
 
 
 def _fit(fit: Fitting) -> SimulatedArmor:
@@ -166,5 +172,11 @@ def _fit(fit: Fitting) -> SimulatedArmor:
 
 
 PART = Part(
-    name="armor", interface=Armor, section=ArmorSection, fit=_fit, after=("gimbal",), sense=SimulatedArmor.sense
+    name="armor",
+    interface=Armor,
+    section=ArmorSection,
+    fit=_fit,
+    after=("gimbal",),
+    sense=SimulatedArmor.sense,
+    duty=lambda armor: armor.duty,
 )

@@ -15,6 +15,7 @@ from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Positive
+from roboglot.simulation.bodies.schedule import Duty
 from roboglot.simulation.components.motion.gimbal import SimulatedGimbal
 from roboglot.simulation.world.beads import Beads
 
@@ -45,6 +46,7 @@ class SimulatedBlaster(Blaster):
         self._section, self._hull, self._gimbal, self._air = section, hull, gimbal, beads
         self._robot, self._random = robot, random
         self._beads, self._ammo = 1, section.magazine
+        self.busy = Duty()
         self._due, self._wait = 0, 0.0  # beads of the shot still to come, and s until the next may leave
 
     @property
@@ -70,6 +72,7 @@ class SimulatedBlaster(Blaster):
         if self._due:
             raise Busy("the last shot is still being fired")
         self._due = min(self._beads, self._ammo)
+        self.busy.begin()
         return self._due
 
     def cease(self) -> None:
@@ -86,6 +89,7 @@ class SimulatedBlaster(Blaster):
     def control(self, seconds: float) -> None:
         """Let a bead go when it is time."""
         if self.idle:
+            self.busy.end()
             return
         stamp = self._robot.clock.time()
         self._wait = max(0.0, self._wait - seconds)
@@ -116,4 +120,5 @@ PART = Part(
     after=("gimbal",),
     control=SimulatedBlaster.control,
     control_after=("gimbal",),
+    duty=lambda blaster: blaster.busy,
 )

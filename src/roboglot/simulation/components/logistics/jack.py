@@ -15,6 +15,7 @@ from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Positive
+from roboglot.simulation.bodies.schedule import Duty
 from roboglot.simulation.building.shelves import ShelfStand
 
 LOOK = 0.02  # s between steps
@@ -36,6 +37,7 @@ class SimulatedJack(Jack):
         self._position = 0.0
         self._moving = 0
         self._shelf: ShelfStand | None = None
+        self.carrying = Duty()  # while it holds a shelf
         self._offset = Pose()  # of the shelf in base_link
         self._free: tuple[Pose, frozenset[Hashable]] = Pose(), frozenset()  # where it was, and what the shelf met there
         self._alarm = ""
@@ -135,12 +137,14 @@ class SimulatedJack(Jack):
                     and self._lifted(shelf) > 0.0
                     and shelf.covers(self._hull.pose, self._hull.floor)
                 ):
+                    self.carrying.begin()
                     self._shelf, self._offset = shelf, shelf.pose.relative_to(self._hull.pose)
                     self._free = self._hull.pose, shelf.meets(shelf.pose, shelf.floor, 0.0)
                     self._tell()
         elif self._lifted(self._shelf) <= 0.0:
             self._shelf.move(self._shelf.pose, self._shelf.floor, 0.0)
             self._shelf = None
+            self.carrying.end()
             self._tell()
 
     def _tell(self) -> None:
@@ -161,5 +165,6 @@ PART = Part(
     section=JackSection,
     fit=_fit,
     sense=SimulatedJack.sense,
+    duty=lambda jack: jack.carrying,
     displaced=SimulatedJack.displaced,
 )

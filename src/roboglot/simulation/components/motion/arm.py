@@ -19,6 +19,7 @@ from roboglot.simulation.bodies.axis_motors import Axis, move
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Offset, Pair, Positive
+from roboglot.simulation.bodies.schedule import Duty
 
 
 class ArmSection(Struct, frozen=True, forbid_unknown_fields=True):
@@ -43,7 +44,7 @@ class SimulatedArm(Arm):
         self._section, self._hull, self._robot = section, hull, robot
         self._from = self._to = self.home
         self._way = Axis(0.0, math.inf, section.acceleration)
-        self._moving = False
+        self.moving = Duty()
 
     @property
     def position(self) -> ArmPosition:
@@ -77,7 +78,7 @@ class SimulatedArm(Arm):
 
     def control(self, seconds: float) -> None:
         """Go on along the way."""
-        if self._moving:
+        if self.moving.on:
             self._way.approach(self._length, self._section.speed, seconds)
 
     @property
@@ -89,14 +90,14 @@ class SimulatedArm(Arm):
             def begin() -> None:
                 self._from, self._to = self.position, goal
                 self._way.position = self._way.rate = 0.0
-                self._moving = True
+                self.moving.begin()
 
             await move(action, self._robot.clock, begin, lambda: self._way.position == self._length, self._halt)
 
         return self._robot.actions.start(name, run, resources={ARM}, goal=goal, source=source)
 
     def _halt(self) -> None:
-        self._moving = False
+        self.moving.end()
         self._way.rate = 0.0
 
     def _check(self, goal: ArmPosition) -> None:
@@ -113,4 +114,6 @@ def _fit(fit: Fitting) -> SimulatedArm:
     return SimulatedArm(fit.body[ArmSection], fit.hull, fit.robot)
 
 
-PART = Part(name="arm", interface=Arm, section=ArmSection, fit=_fit, control=SimulatedArm.control)
+PART = Part(
+    name="arm", interface=Arm, section=ArmSection, fit=_fit, control=SimulatedArm.control, duty=lambda arm: arm.moving
+)

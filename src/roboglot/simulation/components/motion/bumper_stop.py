@@ -7,6 +7,7 @@ from roboglot.model.components.motion.driving import BASE
 from roboglot.model.errors import Collided
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.schedule import Duty
 from roboglot.simulation.components.motion.base import SimulatedBase
 from roboglot.simulation.components.sensing.bumper import SimulatedBumper
 
@@ -20,11 +21,14 @@ class BumperStop:
 
     def __init__(self, robot: Robot, base: SimulatedBase, bumper: SimulatedBumper) -> None:
         self._robot, self._base, self._bumper = robot, base, bumper
+        self.duty = Duty()
+        bumper.reactions.append(self.duty)
 
     def sense(self, _stamp: float, _seconds: float) -> None:
-        """Look after the bumper did, every tick."""
+        """Look after the bumper did, while it feels something."""
         base, bumper = self._base, self._bumper
         if not bumper.touched:
+            self.duty.end()
             return
         base.touch(bumper.bearings)
         if not base.collides:
@@ -41,4 +45,10 @@ def _fit(fit: Fitting) -> BumperStop | None:
     return BumperStop(fit.robot, fit.get(SimulatedBase), bumper) if bumper else None
 
 
-PART = Part(name="bumper_stop", fit=_fit, after=("base", "bumper", "odometry"), sense=BumperStop.sense)
+PART = Part(
+    name="bumper_stop",
+    fit=_fit,
+    after=("base", "bumper", "odometry"),
+    sense=BumperStop.sense,
+    duty=lambda stop: stop.duty,
+)

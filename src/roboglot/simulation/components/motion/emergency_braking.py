@@ -14,6 +14,7 @@ from roboglot.model.events import EventStream, ObstacleBraked
 from roboglot.model.sensing import LaserScan
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Positive
+from roboglot.simulation.bodies.schedule import Duty
 from roboglot.simulation.components.motion.base import SimulatedBase
 
 WHO = "emergency braking"
@@ -36,17 +37,19 @@ class SimulatedEmergencyBraking(EmergencyBraking):
         self, section: EmergencyBrakingSection, radius: float, base: SimulatedBase, lidar: Lidar, events: EventStream
     ) -> None:
         self._section, self._radius, self._base, self._lidar, self._events = section, radius, base, lidar, events
-        self._enabled, self._braking = section.on, False
+        self.duty, self._braking = Duty(on=section.on), False
         self._seen: LaserScan | None = None
         self._free = (math.inf, math.inf)  # m ahead of and behind the hull
 
     @property
     def enabled(self) -> bool:
-        return self._enabled
+        return self.duty.on
 
     def enable(self, on: bool) -> None:
-        self._enabled = on
-        if not on:
+        if on:
+            self.duty.begin()
+        else:
+            self.duty.end()
             self._hold(0.0, ahead=False, behind=False)
 
     @property
@@ -56,7 +59,7 @@ class SimulatedEmergencyBraking(EmergencyBraking):
     def sense(self, stamp: float, _seconds: float) -> None:
         """Look ahead, if driving or held back."""
         speed = self._base.velocity.x
-        if not self._enabled or (abs(speed) < SLOW and not self._braking):
+        if not self.duty.on or (abs(speed) < SLOW and not self._braking):
             return
         scan = self._lidar.scan
         if scan is not self._seen:
@@ -99,4 +102,5 @@ PART = Part(
     fit=_fit,
     after=("base", "lidar"),
     sense=SimulatedEmergencyBraking.sense,
+    duty=lambda braking: braking.duty,
 )

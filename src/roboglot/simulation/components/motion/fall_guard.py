@@ -5,6 +5,7 @@ from __future__ import annotations
 from roboglot.model.errors import Refused
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.schedule import Duty
 from roboglot.simulation.building.floor_edges import Footing
 from roboglot.simulation.components.motion.base import SimulatedBase
 
@@ -17,10 +18,13 @@ class FallGuard:
 
     def __init__(self, hull: Hull, base: SimulatedBase, footing: Footing) -> None:
         self._hull, self._base, self._footing = hull, base, footing
+        self.duty = hull.edges.call(Duty())
 
     def sense(self, _stamp: float, _seconds: float) -> None:
-        """Look after every tick."""
+        """Look after every tick in which the floor may end near."""
         hull = self._hull
+        if not hull.edges.near:
+            self.duty.end()
         if hull.rise < FALLEN_BELOW and hull.hand is None and not self._footing.carries(hull.elevation):
             self._base.lock(FALLEN, Refused("the robot fell down"))
             self._base.cut()
@@ -35,5 +39,10 @@ def _fit(fit: Fitting) -> FallGuard:
 
 
 PART = Part(
-    name="fall_guard", fit=_fit, after=("base", "odometry"), sense=FallGuard.sense, displaced=FallGuard.displaced
+    name="fall_guard",
+    fit=_fit,
+    after=("base", "odometry"),
+    sense=FallGuard.sense,
+    displaced=FallGuard.displaced,
+    duty=lambda guard: guard.duty,
 )

@@ -63,16 +63,20 @@ class _Aim:
     frame: Frame = Frame.WORLD
 
 
+UNAIMED = (None, None)
+
+
 class SimulatedGimbal(Gimbal):
     """Keeps the axes' angles relative to the body; what is not aimed stays where it points in the world."""
 
     def __init__(self, section: GimbalSection, hull: Hull, base: SimulatedBase, robot: Robot) -> None:
         side = section.sideways
         self.limits = GimbalLimits(GimbalAngles(-section.up, -side), GimbalAngles(section.down, side), section.speed)
+        self._top_speed = section.speed
         self._section, self._hull, self._base, self._robot = section, hull, base, robot
         self._pitch = Axis(-section.up, section.down, section.acceleration)
         self._yaw = Axis(-side, side, section.acceleration)
-        self._aims: tuple[_Aim | None, _Aim | None] = (None, None)  # of pitch and yaw
+        self._aims: tuple[_Aim | None, _Aim | None] = UNAIMED  # of pitch and yaw
         self._turning: Action | None = None  # the newest action of set_speed
         self._mode = FollowMode.CHASSIS_LEAD
         self._suspended = False
@@ -263,6 +267,9 @@ class SimulatedGimbal(Gimbal):
         if self._resting and not turn and hull.tilt is LEVEL:
             return
         self._since_start += turn
+        if hull.tilt is LEVEL and self._plain and not self._lean:
+            hull.gaze = self._pitch.position, self._follow_body(turn, seconds)
+            return
         lean = 0.0 if hull.tilt is LEVEL else _lean(hull.tilt, self._yaw.position)
         leaning, self._lean = lean - self._lean, lean
         if self._suspended:
@@ -277,6 +284,21 @@ class SimulatedGimbal(Gimbal):
         rested = self._aims == (None, None) and not self._pitch.rate and not self._yaw.rate
         centred = self._mode is FollowMode.CHASSIS_LEAD and not self._yaw.position
         self._resting = rested and (centred or self._mode is FollowMode.FREE)
+
+    @property
+    def _plain(self) -> bool:
+        """True if all it does is to follow the chassis."""
+        unaimed = self._aims == UNAIMED and not self._pitch.rate
+        return unaimed and self._mode is FollowMode.CHASSIS_LEAD and not self._suspended
+
+    def _follow_body(self, turn: float, seconds: float) -> float:
+        """Hold the yaw against a turn of the body while coming back to its front; return it."""
+        axis = self._yaw
+        if turn:
+            axis.shift(-turn)
+        self._follow(axis, seconds)
+        self._resting = not axis.position and not axis.rate
+        return axis.position
 
     def displaced(self) -> None:
         """The robot was lifted and put elsewhere: the axes went with it."""
@@ -299,8 +321,7 @@ class SimulatedGimbal(Gimbal):
         if abs(axis.position) < SETTLED and abs(axis.rate) < FOLLOWING * SETTLED:
             axis.position = axis.rate = 0.0
             return
-        top = self.limits.speed
-        axis.run(max(-top, min(top, -FOLLOWING * axis.position)), seconds)
+        axis.run(max(-self._top_speed, min(self._top_speed, -FOLLOWING * axis.position)), seconds)
 
     def _steer(self) -> None:
         """Have the base turn after the gimbal, unless something else than hands drives it."""

@@ -16,9 +16,11 @@ from roboglot.model.components.motion.gripper import (
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.axis_motors import Axis, move
-from roboglot.simulation.bodies.hull import GRAVITY, Hull
+from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Positive
+from roboglot.simulation.bodies.schedule import Duty
+from roboglot.simulation.bodies.support import GRAVITY
 from roboglot.simulation.building.things import Thing, Things
 from roboglot.simulation.components.motion.arm import SimulatedArm
 
@@ -43,6 +45,7 @@ class SimulatedGripper(Gripper):
         self._jaws = Axis(0.0, section.opening, 10.0, position=section.opening)
         self._level = 1
         self._goal: float | None = None
+        self.busy = Duty()  # while the jaws move or hold something
         self.holds: Thing | None = None  # truth: what it carries
         self._grip: NDArray[np.float64] = np.zeros(3)  # where in the gripper's frame (base_link's axes) that sits
 
@@ -75,6 +78,8 @@ class SimulatedGripper(Gripper):
             middle, grip = self._hull.to_world(np.array((self._arm.mount, self._grip)))
             vx, vy, vz, _ = self._hull.motion
             self.holds.carry(self._hull.position + middle + grip, (vx, vy, vz))
+        elif self._goal is None:
+            self.busy.end()
 
     def _start(self, name: str, goal: float, level: int, source: str) -> Action:
         if not 1 <= level <= LEVEL_MAX:
@@ -83,6 +88,7 @@ class SimulatedGripper(Gripper):
         async def run(action: Action) -> None:
             def begin() -> None:
                 self._goal, self._level = goal, level
+                self.busy.begin()
 
             await move(action, self._robot.clock, begin, lambda: self._goal is None, self._halt)
 
@@ -147,4 +153,5 @@ PART = Part(
     after=("arm",),
     control=SimulatedGripper.control,
     control_after=("arm",),
+    duty=lambda gripper: gripper.busy,
 )

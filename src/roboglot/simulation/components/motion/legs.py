@@ -38,6 +38,7 @@ from roboglot.simulation.bodies.performing import (
 )
 from roboglot.simulation.bodies.posture_limits import STEP_SECONDS_MAX, added, check_lift, check_pose, check_steps, led
 from roboglot.simulation.bodies.readiness import check_fit, in_the_way
+from roboglot.simulation.bodies.schedule import Duty
 from roboglot.simulation.bodies.walking_body import (
     check_posture,
     followed,
@@ -75,6 +76,7 @@ class SimulatedLegs(Legs):
         self._lift = FootLift()
         self._still = self._strides = 0.0
         places = [wheel_places(hull.body)[index] for index in (1, 0, 3, 2)]  # in the order of Foot
+        self.duty = Duty(on=True)  # while the torso or the feet move
         self._feet = Feet([Point(x, y) for x, y in places], section.reach, hull.pose) if section.gait else None
         self.choreography = Choreography()
         self.off = ""  # why the motors have no power; empty: they have
@@ -157,6 +159,7 @@ class SimulatedLegs(Legs):
     async def _follow(self, action: Action, track: Track) -> None:
         """Wait until the body is there; for ever if something else moves it now."""
         self._track = track
+        self.duty.begin()
         try:
             await followed(track, action, self._clock, LOOK)
         finally:
@@ -178,6 +181,7 @@ class SimulatedLegs(Legs):
         if posture is self._posture:
             return
         self._posture = posture
+        self.duty.begin()
         if posture is Posture.STANDING:
             self._base.unlock(LEGS)
         else:
@@ -209,6 +213,7 @@ class SimulatedLegs(Legs):
         self._still = 0.0
         if (gait, lift) != (self._gait, self._lift) or gait is not None:
             self._gait, self._lift = gait, lift
+            self.duty.begin()
             self._base.walk(GAITS[gait].clamp if gait else None)
             if self._feet:
                 self._feet.narrow(lift.inward)
@@ -266,6 +271,7 @@ class SimulatedLegs(Legs):
         begin = self._hull.pose
         performance = self._performance = Performance(make())
         self._performing = motion
+        self.duty.begin()
         try:
             await self._until_over(performance)
         except asyncio.CancelledError:
@@ -312,6 +318,8 @@ class SimulatedLegs(Legs):
         elif self._track:
             self._take(self._body)
         self._step(seconds)
+        if not (self._gait or self._track or self._hull.effort) and self._body is self._taken:
+            self.duty.end()
 
     def _step(self, seconds: float, frame: Frame | None = None) -> None:
         """The feet follow what the body does."""
@@ -391,4 +399,5 @@ PART = Part(
     after=("base",),
     control=SimulatedLegs.control,
     control_after=("gimbal",),
+    duty=lambda legs: legs.duty,
 )

@@ -7,9 +7,10 @@ import math
 from msgspec import Struct
 
 from roboglot.model.components.motion.motion_status import MotionFlags, MotionStatus
-from roboglot.simulation.bodies.hull import GRAVITY, Hull
+from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Positive
+from roboglot.simulation.bodies.support import GRAVITY
 from roboglot.simulation.components.motion.base import SimulatedBase
 from roboglot.simulation.components.sensing.imu import SimulatedImu
 

@@ -13,6 +13,7 @@ from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.axis_motors import Axis, move
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Count, Positive
+from roboglot.simulation.bodies.schedule import Duty
 
 
 class ServosSection(Struct, frozen=True, forbid_unknown_fields=True):
@@ -33,6 +34,7 @@ class SimulatedServos(Servos):
         self._axes = [Axis(-math.inf, math.inf, section.acceleration) for _ in range(section.count)]
         self._goals: dict[int, tuple[float, float]] = {}  # index: angle (unwrapped) and top speed
         self._speeds: dict[int, float] = {}
+        self.turning = Duty()
         self._turning: dict[int, Action] = {}  # the newest actions of set_speed
 
     def angle(self, number: int) -> float:
@@ -53,6 +55,7 @@ class SimulatedServos(Servos):
 
             def begin() -> None:
                 self._goals[index] = goal, top
+                self.turning.begin()
 
             await move(action, self._robot.clock, begin, lambda: axis.position == goal, lambda: self._halt(index))
 
@@ -72,6 +75,7 @@ class SimulatedServos(Servos):
         async def run(action: Action) -> None:
             def turn() -> bool:
                 self._speeds[index] = rate = float(action.goal)  # type: ignore[arg-type]
+                self.turning.begin()
                 return rate == 0.0
 
             await move(action, self._robot.clock, lambda: None, turn, lambda: self._halt(index))
@@ -98,6 +102,8 @@ class SimulatedServos(Servos):
         self._goals.pop(index, None)
         self._speeds.pop(index, None)
         self._axes[index].rate = 0.0
+        if not self._goals and not self._speeds:
+            self.turning.end()
 
     def _index(self, number: int) -> int:
         if not 1 <= number <= self.count:
@@ -114,4 +120,11 @@ def _fit(fit: Fitting) -> SimulatedServos:
     return SimulatedServos(fit.body[ServosSection], fit.robot)
 
 
-PART = Part(name="servos", interface=Servos, section=ServosSection, fit=_fit, control=SimulatedServos.control)
+PART = Part(
+    name="servos",
+    interface=Servos,
+    section=ServosSection,
+    fit=_fit,
+    control=SimulatedServos.control,
+    duty=lambda servos: servos.turning,
+)

@@ -11,6 +11,7 @@ from roboglot.model.events import BumperPressed, BumperReleased, EventStream
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Positive
+from roboglot.simulation.bodies.schedule import Duty
 
 
 class BumperSection(Struct, frozen=True, forbid_unknown_fields=True):
@@ -30,7 +31,10 @@ class SimulatedBumper(Bumper):
     def __init__(self, hull: Hull, events: EventStream) -> None:
         self._hull, self._events = hull, events
         self._pressed: frozenset[str] = frozenset()
-        self.stuck: frozenset[str] = frozenset()  # zones whose switches hang
+        self._stuck: frozenset[str] = frozenset()
+        self.duty = Duty()  # while something touches the hull, or a switch hangs
+        hull.when_touched.append(self.duty)
+        self.reactions: list[Duty] = []  # of those that look at it while it has a duty
         self.masked: frozenset[str] = frozenset()  # zones that report nothing
         self.touched = False  # whether the hull touches something, or did in the tick before
         self.bearings: tuple[tuple[float, float], ...] = ()  # where it is pressed: unit vectors, base_link
@@ -39,11 +43,24 @@ class SimulatedBumper(Bumper):
     def pressed(self) -> frozenset[str]:
         return self._pressed
 
+    @property
+    def stuck(self) -> frozenset[str]:
+        """Zones whose switches hang."""
+        return self._stuck
+
+    @stuck.setter
+    def stuck(self, zones: frozenset[str]) -> None:
+        self._stuck = zones
+        self.duty.begin()
+
     def sense(self, stamp: float, _seconds: float) -> None:
         """Look at what touches."""
-        self.touched = bool(self._hull.touches or self._pressed or self.stuck)
+        self.touched = bool(self._hull.touches or self._pressed or self._stuck)
         if not self.touched:
+            self.duty.end()
             return
+        for duty in self.reactions:
+            duty.begin()
         touches = [(touch.x, touch.y) for touch in self._hull.touches if not touch.light]
         where = {place: zone_of(*place) for place in touches}
         pressed = self.stuck.union(where.values()) - self.masked
@@ -71,4 +88,11 @@ def _fit(fit: Fitting) -> SimulatedBumper:
     return SimulatedBumper(fit.hull, fit.robot.events)
 
 
-PART = Part(name="bumper", interface=Bumper, section=BumperSection, fit=_fit, sense=SimulatedBumper.sense)
+PART = Part(
+    name="bumper",
+    interface=Bumper,
+    section=BumperSection,
+    fit=_fit,
+    sense=SimulatedBumper.sense,
+    duty=lambda bumper: bumper.duty,
+)

@@ -11,6 +11,7 @@ from roboglot.model.events import CliffCleared, CliffDetected, EventStream
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import NotNegative
+from roboglot.simulation.bodies.schedule import Duty
 from roboglot.simulation.building.floor_edges import Footing
 from roboglot.simulation.components.motion.base import SimulatedBase
 
@@ -40,20 +41,33 @@ class SimulatedCliff(Cliff):
         self._hull, self._base, self._footing, self._events = hull, base, footing, events
         self._reach = hull.body.hull.radius + section.ahead
         self._detected: frozenset[str] = frozenset()
-        self.fooled: frozenset[str] = frozenset()  # zones that see a drop where none is
+        self._fooled: frozenset[str] = frozenset()
+        self.duty = hull.edges.call(Duty(), self._reach)
         self.masked: frozenset[str] = frozenset()  # zones that report nothing
 
     @property
     def detected(self) -> frozenset[str]:
         return self._detected
 
+    @property
+    def fooled(self) -> frozenset[str]:
+        """Zones that see a drop where none is."""
+        return self._fooled
+
+    @fooled.setter
+    def fooled(self, zones: frozenset[str]) -> None:
+        self._fooled = zones
+        self.duty.begin()
+
     def sense(self, stamp: float, _seconds: float) -> None:
         """Look down."""
         hull = self._hull
         near = self._footing.ends_near(hull.x, hull.y, hull.floor, hull.elevation, self._reach)
-        if not near and not self._detected and not self.fooled:
+        if not near and not self._detected and not self._fooled:
+            if not hull.edges.near:
+                self.duty.end()
             return
-        seen = (self._look() if near else self.fooled) - self.masked
+        seen = (self._look() if near else self._fooled) - self.masked
         before, self._detected = self._detected, seen
         if seen == before:
             return
@@ -67,7 +81,7 @@ class SimulatedCliff(Cliff):
     def _look(self) -> frozenset[str]:
         pose, floor, elevation = self._hull.pose, self._hull.floor, self._hull.elevation
         c, s = math.cos(pose.yaw), math.sin(pose.yaw)
-        seen = set(self.fooled)
+        seen = set(self._fooled)
         for zone, (along, aside) in PLACES.items():
             x, y = self._reach * along, self._reach * aside
             if self._footing.missing(pose.x + c * x - s * y, pose.y + s * x + c * y, floor, elevation):
@@ -87,4 +101,5 @@ PART = Part(
     fit=_fit,
     after=("base", "fall_guard"),
     sense=SimulatedCliff.sense,
+    duty=lambda cliff: cliff.duty,
 )

@@ -15,14 +15,10 @@ from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.geometry import LEVEL as STRAIGHT
 from roboglot.model.geometry import Orientation, Vector3, wrap_angle
 from roboglot.model.sensing import ImuReading, RawImu
-from roboglot.simulation.bodies.hull import (
-    GRAVITY,
-    LEVEL,
-    Hull,
-    rotation,
-)
+from roboglot.simulation.bodies.hull import LEVEL, Hull, rotation
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import NotNegative
+from roboglot.simulation.bodies.support import GRAVITY
 
 ACCELERATION_UNIT = GRAVITY / 8192  # of a converter of 16 bits that goes to 4 g
 RATE_UNIT = math.radians(1.0 / 65.5)  # to 500 degrees/s

@@ -54,9 +54,8 @@ class SimulatedLidar(Lidar):
     ) -> None:
         self._section, self._hull, self._sight = section, hull, sight
         self._odometry, self._events, self._random = odometry, events, random
-        self._period = max(1, round(1.0 / (section.rate * tick)))
-        self.rate = 1.0 / (self._period * tick)
-        self._until_next = self._period
+        self.period = max(1, round(1.0 / (section.rate * tick)))  # ticks
+        self.rate = 1.0 / (self.period * tick)
         self._increment = math.tau / section.rays
         self._scan: LaserScan | None = None
         self.silent = False  # whether it stands still and sends nothing
@@ -66,11 +65,7 @@ class SimulatedLidar(Lidar):
         return self._scan
 
     def sense(self, stamp: float, _seconds: float) -> None:
-        """Take a scan when a turn has ended."""
-        self._until_next -= 1
-        if self._until_next:
-            return
-        self._until_next = self._period
+        """Take a scan: a turn has ended."""
         if self.silent:
             self._scan = None
             return
@@ -95,5 +90,12 @@ def _fit(fit: Fitting) -> SimulatedLidar:
 
 
 PART = Part(
-    name="lidar", interface=Lidar, section=LidarSection, fit=_fit, after=("odometry",), sense=SimulatedLidar.sense
+    name="lidar",
+    interface=Lidar,
+    section=LidarSection,
+    fit=_fit,
+    after=("odometry",),
+    sense=SimulatedLidar.sense,
+    every=lambda lidar: lidar.period,
+    first=0,
 )

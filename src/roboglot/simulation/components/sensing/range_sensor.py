@@ -18,6 +18,7 @@ from roboglot.model.geometry import Pose
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import NotNegative, Offset, Positive
+from roboglot.simulation.bodies.schedule import Duty
 
 if TYPE_CHECKING:
     from roboglot.simulation.world.rays import Rays
@@ -47,18 +48,21 @@ class SimulatedRangeSensors(RangeSensors):
         self._section, self._hull, self._rays, self._random = section, hull, rays, random
         self._period = max(1, round(1.0 / (section.rate * tick)))
         self._until_next = 1
-        self._measuring = False
+        self.duty = Duty()
         self._readings: dict[str, RangeReading] = {}
         spread = np.linspace(-section.fov / 2, section.fov / 2, RAYS if section.fov else 1)
         self._fans = {name: _fan(facing + spread) for name, facing in section.facings.items()}
 
     @property
     def measuring(self) -> bool:
-        return self._measuring
+        return self.duty.on
 
     def measure(self, on: bool) -> None:
-        self._measuring, self._until_next = on, 1
-        if not on:
+        self._until_next = 1
+        if on:
+            self.duty.begin()
+        else:
+            self.duty.end()
             self._readings.clear()
 
     def reading(self, name: str) -> RangeReading | None:
@@ -68,7 +72,7 @@ class SimulatedRangeSensors(RangeSensors):
 
     def sense(self, stamp: float, _seconds: float) -> None:
         """Measure all of them when it is time."""
-        if not self._measuring:
+        if not self.duty.on:
             return
         self._until_next -= 1
         if self._until_next:
@@ -106,4 +110,5 @@ PART = Part(
     section=RangeSensorsSection,
     fit=_fit,
     sense=SimulatedRangeSensors.sense,
+    duty=lambda sensors: sensors.duty,
 )

@@ -88,18 +88,13 @@ class HealthWatch:
     def __init__(self, robot: Robot, health: Health, hull: Hull) -> None:
         self._robot, self._health, self._hull = robot, health, hull
         self._watches: list[tuple[_Watch, Component]] | None = None
-        self._until = PERIOD
         for changed in (EmergencyStopChanged, BrakeChanged):  # these are seen elsewhere in the same instant
             robot.events.listen(changed, lambda _: self._look())
         self._pressed_since: dict[str, float] = {}
         self._scanned = 0.0
 
     def sense(self, stamp: float, _seconds: float) -> None:
-        """Look, if it is time."""
-        self._until -= 1
-        if self._until:
-            return
-        self._until = PERIOD
+        """Look."""
         if self._watches is None:
             robot, self._scanned = self._robot, stamp
             self._watches = [(watch, robot[watch.interface]) for watch in WATCHES if watch.interface in robot]
@@ -151,4 +146,6 @@ PART = Part(
         "range_sensors",
     ),
     sense=HealthWatch.sense,
+    every=PERIOD,
+    first=PERIOD,
 )

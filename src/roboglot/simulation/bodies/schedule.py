@@ -1,0 +1,142 @@
+"""Which of a robot's parts are called in a tick: those that are due and have something to do. Knows no part."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from operator import length_hint
+from typing import Any
+
+CYCLE_MAX = 100  # ticks after which the order of calls repeats itself at the latest
+Entry = tuple[int, Callable[..., None], float]  # rank, what is called, s since its last call
+
+
+class Duty:
+    """Whether a part has something to do; while it has not, it is not called (``Part.duty``)."""
+
+    __slots__ = ("changed", "on")
+
+    def __init__(self, *, on: bool = False) -> None:
+        self.on = on
+        self.changed: Callable[[bool], None] | None = None
+
+    def begin(self) -> None:
+        """Be called from now on, in this tick if its turn is still to come."""
+        if not self.on:
+            self._set(True)
+
+    def end(self) -> None:
+        """Be called no more. In the tick in which this is said one more call may come."""
+        if self.on:
+            self._set(False)
+
+    def _set(self, on: bool) -> None:
+        self.on = on
+        if self.changed is not None:
+            self.changed(on)
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One part's call: every so many ticks, from tick ``first`` on, while it has a duty; None: always."""
+
+    call: Callable[..., None]
+    every: int = 1
+    first: int = 1
+    duty: Duty | None = None
+
+    def due(self, tick: int) -> bool:
+        """True in the ticks in which it is called; they count from 1."""
+        return tick >= self.first and (tick - self.first) % self.every == 0
+
+
+class Schedule:
+    """Calls in the order of ``jobs``. The lists for all ticks of a cycle are made once, and when a duty changes."""
+
+    def __init__(self, jobs: Sequence[Job], tick: float) -> None:
+        self._seconds = tick
+        self._jobs = [_every_tick(job) if CYCLE_MAX % job.every else job for job in jobs]
+        self._start = max((job.first for job in self._jobs), default=1)  # from then on all goes round
+        self._length = self._start + math.lcm(*(job.every for job in self._jobs))
+        self._rounds: list[list[Entry]] = [self._round(tick) for tick in range(1, self._length + 1)]
+        self._next = self._at = 0
+        self._running: list[Entry] = []
+        self._pass: Iterator[Entry] = iter(self._running)
+        for rank, job in enumerate(self._jobs):
+            if job.duty is not None:
+                job.duty.changed = _Change(self, rank)
+
+    def due(self) -> Iterator[Entry]:
+        """What is to be called in the next tick: rank, call, seconds since its last one."""
+        self._at = at = self._next
+        self._next = at + 1 if at + 1 < self._length else self._start
+        self._running = self._rounds[at]
+        self._pass = iter(self._running)
+        return self._pass
+
+    def change(self, rank: int, on: bool) -> None:
+        """A part's duty began or ended."""
+        for index, entries in enumerate(self._rounds):
+            entry = self._entry(rank, index + 1)
+            if entry is None:
+                continue
+            place = bisect_left(entries, rank, key=_rank)
+            self._rounds[index] = [*entries[:place], *([entry] if on else ()), *entries[place + (not on) :]]
+            if on and index == self._at:
+                self._join(entry)
+
+    def _join(self, entry: Entry) -> None:
+        """Add it to the tick that is being run, unless its turn has passed."""
+        place = bisect_left(self._running, entry[0], key=_rank)
+        if place >= len(self._running) - length_hint(self._pass):
+            self._running.insert(place, entry)
+
+    def _round(self, tick: int) -> list[Entry]:
+        ranks = (rank for rank, job in enumerate(self._jobs) if job.duty is None or job.duty.on)
+        return [entry for rank in ranks if (entry := self._entry(rank, tick)) is not None]
+
+    def _entry(self, rank: int, tick: int) -> Entry | None:
+        job = self._jobs[rank]
+        if not job.due(tick):
+            return None
+        ticks = job.first if tick == job.first else job.every
+        return rank, job.call, sum([self._seconds] * ticks)  # added up as time is, to the last bit
+
+
+def _rank(entry: Entry) -> int:
+    return entry[0]
+
+
+@dataclass(frozen=True, slots=True)
+class _Change:
+    """Passes a change of a duty on to the schedule."""
+
+    schedule: Schedule
+    rank: int
+
+    def __call__(self, on: bool) -> None:
+        self.schedule.change(self.rank, on)
+
+
+def _every_tick(job: Job) -> Job:
+    """A job whose period does not fit into a cycle counts for itself."""
+    return Job(_Periodic(job.call, job.every, job.first), duty=job.duty)
+
+
+class _Periodic:
+    """Runs a call once in so many ticks, with the time since the last one as its last argument."""
+
+    def __init__(self, call: Callable[..., None], every: int, first: int) -> None:
+        self._call, self._every, self._left = call, every, first
+        self._since = 0.0
+
+    def __call__(self, *times: Any) -> None:
+        *stamp, seconds = times
+        self._since += seconds
+        self._left -= 1
+        if not self._left:
+            self._left = self._every
+            seconds, self._since = self._since, 0.0
+            self._call(*stamp, seconds)
