@@ -3,6 +3,7 @@ import * as Blockly from "/studio/vendor/blockly.mjs";
 import { effect, signal } from "@preact/signals";
 import { kept, language, say, t, theme as shade } from "../base.js";
 import { defineModule, newId, pythonOf } from "./blocks.js";
+import { together } from "./speed.js";
 import { found, noteUse, recentBlocks, theme, toolbox, wanted } from "./toolbox.js";
 
 export const look = kept("studio.look", "plain");
@@ -84,7 +85,7 @@ export function load(state, fresh = true) {
   const group = Blockly.Events.getGroup();
   try {
     Blockly.Events.setRecordUndo(false);
-    Blockly.serialization.workspaces.load(tidied(state), workspace);
+    together(() => Blockly.serialization.workspaces.load(tidied(state), workspace));
   } finally {
     Blockly.Events.setRecordUndo(true);
     Blockly.Events.setGroup(group);

@@ -1,0 +1,61 @@
+// What makes Blockly load many blocks quickly: texts are measured without asking for styles, and what blocks are called
+// for screen readers is made once, after they are there, instead of several times while they are put together.
+import * as Blockly from "/studio/vendor/blockly.mjs";
+
+const { Field, utils: { dom } } = Blockly;
+const SLICE = 8; // ms of work between two looks at what the person does
+/** What has no words yet. @type {Set<any>} */
+const waiting = new Set();
+let deferring = 0, making = /** @type {any} */ (null), due = false;
+
+let canvas = /** @type {Element | null} */ (null);
+const size = Field.prototype.updateSize_;
+// The quick measure fills the memory that the slow one, which has the browser work out all styles, looks into first.
+Field.prototype.updateSize_ = function (/** @type {number | undefined} */ margin) {
+  const c = this.getConstants();
+  if (deferring && c && this.textElement_) dom.getFastTextWidth(this.textElement_, c.FIELD_TEXT_FONTSIZE, c.FIELD_TEXT_FONTWEIGHT, c.FIELD_TEXT_FONTFAMILY);
+  size.call(this, margin);
+  canvas ??= document.querySelector(".blocklyComputeCanvas");
+  if (canvas?.isConnected) canvas.remove(); // it measures outside of the page, too, and there asks for no styles
+};
+
+for (const { prototype: made } of /** @type {any[]} */ ([Field, Blockly.BlockSvg, Blockly.RenderedConnection])) {
+  const now = made.recomputeAriaContext;
+  made.recomputeAriaContext = function () {
+    if (!deferring || making === this) return now.call(this);
+    waiting.add(this);
+    return false; // "it has no words yet", as before it is drawn
+  };
+}
+
+/** Do what makes many blocks; what they are called follows when the page has time. @template T @param {() => T} make @returns {T} */
+export function together(make) {
+  deferring += 1;
+  dom.startTextWidthCache();
+  try {
+    const made = make();
+    Blockly.renderManagement.triggerQueuedRenders();
+    return made;
+  } finally {
+    dom.stopTextWidthCache();
+    deferring -= 1;
+    later();
+  }
+}
+
+function later() {
+  if (due || !waiting.size) return;
+  due = true;
+  (window.requestIdleCallback ?? setTimeout)(() => { due = false; name(SLICE); later(); });
+}
+
+/** Name what waits, for so many ms. @param {number} most */
+export function name(most = Infinity) {
+  const end = performance.now() + most;
+  for (const one of waiting) {
+    if (performance.now() > end) return;
+    waiting.delete(one);
+    making = one;
+    try { if (!(one.getSourceBlock?.() ?? one).isDisposed?.()) one.recomputeAriaContext(); } catch { /* it was taken away meanwhile */ } finally { making = null; }
+  }
+}
