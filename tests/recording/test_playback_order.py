@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import heapq
+from collections.abc import Coroutine, Sequence
 
 import pytest
 from hypothesis import given
@@ -28,7 +30,9 @@ def pushing_session() -> list[Exchange]:
 
 async def ask(playback: Playback, text: bytes, *, reads: bool = False) -> list[tuple[bytes, str]]:
     operation = b" ".join(text.split()[:2]).decode()
-    return [tuple(reply) async for reply in playback.answer("robomaster", operation, text, reads=reads)]
+    return [
+        (reply.payload, reply.status) async for reply in playback.answer("robomaster", operation, text, reads=reads)
+    ]
 
 
 async def test_answers_and_pushes_come_at_their_times_with_the_clients_own_ids() -> None:
@@ -82,3 +86,96 @@ async def test_a_session_played_back_in_order_is_the_session(times: list[float],
         await clock.advance(6.0)
         answers += [payload for payload, _ in asking.result()]
     assert answers == [b"%d;" % index for index in range(len(texts))]
+
+
+class BusyClock(LockstepClock):
+    """Finds all that has become due at once, as a busy machine does: no task runs between two timers."""
+
+    async def advance(self, seconds: float) -> None:
+        await self._settle()
+        self._now += seconds
+        while self._heap and self._heap[0][0] <= self._now:
+            if callback := heapq.heappop(self._heap)[2].callback:
+                callback()
+        await self._settle()
+
+
+REQUESTS = {
+    "slamware": ("PUT /api/core/motion/v1/actions", b"POST /api/core/motion/v1/actions\n\n{}"),
+    "robomaster": ("chassis move", b"chassis move x 1"),
+    "cyberdog": ("6004", b"{}"),
+    "visual": ("task run", b'{"type":"task","operate":"run","id":"7","target_id":["t"]}'),
+}
+
+
+async def played(door: str, directions: Sequence[Direction], gaps: Sequence[float], busy: Sequence[float]) -> list[str]:
+    """What goes out, in order: the request is asked once, then time passes in the steps of ``busy``."""
+    rest, (operation, payload) = ("a", door, "127.0.0.1:5"), REQUESTS[door]
+    exchanges, now = [Exchange(0.0, *rest, "x", Direction.REQUEST, operation, payload)], 0.0
+    for index, (direction, gap) in enumerate(zip(directions, gaps, strict=True)):
+        now += gap
+        seconds = now if direction is Direction.REPLY else 0.0
+        exchanges.append(Exchange(now, *rest, "x", direction, operation, b"<%d>" % index, "ok", "", seconds))
+    clock, sent = BusyClock(), list[str]()
+    playback = Playback(exchanges, clock, 0.0)
+    playback.join(door, lambda _, message: sent.append(message.decode()))
+
+    async def serve() -> None:
+        async for reply in playback.answer(door, operation, payload, reads=False):
+            sent.append(reply.payload.decode())
+
+    serving = asyncio.create_task(serve())
+    for seconds in (*busy, 100.0):
+        await clock.advance(seconds)
+    await serving
+    return sent
+
+
+@pytest.mark.parametrize("door", REQUESTS)
+async def test_a_busy_machine_leaves_answers_before_the_pushes_that_followed(door: str) -> None:
+    order = (Direction.PUSH, Direction.REPLY, Direction.PUSH)
+    assert await played(door, order, (0.1, 0.1, 0.1), ()) == ["<0>", "<1>", "<2>"]
+    assert await played(door, order, (0.0, 0.0, 0.0), ()) == ["<0>", "<1>", "<2>"]
+
+
+@given(
+    st.lists(st.tuples(st.sampled_from((Direction.PUSH, Direction.REPLY)), st.floats(0.0, 0.5)), max_size=20),
+    st.lists(st.floats(0.0, 1.0), max_size=10),
+)
+async def test_what_follows_a_command_comes_in_the_recorded_order(
+    items: list[tuple[Direction, float]], busy: list[float]
+) -> None:
+    directions, gaps = [direction for direction, _ in items], [gap for _, gap in items]
+    assert await played("cyberdog", directions, gaps, busy) == [f"<{index}>" for index in range(len(items))]
+
+
+async def test_an_answer_waits_for_a_push_that_was_recorded_just_before_it() -> None:
+    rest = ("a", "visual", "front ends", "x")
+    asked = b'{"type":"task","operate":"inquiry","id":"%d","target_id":[]}'
+    exchanges = [
+        Exchange(0.0, *rest, Direction.REQUEST, *REQUESTS["visual"]),
+        Exchange(0.0, *rest, Direction.REPLY, "task run", b"started", "ok"),
+        Exchange(1.0, *rest, Direction.PUSH, "", b"stopped"),
+        Exchange(1.2, *rest, Direction.PUSH, "", b"state"),
+        Exchange(1.3, *rest, Direction.REQUEST, "task inquiry", asked % 1),
+        Exchange(1.3, *rest, Direction.REPLY, "task inquiry", b"list", "ok"),
+    ]
+    clock, sent = LockstepClock(), list[str]()
+    playback = Playback(exchanges, clock, 0.0)
+    playback.join("visual", lambda _, message: sent.append(message.decode()))
+
+    async def ask(operation: str, payload: bytes, *, reads: bool) -> None:
+        async for reply in playback.answer("visual", operation, payload, reads=reads):
+            sent.append(reply.payload.decode())
+
+    await ask_while(clock, ask(*REQUESTS["visual"], reads=False), 1.0)
+    await ask_while(clock, ask("task inquiry", asked % 2, reads=True), 0.3)
+    assert sent == ["started", "stopped", "state", "list"]
+    await ask_while(clock, ask("task inquiry", asked % 3, reads=True), 0.0)  # once more: at once
+    assert sent[4:] == ["list"]
+
+
+async def ask_while(clock: LockstepClock, asking: Coroutine[object, object, None], seconds: float) -> None:
+    task = asyncio.create_task(asking)
+    await clock.advance(seconds)
+    await task

@@ -11,10 +11,11 @@ from typing import NamedTuple
 
 
 class StandInReply(NamedTuple):
-    """One answer in the protocol's own bytes; ``status`` as in the tap."""
+    """One answer in the protocol's own bytes; ``status`` as in the tap; ``last``: no other follows."""
 
     payload: bytes
     status: str
+    last: bool = True
 
 
 class StandIn(ABC):
@@ -24,7 +25,8 @@ class StandIn(ABC):
     def answer(self, door: str, operation: str, payload: bytes, *, reads: bool) -> AsyncIterator[StandInReply]:
         """Yield the answers, each when it is time for it; ``reads``: the request changes nothing.
 
-        Raises NotFound for what it cannot answer.
+        Send each before you wait for anything else: so it keeps its place among the pushes. Raises NotFound for what
+        cannot be answered.
         """
 
     @abstractmethod

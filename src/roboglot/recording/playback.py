@@ -18,12 +18,13 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from roboglot.model.clock import Clock, Timer
+from roboglot.model.clock import Clock
 from roboglot.model.errors import NotFound
 from roboglot.model.stand_in import StandIn, StandInReply
 from roboglot.model.tap import Exchange
 from roboglot.recording.matching import Normal, normal, rewritten, without_numbers
 from roboglot.recording.reader import Asked, BadRecording, Recording, pair, read_recording
+from roboglot.recording.timeline import Timeline
 
 log = logging.getLogger(__name__)
 OFF = 0.1  # how far a number of a request may be from the recorded one: absolute
@@ -39,6 +40,7 @@ _time = re.compile(rb"(?<![\w.])1[5-9]\d{8}(?:\d{3}){0,3}(?![\w])")
 class _Door:
     """What one door was asked, and how far the session is."""
 
+    timeline: Timeline
     asked: list[tuple[Asked, Normal]] = field(default_factory=list)
     by_text: dict[str, list[int]] = field(default_factory=lambda: defaultdict(list))  # places in ``asked``
     by_form: dict[str, list[int]] = field(default_factory=lambda: defaultdict(list))
@@ -58,8 +60,7 @@ class Playback(StandIn):
     def __init__(self, exchanges: Sequence[Exchange], clock: Clock, epoch: float) -> None:
         """``epoch``: calendar time at the recording's robot time 0."""
         self._clock, self._epoch = clock, epoch
-        self._doors: dict[str, _Door] = defaultdict(_Door)
-        self._timers: list[Timer] = []
+        self._doors: dict[str, _Door] = defaultdict(lambda: _Door(Timeline(clock)))
         self.missing: list[tuple[str, str]] = []
         asked, pushes = pair(exchanges)
         for one in asked:
@@ -78,6 +79,7 @@ class Playback(StandIn):
         began = self._clock.time()
         live = normal(door, payload)
         kept = self._doors[door]
+        used = len(kept.used)
         place = self._find(kept, operation, live, reads=reads)
         if place is None:
             self._note_missing(door, operation, live)
@@ -87,12 +89,14 @@ class Playback(StandIn):
             if len(kept.ids) < IDS_MAX:
                 kept.ids[old] = new
         if not kept.begun or not reads:
-            self._schedule(kept, place if not reads else -1, asked.request.stamp)
+            self._schedule(kept, place if not reads else -1, asked.request.stamp, began)
         kept.begun = True
-        for reply in asked.replies:
-            await self._clock.sleep_until(began + max(0.0, reply.stamp - asked.request.stamp))
+        in_order = len(kept.used) > used  # not once more
+        for index, (number, reply) in enumerate(asked.numbered, 1):
+            due = began + max(0.0, reply.stamp - asked.request.stamp)
+            await kept.timeline.turn(due, number, in_order=in_order)
             text = rewritten(reply.payload, recorded.fresh, live.fresh)
-            yield StandInReply(self._now(text, reply.stamp), reply.status)
+            yield StandInReply(self._now(text, reply.stamp), reply.status, index == len(asked.numbered))
 
     def join(self, door: str, send: Callable[[str, bytes], None], reads: Collection[str] = ()) -> Callable[[], None]:
         """See ``StandIn``."""
@@ -103,9 +107,8 @@ class Playback(StandIn):
 
     def close(self) -> None:
         """Push no more."""
-        for timer in self._timers:
-            timer.cancel()
-        self._timers.clear()
+        for door in self._doors.values():
+            door.timeline.close()
 
     # -- which recorded request it is ----------------------------------------------------------------------------------
 
@@ -173,22 +176,19 @@ class Playback(StandIn):
 
     # -- what comes by itself ------------------------------------------------------------------------------------------
 
-    def _schedule(self, door: _Door, place: int, since: float) -> None:
-        """Let the pushes follow that followed this command, up to the next one."""
+    def _schedule(self, door: _Door, place: int, since: float, now: float) -> None:
+        """Let the pushes follow that followed this command, up to the next one; ``since`` then is ``now``."""
         first = door.asked[place][0].number if place >= 0 else -1
         last = math.inf
         for later in range(place + 1, len(door.asked)):
             if self._changes(door, door.asked[later][0].request):
                 last = door.asked[later][0].number
                 break
-        now = self._clock.time()
-        self._timers = [timer for timer in self._timers if not getattr(timer, "cancelled", bool)()]
         for number, push in door.pushes:
             if first < number < last and number not in door.scheduled:
                 door.scheduled.add(number)
-                self._timers.append(
-                    self._clock.call_at(now + max(0.0, push.stamp - since), partial(self._push, door, push))
-                )
+                due = now + max(0.0, push.stamp - since)
+                door.timeline.push(due, number, partial(self._push, door, push))
 
     def _push(self, door: _Door, push: Exchange) -> None:
         payload = rewritten(push.payload, tuple(door.ids), tuple(door.ids.values()))

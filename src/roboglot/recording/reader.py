@@ -80,11 +80,16 @@ class Recording:
 
 @dataclass(slots=True)
 class Asked:
-    """A request with all its replies, and its place in the recording."""
+    """A request with all its replies, and their places in the recording."""
 
     number: int
     request: Exchange
-    replies: list[Exchange] = field(default_factory=list)
+    numbered: list[tuple[int, Exchange]] = field(default_factory=list)
+
+    @property
+    def replies(self) -> list[Exchange]:
+        """The replies alone."""
+        return [reply for _, reply in self.numbered]
 
 
 def pair(exchanges: Sequence[Exchange]) -> tuple[list[Asked], list[tuple[int, Exchange]]]:
@@ -100,21 +105,21 @@ def pair(exchanges: Sequence[Exchange]) -> tuple[list[Asked], list[tuple[int, Ex
                 asked.append(found)
                 waiting.setdefault(key, []).append(found)
             case Direction.REPLY:
-                _answer(waiting.get(key, []), exchange)
+                _answer(waiting.get(key, []), number, exchange)
             case Direction.PUSH:
                 pushes.append((number, exchange))
     return asked, pushes
 
 
-def _answer(open_ones: list[Asked], reply: Exchange) -> None:
+def _answer(open_ones: list[Asked], number: int, reply: Exchange) -> None:
     """Give the reply to the request that it says it belongs to: by when that was asked."""
     if not open_ones:
         return
     began = reply.stamp - reply.seconds
     exact = [asked for asked in open_ones if abs(asked.request.stamp - began) <= 1e-6]
     # A dog's answers on the way do not say when they were asked for: they belong to the newest request.
-    best = min(exact, key=lambda asked: (len(asked.replies) > 0, asked.number)) if exact else open_ones[-1]
-    best.replies.append(reply)
+    best = min(exact, key=lambda asked: (len(asked.numbered) > 0, asked.number)) if exact else open_ones[-1]
+    best.numbered.append((number, reply))
     if len(open_ones) > 1 and best.request.door != "cyberdog":  # a dog answers one request more than once
         open_ones.remove(best)
     del open_ones[:-64]

@@ -78,15 +78,16 @@ async def _outcome(call: Call) -> object | None:
 
 async def _ask_stand_in(call: Call, stand_in: StandIn) -> object | None:
     """Have another answer in the robot's place: all but the last answer at once."""
-    operation, last = operations.get(call.code), None
+    operation = operations.get(call.code)
     if call.dog.robot.admission.asks:
         call.dog.robot.admission.check(DOOR, str(int(call.code)), operation.right if operation else Right.ADMIN)
     reads = operation is not None and operation.right is Right.SEE
     async for reply in stand_in.answer(DOOR, str(int(call.code)), call.text.encode(), reads=reads):
-        if last is not None:
-            await call.reply(last)
-        last = reply.payload.decode("utf-8", "replace")
-    return last
+        text = reply.payload.decode("utf-8", "replace")
+        if reply.last:
+            return text
+        await call.reply(text)
+    return None
 
 
 async def _answered(call: Call) -> object | None:
