@@ -15,7 +15,7 @@ from roboglot.model.geometry import LEVEL as STRAIGHT
 from roboglot.model.geometry import Point, Pose, Twist, wrap_angle
 from roboglot.simulation.bodies.body import Body
 from roboglot.simulation.bodies.schedule import Duty
-from roboglot.simulation.bodies.support import GRAVITY, SETTLED, EdgeWatch, Support
+from roboglot.simulation.bodies.support import GRAVITY, SETTLED, Nearness, Support
 from roboglot.simulation.building.terrain import Ground
 
 DRIVE_GAIN = 150.0  # 1/s: how fast the body takes on the wheels' velocity: in one step of physics, or it swings
@@ -113,7 +113,7 @@ class Hull:
         self.gaze = LEVEL  # pitch and yaw of the gimbal, rad; a robot without looks straight ahead
         self.touches: list[Touch] = []  # what touches the hull now, docks left out
         self.when_touched: list[Duty] = []  # begin when something touches the hull
-        self.edges = EdgeWatch(body.hull.radius)
+        self.edges, self.walls = Nearness(body.hull.radius), Nearness(body.hull.radius)
 
     @property
     def geoms(self) -> list[int]:
@@ -168,6 +168,8 @@ class Hull:
             self._counted = z
             self.floor = max((i for i, height in enumerate(self._elevations) if height <= z + 0.5), default=0)
         self.edges.look(self.x, self.y, self.floor)
+        if self.walls.look(self.x, self.y, self.floor):
+            self.support.walls(self.walls.near)
         support, edge = self.support, self.edges.near
         if support.sprung:
             self.loose = False

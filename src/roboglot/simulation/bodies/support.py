@@ -1,6 +1,7 @@
-"""What carries a robot: where the floor may end it stands on contacts, elsewhere the level floor is a spring.
+"""What a robot may meet where it is: floor and walls cost contacts only near edges and near walls.
 
-Contacts cost most of a step of the physics; a robot that rolls far from every edge needs none with the floor.
+Far from every edge the level floor is a spring. Contacts with the floor and the search for those with walls were most
+of a step of the physics.
 """
 
 from __future__ import annotations
@@ -11,26 +12,27 @@ from typing import Any
 from roboglot.simulation.bodies.schedule import Duty
 
 GRAVITY = 9.81
-FOOT = 2  # the bit of what stands on floors
+STANDS, FOOT, HANGS, MOVES = 1, 2, 4, 8  # bits of what meets what
 SPRING, DAMPER = 2500.0, 100.0  # 1/s2 and 1/s, of the floor per kg
 SETTLED, LIFTED = 1e-4, 1e-3  # m/s up to which it stands on the floor, and m by which it does not any more
-EDGE = 0.3  # m beyond the rim: if the floor ends there, it is looked at in every tick
+NEAR = 0.3  # m beyond the rim
+AGAIN = 0.1  # m that a robot goes near something until it is seen whether it still is
 
 
-class EdgeWatch:
-    """Whether the floor may end near a robot. Looks again only when it has gone as far as an edge was away."""
+class Nearness:
+    """Whether something of the building may be near a robot. Looks again only when it has gone as far as that was."""
 
     def __init__(self, radius: float) -> None:
-        self._zone = radius + EDGE  # m from the middle
+        self._zone = radius + NEAR  # m from the middle
         self._room: Callable[[float, float, int], float] | None = None
-        self._x = self._y = 0.0  # where it was looked for an edge last
+        self._x = self._y = 0.0  # where it was looked last
         self._floor = -1
-        self._free = -1.0  # m from there without one
+        self._free = 0.0  # m from there
         self._duties: list[Duty] = []
-        self.near = True  # before it knows where floors end, they may end anywhere
+        self.near = True  # before it knows where things are, they may be anywhere
 
     def call(self, duty: Duty, reach: float = 0.0) -> Duty:
-        """Have ``duty`` begin when the floor may end within ``reach`` m of the middle, or near the rim."""
+        """Have ``duty`` begin when it may be within ``reach`` m of the middle, or near the rim."""
         self._zone = max(self._zone, reach)
         self._duties.append(duty)
         if self.near:
@@ -38,36 +40,35 @@ class EdgeWatch:
         return duty
 
     def learn(self, room: Callable[[float, float, int], float]) -> None:
-        """Look from now on; ``room`` answers how far the floor's end is from a place, m."""
+        """Look from now on; ``room`` answers how far the next one is from a place, m."""
         self._room, self._floor = room, -1
 
-    @property
-    def level(self) -> bool:
-        """True if all ground is floor that ends where it is known to."""
-        return self._room is not None
-
-    def look(self, x: float, y: float, floor: int) -> None:
-        """The robot is there now."""
+    def look(self, x: float, y: float, floor: int) -> bool:
+        """Note that the robot is there now; True if that changed whether something may be near."""
         if floor == self._floor and abs(x - self._x) + abs(y - self._y) <= self._free:
-            return
+            return False
         if self._room is None:
-            return
+            return False
         self._x, self._y, self._floor = x, y, floor
-        self._free = self._room(x, y, floor) - self._zone
-        before, self.near = self.near, self._free <= 0.0
+        free = self._room(x, y, floor) - self._zone
+        before, self.near = self.near, free <= 0.0
+        self._free = AGAIN if self.near else free
         if self.near and not before:
             for duty in self._duties:
                 duty.begin()
+        return self.near is not before
 
 
 class Support:
-    """Switches one robot between contacts and the spring, without moving it."""
+    """Switches one robot between contacts and the spring, without moving it, and between walls and none."""
 
     def __init__(self, model: Any, name: str, mass: float, wheels: list[int]) -> None:
         joint = model.joint(f"{name} z")
         self._model, self._mass, self._wheels = model, mass, wheels
+        self._body, self._chassis = model.body(name).id, model.geom(f"{name} chassis").id
         self._joint, self._q, self._v = joint.id, int(joint.qposadr[0]), int(joint.dofadr[0])
         self._rest = 0.0  # where it stands on the spring, m
+        self._bits = STANDS | MOVES
         self.sprung = False
 
     def rest(self, z: float) -> None:
@@ -77,7 +78,7 @@ class Support:
         model.jnt_stiffness[self._joint] = self._mass * SPRING
         model.dof_damping[self._v] = self._mass * DAMPER
         model.qpos_spring[self._q] = z + GRAVITY / SPRING
-        model.geom_contype[self._wheels] = 0
+        self._meet()
 
     def lifted(self, z: float) -> bool:
         """True if something moved it off the floor, or into it."""
@@ -88,4 +89,15 @@ class Support:
         if self.sprung:
             self.sprung = False
             self._model.jnt_stiffness[self._joint] = self._model.dof_damping[self._v] = 0.0
-            self._model.geom_contype[self._wheels] = FOOT
+            self._meet()
+
+    def walls(self, near: bool) -> None:
+        """Have the physics look for contacts with walls and furniture, or not."""
+        self._bits = STANDS | MOVES if near else MOVES
+        self._meet()
+
+    def _meet(self) -> None:
+        foot = 0 if self.sprung else FOOT
+        self._model.geom_contype[self._wheels] = foot
+        self._model.geom_contype[self._chassis] = self._bits
+        self._model.body_contype[self._body] = self._bits | foot

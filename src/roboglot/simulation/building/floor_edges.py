@@ -1,4 +1,7 @@
-"""Where the floor ends: holes, the lift's shaft while the car is elsewhere, the edge of an open floor. World frame."""
+"""Where the floor ends: holes, the lift's shaft while the car is elsewhere, the edge of an open floor; where walls are.
+
+World frame.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +9,34 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from roboglot.simulation.building.blueprint import Rectangle, holes_of, shaft_of
+import numpy as np
+
+from roboglot.simulation.building.blueprint import Kind, Rectangle, holes_of, shaft_of, solids_of
 from roboglot.simulation.world.description import WorldDescription
 
 if TYPE_CHECKING:
     from roboglot.simulation.building.lift import LiftCar
 
 STEP = 0.03  # m that the car may be lower until that is a drop
+
+
+class Walls:
+    """How far walls and furniture are; what can be moved is none of them."""
+
+    def __init__(self, world: WorldDescription) -> None:
+        self._floors = []
+        for floor in world.floors:
+            solids = [s for s in solids_of(floor, world.lift, lift_here=True) if s.kind is not Kind.DOCK]
+            rows = [(s.pose.x, s.pose.y, math.cos(s.pose.yaw), math.sin(s.pose.yaw), *s.size[:2]) for s in solids]
+            self._floors.append(np.array(rows).reshape(-1, 6).T.copy())
+
+    def room(self, x: float, y: float, floor: int) -> float:
+        """Metres to the nearest; inf if there is none."""
+        at_x, at_y, c, s, width, depth = self._floors[floor]
+        dx, dy = x - at_x, y - at_y
+        along = np.maximum(0.0, np.abs(c * dx + s * dy) - width / 2)
+        aside = np.maximum(0.0, np.abs(c * dy - s * dx) - depth / 2)
+        return float(np.sqrt(np.min(along * along + aside * aside, initial=np.inf)))
 
 
 class Footing:

@@ -35,6 +35,7 @@ class Radio:
         self.mobile: Mobile = world.mobile
         self._walls = walls_of(world)
         self._aerials = [(Point(*point.at), point.power, away, point.ssid) for away, point in self.points]
+        self._ends = np.array([(point.x, point.y) for point, *_ in self._aerials]).reshape(-1, 2)
         self.traffic: list[SimulatedTrafficRadio] = []  # those of the robots
         self._leases: dict[str, list[str]] = {}
 
@@ -45,8 +46,11 @@ class Radio:
     def levels(self, at: Point, floor: int) -> dict[str, float]:
         """dBm of every network at a place: of the strongest of its access points."""
         found: dict[str, float] = {}
-        for point, power, away, ssid in self._aerials:
-            found[ssid] = max(self.heard(point, power, away, at, floor), found.get(ssid, -math.inf))
+        if not self._aerials:
+            return found
+        walls = crossings(self._walls[floor], self._ends, at).tolist()
+        for (point, power, away, ssid), between in zip(self._aerials, walls, strict=True):
+            found[ssid] = max(self._faded(point, power, away, at, floor, between), found.get(ssid, -math.inf))
         return found
 
     def lease(self, ssid: str, mac: str) -> str:
@@ -64,10 +68,14 @@ class Radio:
 
     def heard(self, point: Point, power: float, point_floor: int, at: Point, floor: int) -> float:
         """dBm at a place of a sender whose ``power`` is what one receives a metre away."""
+        return self._faded(point, power, point_floor, at, floor, crossed(self._walls[floor], point, at))
+
+    @staticmethod
+    def _faded(point: Point, power: float, point_floor: int, at: Point, floor: int, walls: int) -> float:
         slabs = abs(point_floor - floor)
         distance = math.hypot(point.distance_to(at), 3.0 * slabs)
         loss = 10 * EXPONENT * math.log10(max(1.0, distance))
-        return power - loss - SLAB_LOSS * slabs - WALL_LOSS * crossed(self._walls[floor], point, at)
+        return power - loss - SLAB_LOSS * slabs - WALL_LOSS * walls
 
 
 def walls_of(world: WorldDescription) -> list[NDArray[np.float64]]:
@@ -87,8 +95,15 @@ def walls_of(world: WorldDescription) -> list[NDArray[np.float64]]:
 
 def crossed(walls: NDArray[np.float64], a: Point, b: Point) -> int:
     """How many of the walls, as ``walls_of`` has them, lie between two points."""
+    return int(crossings(walls, np.array(((a.x, a.y),)), b)[0])
+
+
+def crossings(walls: NDArray[np.float64], ends: NDArray[np.float64], b: Point) -> NDArray[np.intp]:
+    """How many of the walls, as ``walls_of`` has them, lie between each of ``ends`` (n x 2) and one point."""
     x1, y1, x2, y2, wall_x, wall_y = walls
-    way_x, way_y = b.x - a.x, b.y - a.y
-    parts_points = (wall_x * (a.y - y1) - wall_y * (a.x - x1)) * (wall_x * (b.y - y1) - wall_y * (b.x - x1)) < 0
-    parts_walls = (way_x * (y1 - a.y) - way_y * (x1 - a.x)) * (way_x * (y2 - a.y) - way_y * (x2 - a.x)) < 0
-    return int(np.count_nonzero(parts_points & parts_walls))
+    x, y = ends[:, :1], ends[:, 1:]
+    way_x, way_y = b.x - x, b.y - y
+    parts_points = (wall_x * (y - y1) - wall_y * (x - x1)) * (wall_x * (b.y - y1) - wall_y * (b.x - x1)) < 0
+    parts_walls = (way_x * (y1 - y) - way_y * (x1 - x)) * (way_x * (y2 - y) - way_y * (x2 - x)) < 0
+    counts: NDArray[np.intp] = np.count_nonzero(parts_points & parts_walls, axis=1)
+    return counts

@@ -1,7 +1,7 @@
 """The world as a MuJoCo model: floors, solids, lift car, people, spare obstacles, robots. The only maker of geoms.
 
-Contacts by bits: a robot's chassis and things meet what STANDS; its torso, as wide as the chassis, only what HANGS
-above the chassis or moves; the casters that carry robots touch floors (bit 2) only.
+Contacts by bits: a robot's chassis and things meet what MOVES, and near walls what STANDS; its torso, as wide as the
+chassis, only what HANGS above the chassis or moves; the casters that carry robots touch floors only.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import mujoco
 
 from roboglot.simulation.bodies.body import Body
 from roboglot.simulation.bodies.hull import DRIVE_GAIN, LEG_GAIN, TORSO, wheel_places
-from roboglot.simulation.bodies.support import FOOT, GRAVITY
+from roboglot.simulation.bodies.support import FOOT, GRAVITY, HANGS, MOVES, STANDS
 from roboglot.simulation.building.blueprint import (
     Kind,
     Rectangle,
@@ -39,7 +39,6 @@ from roboglot.simulation.world.description import (
 
 TIMESTEP = 0.02 / 3  # s: a third of a tick, and of the time in which a contact gives way
 SLAB = 0.2
-STANDS, HANGS = 1, 4
 PIT = 1.2  # m below the lowest floor
 BELLY_PLAY = 0.002
 CASTER = 0.02
@@ -61,7 +60,7 @@ def build(world: WorldDescription, robots: Sequence[tuple[str, Body]]) -> Any:
         _add_car(spec, world.lift, world.elevation(world.lift.parked_at))
     for key in keys_of(world):
         body = root.add_body(name=key, mocap=True, pos=AWAY)
-        _add_standing(body, mujoco.mjtGeom.mjGEOM_BOX, [0.1, 0.1, 0.1], name=key)
+        _add_standing(body, mujoco.mjtGeom.mjGEOM_BOX, [0.1, 0.1, 0.1], STANDS | HANGS | MOVES, name=key)
     uneven = Ground(world).uneven
     for name, body in robots:
         _add_robot(spec, name, body, tilting=uneven)
@@ -100,11 +99,11 @@ def _add_floor(spec: Any, world: WorldDescription, number: int, floor: Floor, so
     for index, person in enumerate(floor.people):
         body = root.add_body(name=f"person {number} {index}", mocap=True, pos=AWAY)
         size = [person.radius, max(0.01, person.height / 2 - person.radius), 0]
-        _add_standing(body, mujoco.mjtGeom.mjGEOM_CAPSULE, size)
+        _add_standing(body, mujoco.mjtGeom.mjGEOM_CAPSULE, size, STANDS | HANGS | MOVES)
     return solids
 
 
-def _add_standing(body: Any, kind: Any, size: list[float], bits: int = STANDS | HANGS, **more: object) -> None:
+def _add_standing(body: Any, kind: Any, size: list[float], bits: int, **more: object) -> None:
     """A geom that robots bump into and rays hit."""
     body.add_geom(type=kind, size=size, contype=0, conaffinity=bits, friction=[0.3, 0.005, 0.0001], **more)
 
@@ -186,7 +185,7 @@ def _add_thing(root: Any, thing: Thing, elevation: float) -> None:
         )
     _add_foot(body, f"thing {thing.name} foot", thing.diameter / 4, (0.0, 0.0))
     height = thing.height - 0.002
-    _add_hull(body, f"thing {thing.name}", thing.diameter / 2, height, 0.002, thing.mass, STANDS | HANGS)
+    _add_hull(body, f"thing {thing.name}", thing.diameter / 2, height, 0.002, thing.mass, STANDS | HANGS | MOVES)
     body.pos = [*thing.at, elevation]
 
 
@@ -231,7 +230,9 @@ def _add_robot(spec: Any, name: str, body: Body, tilting: bool) -> None:
         _add_foot(chassis, f"{name} wheel 0", CASTER, (0.0, 0.0))
     travel = BUMPER_TRAVEL if body.get(BumperSection) else 0.0
     heavy, light = hull.mass * (1 - TORSO), hull.mass * TORSO
-    _add_hull(chassis, f"{name} chassis", hull.radius, hull.chassis_height, hull.clearance, heavy, STANDS, travel)
+    _add_hull(
+        chassis, f"{name} chassis", hull.radius, hull.chassis_height, hull.clearance, heavy, STANDS | MOVES, travel
+    )
     belly = body.legs.standing if body.legs else hull.height - hull.torso_height
     torso = chassis.add_body(name=f"{name} torso")
     if body.legs:

@@ -157,7 +157,7 @@ class SimulatedBattery(Battery):
         if self._published is None:
             self._published = self._words()  # not charging yet: a robot that wakes up on its dock begins to charge now
         load = self._load()
-        docked = self.supply is not Supply.NONE
+        docked = self._wire or (self._dock is not None and self._dock.docked)
         self._locked = self._temperature > (UNLOCK if self._locked else LOCK)
         self._charging = (
             docked and not (self._locked or self._starved) and self._charge < (FULL if self._charging else RECHARGE)

@@ -38,6 +38,7 @@ class SimulatedMotors(Motors):
         self._shares = shares / shares.sum()
         self._temperatures = np.full(len(section.names), AMBIENT)
         self._energy = self._seconds = 0.0
+        self._hottest = AMBIENT
 
     @property
     def temperatures(self) -> Mapping[str, float]:
@@ -45,11 +46,12 @@ class SimulatedMotors(Motors):
 
     @property
     def hottest(self) -> float:
-        return round(float(self._temperatures.max()), 2)
+        return self._hottest
 
     def warm(self, celsius: float) -> None:
         """Have all motors this warm at once: for tests and faults."""
         self._temperatures[:] = celsius
+        self._hottest = round(float(celsius), 2)
 
     def sense(self, _stamp: float, seconds: float) -> None:
         """Gather a second's load, then warm up or cool down."""
@@ -60,6 +62,7 @@ class SimulatedMotors(Motors):
         load = self._energy / self._seconds
         goal = AMBIENT + self._section.warming * load * self._shares
         self._temperatures += (goal - self._temperatures) * (1.0 - math.exp(-self._seconds / self._section.inertia))
+        self._hottest = round(float(self._temperatures.max()), 2)
         self._energy = self._seconds = 0.0
 
 
