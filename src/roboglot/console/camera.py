@@ -7,12 +7,14 @@ import importlib
 import logging
 from collections.abc import Iterator
 from contextlib import suppress
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from roboglot.console.http import Problem, Receive, Send, answer
 from roboglot.console.settings import CALL_SECONDS, CALLS_MAX, JPEG_QUALITY, OFFER_MAX, REVOKED_SECONDS
 from roboglot.media.stills import jpeg
 from roboglot.media.video import VideoStream, beside
+from roboglot.model import background
 from roboglot.model.admission import Right
 from roboglot.model.components.sensing.camera import Camera
 from roboglot.model.components.sensing.detector import Detector
@@ -33,7 +35,7 @@ ENDED = ("failed", "closed", "blind")  # states of a call that is over
 async def send_photo(robot: Robot, send: Send) -> None:
     """Answer with a picture of this moment."""
     frame = await robot[Camera].capture()
-    picture = await asyncio.to_thread(jpeg, frame, JPEG_QUALITY)
+    picture = await background.beside(partial(jpeg, frame, JPEG_QUALITY))
     await answer(send, 200, b"image/jpeg", picture, [(b"cache-control", b"no-store")])
 
 
@@ -51,7 +53,7 @@ async def send_film(robot: Robot, receive: Receive, send: Send) -> None:
                 if not robot.admission.may(Right.SEE):  # it was revoked meanwhile
                     break
                 frame = (viewer.drain() or [first])[-1]
-                picture = await asyncio.to_thread(jpeg, frame, JPEG_QUALITY)
+                picture = await background.beside(partial(jpeg, frame, JPEG_QUALITY))
                 head = b"--%s\r\ncontent-type: image/jpeg\r\ncontent-length: %d\r\n\r\n" % (BOUNDARY, len(picture))
                 await send({"type": "http.response.body", "body": head + picture + b"\r\n", "more_body": True})
         finally:

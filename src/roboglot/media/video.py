@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Protocol, TypeVar
 
 from roboglot.media.h264 import H264Encoder, VideoPacket
+from roboglot.model import background
 from roboglot.model.clock import Clock, RealClock
 from roboglot.model.components.component import Component
 from roboglot.model.components.sensing.camera import Frame
@@ -20,7 +21,7 @@ QUEUE_MAX = 30  # packets: a second; a viewer that is further behind goes on at 
 
 async def beside(clock: Clock, job: Callable[[], R]) -> R:
     """The result of ``job``: in a thread in real time, in place in lockstep, where threads would upset the order."""
-    return await asyncio.to_thread(job) if isinstance(clock, RealClock) else job()
+    return await background.beside(job) if isinstance(clock, RealClock) else job()
 
 
 class Pictures(Protocol):

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, TypeVar
 
 from roboglot.kernels import loading
+from roboglot.model.background import beside
 from roboglot.model.clock import Clock, RealClock
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.hull import Hull
@@ -71,4 +72,4 @@ class Studio:
 
     async def work(self, job: Callable[[], R]) -> R:
         """The result of ``job``, done beside the loop in real time."""
-        return await asyncio.to_thread(job) if self._threaded else job()
+        return await beside(job) if self._threaded else job()

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 QUEUE_MAX = 2  # pictures that a viewer may be behind
+WINDOW = 5.0  # s over which pictures are counted
+ENOUGH, RECOVERED = 0.8, 0.95  # of the pictures: fewer are worth a warning, and so many end it
 
 
 class CameraSection(Struct, frozen=True, forbid_unknown_fields=True):
@@ -62,6 +64,36 @@ class _Shot:
         planes = self.renderer.render(self.stage.scene(self.instant), self.eye, self.gain)
         planes.setflags(write=False)
         return Frame(self.stamp, planes)
+
+
+class Shortfall:
+    """What the log says about a camera that takes fewer pictures than it should."""
+
+    def __init__(self, robot: str, rate: float) -> None:
+        self._robot, self._rate = robot, rate
+        self._began: float | None = None
+        self._pictures = 0
+        self._short = False
+
+    def note(self, now: float) -> None:
+        """Count a picture; judge when a window of robot time is over."""
+        if self._began is None:
+            self._began = now
+            return
+        self._pictures += 1
+        if now - self._began < WINDOW:
+            return
+        rate = self._pictures / (now - self._began)
+        self._began, self._pictures = now, 0
+        short = rate < (RECOVERED if self._short else ENOUGH) * self._rate
+        if short and not self._short:
+            log.warning(
+                "the camera of %s takes %.1f of %g pictures a second: this machine draws and encodes no more",
+                self._robot, rate, self._rate,
+            )  # fmt: skip
+        elif self._short and not short:
+            log.info("the camera of %s takes %.1f of %g pictures a second again", self._robot, rate, self._rate)
+        self._short = short
 
 
 class SimulatedCamera(Camera):
@@ -153,9 +185,11 @@ class SimulatedCamera(Camera):
 
     async def _film(self) -> None:
         try:
+            shortfall = Shortfall(self._hull.name, self.rate)
             self._feed.push(await self.capture())
-            async for _ in self._clock.every(1.0 / self.rate):
+            async for now in self._clock.every(1.0 / self.rate):  # which skips the beats that a picture takes too long
                 self._feed.push(await self.capture())
+                shortfall.note(now)
         except Exception:
             log.exception("the camera broke")
             self._filming = None

@@ -1,0 +1,32 @@
+"""Work beside the event loop in threads that give way: pictures and video take what clients leave of the machine."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
+from functools import cache
+from typing import TypeVar
+
+R = TypeVar("R")
+NICENESS = 10  # of the threads: a tenth of a core where the event loop wants it, too
+
+
+async def beside(job: Callable[[], R]) -> R:
+    """Return the result of ``job``, done in one of as many threads as there are processors."""
+    return await asyncio.get_running_loop().run_in_executor(_pool(os.getpid()), copy_context().run, job)
+
+
+@cache
+def _pool(_process: int) -> ThreadPoolExecutor:
+    """Return the pool of a process; a forked one makes its own."""
+    return ThreadPoolExecutor(max(2, os.cpu_count() or 1), "beside", initializer=_give_way)
+
+
+def _give_way() -> None:
+    if hasattr(os, "setpriority"):
+        identifier = threading.get_native_id()  # on Linux a thread has a priority of its own
+        os.setpriority(os.PRIO_PROCESS, identifier, max(NICENESS, os.getpriority(os.PRIO_PROCESS, identifier)))
