@@ -5,14 +5,19 @@ from __future__ import annotations
 import asyncio
 import subprocess
 import sys
+import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
 
 from roboglot.access import audit
+from roboglot.access.guard import Guard
 from roboglot.access.store import FILE, AccessStore, Grant
+from roboglot.config import AccessConfig
 from roboglot.model.clock import LockstepClock
 from roboglot.operations import Right
 from roboglot.runtime import Runtime
@@ -132,6 +137,37 @@ async def test_another_program_revokes_within_a_second(runtime: Runtime, data: P
             pass
     await link.close()
     assert await open_frames(CALLERS[1].address) is None
+
+
+def test_a_change_is_found_at_the_next_look(data: Path) -> None:
+    """Counts looks instead of seconds: the one after a change finds it, and two are less than a second apart."""
+    guard, other = Guard(data, AccessConfig(on=True), {}), AccessStore(data / FILE)
+    looks: list[float] = []
+    found_at: list[int] = []
+
+    class Ended:
+        def wait(self, period: float) -> bool:
+            looks.append(period)
+            if len(looks) == 3:
+                other.add_machine("cell", [Grant("a", DRIVE)])
+            return bool(found_at) or len(looks) > 20
+
+        def is_set(self) -> bool:
+            return False
+
+    class Loop:
+        def call_soon_threadsafe(self, reload: Callable[[], None]) -> None:
+            found_at.append(len(looks))
+            reload()
+
+    guard._ended = Ended()  # type: ignore[assignment]
+    loop: Any = Loop()
+    guard._follow(loop)
+    assert found_at == [3]
+    assert 2 * looks[2] < 1.0
+    guard._ended = threading.Event()
+    guard.close()
+    other.close()
 
 
 async def test_what_changed_and_what_was_refused_is_kept(runtime: Runtime, store: AccessStore, data: Path) -> None:

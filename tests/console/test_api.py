@@ -120,7 +120,7 @@ async def test_with_access_the_console_asks_who_comes(tmp_path: Path, monkeypatc
     await runtime.start()
     await runtime.console.ready()
     shown = Shown(runtime, runtime.fleet.robots["a"], runtime.clock, runtime.console.address)
-    assert (await shown.ask("/"))[0] == 401
+    assert (await shown.ask("/"))[0] == 200  # the log-in page
     assert (await shown.ask("/api/robots"))[0] == 401
     assert (await shown.ask("/api/robots/a/stop", {}, Authorization="Bearer nothing"))[0] == 401
     await runtime.close()

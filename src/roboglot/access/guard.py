@@ -10,12 +10,13 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import TypeVar
 
 from roboglot.access import audit
 from roboglot.access.book import LOCAL, Book, Rights
 from roboglot.access.rights import NOTHING
 from roboglot.access.secrets import password_fits, token_hash
-from roboglot.access.store import FILE, AccessStore, Kind
+from roboglot.access.store import FILE, AccessStore, Grant, Kind
 from roboglot.config import AccessConfig, is_loopback
 from roboglot.model.admission import NO_PROOF, Admission, Forbidden, LockedOut, Proof, ProofKind, Right, Unknown
 from roboglot.model.client_context import connection, identity
@@ -24,6 +25,7 @@ from roboglot.model.tap import Direction, Exchange
 from roboglot.transport.limiter import Limiter
 from roboglot.transport.seldom import Seldom
 
+T = TypeVar("T")
 log = logging.getLogger(__name__)
 seldom = Seldom(log)
 
@@ -133,6 +135,26 @@ class Guard:
                 self._proofs.pop(next(iter(self._proofs)))
             self._proofs[proof.value] = found
         return found
+
+    async def invite(self, name: str, grant: Grant) -> Proof:
+        """See ``Admission.invite``."""
+        token = await asyncio.to_thread(self._change, lambda store: store.add_guest(name, [grant], self.now()))
+        self.reload()
+        return Proof(HTTP, f"Bearer {token}")
+
+    async def shut_out(self, name: str) -> None:
+        """See ``Admission.shut_out``."""
+        if self._book.has(name, Kind.GUEST):
+            await asyncio.to_thread(self._change, lambda store: store.revoke(name))
+            self.reload()
+
+    def _change(self, change: Callable[[AccessStore], T]) -> T:
+        """Change the list, in a thread: the disk is slow."""
+        store = AccessStore(self._path)
+        try:
+            return change(store)
+        finally:
+            store.close()
 
     def may_shake_hands(self, host: str) -> bool:
         """See ``Admission.may_shake_hands``."""
@@ -252,6 +274,16 @@ class RobotAdmission(Admission):
     def may_shake_hands(self, host: str) -> bool:
         """Whether one more TLS handshake may begin."""
         return self._guard.may_shake_hands(host)
+
+    async def invite(self, name: str, rights: frozenset[Right], seconds: float) -> Proof | None:
+        """Let a guest in for so long."""
+        proof = await self._guard.invite(name, Grant(self._name, rights, self._guard.now() + seconds))
+        self._note(identity(), connection(), "", "rights", "invited", name)
+        return proof
+
+    async def shut_out(self, name: str) -> None:
+        """Let a guest in no more."""
+        await self._guard.shut_out(name)
 
     def check(self, door: str, operation: str, right: Right | None) -> None:
         """Raises Forbidden, and notes it, unless who asks has ``right``."""

@@ -36,6 +36,7 @@ class Kind(StrEnum):
     PERSON = "person"  # by a password
     MACHINE = "machine"  # by a token
     APP = "app"  # by a client certificate, whose common name is the identity's
+    GUEST = "guest"  # by a token for a time, made by the program itself: a pupil who joined a class by its code
     ADDRESS = "address"  # by where it comes from: for clients that can show nothing
 
 
@@ -86,6 +87,18 @@ class AccessStore:
         """Let a machine in; its token, which is known this once."""
         token = new_token()
         self._put(name, Kind.MACHINE, grants, token=token_hash(token))
+        return token
+
+    def add_guest(self, name: str, grants: Iterable[Grant], now: float) -> str:
+        """Let a guest in, and forget those whose time is over at ``now``; the guest's token. Raises ValueError."""
+        for identity in self.identities():
+            over = all(grant.until is not None and grant.until < now for grant in identity.grants)
+            if identity.kind is Kind.GUEST and over:
+                self.revoke(identity.name)
+            elif identity.name == name and identity.kind is not Kind.GUEST:
+                raise ValueError(f"there is a {identity.kind} named {name}")
+        token = new_token()
+        self._put(name, Kind.GUEST, grants, token=token_hash(token))
         return token
 
     def add_app(self, name: str, grants: Iterable[Grant]) -> None:

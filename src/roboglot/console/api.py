@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Mapping as Values
 from typing import Any
+
+import msgspec
 
 from roboglot.console import drawings, program_runs
 from roboglot.console.camera import Calls, send_film, send_photo
@@ -12,6 +15,7 @@ from roboglot.console.desk import CLIENT, Desk
 from roboglot.console.http import Problem, Receive, Scope, Send, answer, answer_json, read_json
 from roboglot.console.map_verbs import map_archive
 from roboglot.console.openapi import document
+from roboglot.console.people.classes import Classes, Wish
 from roboglot.console.resend import resend
 from roboglot.console.studio import blocks, lessons
 from roboglot.console.thumbnails import thumbnail
@@ -54,8 +58,8 @@ STATUSES: list[tuple[type[Exception], int]] = [
 class Api:
     """Serves paths below ``/api/``."""
 
-    def __init__(self, desk: Desk) -> None:
-        self._desk = desk
+    def __init__(self, desk: Desk, classes: Classes) -> None:
+        self._desk, self._classes = desk, classes
         self.calls = Calls()
 
     async def serve(self, scope: Scope, receive: Receive, send: Send, client: str) -> None:
@@ -77,6 +81,10 @@ class Api:
             case "GET", ["lessons"]:
                 found = await asyncio.to_thread(self._desk.studio.lessons)
                 await answer_json(send, lessons.shown(found))
+            case "GET", ["class"]:
+                await answer_json(send, self._classes.look())
+            case "POST", ["class"]:
+                await answer_json(send, await self._classes.do(_wish(await read_json(receive))))
             case _, ["robots", *_]:
                 await self._route_robot(method, parts, receive, send, client)
             case _, ["world" | "world.toml", *_]:
@@ -181,6 +189,13 @@ class Api:
         if endpoint is None:
             raise NotFound(f"the {door} door of robot {name} is closed")
         return endpoint
+
+
+def _wish(values: Values[str, object]) -> Wish:
+    try:
+        return msgspec.convert(values, Wish)
+    except msgspec.ValidationError as error:
+        raise BadParameters(str(error)) from None
 
 
 def _nothing_here() -> Problem:

@@ -13,9 +13,12 @@ from msgspec import MsgspecError
 from roboglot.console.api import Api
 from roboglot.console.assets import Assets
 from roboglot.console.desk import Desk
-from roboglot.console.entry import CHALLENGE, enter
 from roboglot.console.http import Problem, Receive, Scope, Send, answer, answer_json
 from roboglot.console.live import Page
+from roboglot.console.people.classes import Classes
+from roboglot.console.people.entry import CHALLENGE, admission_of, enter
+from roboglot.console.people.sessions import Sessions
+from roboglot.console.people.signing import Signing
 from roboglot.console.settings import MESSAGE_MAX, VIEWERS_MAX
 from roboglot.console.studio.channel import MESSAGE_MAX as STUDIO_MESSAGE_MAX
 from roboglot.console.studio.channel import Session
@@ -39,11 +42,15 @@ class Application:
 
     def __init__(self, desk: Desk, browsers: Browsers) -> None:
         self._desk, self._browsers = desk, browsers
-        self._api, self._assets = Api(desk), Assets()
+        self._assets = Assets()
         self.pages: set[Page] = set()
         self.sessions: set[Session] = set()
         self._classroom = Classroom(self._stop)
         self._listening: dict[asyncio.Task[None], str] = {}  # and who is at the other end
+        self._login = Sessions()
+        self._classes = Classes(desk, self._classroom, self._listening.values, self._put_out)
+        self._api = Api(desk, self._classes)
+        self._signing = Signing(desk, self._login, self._classes)
         for robot in desk.robots.values():
             robot.admission.on_lost(self._close_pages_of)
         self._metrics: Metrics | None = None  # from the first scrape on
@@ -74,13 +81,18 @@ class Application:
         try:
             if why := self._refusal(scope, scope["method"]):
                 raise Problem(403, why)
-            await enter(self._desk, scope)
+            if await self._signing.serve(scope, receive, send):
+                return
+            if scope["path"] != "/metrics" and not scope["path"].startswith("/api/"):
+                await self._serve_file(scope, send)  # everybody may have the pages: they show nothing by themselves
+                return
+            named = await enter(self._desk, self._login, scope)
             if scope["path"] == "/metrics":
                 await self._serve_metrics(scope, send)
-            elif scope["path"].startswith("/api/"):
-                await self._api.serve(scope, receive, send, client())
+            elif scope["path"] == "/api/me":
+                await answer_json(send, {"name": named, "asks": admission_of(self._desk) is not None})
             else:
-                await self._serve_file(scope, send)
+                await self._api.serve(scope, receive, send, client())
         except Unknown as unknown:
             await answer_json(send, {"error": str(unknown)}, 401, [CHALLENGE])
         except Problem as problem:
@@ -106,6 +118,9 @@ class Application:
         return self._metrics or cast("Metrics", metrics.Metrics(self._desk))
 
     async def _serve_file(self, scope: Scope, send: Send) -> None:
+        if scope["path"] in ("/studio", "/studio/") and not await self._knows(scope):
+            await answer(send, 303, b"text/plain", b"", [(b"location", b"/?to=studio")])
+            return
         asset = self._assets.find(scope["path"])
         if asset is None:
             raise Problem(404, "there is no such page")
@@ -126,12 +141,20 @@ class Application:
             body, more = asset.packed, [*more, (b"content-encoding", b"gzip")]
         await answer(send, 200, asset.content_type.encode(), body, more)
 
+    async def _knows(self, scope: Scope) -> bool:
+        """Whether the client may come in; else the log-in page comes first."""
+        try:
+            await enter(self._desk, self._login, scope)
+        except Unknown:
+            return False
+        return True
+
     async def _serve_socket(self, scope: Scope, receive: Receive, send: Send) -> None:
         await receive()  # websocket.connect
         try:
             if scope["path"] not in ("/live", "/studio") or self._refusal(scope, "GET"):
                 raise Unknown("it is not our page")
-            named = await enter(self._desk, scope)
+            named = await enter(self._desk, self._login, scope)
         except Unknown:
             await send({"type": "websocket.close", "code": GOING_AWAY})
             return
@@ -168,6 +191,10 @@ class Application:
             pages.discard(page)
             page.close()
             sending.cancel()
+
+    def _put_out(self, who: str) -> None:
+        self._login.end_all_of(who)
+        self._close_pages_of(who)
 
     def _close_pages_of(self, who: str) -> None:
         for listening in [task for task, owner in self._listening.items() if owner == who]:

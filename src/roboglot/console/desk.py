@@ -13,9 +13,10 @@ from roboglot.console.verbs import VERBS
 from roboglot.console.views import RobotView
 from roboglot.console.world_verbs import WORLD_VERBS
 from roboglot.model.admission import Right
+from roboglot.model.client_context import identity
 from roboglot.model.clock import Clock, RealClock
 from roboglot.model.components.system.lease import Lease
-from roboglot.model.errors import NotFound, Refused
+from roboglot.model.errors import Forbidden, NotFound, Refused
 from roboglot.model.robot import Robot
 from roboglot.model.stage import Stage
 from roboglot.protocols.door import Endpoint
@@ -55,6 +56,8 @@ class Desk:
     studio: Studio = field(default_factory=Studio)
     running: Callable[[], int] = lambda: 0
     views: dict[str, RobotView] = field(init=False)
+    pupils: set[str] = field(default_factory=set)  # of the class that is open, by their identities
+    locked: set[str] = field(default_factory=set)  # robots that only a teacher moves
 
     def __post_init__(self) -> None:
         self.views = {name: RobotView(robot, self.stage) for name, robot in self.robots.items()}
@@ -72,6 +75,22 @@ class Desk:
         view.robot.admission.check(CLIENT, verb, Right.SEE)
         return view
 
+    @property
+    def may_teach(self) -> bool:
+        """Whether the client who is asked for may do everything with every robot, and is no pupil."""
+        return identity() not in self.pupils and self.may_change_world
+
+    @property
+    def may_change_world(self) -> bool:
+        """Whether the client who is asked for may do everything with every robot."""
+        return all(robot.admission.may(Right.ADMIN) for robot in self.robots.values())
+
+    def check(self, robot: Robot, verb: str, right: Right | None) -> None:
+        """Raise Forbidden unless the client who is asked for may do ``verb`` with a robot now."""
+        robot.admission.check(CLIENT, verb, right)
+        if robot.id in self.locked and right is not Right.SEE and not self.may_teach:
+            raise Forbidden(f"the teacher has locked robot {robot.id}")
+
     def hello(self) -> dict[str, Any]:
         """What a page needs before anything else."""
         visible = self.visible
@@ -81,7 +100,13 @@ class Desk:
             "world": self.world.name,
             "seed": self.world.seed,
             "pace": self.world.pace,
-            "robots": [{"name": name, "simulated": name in simulated} for name in visible],
+            "robots": [
+                {"name": name, "simulated": name in simulated, "rights": self._rights(view.robot)}
+                for name, view in visible.items()
+            ],
+            "needs": self._needs(),
+            "all": self.may_change_world,
+            "teacher": self.may_teach,
             "doors": {
                 name: [[e.label, e.address, e.try_line] for e in listed]
                 for name, listed in self.doors().items()
@@ -93,15 +118,26 @@ class Desk:
             ],
         }
 
+    @staticmethod
+    def _needs() -> dict[str, str]:
+        """Return the right that each verb needs; "all": to admin on all robots."""
+        own = {operation.key: str(operation.right or Right.ADMIN) for operation in VERBS}
+        of_all = {operation.key: "all" for operation in (*WORLD_VERBS, *CLOCK_VERBS)}
+        return own | of_all | {TAKE: Right.DRIVE, "resend": Right.ADMIN}
+
+    @staticmethod
+    def _rights(robot: Robot) -> list[str]:
+        return [right for right in Right if robot.admission.may(right)]
+
     async def command(self, name: str, verb: str, values: Mapping[str, object], client: str) -> Any:
         """Have a robot do something. Raises NotFound, BadParameters and what the robot raises."""
         robot = self.view(name, verb).robot
         if verb == TAKE:
-            robot.admission.check(CLIENT, verb, Right.DRIVE)
+            self.check(robot, verb, Right.DRIVE)
             return await robot[Lease].take(client)
         if (operation := VERBS.get(verb)) is None:
             raise NotFound(f"there is no verb {verb!r}")
-        robot.admission.check(CLIENT, verb, operation.right)
+        self.check(robot, verb, operation.right)
         return await operation.call(robot, values)
 
     def world_file(self) -> str:

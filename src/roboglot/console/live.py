@@ -218,7 +218,7 @@ class Page:
         pad = self._pads.setdefault(velocity.robot, Pad(view.robot, self._source))
         why = ""
         try:
-            view.robot.admission.check(CLIENT, "drive", Right.DRIVE)
+            self._desk.check(view.robot, "drive", Right.DRIVE)
             pad.drive(velocity, milliseconds())
         except RobotError as error:
             why = str(error)

@@ -65,6 +65,13 @@ class Admission:
         """True if the client that is asked for has ``right``."""
         return True
 
+    async def invite(self, name: str, rights: frozenset[Right], seconds: float) -> Proof | None:
+        """Let a guest in for so long; what the guest shows from now on. None: nothing is asked here."""
+        return None
+
+    async def shut_out(self, name: str) -> None:
+        """Let a guest in no more."""
+
     def spend(self, client: str, amount: int) -> float:
         """Count bytes to and from a client (its identity, or its host); seconds until it may send more."""
         return 0.0

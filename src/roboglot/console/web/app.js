@@ -1,21 +1,33 @@
 // The frame of the page: header with what must always be seen, the four views, messages.
 import { render } from "preact";
-import { useEffect } from "preact/hooks";
+import { useEffect, useState } from "preact/hooks";
 import { signal } from "@preact/signals";
-import { Button, Icon, html, language, loadWords, notice, robotWord, t, theme } from "./base.js";
-import { age, changeWorld, choose, command, connect, current, hello, pace, state, status, want } from "./link.js";
+import { Button, Icon, html, lacks, language, loadWords, notice, robotWord, t, theme } from "./base.js";
+import { age, changeWorld, choose, command, connect, current, hello, me, pace, signOut, state, status, want } from "./link.js";
 import { Live } from "./views/live.js";
 import { Robots } from "./views/robots.js";
 import { Wire } from "./views/wire.js";
 import { World } from "./views/world.js";
 
-const VIEWS = { live: ["map", Live], wire: ["wire", Wire], world: ["world", World], robots: ["robots", Robots] };
+/** A view whose file is loaded when it is shown first. @param {() => Promise<any>} load */
+function later(load) {
+  let view = null;
+  return function Later() {
+    const [, shown] = useState(false);
+    useEffect(() => { if (!view) load().then((loaded) => { view = loaded; shown(true); }); }, []);
+    return view ? html`<${view} />` : null;
+  };
+}
+const SignIn = later(() => import("./views/sign.js").then((m) => m.SignIn));
+const Class = later(() => import("./views/class.js").then((m) => m.Class));
+
+const VIEWS = { live: ["map", Live], wire: ["wire", Wire], world: ["world", World], robots: ["robots", Robots], class: ["school", Class] };
 const named = () => (location.hash.slice(2) in VIEWS ? location.hash.slice(2) : "live");
 const view = signal(named());
 addEventListener("hashchange", () => { view.value = named(); });
 
 function Stop() {
-  return html`<button type="button" class="stop" onClick=${() => command("stop")} title=${t("stop.hint")}>
+  return html`<button type="button" class="stop" verb="stop" onClick=${() => command("stop")} title=${lacks("stop") || t("stop.hint")} aria-disabled=${lacks("stop") ? "true" : undefined}>
     <${Icon} name="stop" size=${18} /><span>${t("stop")}</span><kbd>Esc</kbd></button>`;
 }
 
@@ -33,6 +45,11 @@ function Charge() {
     <${Icon} name=${battery.charging ? "bolt" : "battery"} size=${18} />${Math.round(battery.charge * 100)} %</span>`;
 }
 
+function Person() {
+  if (me.value.name) return html`<${Button} kind="plain" icon="leave" label=${me.value.name} title=${t("sign.out.of", { name: me.value.name })} onClick=${signOut} />`;
+  return me.value.asks && status.value === "open" ? html`<${Button} kind="plain" icon="person" label=${t("sign.in")} onClick=${() => { status.value = "out"; }} />` : null;
+}
+
 function Header() {
   const robots = hello.value?.robots ?? [];
   return html`<header>
@@ -42,7 +59,7 @@ function Header() {
         ${robots.map((r) => html`<option value=${r.name}>${t("robot.named", { name: r.name })}</option>`)}
       </select></label>
     <${Link} /><${Charge} /><${Pace} />
-    <span class="grow"></span>
+    <span class="grow"></span><${Person} />
     <button type="button" class="button plain" lang=${language.value === "zh" ? "en" : "zh-CN"}
       onClick=${() => { language.value = language.value === "zh" ? "en" : "zh"; }}>${language.value === "zh" ? "EN" : "中文"}</button>
     <${Button} compact kind="plain" icon=${theme.value === "dark" ? "sun" : "moon"} label=${t("theme")}
@@ -52,7 +69,7 @@ function Header() {
 }
 
 function Nav() {
-  return html`<nav aria-label=${t("views")}>${Object.entries(VIEWS).map(([name, [icon]]) => html`
+  return html`<nav aria-label=${t("views")}>${Object.entries(VIEWS).filter(([name]) => name !== "class" || hello.value?.teacher).map(([name, [icon]]) => html`
     <a href=${`#/${name}`} aria-current=${view.value === name ? "page" : undefined}><${Icon} name=${icon} size=${22} /><span>${t(`view.${name}`)}</span></a>`)}
     <a href="/studio/"><${Icon} name="blocks" size=${22} /><span>${t("view.studio")}</span></a></nav>`;
 }
@@ -66,12 +83,16 @@ function Pace() {
 function Banner() {
   if (status.value === "lost") return html`<div class="banner bad" role="alert">${t("link.gone")}</div>`;
   if (pace.value.paused) return html`<div class="banner warn" role="status">${t("clock.paused")}
-    <${Button} label=${t("clock.resume")} onClick=${() => changeWorld("resume_clock")} /></div>`;
+    <${Button} label=${t("clock.resume")} verb="resume_clock" onClick=${() => changeWorld("resume_clock")} /></div>`;
   const safety = state.value?.safety;
   if (safety?.emergency_stop) return html`<div class="banner bad" role="alert"><${Icon} name="alert" />${t("estop.on")}
-    <${Button} label=${t("estop.release")} onClick=${() => command("emergency_stop", { engage: false })} /></div>`;
+    <${Button} label=${t("estop.release")} verb="emergency_stop" onClick=${() => command("emergency_stop", { engage: false })} /></div>`;
   if (safety?.power && safety.power !== "awake") return html`<div class="banner warn" role="status">${t("power.is", { mode: robotWord(safety.power) })}</div>`;
   return null;
+}
+
+function Notice() {
+  return html`<div class=${`notice ${notice.value.bad ? "bad" : ""}`} role="status" aria-live="polite">${notice.value.text}</div>`;
 }
 
 function App() {
@@ -82,8 +103,8 @@ function App() {
   }, []);
   useEffect(() => want({ wire: view.value === "wire" }), [view.value]);
   const [, Shown] = VIEWS[view.value];
-  return html`<${Header} /><${Nav} /><main>${view.value !== "robots" && html`<h1 class="unseen">${t(`view.${view.value}`)} · ${t("robot.named", { name: current.value })}</h1>`}<${Banner} />${hello.value ? html`<${Shown} />` : html`<p class="empty">${t(`link.${status.value}`)}</p>`}</main>
-    <div class=${`notice ${notice.value.bad ? "bad" : ""}`} role="status" aria-live="polite">${notice.value.text}</div>`;
+  if (status.value === "out") return html`<${Header} /><main class="lone"><${SignIn} /></main><${Notice} />`;
+  return html`<${Header} /><${Nav} /><main>${view.value !== "robots" && html`<h1 class="unseen">${t(`view.${view.value}`)} · ${t("robot.named", { name: current.value })}</h1>`}<${Banner} />${hello.value && !hello.value.robots.length ? html`<p class="empty">${t("robots.hidden")}</p>` : hello.value ? html`<${Shown} />` : html`<p class="empty">${t(`link.${status.value}`)}</p>`}</main><${Notice} />`;
 }
 
 await loadWords();

@@ -23,23 +23,35 @@ export const person = kept("person", `guest-${Math.random().toString(36).slice(2
 /** @type {import("@preact/signals").Signal<Record<string, Record<string, string>>>} */
 const words = signal({});
 
-/** Load both languages' words, which are small, from these folders: switching must not wait. @param {...string} folders */
-export async function loadWords(...folders) {
-  const load = async (l) => Object.assign({}, ...(await Promise.all((folders.length ? folders : ["/words"]).map((f) => fetch(`${f}/${l}.json`).then((r) => r.json())))));
-  const [en, zh] = await Promise.all(["en", "zh"].map(load));
-  words.value = { en, zh };
+const folders = /** @type {string[]} */ (["/words"]);
+
+/** Load a language's words once. @param {string} name */
+async function loadLanguage(name) {
+  if (words.value[name]) return;
+  const parts = await Promise.all(folders.map((folder) => fetch(`${folder}/${name}.json`).then((r) => r.json())));
+  words.value = { ...words.value, [name]: Object.assign({}, ...parts) };
 }
+
+/** Load the words of the language chosen from these folders; another language's when it is chosen. @param {...string} from */
+export async function loadWords(...from) {
+  if (from.length) folders.splice(0, folders.length, ...from);
+  await loadLanguage(language.value);
+  effect(() => { loadLanguage(language.value).catch(() => {}); });
+}
+
+/** The words of the language chosen; those before it until they are there. */
+const spoken = () => words.value[language.value] ?? Object.values(words.value)[0] ?? {};
 
 /** The sentence under a key, with {names} filled in. @param {string} key @param {Record<string, unknown>} [values] */
 export function t(key, values = {}) {
-  const text = words.value[language.value]?.[key] ?? words.value.en?.[key] ?? key;
+  const text = spoken()[key] ?? key;
   return text.replace(/\{(\w+)\}/g, (_, name) => String(values[name] ?? ""));
 }
 
 /** A word of the robot's own (a status, a stage, a fault) where we know it in this language; else as it came.
  * @param {string} word */
 export function robotWord(word) {
-  return words.value[language.value]?.[`robot.${word}`] ?? word;
+  return spoken()[`robot.${word}`] ?? word;
 }
 
 effect(() => {
@@ -69,6 +81,7 @@ const PATHS = {
   step: "M5 5v14l9-7zM18 5v14", undo: "M9 7L4 12l5 5M4 12h11a5 5 0 010 10h-3", redo: "M15 7l5 5-5 5M20 12H9a5 5 0 000 10h3", folder: "M3 6h7l2 3h9v10H3z",
   clock: "M12 3a9 9 0 100 18 9 9 0 000-18M12 7v5l4 2", keys: "M3 6h18v12H3zM7 10h.5M11 10h.5M15 10h.5M7 14h10", dot: "M12 6a6 6 0 100 12 6 6 0 000-12", blocks: "M4 4h7v3h3V4h6v7h-3v3h3v6H4z",
   star: "M12 3l2.8 5.8 6.2.9-4.5 4.4 1 6.2-5.5-3-5.5 3 1-6.2L3 9.7l6.2-.9z", school: "M3 9l9-5 9 5-9 5zM7 11v5c3 2 7 2 10 0v-5",
+  leave: "M14 4h6v16h-6M15 12H4M8 8l-4 4 4 4",
   move: "M12 3a9 9 0 100 18 9 9 0 000-18M12 12l4-4",
 };
 
@@ -77,11 +90,23 @@ export function Icon({ name, size = 20 }) {
   return html`<svg class="icon" width=${size} height=${size} viewBox="0 0 24 24" aria-hidden="true"><path d=${PATHS[name]} /></svg>`;
 }
 
-/** A button; `on` shows that it is chosen.
+/** What the person at the page may do with the robot that is shown, and which right each verb needs; set by link.js. */
+export const rights = signal(/** @type {{mine: string[] | null, needs: Record<string, string>}} */ ({ mine: null, needs: {} }));
+
+/** Why a verb is not for this person, in words; empty: it is. @param {string} [verb] */
+export function lacks(verb) {
+  const { mine, needs } = rights.value;
+  const right = verb ? needs[verb] : undefined;
+  return !right || !mine || mine.includes(right) ? "" : t("right.missing", { right: t(`right.${right}`) });
+}
+
+/** A button; `on` shows that it is chosen; `verb` is what it has done: without the right to that it is off, and says why.
  * @param {any} props */
-export function Button({ label, icon, on, kind = "", compact = false, children, ...rest }) {
+export function Button({ label, icon, on, verb, kind = "", compact = false, children, ...rest }) {
   const toggles = on === undefined ? {} : { "aria-pressed": String(Boolean(on)) };
+  const why = lacks(verb);
   const name = compact ? { "aria-label": label, title: label } : {};
+  if (why) Object.assign(rest, { type: "button", "aria-disabled": "true", title: why, onClick: () => say(why, true) });
   return html`<button type="button" class=${`button ${kind} ${compact ? "compact" : ""}`} ...${toggles} ...${name} ...${rest}>
     ${icon && html`<${Icon} name=${icon} />`}${!compact && html`<span>${label}</span>`}${children}</button>`;
 }

@@ -1,8 +1,9 @@
 // The socket to the robot runtime: keeps what is known of every robot, carries commands, measures its own age.
-import { signal, computed, batch } from "@preact/signals";
-import { person, say, t, kept } from "./base.js";
+import { signal, computed, batch, effect } from "@preact/signals";
+import { lacks, person, rights, say, t, kept } from "./base.js";
 
-export const status = signal(/** @type {"opening" | "open" | "lost"} */ ("opening"));
+export const status = signal(/** @type {"opening" | "open" | "lost" | "out"} */ ("opening")); // out: a name is needed
+export const me = signal({ name: "", asks: false }); // who signed in here; whether names are asked for
 export const age = signal(/** @type {number | null} */ (null)); // ms there and back
 export const hello = signal(/** @type {any} */ (null));
 export const you = signal("");
@@ -26,28 +27,50 @@ export const current = computed(() => {
 });
 export const state = computed(() => states.value[current.value] ?? null);
 export const simulated = computed(() => Boolean(hello.value?.robots.find((r) => r.name === current.value)?.simulated));
+effect(() => {
+  const robot = hello.value?.robots.find((r) => r.name === current.value);
+  rights.value = { mine: robot ? [...robot.rights, ...(hello.value.all ? ["all"] : [])] : null, needs: hello.value?.needs ?? {} };
+});
 export const wanted = signal({ wire: false, truth: false, seen: false });
 
 const KEPT_MAX = 5000; // exchanges
 const RETRY = 1000; // ms
 let socket = /** @type {WebSocket | null} */ (null);
+const REVOKED = 1008; // the code with which a socket is closed when its person's rights change
 let next = 1, sequence = 0, server = { now: 0, at: 0 };
 const waiting = /** @type {Map<number, {resolve: (v: any) => void, reject: (e: Error) => void}>} */ (new Map());
 
+/** Whether this browser may open the socket: it needs no name here, or has one. Fails without a connection. */
+async function admitted() {
+  const reply = await fetch("/api/me");
+  if (reply.ok) me.value = await reply.json();
+  return reply.ok;
+}
+
 /** Open the socket, and again whenever it is lost. */
-export function connect() {
+export async function connect() {
+  try {
+    if (!await admitted()) { batch(() => { status.value = "out"; hello.value = null; me.value = { name: "", asks: true }; }); return; }
+  } catch { status.value = "lost"; setTimeout(connect, RETRY); return; }
   const opened = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`);
   socket = opened;
   opened.binaryType = "arraybuffer";
   opened.onopen = () => { status.value = "open"; introduce(); watch(); ping(); };
   opened.onmessage = ({ data }) => (typeof data === "string" ? receive(JSON.parse(data)) : receiveFrame(data));
-  opened.onclose = () => {
+  opened.onclose = ({ code }) => {
     if (socket !== opened) return;
     batch(() => { status.value = "lost"; age.value = null; });
     for (const { reject } of waiting.values()) reject(new Error(t("link.lost")));
     waiting.clear();
-    setTimeout(connect, RETRY);
+    if (code === REVOKED) say(t("rights.changed"), true);
+    setTimeout(connect, code === REVOKED ? 0 : RETRY);
   };
+}
+
+/** Forget who signed in here; the page asks for a name again. */
+export async function signOut() {
+  await fetch("/api/sign_out", { method: "POST" });
+  socket?.close();
 }
 
 /** @param {object} message */
@@ -91,11 +114,13 @@ export function ask(robot, verb, values = {}) {
 
 /** The same for the robot that is shown; what is refused is said. @param {string} verb @param {object} [values] */
 export async function command(verb, values = {}) {
+  if (lacks(verb)) return void say(lacks(verb), true);
   try { return await ask(current.value, verb, values); } catch (error) { say(t("refused", { why: error.message }), true); return undefined; }
 }
 
 /** @param {string} verb @param {object} [values] */
 export async function changeWorld(verb, values = {}) {
+  if (lacks(verb)) return void say(lacks(verb), true);
   try { return await ask("", verb, values); } catch (error) { say(t("refused", { why: error.message }), true); return undefined; }
 }
 

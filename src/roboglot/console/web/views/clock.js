@@ -10,10 +10,10 @@ export function Clock() {
   if (lockstep) return html`<div class="card"><h3>${t("clock")}</h3><p>${t("clock.lockstep")}</p></div>`;
   return html`<div class="card"><h3>${t("clock")}</h3>
       <p class="time" aria-live="off">${t("clock.is", { time: clock.value.toFixed(1), speed })}</p>
-      <div class="buttons"><${Button} kind="main" icon=${paused ? "play" : "pause"} label=${t(paused ? "clock.resume" : "clock.pause")} onClick=${() => changeWorld(paused ? "resume_clock" : "pause_clock")} />
-        ${STEPS.map((seconds) => html`<${Button} label=${t("clock.step", { seconds })} onClick=${() => changeWorld("step_clock", { seconds })} />`)}</div>
+      <div class="buttons"><${Button} kind="main" icon=${paused ? "play" : "pause"} label=${t(paused ? "clock.resume" : "clock.pause")} verb="pause_clock" onClick=${() => changeWorld(paused ? "resume_clock" : "pause_clock")} />
+        ${STEPS.map((seconds) => html`<${Button} label=${t("clock.step", { seconds })} verb="step_clock" onClick=${() => changeWorld("step_clock", { seconds })} />`)}</div>
       <h3>${t("clock.speed")}</h3>
-      <div class="buttons">${SPEEDS.map((each) => html`<${Button} label=${`× ${each}`} on=${each === speed} onClick=${() => changeWorld("set_clock_speed", { speed: each })} />`)}</div>
+      <div class="buttons">${SPEEDS.map((each) => html`<${Button} label=${`× ${each}`} on=${each === speed} verb="set_clock_speed" onClick=${() => changeWorld("set_clock_speed", { speed: each })} />`)}</div>
       <p class="muted">${t("clock.hint")}</p></div>
     <div class="card"><h3>${t("world.file")}</h3><p>${t("world.named", { world: hello.value.world, seed: hello.value.seed })}</p>
       <div class="buttons"><a class="button" href="/api/world.toml" download="world.toml">${t("world.save")}</a></div>

@@ -1,7 +1,7 @@
 // Driving by hand: a pad that must be held, keys, a gamepad; and panels for what else this body has.
 import { useEffect, useRef } from "preact/hooks";
 import { signal } from "@preact/signals";
-import { Button, html, robotWord, t } from "../base.js";
+import { Button, html, lacks, robotWord, t } from "../base.js";
 import { command, drive, padRefused, state } from "../link.js";
 import { Camera } from "./camera.js";
 
@@ -15,7 +15,7 @@ let timer = 0;
 /** Drive so from now on; nothing at all lets go. @param {number} x @param {number} y @param {number} yaw */
 function push(x, y, yaw) {
   const held = Boolean(x || y || yaw);
-  if (!held && !hand.value.held) return;
+  if (lacks("drive") || (!held && !hand.value.held)) return;
   hand.value = { x, y, yaw, held };
   const send = () => drive(hand.value.x * share.value, hand.value.y * share.value, hand.value.yaw * share.value * 0.6);
   send();
@@ -81,16 +81,16 @@ function Pad() {
     push(-v / far, 0, -u / far);
   };
   const { x, yaw, held } = hand.value;
-  return html`<div class=${`pad ${held ? "held" : ""}`} ref=${element} role="group" aria-label=${t("pad")} tabindex="0"
+  return html`<div class=${`pad ${held ? "held" : ""}`} ref=${element} role="group" aria-label=${t("pad")} tabindex="0" aria-disabled=${lacks("drive") ? "true" : undefined}
       onPointerDown=${(e) => { e.currentTarget.setPointerCapture(e.pointerId); follow(e); }} onPointerMove=${follow}
       onPointerUp=${letGo} onPointerCancel=${letGo} onLostPointerCapture=${letGo} onContextMenu=${(e) => e.preventDefault()}>
     <i class="knob" style=${{ transform: `translate(${-yaw * 62}px, ${-x * 62}px)` }}></i>
     <span class="n">▲</span><span class="s">▼</span><span class="w">↺</span><span class="e">↻</span></div>`;
 }
 
-function Slider({ name, min, max, step, value, onChange, unit = "" }) {
+function Slider({ name, min, max, step, value, onChange, verb, unit = "" }) {
   return html`<label class="field"><span>${name} <output>${value}${unit}</output></span>
-    <input type="range" min=${min} max=${max} step=${step} value=${value} onChange=${(e) => onChange(Number(e.target.value))} /></label>`;
+    <input type="range" min=${min} max=${max} step=${step} value=${value} disabled=${Boolean(lacks(verb))} title=${lacks(verb)} onChange=${(e) => onChange(Number(e.target.value))} /></label>`;
 }
 
 const degrees = (rad) => Math.round(rad * 180 / Math.PI);
@@ -98,24 +98,24 @@ const radians = (deg) => deg * Math.PI / 180;
 
 const PANELS = {
   legs: (body) => html`<div class="card"><h3>${t("legs")}</h3><p>${robotWord(body.posture)}</p><div class="buttons">
-    <${Button} label=${t("stand")} onClick=${() => command("stand")} /><${Button} label=${t("lie")} onClick=${() => command("lie_down")} /></div></div>`,
+    <${Button} label=${t("stand")} verb="stand" onClick=${() => command("stand")} /><${Button} label=${t("lie")} verb="lie_down" onClick=${() => command("lie_down")} /></div></div>`,
   gimbal: (body) => html`<div class="card"><h3>${t("gimbal")}</h3>
-    <${Slider} name=${t("pitch")} unit="°" min=${degrees(body.gimbal_reach[0])} max=${degrees(body.gimbal_reach[1])} step="1" value=${degrees(body.gimbal.pitch)} onChange=${(v) => command("aim", { pitch: radians(v) })} />
-    <${Slider} name=${t("yaw")} unit="°" min=${degrees(body.gimbal_reach[2])} max=${degrees(body.gimbal_reach[3])} step="1" value=${degrees(body.gimbal.yaw)} onChange=${(v) => command("aim", { yaw: radians(v) })} />
-    <div class="buttons"><${Button} label=${t("recenter")} onClick=${() => command("recenter_gimbal")} /></div></div>`,
+    <${Slider} name=${t("pitch")} unit="°" min=${degrees(body.gimbal_reach[0])} max=${degrees(body.gimbal_reach[1])} step="1" value=${degrees(body.gimbal.pitch)} verb="aim" onChange=${(v) => command("aim", { pitch: radians(v) })} />
+    <${Slider} name=${t("yaw")} unit="°" min=${degrees(body.gimbal_reach[2])} max=${degrees(body.gimbal_reach[3])} step="1" value=${degrees(body.gimbal.yaw)} verb="aim" onChange=${(v) => command("aim", { yaw: radians(v) })} />
+    <div class="buttons"><${Button} label=${t("recenter")} verb="recenter_gimbal" onClick=${() => command("recenter_gimbal")} /></div></div>`,
   arm: (body) => html`<div class="card"><h3>${t("arm")}</h3><p>x ${body.arm.x.toFixed(2)} · z ${body.arm.z.toFixed(2)} m</p><div class="buttons">
-    ${[["arm.out", 0.02, 0], ["arm.in", -0.02, 0], ["arm.up", 0, 0.02], ["arm.down", 0, -0.02]].map(([key, x, z]) => html`<${Button} label=${t(key)} onClick=${() => command("move_arm", { x, z })} />`)}
-    <${Button} label=${t("recenter")} onClick=${() => command("recenter_arm")} /></div></div>`,
+    ${[["arm.out", 0.02, 0], ["arm.in", -0.02, 0], ["arm.up", 0, 0.02], ["arm.down", 0, -0.02]].map(([key, x, z]) => html`<${Button} label=${t(key)} verb="move_arm" onClick=${() => command("move_arm", { x, z })} />`)}
+    <${Button} label=${t("recenter")} verb="recenter_arm" onClick=${() => command("recenter_arm")} /></div></div>`,
   gripper: (body) => html`<div class="card"><h3>${t("gripper")}</h3><p>${robotWord(body.gripper)}</p><div class="buttons">
-    <${Button} label=${t("grip.open")} onClick=${() => command("grip", { close: false })} /><${Button} label=${t("grip.close")} onClick=${() => command("grip", { close: true })} /></div></div>`,
-  blaster: (body) => html`<div class="card"><h3>${t("blaster")}</h3><p>${t("beads", { n: body.ammo })}</p><div class="buttons"><${Button} kind="danger" label=${t("fire")} onClick=${() => command("fire")} /></div></div>`,
+    <${Button} label=${t("grip.open")} verb="grip" onClick=${() => command("grip", { close: false })} /><${Button} label=${t("grip.close")} verb="grip" onClick=${() => command("grip", { close: true })} /></div></div>`,
+  blaster: (body) => html`<div class="card"><h3>${t("blaster")}</h3><p>${t("beads", { n: body.ammo })}</p><div class="buttons"><${Button} kind="danger" label=${t("fire")} verb="fire" onClick=${() => command("fire")} /></div></div>`,
   light: () => html`<div class="card"><h3>${t("light")}</h3><div class="buttons">
-    ${["#ff3b30", "#34c759", "#0a84ff", "#ffd60a", "#ffffff"].map((c) => html`<button type="button" class="swatch" aria-label=${c} style=${{ background: c }} onClick=${() => shine(c)}></button>`)}
-    <${Button} label=${t("light.off")} onClick=${() => shine("#000000")} /></div></div>`,
+    ${["#ff3b30", "#34c759", "#0a84ff", "#ffd60a", "#ffffff"].map((c) => html`<button type="button" class="swatch" aria-label=${c} style=${{ background: c }} aria-disabled=${lacks("shine") ? "true" : undefined} onClick=${() => shine(c)}></button>`)}
+    <${Button} label=${t("light.off")} verb="shine" onClick=${() => shine("#000000")} /></div></div>`,
   speaker: (body) => html`<div class="card"><h3>${t("speaker")}</h3>
     <form class="inline" onSubmit=${(e) => { e.preventDefault(); const text = new FormData(e.target).get("text"); if (text) command("say", { text }); }}>
-      <label class="grow"><span class="unseen">${t("say.text")}</span><input name="text" maxlength="200" placeholder=${t("say.text")} /></label><button class="button">${t("say")}</button></form>
-    <${Slider} name=${t("volume")} min="0" max="1" step="0.05" value=${body.volume} onChange=${(to) => command("volume", { to })} /></div>`,
+      <label class="grow"><span class="unseen">${t("say.text")}</span><input name="text" maxlength="200" placeholder=${t("say.text")} /></label><${Button} type="submit" label=${t("say")} verb="say" /></form>
+    <${Slider} name=${t("volume")} min="0" max="1" step="0.05" value=${body.volume} verb="volume" onChange=${(to) => command("volume", { to })} /></div>`,
 };
 
 function shine(colour) {
@@ -128,7 +128,7 @@ export function Drive() {
   useGamepad();
   const { parts, body, about } = state.value;
   return html`${parts.includes("driving") && html`<div class="card"><h3>${t("pad.title")}</h3><${Pad} />
-      ${padRefused.value && html`<p class="warned">${padRefused.value}</p>`}
+      ${(lacks("drive") || padRefused.value) && html`<p class="warned">${lacks("drive") || padRefused.value}</p>`}
       <${Slider} name=${t("pad.speed", { speed: (about.speed * share.value).toFixed(1) })} min="0.05" max="1" step="0.05" value=${share.value} onChange=${(v) => { share.value = v; }} />
       <p class="muted">${t("pad.hint")}</p></div>`}
     ${parts.includes("camera") && html`<${Camera} />`}

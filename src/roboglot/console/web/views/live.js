@@ -28,13 +28,14 @@ const TOOLS = {
   pan: null,
   ruler: { drag: (from, to) => { measure.value = [from, to]; }, done: () => {}, drop: () => {} },
 };
+const NEEDS = { go: "go_to", route: "go_to" };
 const ICONS = { go: "goal", route: "route", pan: "hand", ruler: "ruler" };
 
 function Tools() {
   return html`<div class="tools" role="toolbar" aria-label=${t("tools")}>
-    ${Object.keys(TOOLS).map((name) => html`<${Button} compact icon=${ICONS[name]} label=${t(`tool.${name}`)} on=${tool.value === name}
+    ${Object.keys(TOOLS).map((name) => html`<${Button} compact icon=${ICONS[name]} label=${t(`tool.${name}`)} verb=${NEEDS[name]} on=${tool.value === name}
       onClick=${() => { tool.value = name; measure.value = null; route.value = []; }} />`)}
-    ${tool.value === "route" && route.value.length > 0 && html`<${Button} kind="main" icon="play" label=${t("route.go", { n: route.value.length })}
+    ${tool.value === "route" && route.value.length > 0 && html`<${Button} kind="main" icon="play" label=${t("route.go", { n: route.value.length })} verb="go_to"
       onClick=${() => { go(route.value); route.value = []; }} />`}
   </div>
   <p class="hint">${t(`tool.${tool.value}.hint`)}</p>`;
@@ -59,9 +60,9 @@ function Control() {
     <label class="field"><span>${t("control.name")}</span><input value=${person.value} maxlength="40" autocomplete="nickname"
       onChange=${(e) => { person.value = e.target.value.trim() || person.value; introduce(); }} /></label>
     <div class="buttons">
-      ${!mine && html`<${Button} label=${t("control.take")} onClick=${() => command("take_control")} />`}
-      ${control.taken_by && html`<${Button} label=${t("control.release")} onClick=${() => command("release_control")} />`}
-      ${mine && html`<${Button} label=${t("control.give")} onClick=${() => { const to = prompt(t("control.give.to")); if (to) command("give_control", { to }); }} />`}
+      ${!mine && html`<${Button} label=${t("control.take")} verb="take_control" onClick=${() => command("take_control")} />`}
+      ${control.taken_by && html`<${Button} label=${t("control.release")} verb="release_control" onClick=${() => command("release_control")} />`}
+      ${mine && html`<${Button} label=${t("control.give")} verb="give_control" onClick=${() => { const to = prompt(t("control.give.to")); if (to) command("give_control", { to }); }} />`}
     </div></div>`;
 }
 
@@ -80,17 +81,17 @@ function State() {
       <${Row} name=${t("model")}>${about.maker} ${about.model}<small>${about.serial} · ${t("firmware")} ${about.firmware}</small><//>
     </dl>
     <div class="buttons">
-      ${state.value.parts.includes("docking") && html`<${Button} icon="dock" label=${safety.docked ? t("undock") : t("dock.go")} onClick=${() => command(safety.docked ? "undock" : "dock")} />`}
-      ${state.value.parts.includes("emergency_stop") && !safety.emergency_stop && html`<${Button} kind="danger" icon="alert" label=${t("estop")} onClick=${() => command("emergency_stop", { engage: true })} />`}
+      ${state.value.parts.includes("docking") && html`<${Button} icon="dock" label=${safety.docked ? t("undock") : t("dock.go")} verb="dock" onClick=${() => command(safety.docked ? "undock" : "dock")} />`}
+      ${state.value.parts.includes("emergency_stop") && !safety.emergency_stop && html`<${Button} kind="danger" icon="alert" label=${t("estop")} verb="emergency_stop" onClick=${() => command("emergency_stop", { engage: true })} />`}
     </div></div>
     <details class="card"><summary>${t("list")}</summary>
       <p>${t("list.robot", { name: current.value, x: pose[0].toFixed(1), y: pose[1].toFixed(1), yaw: Math.round(pose[2] * 180 / Math.PI) })}</p>
       <ul class="list">${drawings.places.map((p) => html`<li><span>${p.name}</span><small>${p.pose[0].toFixed(1)}, ${p.pose[1].toFixed(1)}</small>
-        <${Button} label=${t("go")} onClick=${() => go([[p.pose[0], p.pose[1]]], p.pose[2])} /></li>`)}</ul>
+        <${Button} label=${t("go")} verb="go_to" onClick=${() => go([[p.pose[0], p.pose[1]]], p.pose[2])} /></li>`)}</ul>
       <p>${t("list.drawn", { lines: drawings.lines.length, areas: drawings.areas.length, docks: drawings.docks.length })}</p>
       <form class="inline" onSubmit=${(e) => { e.preventDefault(); const f = new FormData(e.target); go([[Number(f.get("x")), Number(f.get("y"))]]); }}>
         <label>x <input name="x" type="number" step="0.1" required /></label><label>y <input name="y" type="number" step="0.1" required /></label>
-        <button class="button">${t("go")}</button></form>
+        <${Button} type="submit" label=${t("go")} verb="go_to" /></form>
     </details>`;
 }
 
@@ -100,9 +101,9 @@ function Running({ action }) {
   return html`<li class="running"><b>${robotWord(action.name)}</b><span class="badge">${robotWord(action.status)}</span>
     <small>${action.client || t("itself")} · ${duration(action.seconds)}${words ? ` · ${words}` : ""}</small>
     <div class="buttons">
-      <${Button} compact icon=${action.status === "PAUSED" ? "play" : "pause"} label=${action.status === "PAUSED" ? t("resume") : t("pause")}
+      <${Button} compact icon=${action.status === "PAUSED" ? "play" : "pause"} label=${action.status === "PAUSED" ? t("resume") : t("pause")} verb="pause"
         onClick=${() => command(action.status === "PAUSED" ? "resume" : "pause", { action: action.id })} />
-      <${Button} compact icon="stop" label=${t("cancel")} onClick=${() => command("cancel", { action: action.id })} /></div></li>`;
+      <${Button} compact icon="stop" label=${t("cancel")} verb="cancel" onClick=${() => command("cancel", { action: action.id })} /></div></li>`;
 }
 
 function Actions() {

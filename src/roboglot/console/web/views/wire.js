@@ -57,7 +57,7 @@ function Line({ row, slowest }) {
       ${row[REFUSAL] && html`<p class="warned">${t("wire.refused", { why: row[REFUSAL] })}</p>`}
       <pre tabindex="0">${pretty(row[EXCERPT])}</pre>
       ${asks && FORMS[row[DOOR]] && html`<div class="buttons">${FORMS[row[DOOR]].map((form) => html`<${Button} icon="copy" label=${t("copy.as", { form })} onClick=${() => copy(row[NUMBER], form)} />`)}
-        <${Button} icon="play" label=${t("wire.resend")} onClick=${() => sendAgain(row[NUMBER])} /></div>`}</div>`}
+        <${Button} icon="play" label=${t("wire.resend")} verb="resend" onClick=${() => sendAgain(row[NUMBER])} /></div>`}</div>`}
   </li>`;
 }
 

@@ -34,6 +34,7 @@ const MAP_TOOLS = {
   track: { drag: (from, to) => { shape.value = { line: [from, to] }; }, drop, done: (from, to) => { drop(); if (to) draw("add_line", { kind: "track", start: from, end: to }); } },
   area: { drag: (from, to) => { shape.value = { rectangle: [from, to] }; }, drop, done: (from, to) => { drop(); if (to) draw("add_area", rectangle(from, to)); } },
 };
+const NEEDS = { box: "add_box", person: "move_person", move: "place_robot", place: "add_place", wall: "add_line", track: "add_line", area: "add_area" };
 const ICONS = { box: "box", person: "person", move: "move", place: "place", wall: "wall", track: "route", area: "fit" };
 
 /** A forbidden area between two corners. */
@@ -45,17 +46,17 @@ function rectangle([x0, y0], [x1, y1]) {
 function People() {
   const names = Object.keys(truth.value?.people ?? {}), boxes = Object.keys(truth.value?.boxes ?? {});
   return html`<div class="card"><h3>${t("robot.hands")}</h3><div class="buttons">
-      <${Button} label=${t("hands.push")} onClick=${() => changeWorld("push", { robot: current.value, x: 8 })} />
-      <${Button} label=${t("hands.lift")} onClick=${() => changeWorld("lift", { robot: current.value, up: true })} />
-      <${Button} label=${t("hands.letgo")} onClick=${() => changeWorld("lift", { robot: current.value, up: false })} />
-      <${Button} label=${t("hands.plug")} onClick=${() => changeWorld("plug_in", { robot: current.value, wire: true })} />
-      <${Button} label=${t("hands.unplug")} onClick=${() => changeWorld("plug_in", { robot: current.value, wire: false })} /></div></div>
+      <${Button} label=${t("hands.push")} verb="push" onClick=${() => changeWorld("push", { robot: current.value, x: 8 })} />
+      <${Button} label=${t("hands.lift")} verb="lift" onClick=${() => changeWorld("lift", { robot: current.value, up: true })} />
+      <${Button} label=${t("hands.letgo")} verb="lift" onClick=${() => changeWorld("lift", { robot: current.value, up: false })} />
+      <${Button} label=${t("hands.plug")} verb="plug_in" onClick=${() => changeWorld("plug_in", { robot: current.value, wire: true })} />
+      <${Button} label=${t("hands.unplug")} verb="plug_in" onClick=${() => changeWorld("plug_in", { robot: current.value, wire: false })} /></div></div>
     <div class="card"><h3>${t("people")}</h3>${names.length ? html`<ul class="list">${names.map((name) => html`<li>
       <${Button} label=${name} on=${(someone.value || names[0]) === name} onClick=${() => { someone.value = name; tool.value = "person"; }} />
-      <${Button} label=${t("people.resume")} onClick=${() => changeWorld("resume_person", { person: name })} />
-      <${Button} label=${t("say")} onClick=${() => { const text = prompt(t("say.text")); if (text) changeWorld("person_says", { person: name, text }); }} /></li>`)}</ul>` : html`<p class="muted">${t("people.none")}</p>`}</div>
+      <${Button} label=${t("people.resume")} verb="resume_person" onClick=${() => changeWorld("resume_person", { person: name })} />
+      <${Button} label=${t("say")} verb="person_says" onClick=${() => { const text = prompt(t("say.text")); if (text) changeWorld("person_says", { person: name, text }); }} /></li>`)}</ul>` : html`<p class="muted">${t("people.none")}</p>`}</div>
     <div class="card"><h3>${t("boxes")}</h3>${boxes.length ? html`<ul class="list">${boxes.map((number) => html`<li><span>${t("box.number", { number })}</span>
-      <${Button} label=${t("remove")} onClick=${() => changeWorld("remove_box", { number: Number(number) })} /></li>`)}</ul>` : html`<p class="muted">${t("boxes.none")}</p>`}</div>`;
+      <${Button} label=${t("remove")} verb="remove_box" onClick=${() => changeWorld("remove_box", { number: Number(number) })} /></li>`)}</ul>` : html`<p class="muted">${t("boxes.none")}</p>`}</div>`;
 }
 
 function Faults() {
@@ -76,9 +77,9 @@ function Faults() {
       ${Object.entries(chosen.options).map(([name, fallback]) => html`<label class="field" key=${`${chosen.name}-${name}`}><span>${name}</span>
         <input name=${`option-${name}`} defaultValue=${fallback ?? ""} placeholder=${fallback === null ? t("fault.chosen") : ""} /></label>`)}
       <label class="field"><span>${t("fault.seconds")}</span><input name="duration" type="number" min="0" step="1" placeholder=${t("fault.forever")} /></label>
-      <button class="button main">${t("fault.inject")}</button></form>
+      <${Button} type="submit" kind="main" label=${t("fault.inject")} verb="inject_fault" /></form>
     <div class="card"><h3>${t("fault.active")}</h3>${active.length ? html`<ul class="list">${active.map((f) => html`<li><span>${robotWord(f.kind)}<small>${f.robot ?? t("building")}</small></span>
-      <${Button} label=${t("fault.clear")} onClick=${() => changeWorld("clear_fault", { number: f.number })} /></li>`)}</ul>` : html`<p class="muted">${t("fault.none")}</p>`}</div>`;
+      <${Button} label=${t("fault.clear")} verb="clear_fault" onClick=${() => changeWorld("clear_fault", { number: f.number })} /></li>`)}</ul>` : html`<p class="muted">${t("fault.none")}</p>`}</div>`;
 }
 
 function Drawn() {
@@ -90,13 +91,13 @@ function Drawn() {
   ];
   const here = poses.value[current.value] ?? [0, 0, 0];
   return html`<div class="card"><h3>${t("map")}</h3><div class="buttons">
-      <${Button} label=${t("place.here")} onClick=${() => { const name = prompt(t("place.name")); if (name) draw("add_place", { name, x: here[0], y: here[1], yaw: here[2] }); }} />
-      <${Button} label=${t("home.here")} onClick=${() => command("set_home")} />
-      <${Button} label=${t("relocalize")} onClick=${() => command("relocalize")} />
-      <${Button} label=${t("mapping")} on=${Boolean(state.value.place.mapping)} onClick=${() => command("mapping", { on: !state.value.place.mapping })} />
-      <${Button} kind="danger" label=${t("map.clear")} onClick=${() => { if (confirm(t("map.clear.sure"))) command("clear_map"); }} /></div></div>
+      <${Button} label=${t("place.here")} verb="add_place" onClick=${() => { const name = prompt(t("place.name")); if (name) draw("add_place", { name, x: here[0], y: here[1], yaw: here[2] }); }} />
+      <${Button} label=${t("home.here")} verb="set_home" onClick=${() => command("set_home")} />
+      <${Button} label=${t("relocalize")} verb="relocalize" onClick=${() => command("relocalize")} />
+      <${Button} label=${t("mapping")} on=${Boolean(state.value.place.mapping)} verb="mapping" onClick=${() => command("mapping", { on: !state.value.place.mapping })} />
+      <${Button} kind="danger" label=${t("map.clear")} verb="clear_map" onClick=${() => { if (confirm(t("map.clear.sure"))) command("clear_map"); }} /></div></div>
     <div class="card"><h3>${t("drawn.title")}</h3>${rows.length ? html`<ul class="list">${rows.map(([name, what, remove]) => html`<li><span>${name}<small>${what}</small></span>
-      <${Button} label=${t("remove")} onClick=${remove} /></li>`)}</ul>` : html`<p class="muted">${t("drawn.none")}</p>`}</div><${Maps} />`;
+      <${Button} label=${t("remove")} verb="remove_drawing" onClick=${remove} /></li>`)}</ul>` : html`<p class="muted">${t("drawn.none")}</p>`}</div><${Maps} />`;
 }
 
 export function World() {
@@ -108,7 +109,7 @@ export function World() {
   return html`<div class="split">
     <${MapView} tool=${tools[used]} overlay=${shape.value}>
       <div class="tools" role="toolbar" aria-label=${t("tools")}>${Object.keys(tools).map((name) => html`
-        <${Button} compact icon=${ICONS[name]} label=${t(`tool.${name}`)} on=${used === name} onClick=${() => { tool.value = name; }} />`)}</div>
+        <${Button} compact icon=${ICONS[name]} label=${t(`tool.${name}`)} verb=${NEEDS[name]} on=${used === name} onClick=${() => { tool.value = name; }} />`)}</div>
       <p class="hint">${t(`tool.${used}.hint`)}</p><//>
     <aside><${Tabs} tabs=${tabs} chosen=${tab} label=${t("panels")} />
       <div id="panel" class="panel" role="tabpanel" aria-labelledby=${`tab-${tab.value}`} tabindex="0">${state.value ? html`<${Shown} />` : null}</div></aside>

@@ -1,0 +1,52 @@
+"""Who asks: where access is configured, a browser or a script shows who it is; else this machine's programs come in."""
+
+from __future__ import annotations
+
+from roboglot.console.desk import CLIENT, Desk
+from roboglot.console.http import Scope
+from roboglot.console.people.sessions import Sessions, cookie_name, read_cookie
+from roboglot.model.admission import NO_PROOF, Admission, LockedOut, Proof, ProofKind, Unknown
+from roboglot.model.client_context import ask_for
+
+CHALLENGE = (b"www-authenticate", b'Bearer realm="roboglot"')  # not Basic: browsers would ask in a window of their own
+
+
+def admission_of(desk: Desk) -> Admission | None:
+    """Return what decides who comes in; None: all who reach the console come in."""
+    return next((robot.admission for robot in desk.robots.values() if robot.admission.asks), None)
+
+
+def address_of(scope: Scope) -> str:
+    """The client's end of the connection."""
+    host, port = scope.get("client") or ("", 0)
+    return f"{host}:{port}"
+
+
+def cookie_of(scope: Scope) -> str:
+    """The cookie that this console set; empty if there is none."""
+    return read_cookie(scope["headers"], cookie_name((scope.get("server") or ("", 0))[1] or 0))
+
+
+async def enter(desk: Desk, sessions: Sessions, scope: Scope) -> str:
+    """From here on it is asked for who the client is; returns a name that it showed, empty if it needed none.
+
+    Raises Unknown.
+    """
+    address, who = address_of(scope), ""
+    shown = next((value.decode("latin-1") for name, value in scope["headers"] if name == b"authorization"), "")
+    session = None if shown else sessions.find(cookie_of(scope))
+    proof = Proof(ProofKind.HTTP, shown) if shown else session.proof if session is not None else NO_PROOF
+    admission = admission_of(desk)
+    if admission is not None:
+        known = admission.known(address, proof)
+        try:
+            who = known if known is not None else await admission.admit(address, proof)
+        except LockedOut:
+            raise
+        except Unknown:
+            if session is not None:  # what was shown once no longer counts
+                sessions.end(cookie_of(scope))
+            raise
+    named = who if shown and admission is not None else session.name if session is not None else ""
+    ask_for(f"{CLIENT} {named or address.rpartition(':')[0]}".strip(), address, who)
+    return named

@@ -1,0 +1,93 @@
+"""The log-in page's requests: sign in by name and password, by a token or by a class's code; sign out; who am I."""
+
+from __future__ import annotations
+
+import base64
+import time
+from typing import Annotated, Any
+
+import msgspec
+
+from roboglot.console.desk import Desk
+from roboglot.console.http import Problem, Receive, Scope, Send, answer_json, read_json
+from roboglot.console.people.classes import Classes
+from roboglot.console.people.entry import address_of, admission_of, cookie_of
+from roboglot.console.people.sessions import Sessions, cookie_name, set_cookie
+from roboglot.console.settings import JOIN_TRIES
+from roboglot.model.admission import NO_PROOF, LockedOut, Proof, ProofKind, Unknown
+from roboglot.transport.limiter import Limiter
+
+SIGN_IN, SIGN_OUT = "/api/sign_in", "/api/sign_out"
+Secret = Annotated[str, msgspec.Meta(max_length=300)]
+MINUTE = 60.0
+
+
+class Shown(msgspec.Struct, forbid_unknown_fields=True):
+    """What a person shows: ``name`` and ``password``, or a ``token``, or a ``name`` and a class's ``code``."""
+
+    name: Annotated[str, msgspec.Meta(max_length=64)] = ""
+    password: Secret = ""
+    token: Secret = ""
+    code: Annotated[str, msgspec.Meta(max_length=12)] = ""
+
+
+class Signing:
+    """Of one console."""
+
+    def __init__(self, desk: Desk, sessions: Sessions, classes: Classes) -> None:
+        self._desk, self._sessions, self._classes = desk, sessions, classes
+        self._tries = Limiter(JOIN_TRIES / MINUTE, JOIN_TRIES, time.monotonic)
+
+    async def serve(self, scope: Scope, receive: Receive, send: Send) -> bool:
+        """Answer if the path is one of ours; needs no identity. Raises Problem."""
+        if scope["path"] not in (SIGN_IN, SIGN_OUT):
+            return False
+        if scope["method"] != "POST":
+            raise Problem(405, "signing in and out is posted")
+        name = cookie_name((scope.get("server") or ("", 0))[1] or 0)
+        secure = scope.get("scheme") == "https"
+        if scope["path"] == SIGN_OUT:
+            self._sessions.end(cookie_of(scope))
+            await answer_json(send, {"name": ""}, 200, [set_cookie(name, "", secure=secure)])
+            return True
+        try:
+            shown = msgspec.convert(await read_json(receive), Shown)
+        except msgspec.ValidationError as error:
+            raise Problem(400, str(error)) from None
+        token, answer = await self._sign_in(address_of(scope), shown)
+        self._sessions.end(cookie_of(scope))  # a session that others may know is not carried on
+        await answer_json(send, answer, 200, [set_cookie(name, token, secure=secure)])
+        return True
+
+    async def _sign_in(self, address: str, shown: Shown) -> tuple[str, dict[str, Any]]:
+        if shown.code:
+            return await self._join(address, shown)
+        admission = admission_of(self._desk)
+        if admission is None:
+            raise Problem(409, "no sign-in is needed here: access is not switched on")
+        if not (shown.token or (shown.name and shown.password)):
+            raise Problem(400, "a name and a password, or a token, or a name and a code are needed")
+        proof = Proof(ProofKind.HTTP, _header(shown))
+        try:
+            who = await admission.admit(address, proof)
+        except LockedOut as locked:
+            raise Problem(429, str(locked)) from None
+        except Unknown as unknown:
+            raise Problem(401, str(unknown)) from None
+        return self._sessions.open(proof, who), {"name": who}
+
+    async def _join(self, address: str, shown: Shown) -> tuple[str, dict[str, Any]]:
+        host = address.rpartition(":")[0]
+        if not self._tries.take(host):
+            raise Problem(429, "too many wrong codes from your address: wait a minute")
+        seat = await self._classes.join(shown.code, shown.name)
+        self._tries.give_back(host)
+        token = self._sessions.open(seat.proof or NO_PROOF, seat.identity, seat.robot, seat.code)
+        return token, {"name": seat.identity, "robot": seat.robot}
+
+
+def _header(shown: Shown) -> str:
+    """As a client of HTTP would show it."""
+    if shown.token:
+        return f"Bearer {shown.token.strip()}"
+    return "Basic " + base64.b64encode(f"{shown.name}:{shown.password}".encode("utf-8", "surrogatepass")).decode()

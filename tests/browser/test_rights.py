@@ -1,0 +1,283 @@
+"""The console where names are asked for: signing in and out, buttons by rights, a class, a right that ends."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import AsyncIterator, Awaitable, Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import pytest
+import pytest_asyncio
+
+from roboglot.access.store import FILE, AccessStore, Grant
+from roboglot.config import AccessConfig, ConsoleConfig, RobotConfig, load_config
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.system.lease import Lease
+from roboglot.model.geometry import Pose
+from roboglot.operations import Right
+from roboglot.runtime import Runtime
+from tests.browser.served import ADDRESS
+
+pytestmark = pytest.mark.asyncio(loop_scope="module")
+PASSWORD, LOGINS = "a long password", 3
+PATIENCE = 15_000  # ms
+HOSTS = {"a": ADDRESS.replace(".91.", ".94."), "b": ADDRESS.replace(".91.", ".95.")}
+WHO = ("none", "see", "drive", "program", "edit", "admin")
+MAY = {  # what each may: to stop and drive, to draw on the map, to break the world
+    "see": set[str](),
+    "drive": {"stop", "drive"},
+    "program": {"stop", "drive"},
+    "edit": {"draw"},
+    "admin": {"stop", "drive", "draw", "break"},
+}
+BUTTONS = {
+    "stop": ("live", "", ".stop"),
+    "drive": ("live", "#tab-state", "button:has-text('Take control')"),
+    "draw": ("world", "#tab-drawn", "button:has-text('Save the map')"),
+    "break": ("world", "#tab-faults", "button:has-text('Break it')"),
+}
+TRY = "(body) => fetch('/api/sign_in', {method: 'POST', body}).then((reply) => reply.status)"
+Page = Any
+Open = Callable[[], Awaitable[Page]]
+
+
+@dataclass(frozen=True, slots=True)
+class Guarded:
+    """Two robots whose console asks who comes, and the list of who may."""
+
+    runtime: Runtime
+    clock: LockstepClock
+    store: AccessStore
+    url: str
+
+    def add(self, name: str, right: str, robot: str = "*") -> None:
+        """Let a person in."""
+        rights = frozenset({Right(right)}) if right != "none" else frozenset()
+        self.store.add_person(name, PASSWORD, [Grant(robot, rights)] if rights else [])
+        assert self.runtime.guard is not None
+        self.runtime.guard.reload()
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def guarded(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Guarded]:
+    data = tmp_path_factory.mktemp("guarded")
+    base = load_config(None, {"data": str(data), "world": "empty", "lockstep": True})
+    robots = tuple(RobotConfig(name, "universal", host) for name, host in HOSTS.items())
+    access = AccessConfig(on=True, local=False, logins=LOGINS, connections=200)
+    runtime = Runtime(replace(base, robots=robots, access=access, console=ConsoleConfig(port=0)))
+    assert isinstance(runtime.clock, LockstepClock)
+    assert runtime.console is not None
+    monkeypatch = pytest.MonkeyPatch()
+    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
+    store = AccessStore(data / FILE)
+    await runtime.start()
+    await runtime.console.ready()
+    yield Guarded(runtime, runtime.clock, store, runtime.console.address)
+    store.close()
+    await runtime.close()
+    monkeypatch.undo()
+
+
+@pytest_asyncio.fixture(loop_scope="module", scope="module")
+async def chromium() -> AsyncIterator[Any]:
+    from playwright import async_api
+
+    from tests.browser.conftest import CHROMIUM, OPTIONS
+
+    async with async_api.async_playwright() as playwright:
+        opened = await playwright.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+        yield opened
+        await opened.close()
+
+
+@pytest_asyncio.fixture(loop_scope="module")
+async def open_page(chromium: Any, guarded: Guarded) -> AsyncIterator[Open]:
+    contexts = []
+
+    async def open_it(path: str = "/") -> Page:
+        context = await chromium.new_context(viewport={"width": 1280, "height": 800})
+        contexts.append(context)
+        await context.add_init_script("localStorage.language = 'en'")
+        page = await context.new_page()
+        page.set_default_timeout(PATIENCE)
+        await page.goto(guarded.url + path)
+        return page
+
+    yield open_it  # type: ignore[misc]
+    for context in contexts:
+        await context.close()
+
+
+async def until(condition: Callable[[], bool]) -> None:
+    """Wait, in the machine's time, for what a page sent."""
+    async with asyncio.timeout(PATIENCE / 1000):
+        while not condition():  # noqa: ASYNC110 - a page has no event of ours
+            await asyncio.sleep(0.02)
+
+
+async def sign_in(page: Page, name: str, password: str = PASSWORD) -> None:
+    await page.fill("input[name=name]", name)
+    await page.fill("input[name=password]", password)
+    await page.click("form .main")
+
+
+async def offered(page: Page, what: str) -> bool:
+    """Whether a button is on; one that is off must say why."""
+    view, tab, button = BUTTONS[what]
+    await page.evaluate(f"location.hash = '#/{view}'")
+    if tab:
+        await page.click(tab)
+    await page.wait_for_selector(button)
+    off = await page.get_attribute(button, "aria-disabled") == "true"
+    if off:
+        assert "needs the right to" in await page.get_attribute(button, "title")
+    return not off
+
+
+async def test_buttons_are_on_for_those_who_may(guarded: Guarded, open_page: Open) -> None:
+    for who in WHO:
+        guarded.add(who, who)
+        page = await open_page()
+        await sign_in(page, who)
+        if who == "none":
+            await page.wait_for_selector("text=may see none of the robots")
+            continue
+        await page.wait_for_selector("text=Scan fits map")
+        assert {what for what in BUTTONS if await offered(page, what)} == MAY[who], who
+        cookies = await page.context.cookies()
+        assert [(c["httpOnly"], c["sameSite"]) for c in cookies] == [(True, "Strict")]
+        assert await page.evaluate("document.cookie") == ""
+        await page.context.close()
+
+
+async def test_signing_out_ends_the_session(guarded: Guarded, open_page: Open) -> None:
+    guarded.add("anna", "drive")
+    page = await open_page()
+    await sign_in(page, "anna")
+    await page.wait_for_selector("text=Scan fits map")
+    (cookie,) = await page.context.cookies()
+    await page.click("header button:has-text('anna')")
+    await page.wait_for_selector("input[name=password]")
+    await page.context.add_cookies([cookie])  # a kept copy is worth nothing
+    assert await page.evaluate("fetch('/api/robots').then((r) => r.status)") == 401
+
+
+async def test_a_token_signs_in_and_its_rotation_signs_out(guarded: Guarded, open_page: Open) -> None:
+    token = guarded.store.add_machine("cell7", [Grant("b", frozenset({Right.DRIVE}))])
+    guarded.runtime.guard.reload()  # type: ignore[union-attr]
+    page = await open_page()
+    await page.click("text=Token")
+    await page.fill("input[name=token]", token)
+    await page.click("form .main")
+    await page.wait_for_selector("text=Scan fits map")
+    assert await page.locator("header option").all_inner_texts() == ["Robot b"]
+    guarded.store.rotate("cell7")
+    guarded.runtime.guard.reload()  # type: ignore[union-attr]
+    await page.wait_for_selector(".sign")
+
+
+async def test_guesses_are_limited_and_told_apart_from_nothing(guarded: Guarded, open_page: Open) -> None:
+    guarded.add("ben", "see")
+    page = await open_page()
+    await sign_in(page, "ben", "a wrong password")
+    await page.wait_for_selector("text=lets nobody in")
+    for name in ("unknown", "ben"):
+        body = json.dumps({"name": name, "password": "a wrong password"})
+        assert await page.evaluate(TRY, body) == 401
+    await sign_in(page, "ben", "another wrong one")
+    await page.wait_for_selector("text=too many wrong passwords")
+    guarded.runtime.guard._tries.give_back("127.0.0.1")  # type: ignore[union-attr]
+    guarded.runtime.guard._tries = type(guarded.runtime.guard._tries)(1.0, LOGINS, lambda: 0.0)  # type: ignore[union-attr]
+
+
+async def test_a_driver_whose_right_is_revoked_stands(guarded: Guarded, open_page: Open) -> None:
+    robot = guarded.runtime.fleet.robots["a"]
+    guarded.add("carl", "drive", "a")
+    page = await open_page()
+    await sign_in(page, "carl")
+    await page.wait_for_selector("text=Scan fits map")
+    await page.click("#tab-drive")
+    box = await page.locator(".pad").bounding_box()
+    await page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 20)
+    await page.mouse.down()
+    await until(lambda: any(action.name == "drive" for action in robot.actions.running()))
+    for _ in range(8):
+        await asyncio.sleep(0.09)
+        await guarded.clock.advance(0.08)
+    assert robot[Base].velocity.speed > 0.1
+    guarded.store.revoke("carl")
+    guarded.runtime.guard.reload()  # type: ignore[union-attr]
+    await guarded.clock.advance(0.5)
+    assert robot[Base].velocity.speed < 0.02
+    await page.wait_for_selector("text=Your rights have changed")
+    await page.wait_for_selector(".sign")
+    await page.mouse.up()
+    assert robot.actions.running() == []
+
+
+async def test_a_right_that_becomes_less_leaves_the_page_with_what_is_left(guarded: Guarded, open_page: Open) -> None:
+    guarded.add("dora", "drive", "a")
+    page = await open_page()
+    await sign_in(page, "dora")
+    await page.wait_for_selector("text=Scan fits map")
+    assert await offered(page, "drive")
+    with guarded.store._transaction() as connection:
+        connection.execute("UPDATE allowed SET rights='see' WHERE identity='dora'")
+    guarded.runtime.guard.reload()  # type: ignore[union-attr]
+    await page.wait_for_selector("button[aria-disabled=true]:has-text('Take control')")
+
+
+async def test_pupils_join_by_a_code_and_the_teacher_leads(guarded: Guarded, open_page: Open) -> None:
+    guarded.add("teacher", "admin")
+    teacher = await open_page()
+    await sign_in(teacher, "teacher")
+    await teacher.wait_for_selector("text=Scan fits map")
+    await teacher.click("nav >> text=Class")
+    await teacher.fill("input[name=name]", "5b")
+    await teacher.click("form .main")
+    code = await teacher.inner_text("output.code")
+    pupils = []
+    for name in ("Emil", "Frida"):
+        page = await open_page(f"/?code={code}")
+        await page.fill("input[name=name]", name)
+        await page.click("form .main")
+        await page.wait_for_selector("text=Scan fits map")
+        assert await page.locator("nav >> text=Class").count() == 0
+        pupils.append(page)
+    shown = [await page.locator("header option").all_inner_texts() for page in pupils]
+    assert sorted(shown) == [["Robot a"], ["Robot b"]]
+    assert await pupils[0].evaluate("fetch('/api/class').then((r) => r.status)") == 403
+    emils = shown[0][0][-1]
+    await teacher.wait_for_selector(".tile:has-text('Frida'):has-text('is here')")
+
+    await teacher.click(".tile:has-text('Emil') >> text=Lock")
+    await until(lambda: guarded.runtime.fleet.robots[emils][Lease].taken_by == "console teacher")
+    await pupils[0].click("text=Take control")
+    await pupils[0].wait_for_selector("text=the teacher has locked")
+    await teacher.click(".tile:has-text('Emil') >> text=Unlock")
+    await until(lambda: guarded.runtime.fleet.robots[emils][Lease].taken_by == "")
+
+    hands = guarded.runtime.fleet.world.hands
+    hands.place(emils, Pose(5.0, 5.0, 1.0))
+    await teacher.click(".tile:has-text('Emil') >> text=Reset")
+    await until(lambda: next(r.pose for r in hands.robots if r.name == emils).distance_to(Pose(5.0, 5.0)) > 1.0)
+
+    await teacher.click(".tile:has-text('Emil') >> text=Give back")
+    await pupils[0].wait_for_selector(".sign")
+    await teacher.wait_for_selector(".tile:has-text('Emil')", state="detached")
+    teacher.on("dialog", lambda dialog: asyncio.ensure_future(dialog.accept()))
+    await teacher.click("text=End the class")
+    await pupils[1].wait_for_selector(".sign")
+    assert await pupils[1].evaluate("fetch('/api/robots').then((r) => r.status)") == 401
+
+
+async def test_wrong_codes_are_limited(guarded: Guarded, open_page: Open) -> None:
+    page = await open_page("/?code=NOTONE")
+    statuses = await page.evaluate("""async () => { const found = []; for (let i = 0; i < 12; i++) {
+        const body = JSON.stringify({name: 'x', code: 'WRONG' + i});
+        found.push((await fetch('/api/sign_in', {method: 'POST', body})).status);
+    } return found; }""")
+    assert statuses == [401] * 10 + [429] * 2
