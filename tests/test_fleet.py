@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import json
 
 import pytest
 
-from roboglot.config import RobotConfig, StartConfig
-from roboglot.fleet import Fleet, build_fleet
+from roboglot.config import Config, RobotConfig, StartConfig
+from roboglot.fleet import Fleet, build_fleet, origin_of
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.logistics.delivery import Delivery, OrderKind, OrderRequest
 from roboglot.model.components.mapping.places import Places
@@ -47,3 +48,15 @@ async def test_robots_start_where_the_configuration_says_and_others_keep_away() 
         build_fleet("empty", [outside], clock=LockstepClock(), seed=1, database=database)
     await fleet.close()
     database.close()
+
+
+def test_a_recordings_settings_hold_no_secrets() -> None:
+    config = Config(
+        robots=(RobotConfig("a", "slamware://user:hunter2@10.0.0.7?token=hunter2"),),
+        database="postgresql://robots:hunter2@db/robots",
+        doors={"visual": {"cloud": "https://cloud", "cloud_token": "hunter2"}},
+    )
+    origin = origin_of(config, "1")
+    kept = {attachment.name: attachment.data.decode() for attachment in origin.attachments}
+    assert "hunter2" not in json.dumps(origin.facts) + kept["config.json"]
+    assert json.loads(kept["config.json"])["database"] == "postgresql://db/robots"

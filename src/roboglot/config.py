@@ -156,6 +156,8 @@ class Config:
     """Everything ``roboglot up`` needs. ``speed`` is the clock's; ``lockstep`` stops it until it is advanced.
 
     ``doors`` are the doors' own sections by name; the defaults hold for those that are not there.
+    ``database`` is the URL of a PostgreSQL server that keeps what robots remember, for a fleet on several machines;
+    without it, a file in the data folder does.
     ``insecure`` lets robots listen outside loopback, where everyone who reaches them may drive them.
     """
 
@@ -165,6 +167,7 @@ class Config:
     lockstep: bool = False
     seed: int = 1
     data: Path = field(default_factory=lambda: default_data_folder(os.environ))
+    database: str = ""
     doors: Mapping[str, Any] = field(default_factory=dict)
     programs: ProgramsConfig = field(default_factory=ProgramsConfig)
     access: AccessConfig = field(default_factory=AccessConfig)

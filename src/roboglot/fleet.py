@@ -9,6 +9,7 @@ import asyncio
 import dataclasses
 import json
 import platform
+import re
 from collections.abc import Awaitable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -41,7 +42,6 @@ from roboglot.simulation.world.world import RobotPlacement, World
 from roboglot.simulation.world.world_files import load_world, world_sources
 from roboglot.storage.annotations import StoredAnnotations
 from roboglot.storage.apps import StoredApps
-from roboglot.storage.database import Database
 from roboglot.storage.files import StoredFiles
 from roboglot.storage.ledger import StoredLedger
 from roboglot.storage.map_memory import StoredMapMemory
@@ -49,6 +49,7 @@ from roboglot.storage.maps import StoredMaps
 from roboglot.storage.members import StoredMembers
 from roboglot.storage.places import StoredPlaces
 from roboglot.storage.settings import StoredSettings
+from roboglot.storage.transactions import Transactions
 
 if TYPE_CHECKING:
     from roboglot.recording.files import Origin
@@ -56,6 +57,8 @@ if TYPE_CHECKING:
 UNKNOWN = Description(  # of a real robot until it has reported; the footprint of a medium one
     maker="", model="", serial="", hardware_version="", software_version="", radius=0.25, height=0.3
 )
+SECRET = re.compile("token|password|secret", re.IGNORECASE)  # names of settings that recordings leave out
+URL_LOGIN = re.compile("(://)[^/@]*@")  # the part of a URL that says who comes
 STEP = 0.1  # s that pass at a time while robots come to a stand on a lockstep clock
 BREATH = 0.001  # real s for sockets between two steps
 
@@ -104,7 +107,7 @@ async def _settled(clock: Clock, *endings: Awaitable[object]) -> None:
     await together
 
 
-def build_fleet(world: str, robots: Sequence[RobotConfig], *, clock: Clock, seed: int, database: Database) -> Fleet:
+def build_fleet(world: str, robots: Sequence[RobotConfig], *, clock: Clock, seed: int, database: Transactions) -> Fleet:
     """Build all robots of the configuration in the named (or given by path) world. Raises ValueError in plain words."""
     placements = [_placement(robot) for robot in robots if robot.is_simulated]
     simulated = World(load_world(world), placements, clock=clock, seed=seed)
@@ -145,7 +148,7 @@ def origin_of(config: Config, version: str) -> Origin:
     """Return what a recording says about where it comes from: settings, seed, versions, and the files they name."""
     from roboglot.recording.files import Attachment, Origin
 
-    settings = json.dumps(dataclasses.asdict(config), default=_in_words)
+    settings = json.dumps(_public(dataclasses.asdict(config)))
     facts = {
         "version": version,
         "python": platform.python_version(),
@@ -161,8 +164,19 @@ def origin_of(config: Config, version: str) -> Origin:
     return Origin(facts, [Attachment("config.json", "application/json", settings.encode()), *files])
 
 
-def _in_words(value: object) -> object:
-    return dict(value) if isinstance(value, Mapping) else str(value)
+def _public(value: object) -> object:
+    """Return ``value`` as JSON has it, without tokens, passwords and what URLs hold of them."""
+    match value:
+        case Mapping():
+            return {
+                str(key): "[redacted]" if inner and SECRET.search(str(key)) else _public(inner)
+                for key, inner in value.items()
+            }
+        case list() | tuple():
+            return [_public(inner) for inner in value]
+        case bool() | int() | float() | None:
+            return value
+    return URL_LOGIN.sub(r"\1", _without_options(str(value)))
 
 
 def _without_options(url: str) -> str:
@@ -170,7 +184,7 @@ def _without_options(url: str) -> str:
     return url.partition("?")[0]
 
 
-def _add_memory(robot: Robot, clock: Clock, database: Database) -> None:
+def _add_memory(robot: Robot, clock: Clock, database: Transactions) -> None:
     """Add the components that are stored on our disk, for any robot."""
     if Disk in robot:
         database = database.on(robot[Disk])

@@ -40,7 +40,7 @@ from roboglot.protocols.door import Clouds, Door, DoorType, Endpoint, PortKind, 
 from roboglot.protocols.lease_desk import LeaseDesk
 from roboglot.protocols.record_desk import RecordDesk
 from roboglot.rehearsal import Rehearsals, scene_of
-from roboglot.storage.database import Database
+from roboglot.storage.opening import open_database
 from roboglot.storage.outbox import Outbox
 from roboglot.storage.programs import program_stores
 from roboglot.transport.tls import Tls, server_context
@@ -123,7 +123,8 @@ class Runtime:
         self.config = config
         self._lock = lock_folder(config.data)
         self.clock: Clock = LockstepClock() if config.lockstep else RealClock(config.speed)
-        self._database = Database(config.data / "roboglot.db", in_place=config.lockstep)
+        file, names = config.data / "roboglot.db", [robot.name for robot in config.robots]
+        self._database = open_database(file, config.database, names, in_place=config.lockstep)
         limits = dataclasses.asdict(config.programs)
         together = limits.pop("memory_together")
         self._memory_together = together

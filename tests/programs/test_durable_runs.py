@@ -21,7 +21,7 @@ from roboglot.programs.engine.journal import Journal, does_something, header_of
 from roboglot.programs.stores import JournalEntry, StoredProgram
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.storage.database import Database
-from roboglot.storage.journals import SqliteJournalStore
+from roboglot.storage.journals import DatabaseJournalStore
 from roboglot.storage.programs import program_stores
 from roboglot.testing.process import child
 
@@ -151,7 +151,7 @@ async def test_what_was_under_way_is_reported_and_not_repeated(
     """A result with a state tells it, and the program goes on; where there is none, the call raises."""
     first_life(tmp_path / "robot.db", PROGRAM, "step 2")
     database = Database(tmp_path / "robot.db")
-    store = SqliteJournalStore(database, "a")
+    store = DatabaseJournalStore(database, "a")
     entries = await store.entries("t")
     assert [entry.name for entry in entries].count("cyberdog.task.start") == 3
     record = b'{"$":"record","t":"State","v":{"code":1,"describe":"%s"}}'
@@ -199,7 +199,7 @@ print('end', True)
 
 async def test_a_journal_knows_what_was_under_way(tmp_path: Path) -> None:
     database = Database(":memory:")
-    store = SqliteJournalStore(database, "a")
+    store = DatabaseJournalStore(database, "a")
     first = Journal(store, "t")
     header = header_of("pass", {"m": "def f(): pass"}, 3600)
     await first.open(header)
@@ -229,7 +229,7 @@ async def test_a_journal_knows_what_was_under_way(tmp_path: Path) -> None:
 
 async def test_a_run_that_becomes_too_long_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     database = Database(":memory:")
-    store = SqliteJournalStore(database, "a")
+    store = DatabaseJournalStore(database, "a")
     kept = Journal(store, "t")
     await kept.open(header_of("pass", {}, 0))
     monkeypatch.setattr(journal, "CALLS_MAX", 3)

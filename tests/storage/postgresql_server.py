@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import psycopg
+import pytest
 
 BINARIES = Path("/usr/lib/postgresql")
 
@@ -93,3 +94,8 @@ def postgresql_server(binaries: Path) -> Iterator[PostgreSQLServer]:
             yield server
         finally:
             server.stop()
+
+
+needs_postgresql = pytest.mark.skipif(
+    binary_folder() is None, reason="no PostgreSQL server on this machine (Debian: apt-get install postgresql)"
+)

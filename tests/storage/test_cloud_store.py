@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator
 from pathlib import Path
 
 import psycopg
@@ -11,35 +10,9 @@ import pytest
 
 from roboglot.storage import cloud
 from roboglot.storage.cloud import CloudStore, TooMany
-from roboglot.storage.database import Database
 from roboglot.storage.postgresql import PostgreSQL
-from roboglot.storage.transactions import Transactions
-from tests.storage.postgresql_server import PostgreSQLServer, binary_folder, postgresql_server
-
-BINARIES = binary_folder()
-needs_postgresql = pytest.mark.skipif(
-    BINARIES is None, reason="no PostgreSQL server on this machine (Debian: apt-get install postgresql)"
-)
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[PostgreSQLServer]:
-    assert BINARIES
-    with postgresql_server(BINARIES) as running:
-        yield running
-
-
-@pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=needs_postgresql)])
-def database(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Transactions]:
-    opened: Transactions
-    if request.param == "sqlite":
-        opened = Database(tmp_path / "cloud.db")
-    else:
-        running: PostgreSQLServer = request.getfixturevalue("server")
-        running.empty()
-        opened = PostgreSQL(running.url)
-    yield opened
-    opened.close()
+from roboglot.storage.transactions import DatabaseError, Transactions
+from tests.storage.postgresql_server import PostgreSQLServer, needs_postgresql
 
 
 @pytest.fixture
@@ -109,7 +82,7 @@ async def test_a_restart_of_the_server_is_survived(server: PostgreSQLServer) -> 
     store = CloudStore(database)
     token = await store.add_account("one")
     server.stop()
-    with pytest.raises(psycopg.Error):
+    with pytest.raises(DatabaseError):
         await store.record("one", "dog", "lost, and said so")
     server.start()
     for number in range(8):

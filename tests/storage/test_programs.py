@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import signal
-import sqlite3
 from collections.abc import Iterator
 from pathlib import Path
 from threading import Event
@@ -13,7 +12,8 @@ import pytest
 
 from roboglot.programs.stores import LOG_MAX, LOG_TEXT_MAX, LogEntry, StoredProgram
 from roboglot.storage.database import Database
-from roboglot.storage.programs import SqliteProgramStore
+from roboglot.storage.programs import DatabaseProgramStore
+from roboglot.storage.transactions import Connection, DatabaseError
 from roboglot.testing.process import child
 
 
@@ -29,7 +29,7 @@ def program(id: str, state: str = "wait_run", body: str = "pass") -> StoredProgr
 
 
 async def test_programs_are_kept_per_robot_and_kind_and_listed_by_id(database: Database) -> None:
-    tasks = SqliteProgramStore(database, "a")
+    tasks = DatabaseProgramStore(database, "a")
     for id in ("t10", "t1", "t2"):
         await tasks.put(program(id))
     await tasks.put(program("t1", body="print(1)"))
@@ -37,12 +37,12 @@ async def test_programs_are_kept_per_robot_and_kind_and_listed_by_id(database: D
     assert [p.id for p in await tasks.all(["t2", "nobody", "t1", "t2"])] == ["t1", "t2"]
     assert await tasks.get("t1") == program("t1", body="print(1)")
     assert await tasks.count() == 3
-    for other in (SqliteProgramStore(database, "b"), SqliteProgramStore(database, "a", "module")):
+    for other in (DatabaseProgramStore(database, "b"), DatabaseProgramStore(database, "a", "module")):
         assert await other.all() == []
 
 
 async def test_removing_one_leaves_those_whose_id_begins_alike(database: Database) -> None:
-    tasks = SqliteProgramStore(database, "a")
+    tasks = DatabaseProgramStore(database, "a")
     for id in ("t1", "t10"):
         await tasks.put(program(id))
         await tasks.append_log(id, [LogEntry(1.0, "print", id)])
@@ -54,7 +54,7 @@ async def test_removing_one_leaves_those_whose_id_begins_alike(database: Databas
 
 
 async def test_a_log_keeps_the_newest_entries(database: Database) -> None:
-    tasks = SqliteProgramStore(database, "a")
+    tasks = DatabaseProgramStore(database, "a")
     await tasks.put(program("t"))
     await tasks.append_log("t", [LogEntry(float(i), "print", str(i)) for i in range(LOG_MAX)])
     await tasks.set_state("t", "shutdown", [LogEntry(9.0, "error", "x" * (LOG_TEXT_MAX + 1))])
@@ -65,7 +65,7 @@ async def test_a_log_keeps_the_newest_entries(database: Database) -> None:
 
 
 async def test_what_was_left_running_is_settled_at_the_start(database: Database) -> None:
-    tasks = SqliteProgramStore(database, "a")
+    tasks = DatabaseProgramStore(database, "a")
     for id, state in (("t1", "run"), ("t2", "suspend"), ("t3", "wait_run")):
         await tasks.put(program(id, state))
     assert [p.id for p in tasks.in_states_now(["run", "suspend"])] == ["t1", "t2"]
@@ -78,9 +78,10 @@ CHILD = """
 import asyncio, sys
 from roboglot.storage.database import Database
 from roboglot.programs.stores import StoredProgram
-from roboglot.storage.programs import SqliteProgramStore
+from roboglot.storage.programs import DatabaseProgramStore
+from roboglot.storage.transactions import Connection, DatabaseError
 async def main():
-    store = SqliteProgramStore(Database(sys.argv[1]), "a")
+    store = DatabaseProgramStore(Database(sys.argv[1]), "a")
     for number in range(10_000):
         await store.put(StoredProgram(f"t{number}", "", "", "single", "now", "pass", "wait_run"))
         print(number, flush=True)
@@ -96,17 +97,17 @@ async def test_what_was_acknowledged_survives_kill_9(tmp_path: Path) -> None:
         writer.send_signal(signal.SIGKILL)
         acknowledged += [int(line) for line in writer.stdout if line.endswith("\n")]
     database = Database(path)
-    kept = {p.id for p in await SqliteProgramStore(database, "a").all()}
+    kept = {p.id for p in await DatabaseProgramStore(database, "a").all()}
     database.close()
     assert {f"t{number}" for number in acknowledged} <= kept
 
 
 async def test_reading_waits_for_no_writer(tmp_path: Path) -> None:
     database, may_end = Database(tmp_path / "robot.db"), Event()
-    tasks = SqliteProgramStore(database, "a")
+    tasks = DatabaseProgramStore(database, "a")
     await tasks.put(program("t"))
 
-    def write_slowly(connection: sqlite3.Connection) -> None:
+    def write_slowly(connection: Connection) -> None:
         connection.execute("DELETE FROM program")
         assert may_end.wait(60)
 
@@ -116,6 +117,6 @@ async def test_reading_waits_for_no_writer(tmp_path: Path) -> None:
     may_end.set()
     await writing
     assert await tasks.get("t") is None
-    with pytest.raises(sqlite3.OperationalError, match="readonly"):
+    with pytest.raises(DatabaseError, match="readonly"):
         await database.read(lambda connection: connection.execute("DELETE FROM program"))
     database.close()

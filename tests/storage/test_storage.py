@@ -24,6 +24,7 @@ from roboglot.storage.database import Database
 from roboglot.storage.maps import StoredMaps
 from roboglot.storage.places import StoredPlaces
 from roboglot.storage.settings import StoredSettings
+from roboglot.storage.transactions import Connection
 from roboglot.testing.process import child
 
 Open = Callable[[], Database]
@@ -105,7 +106,7 @@ async def test_settings_come_back(open_database: Open) -> None:
 async def test_a_failed_transaction_leaves_nothing(open_database: Open) -> None:
     database = open_database()
 
-    def half(connection: sqlite3.Connection) -> None:
+    def half(connection: Connection) -> None:
         connection.execute("INSERT INTO setting VALUES ('a', 'k', '1')")
         raise RuntimeError("half way")
 
@@ -117,8 +118,8 @@ async def test_a_failed_transaction_leaves_nothing(open_database: Open) -> None:
 async def test_transactions_together_share_a_flush_and_no_failure(open_database: Open) -> None:
     database, done = open_database(), list[int]()
 
-    def write(number: int) -> Callable[[sqlite3.Connection], None]:
-        def work(connection: sqlite3.Connection) -> None:
+    def write(number: int) -> Callable[[Connection], None]:
+        def work(connection: Connection) -> None:
             connection.execute("INSERT INTO setting VALUES ('a', ?, '1')", (f"k{number}",))
             if number % 7 == 3:
                 raise RuntimeError("this one breaks")

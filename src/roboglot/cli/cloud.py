@@ -14,7 +14,6 @@ from roboglot.hosting.logs import set_up_logging
 
 if TYPE_CHECKING:
     from roboglot.storage.cloud import CloudStore
-    from roboglot.storage.transactions import Transactions
 
 CONNECTIONS_MAX = 200
 
@@ -39,11 +38,12 @@ def command(
     """Run a back end that records the events of robots and stores the favourite programs of accounts."""
     set_up_logging(verbose)
     from roboglot.storage.cloud import CloudStore
+    from roboglot.storage.opening import open_database
 
     if not account:
         _warn_if_open(address, insecure)
     try:
-        opened = _open(data, database)
+        opened = open_database(data, database)
     except (OSError, ValueError, sqlite3.Error) as error:
         sys.exit(f"roboglot cloud: {'the database' if database else data} can't be used: {error}")
     store = CloudStore(opened)
@@ -56,21 +56,6 @@ def command(
         sys.exit(f"roboglot cloud: {error}")
     finally:
         opened.close()
-
-
-def _open(data: Path, url: str) -> Transactions:
-    """PostgreSQL by its URL, else the file."""
-    from roboglot.storage.database import Database
-
-    if not url:
-        return Database(data)
-    if not url.startswith(("postgresql://", "postgres://")):
-        raise ValueError("its URL begins with postgresql://")
-    try:
-        from roboglot.storage.postgresql import PostgreSQL
-    except ImportError:
-        raise OSError("PostgreSQL needs another package, which roboglot's extra `postgresql` brings") from None
-    return PostgreSQL(url)
 
 
 def _warn_if_open(address: str, insecure: bool) -> None:

@@ -56,6 +56,14 @@ def command(
     data: Annotated[
         Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="Folder for programs, places, certificates.")
     ] = None,
+    database: Annotated[
+        str | None,
+        typer.Option(
+            metavar="URL",
+            envvar="ROBOGLOT_DATABASE",
+            help="Keep what robots remember in PostgreSQL (postgresql://...), not in a file of the folder.",
+        ),
+    ] = None,
     access: Annotated[
         bool,
         typer.Option("--access", envvar="ROBOGLOT_ACCESS", help="Ask who comes: see `roboglot access`."),
@@ -89,6 +97,7 @@ def command(
                 "lockstep": lockstep or None,
                 "seed": seed,
                 "data": str(data) if data else None,
+                "database": database,
                 **_sections(doors),
                 "access": {"on": True} if access else None,
                 "console": None if console else {"enabled": False},

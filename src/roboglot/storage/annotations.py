@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import sqlite3
 from collections.abc import Callable
 
 import msgspec
@@ -18,13 +17,13 @@ from roboglot.model.components.mapping.annotations import (
 )
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.events import AnnotationsChanged, EventStream
-from roboglot.storage.database import Database
+from roboglot.storage.transactions import Connection, Transactions
 
 
 class StoredAnnotations(MapAnnotations):
     """The annotations of one robot."""
 
-    def __init__(self, database: Database, robot: str, clock: Clock, events: EventStream) -> None:
+    def __init__(self, database: Transactions, robot: str, clock: Clock, events: EventStream) -> None:
         self._database = database
         self._robot = robot
         self._clock = clock
@@ -43,7 +42,7 @@ class StoredAnnotations(MapAnnotations):
             await self._database.run(self.writing(changed))
             self.adopt(changed)
 
-    def writing(self, changed: Annotations) -> Callable[[sqlite3.Connection], object]:
+    def writing(self, changed: Annotations) -> Callable[[Connection], object]:
         """Return the transaction that writes them; call it with ``turn`` held. Raises InvalidGoal for too many."""
         for what, entries, most in (
             ("lines", changed.lines, LINES_MAX),

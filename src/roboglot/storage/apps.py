@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sqlite3
 from collections.abc import Sequence
 from typing import BinaryIO
 
@@ -15,7 +14,7 @@ from roboglot.model.components.system.apps import (
 )
 from roboglot.model.components.system.disk import Disk
 from roboglot.model.errors import InvalidGoal, NotFound
-from roboglot.storage.database import Database
+from roboglot.storage.transactions import Connection, Transactions
 
 NAME_MAX = 200  # characters
 PIECE = 1 << 20  # bytes
@@ -24,7 +23,7 @@ PIECE = 1 << 20  # bytes
 class StoredApps(Apps):
     """The apps of one robot; ``disk`` accounts for the room that each takes."""
 
-    def __init__(self, database: Database, robot: str, clock: Clock, disk: Disk) -> None:
+    def __init__(self, database: Transactions, robot: str, clock: Clock, disk: Disk) -> None:
         self._database, self._robot, self._clock, self._disk = database, robot, clock, disk
         self._apps = {app.name: app for app in database.run_now(self._load)}
         for app in self._apps.values():
@@ -52,30 +51,35 @@ class StoredApps(Apps):
         self._apps[name] = app
         return app
 
-    def _write(self, connection: sqlite3.Connection, app: App, package: BinaryIO) -> None:
+    def _write(self, connection: Connection, app: App, package: BinaryIO) -> None:
         """A piece at a time: the package is never whole in memory."""
-        ((row,),) = connection.execute(
-            "INSERT INTO app (robot, name, version, package, installed_at) VALUES (?, ?, ?, zeroblob(?), ?)"
-            " ON CONFLICT (robot, name) DO UPDATE SET version=excluded.version, package=excluded.package,"
-            " installed_at=excluded.installed_at RETURNING rowid",
+        connection.execute(
+            "INSERT INTO app (robot, name, version, size, installed_at) VALUES (?, ?, ?, ?, ?)"
+            " ON CONFLICT (robot, name) DO UPDATE SET version=excluded.version, size=excluded.size,"
+            " installed_at=excluded.installed_at",
             (self._robot, app.name, app.version, app.size, app.installed_at),
-        ).fetchall()
+        )
+        connection.execute("DELETE FROM app_piece WHERE robot=? AND name=?", (self._robot, app.name))
         package.seek(0)
-        with connection.blobopen("app", "package", row) as blob:
-            while piece := package.read(PIECE):
-                blob.write(piece)
+        for number, piece in enumerate(iter(lambda: package.read(PIECE), b"")):
+            connection.execute(
+                "INSERT INTO app_piece (robot, name, number, data) VALUES (?, ?, ?, ?)",
+                (self._robot, app.name, number, piece),
+            )
 
     async def remove(self, name: str) -> None:
         if name not in self._apps:
             raise NotFound(f"no app is named {name!r}")
-        await self._database.run(lambda c: c.execute("DELETE FROM app WHERE robot=? AND name=?", (self._robot, name)))
+        await self._database.run(lambda connection: self._delete(connection, name))
         self._apps.pop(name, None)
         self._disk.release(_place(name))
 
-    def _load(self, connection: sqlite3.Connection) -> list[App]:
-        rows = connection.execute(
-            "SELECT name, version, length(package), installed_at FROM app WHERE robot=?", (self._robot,)
-        )
+    def _delete(self, connection: Connection, name: str) -> None:
+        for table in ("app", "app_piece"):
+            connection.execute(f"DELETE FROM {table} WHERE robot=? AND name=?", (self._robot, name))
+
+    def _load(self, connection: Connection) -> list[App]:
+        rows = connection.execute("SELECT name, version, size, installed_at FROM app WHERE robot=?", (self._robot,))
         return [App(*row) for row in rows]
 
 

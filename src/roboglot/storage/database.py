@@ -6,24 +6,21 @@ WAL with ``synchronous=FULL``: when ``run`` returns, the work survives ``kill -9
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import copy
 import re
 import sqlite3
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar
 
 from roboglot.model.components.system.disk import Disk
-from roboglot.model.errors import Refused
+from roboglot.storage.transactions import AlreadyThere, Connection, DatabaseError, DiskFull
 
 T = TypeVar("T")
-Work = Callable[[sqlite3.Connection], Any]
-
-
-class DiskFull(Refused):
-    """Nothing is left on the robot's disk."""
+Work = Callable[[Connection], Any]
 
 
 class Database:
@@ -47,13 +44,13 @@ class Database:
         database._disk = disk
         return database
 
-    async def run(self, work: Callable[[sqlite3.Connection], T]) -> T:
+    async def run(self, work: Callable[[Connection], T]) -> T:
         """Run ``work`` in the database's thread as one transaction; an exception rolls it back."""
         if self._in_place:
             return self.run_now(work)
         return await asyncio.get_running_loop().run_in_executor(self._thread, self._transact, work)
 
-    async def read(self, work: Callable[[sqlite3.Connection], T]) -> T:
+    async def read(self, work: Callable[[Connection], T]) -> T:
         """Run ``work``, which changes nothing, beside what is being written: it waits for no flush of the disk.
 
         It sees everything whose ``run`` has returned.
@@ -62,7 +59,7 @@ class Database:
             return self.run_now(work)
         return await asyncio.get_running_loop().run_in_executor(self._reader.thread, self._reader.read, work)
 
-    async def run_together(self, work: Callable[[sqlite3.Connection], T]) -> T:
+    async def run_together(self, work: Callable[[Connection], T]) -> T:
         """The same for what many do often: one transaction for all who wait, so that one flush of the disk serves them.
 
         At most one such transaction is queued at a time, so every other ``run`` waits for at most that one. Where
@@ -92,11 +89,12 @@ class Database:
     def _transact_all(self, works: list[tuple[Database, Work]]) -> list[tuple[Any, Exception | None]]:
         results: list[tuple[Any, Exception | None]] = []
 
-        def all_of_them(connection: sqlite3.Connection) -> None:
+        def all_of_them(connection: Connection) -> None:
             for database, work in works:
                 connection.execute("SAVEPOINT one")
                 try:
-                    results.append((database._within_room(work), None))
+                    with database_errors():
+                        results.append((database._within_room(work), None))
                 except Exception as error:
                     connection.execute("ROLLBACK TO one")
                     results.append((None, error))
@@ -105,14 +103,18 @@ class Database:
         self._in_transaction(all_of_them)
         return results
 
-    def run_now(self, work: Callable[[sqlite3.Connection], T]) -> T:
+    def run_now(self, work: Callable[[Connection], T]) -> T:
         """The same, waiting in place: for start-up, and where nothing else may go on."""
         return self._thread.submit(self._transact, work).result()
 
-    def _transact(self, work: Callable[[sqlite3.Connection], T]) -> T:
+    def _transact(self, work: Callable[[Connection], T]) -> T:
         return self._in_transaction(lambda _: self._within_room(work))
 
-    def _in_transaction(self, work: Callable[[sqlite3.Connection], T]) -> T:
+    def _in_transaction(self, work: Callable[[Connection], T]) -> T:
+        with database_errors():
+            return self._committed(work)
+
+    def _committed(self, work: Callable[[Connection], T]) -> T:
         self._connection.execute("BEGIN IMMEDIATE")
         try:
             result = work(self._connection)
@@ -124,7 +126,7 @@ class Database:
             result.close()  # left to another thread's garbage collection, it would reset a statement in use here
         return result
 
-    def _within_room(self, work: Callable[[sqlite3.Connection], T]) -> T:
+    def _within_room(self, work: Callable[[Connection], T]) -> T:
         if self._disk is None or self._disk.free > 0:
             return work(self._connection)
         self._connection.execute("PRAGMA query_only=ON")
@@ -153,22 +155,34 @@ class _Reader:
         self._path = path
         self._connection: sqlite3.Connection | None = None
 
-    def read(self, work: Callable[[sqlite3.Connection], T]) -> T:
+    def read(self, work: Callable[[Connection], T]) -> T:
         """Run ``work`` in one transaction; in the thread."""
         if self._connection is None:
             self._connection = sqlite3.connect(self._path, isolation_level=None, timeout=5.0)
             self._connection.execute("PRAGMA query_only=ON")
-        self._connection.execute("BEGIN")
-        try:
-            return work(self._connection)
-        finally:
-            self._connection.execute("ROLLBACK")
+        with database_errors():
+            self._connection.execute("BEGIN")
+            try:
+                return work(self._connection)
+            finally:
+                self._connection.execute("ROLLBACK")
 
     def close(self) -> None:
         """Finish what is queued, then close the file."""
         if self._connection is not None:
             self.thread.submit(self._connection.close).result()
         self.thread.shutdown()
+
+
+@contextlib.contextmanager
+def database_errors() -> Iterator[None]:
+    """Raise the stores' errors instead of SQLite's."""
+    try:
+        yield
+    except sqlite3.IntegrityError as error:
+        raise AlreadyThere(str(error)) from error
+    except sqlite3.Error as error:
+        raise DatabaseError(str(error)) from error
 
 
 def connect(path: Path | str) -> sqlite3.Connection:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import sqlite3
 from collections.abc import Callable, Sequence
 
 from roboglot.model.clock import Clock
 from roboglot.model.components.system.file_store import FILE_BYTES_MAX, FileStore
 from roboglot.model.errors import InvalidGoal, NotFound
-from roboglot.storage.database import Database
+from roboglot.storage.transactions import Connection, Transactions
 
 FILES_MAX = 100
 
@@ -16,7 +15,7 @@ FILES_MAX = 100
 class StoredFiles(FileStore):
     """The files of one robot."""
 
-    def __init__(self, database: Database, robot: str, clock: Clock) -> None:
+    def __init__(self, database: Transactions, robot: str, clock: Clock) -> None:
         self._database = database
         self._robot = robot
         self._clock = clock
@@ -38,20 +37,24 @@ class StoredFiles(FileStore):
     async def write(self, name: str, data: bytes) -> None:
         await self._database.run(self.writing(name, data))
 
-    def writing(self, name: str, data: bytes | None) -> Callable[[sqlite3.Connection], None]:
+    def writing(self, name: str, data: bytes | None) -> Callable[[Connection], None]:
         """Return the transaction that writes it, or (None) removes it. Raises InvalidGoal if it is too long."""
         if data is not None and len(data) > FILE_BYTES_MAX:
             raise InvalidGoal(f"a file has at most {FILE_BYTES_MAX} bytes")
         row = (self._robot, name, data, self._clock.epoch())
 
-        def work(connection: sqlite3.Connection) -> None:
+        def work(connection: Connection) -> None:
             if data is None:
                 connection.execute("DELETE FROM file WHERE robot=? AND name=?", row[:2])
                 return
             others = connection.execute("SELECT count(*) FROM file WHERE robot=? AND name<>?", row[:2]).fetchone()[0]
             if others >= FILES_MAX:
                 raise InvalidGoal(f"more than {FILES_MAX} files")
-            connection.execute("INSERT OR REPLACE INTO file (robot, name, data, saved_at) VALUES (?, ?, ?, ?)", row)
+            connection.execute(
+                "INSERT INTO file (robot, name, data, saved_at) VALUES (?, ?, ?, ?)"
+                " ON CONFLICT (robot, name) DO UPDATE SET data=excluded.data, saved_at=excluded.saved_at",
+                row,
+            )
 
         return work
 

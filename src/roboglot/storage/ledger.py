@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import json
-import sqlite3
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from roboglot.model.components.system.ledger import Ledger
-from roboglot.storage.database import Database
+from roboglot.storage.transactions import Connection, Transactions
 
 
 class StoredLedger(Ledger):
     """The documents of one robot. ``all`` waits for the database: it is for start-up."""
 
-    def __init__(self, database: Database, robot: str) -> None:
+    def __init__(self, database: Transactions, robot: str) -> None:
         self._database, self._robot = database, robot
 
     def all(self, kind: str) -> Sequence[tuple[str, Any]]:
@@ -28,7 +27,7 @@ class StoredLedger(Ledger):
     async def write(self, kind: str, documents: Mapping[str, Any], *, forget: Sequence[str] = ()) -> None:
         rows = [(self._robot, kind, id, json.dumps(document)) for id, document in documents.items()]
 
-        def work(connection: sqlite3.Connection) -> None:
+        def work(connection: Connection) -> None:
             connection.executemany(
                 "INSERT INTO ledger (robot, kind, id, document) VALUES (?, ?, ?, ?)"
                 " ON CONFLICT (robot, kind, id) DO UPDATE SET document=excluded.document",

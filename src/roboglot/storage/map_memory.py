@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import sqlite3
 from collections.abc import Callable
 from dataclasses import replace
 
 from roboglot.model.components.mapping.map_memory import Drawings, MapMemory, Replacement
 from roboglot.storage.annotations import StoredAnnotations
-from roboglot.storage.database import Database
 from roboglot.storage.files import StoredFiles
 from roboglot.storage.places import StoredPlaces
 from roboglot.storage.settings import StoredSettings
+from roboglot.storage.transactions import Connection, Transactions
 
 
 class StoredMapMemory(MapMemory):
@@ -19,7 +18,7 @@ class StoredMapMemory(MapMemory):
 
     def __init__(
         self,
-        database: Database,
+        database: Transactions,
         places: StoredPlaces,
         annotations: StoredAnnotations,
         settings: StoredSettings,
@@ -41,7 +40,7 @@ class StoredMapMemory(MapMemory):
                 *(self._files.writing(name, data) for name, data in new.files.items()),
             ]
 
-            def work(connection: sqlite3.Connection) -> None:
+            def work(connection: Connection) -> None:
                 for write in writes:
                     write(connection)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sqlite3
 import zlib
 from collections.abc import Sequence
 
@@ -14,7 +13,7 @@ from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.model.geodesy import GlobeAnchor
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid
-from roboglot.storage.database import Database
+from roboglot.storage.transactions import Connection, Transactions
 
 MAPS_MAX = 100
 
@@ -22,20 +21,19 @@ MAPS_MAX = 100
 class StoredMaps(MapLibrary):
     """The saved maps of one robot."""
 
-    def __init__(self, database: Database, robot: str) -> None:
+    def __init__(self, database: Transactions, robot: str) -> None:
         self._database = database
         self._robot = robot
 
     async def names(self, *, outdoor: bool | None = None, number: int | None = None) -> Sequence[str]:
-        wanted = (self._robot, outdoor, None if number is None else str(number))
         rows = await self._database.run(
             lambda c: c.execute(
-                "SELECT name FROM map WHERE robot=?1 AND outdoor=coalesce(?2, outdoor)"
-                " AND number=coalesce(?3, number) ORDER BY seq",
-                wanted,
+                "SELECT name, outdoor, number FROM map WHERE robot=? ORDER BY seq", (self._robot,)
             ).fetchall()
         )
-        return [name for (name,) in rows]
+        return [
+            name for name, outside, given in rows if outdoor in (None, bool(outside)) and number in (None, int(given))
+        ]
 
     async def get(self, name: str) -> StoredMap:
         row = await self._database.run(
@@ -75,14 +73,14 @@ class StoredMaps(MapLibrary):
             zlib.compress(np.ascontiguousarray(grid.log_odds).tobytes()),
             json.dumps(labels),
             stored.saved_at,
-            stored.outdoor,
+            int(stored.outdoor),
             str(stored.number),
             _anchor_text(stored.anchor),
             None if stored.dock is None else json.dumps([stored.dock.x, stored.dock.y, stored.dock.yaw]),
         )
         await self._database.run(lambda connection: self._put(connection, row))
 
-    def _put(self, connection: sqlite3.Connection, row: tuple[object, ...]) -> None:
+    def _put(self, connection: Connection, row: tuple[object, ...]) -> None:
         others = connection.execute("SELECT count(*) FROM map WHERE robot=? AND name<>?", row[:2]).fetchone()[0]
         if others >= MAPS_MAX:
             raise InvalidGoal(f"more than {MAPS_MAX} maps")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import sqlite3
 from collections.abc import Sequence
 
 from roboglot.model.clock import Clock
@@ -16,13 +15,13 @@ from roboglot.model.components.interaction.members import (
 )
 from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.model.events import EventStream, MembersChanged
-from roboglot.storage.database import Database
+from roboglot.storage.transactions import AlreadyThere, Connection, Transactions
 
 
 class StoredMembers(Members):
     """The members of one robot."""
 
-    def __init__(self, database: Database, robot: str, clock: Clock, events: EventStream) -> None:
+    def __init__(self, database: Transactions, robot: str, clock: Clock, events: EventStream) -> None:
         self._database, self._robot, self._clock, self._events = database, robot, clock, events
         self._members = {member.name: member for member in database.run_now(self._load)}
 
@@ -40,16 +39,17 @@ class StoredMembers(Members):
         if len(self._members) >= MEMBERS_MAX:
             raise InvalidGoal(f"more than {MEMBERS_MAX} members")
 
-        def insert(connection: sqlite3.Connection) -> int | None:
-            return connection.execute(
-                "INSERT INTO member (robot, name, host) VALUES (?, ?, ?)", (self._robot, name, host)
-            ).lastrowid
+        def insert(connection: Connection) -> int:
+            ((id,),) = connection.execute(
+                "INSERT INTO member (robot, name, host) VALUES (?, ?, ?) RETURNING id", (self._robot, name, int(host))
+            ).fetchall()
+            return int(id)
 
         try:
             id = await self._database.run(insert)
-        except sqlite3.IntegrityError:  # taken meanwhile
+        except AlreadyThere:  # taken meanwhile
             raise InvalidGoal(f"there is a member named {name!r} already") from None
-        return self._keep(Member(id or 0, name, host))
+        return self._keep(Member(id, name, host))
 
     async def rename(self, name: str, new: str) -> Member:
         member = self.get(name)
@@ -58,7 +58,7 @@ class StoredMembers(Members):
         self._check_free(new)
         try:
             await self._update(member, "name", new)
-        except sqlite3.IntegrityError:
+        except AlreadyThere:
             raise InvalidGoal(f"there is a member named {new!r} already") from None
         self._members.pop(name, None)
         return self._keep(dataclasses.replace(member, name=new))
@@ -97,7 +97,7 @@ class StoredMembers(Members):
         self._publish()
         return member
 
-    def _load(self, connection: sqlite3.Connection) -> list[Member]:
+    def _load(self, connection: Connection) -> list[Member]:
         rows = connection.execute(
             "SELECT id, name, host, face, voice FROM member WHERE robot=? ORDER BY id", (self._robot,)
         )

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import sqlite3
-
-from roboglot.storage.database import Database
 from roboglot.storage.program_errors import store_errors
+from roboglot.storage.transactions import Connection, Transactions
 
 OUTBOX_MAX = 10_000  # documents of one robot; the oldest go first
 
@@ -13,14 +11,14 @@ OUTBOX_MAX = 10_000  # documents of one robot; the oldest go first
 class Outbox:
     """Outbox of one robot. When ``put`` returns, the document survives a crash."""
 
-    def __init__(self, database: Database, robot: str) -> None:
+    def __init__(self, database: Transactions, robot: str) -> None:
         self._database = database
         self._robot = robot
 
     async def put(self, document: str) -> None:
         """Add it at the end."""
 
-        def work(connection: sqlite3.Connection) -> None:
+        def work(connection: Connection) -> None:
             connection.execute("INSERT INTO cloud_outbox (robot, document) VALUES (?, ?)", (self._robot, document))
             connection.execute(
                 "DELETE FROM cloud_outbox WHERE robot=? AND seq <= (SELECT seq FROM cloud_outbox WHERE robot=?"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import sqlite3
 from collections.abc import Callable, Sequence
 
 from roboglot.model.clock import Clock
@@ -13,7 +12,7 @@ from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.model.events import EventStream, PlacesChanged
 from roboglot.model.geometry import Pose
 from roboglot.model.maps import PointOfInterest
-from roboglot.storage.database import Database
+from roboglot.storage.transactions import Connection, Transactions
 
 PLACES_MAX = 10_000
 
@@ -21,7 +20,7 @@ PLACES_MAX = 10_000
 class StoredPlaces(Places):
     """The places of one robot."""
 
-    def __init__(self, database: Database, robot: str, clock: Clock, events: EventStream) -> None:
+    def __init__(self, database: Transactions, robot: str, clock: Clock, events: EventStream) -> None:
         self._database = database
         self._robot = robot
         self._clock = clock
@@ -44,16 +43,14 @@ class StoredPlaces(Places):
             self._places |= {place.id: place for place in places}
         self._publish()
 
-    def writing(
-        self, places: Sequence[PointOfInterest], *, alone: bool = False
-    ) -> Callable[[sqlite3.Connection], object]:
+    def writing(self, places: Sequence[PointOfInterest], *, alone: bool = False) -> Callable[[Connection], object]:
         """Return the transaction that writes them, ``alone`` instead of all others. Raises InvalidGoal for too many."""
         new = {place.id: place for place in places}
         if len(new if alone else self._places.keys() | new.keys()) > PLACES_MAX:
             raise InvalidGoal(f"more than {PLACES_MAX} places")
         rows = [(self._robot, p.id, p.pose.x, p.pose.y, p.pose.yaw, json.dumps(dict(p.metadata))) for p in new.values()]
 
-        def work(connection: sqlite3.Connection) -> None:
+        def work(connection: Connection) -> None:
             if alone:
                 connection.execute("DELETE FROM place WHERE robot=?", (self._robot,))
             connection.executemany(
@@ -82,7 +79,7 @@ class StoredPlaces(Places):
             self._places.clear()
         self._publish()
 
-    def _load(self, connection: sqlite3.Connection) -> list[PointOfInterest]:
+    def _load(self, connection: Connection) -> list[PointOfInterest]:
         rows = connection.execute(
             "SELECT id, x, y, yaw, metadata FROM place WHERE robot=? ORDER BY seq", (self._robot,)
         )

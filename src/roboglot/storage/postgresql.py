@@ -7,49 +7,101 @@ nothing was under way is made anew. Knows no robot.
 from __future__ import annotations
 
 import asyncio
+import copy
+import functools
 import re
 import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from importlib import resources
 from typing import Any, TypeVar
 
 import psycopg
 
-from roboglot.storage.transactions import Connection, Rows
+from roboglot.model.components.system.disk import Disk
+from roboglot.storage.transactions import AlreadyThere, Connection, DatabaseError, DiskFull, Rows
 
 T = TypeVar("T")
 
 CONNECTIONS_MAX = 4
 CONNECT_MAX, STATEMENT_MAX, IDLE_MAX = 5, 10, 10  # s for connecting, for a statement, for a transaction that waits
+CLAIM_LOCKS = 0x626F74  # the class of the locks by which a program claims its robots
+ESCAPE = "\ue000"  # of Unicode's private use
 MIGRATION_LOCK = 0x726F626F  # who opens an empty database first makes the tables, the others wait
 
 
 class PostgreSQL:
-    """Open with ``PostgreSQL(url)``; close with ``close``. Raises OSError if the database can't be used."""
+    """Open with ``PostgreSQL(url)``; close with ``close``. Raises OSError if the database can't be used.
 
-    def __init__(self, url: str) -> None:
-        self._url = url
+    ``robots``: those that this program alone may write. Everything is then written in the order of the calls, over one
+    connection that holds a lock of the server's for each of them: no other program gets it before the connection is
+    lost, and nothing is written by one that has lost it. ``in_place``: ``run`` waits in place, for a lockstep clock.
+    """
+
+    def __init__(self, url: str, *, robots: Collection[str] = (), in_place: bool = False) -> None:
+        self._url, self._robots, self._in_place = url, tuple(robots), in_place
+        connections = 1 if robots else CONNECTIONS_MAX
+        self._disk: Disk | None = None
         self._own = threading.local()
         self._opened: list[psycopg.Connection[Any]] = []
-        self._threads = ThreadPoolExecutor(max_workers=CONNECTIONS_MAX, thread_name_prefix="postgresql")
+        self._opening = threading.Lock()
+        self._threads = ThreadPoolExecutor(
+            max_workers=connections,
+            thread_name_prefix="database",
+            initializer=lambda: setattr(self._own, "writes", True),
+        )
+        self._readers = ThreadPoolExecutor(max_workers=1, thread_name_prefix="database reader")
         try:
             self._threads.submit(self._transact, _migrate).result()
         except BaseException as error:
             self.close()
-            if isinstance(error, psycopg.Error):
+            if isinstance(error, DatabaseError):
                 raise OSError(str(error).strip().splitlines()[0]) from None
             raise
+
+    def on(self, disk: Disk) -> PostgreSQL:
+        """Return the same for the robot that has this disk: while nothing is left on it, writing raises DiskFull."""
+        database = copy.copy(self)
+        database._disk = disk
+        return database
 
     async def run(self, work: Callable[[Connection], T]) -> T:
         """Run ``work`` as one transaction in a thread; an exception rolls it back.
 
-        Raises psycopg.Error, also where the transaction may have been kept: when the connection broke at its end.
+        Raises DatabaseError, also where the transaction may have been kept: when the connection broke at its end.
         """
+        if self._in_place:
+            return self.run_now(work)
         return await asyncio.get_running_loop().run_in_executor(self._threads, self._transact, work)
 
-    def _transact(self, work: Callable[[Connection], T]) -> T:
-        connection = self._begin()
+    run_together = run  # the server itself flushes the disk once for transactions that end at the same time
+
+    async def read(self, work: Callable[[Connection], T]) -> T:
+        """Run ``work``, which changes nothing, beside what is being written."""
+        if self._in_place:
+            return self.run_now(work)
+        reading = functools.partial(self._transact, work, read_only=True)
+        return await asyncio.get_running_loop().run_in_executor(self._readers, reading)
+
+    def run_now(self, work: Callable[[Connection], T]) -> T:
+        """Run ``work`` and wait in place: for start-up, and where nothing else may go on."""
+        return self._threads.submit(self._transact, work).result()
+
+    def _transact(self, work: Callable[[Connection], T], *, read_only: bool = False) -> T:
+        full = self._disk is not None and self._disk.free <= 0
+        try:
+            return self._committed(work, read_only=read_only or full)
+        except psycopg.errors.ReadOnlySqlTransaction as error:
+            if full:
+                raise DiskFull("the disk is full") from None
+            raise DatabaseError(str(error)) from error
+        except psycopg.IntegrityError as error:
+            raise AlreadyThere(str(error)) from error
+        except psycopg.Error as error:
+            raise DatabaseError(str(error)) from error
+
+    def _committed(self, work: Callable[[Connection], T], *, read_only: bool) -> T:
+        connection = self._begin(b"BEGIN READ ONLY" if read_only else b"BEGIN")
         try:
             result = work(_Statements(connection))
             connection.execute("COMMIT")
@@ -59,52 +111,109 @@ class PostgreSQL:
             raise
         return result
 
-    def _begin(self) -> psycopg.Connection[Any]:
+    def _begin(self, begin: bytes) -> psycopg.Connection[Any]:
         """Return this thread's connection with a transaction begun; reconnects if it died while idle."""
         connection: psycopg.Connection[Any] | None = getattr(self._own, "connection", None)
         if connection is not None and not connection.closed:
             try:
-                connection.execute("BEGIN")
+                connection.execute(begin)
             except psycopg.OperationalError:
                 connection.close()
             else:
                 return connection
         connection = self._own.connection = self._connect()
-        connection.execute("BEGIN")
+        if getattr(self._own, "writes", False):
+            self._claim(connection)
+        connection.execute(begin)
         return connection
 
+    def _claim(self, connection: psycopg.Connection[Any]) -> None:
+        """Take the robots' locks, which end with the connection. Raises DatabaseError if another program has one."""
+        for robot in self._robots:
+            query = "SELECT pg_try_advisory_lock(%s, hashtext(%s))"
+            (free,) = connection.execute(query, (CLAIM_LOCKS, robot)).fetchone() or (False,)
+            if not free:
+                connection.close()
+                raise DatabaseError(f"robot {robot} is served by another program from the same database")
+
     def _connect(self) -> psycopg.Connection[Any]:
-        limits = f"-c statement_timeout={STATEMENT_MAX}s -c idle_in_transaction_session_timeout={IDLE_MAX}s"
-        connection = psycopg.connect(
-            self._url, autocommit=True, connect_timeout=CONNECT_MAX, options=limits, application_name="roboglot cloud"
+        limits = (
+            f"-c statement_timeout={STATEMENT_MAX}s -c idle_in_transaction_session_timeout={IDLE_MAX}s"
+            # The server notices within ten seconds that a machine is gone, and frees its robots.
+            " -c tcp_keepalives_idle=4 -c tcp_keepalives_interval=2 -c tcp_keepalives_count=3"
         )
-        self._opened = [opened for opened in self._opened if not opened.closed] + [connection]
+        connection = psycopg.connect(
+            self._url, autocommit=True, connect_timeout=CONNECT_MAX, options=limits, application_name="roboglot"
+        )
+        with self._opening:
+            self._opened[:] = [*(opened for opened in self._opened if not opened.closed), connection]
         return connection
 
     def close(self) -> None:
         """Finish what is queued, then close the connections."""
         self._threads.shutdown()
+        self._readers.shutdown()
         for connection in self._opened:
             connection.close()
 
 
+class _Rows:
+    """A result whose texts are as they were stored."""
+
+    def __init__(self, cursor: psycopg.Cursor[Any]) -> None:
+        self._cursor = cursor
+
+    @property
+    def rowcount(self) -> int:
+        return self._cursor.rowcount
+
+    def fetchone(self) -> Any:
+        row = self._cursor.fetchone()
+        return None if row is None else _restored(row)
+
+    def fetchall(self) -> list[Any]:
+        return [_restored(row) for row in self._cursor.fetchall()]
+
+    def __iter__(self) -> Iterator[Any]:
+        return map(_restored, self._cursor)
+
+
 class _Statements:
-    """A connection that takes ``?`` for parameters, as SQLite does."""
+    """A connection that takes ``?`` for parameters, and any character in a text, as SQLite does."""
 
     def __init__(self, connection: psycopg.Connection[Any]) -> None:
         self._connection = connection
 
     def execute(self, query: str, parameters: Sequence[Any] = (), /) -> Rows:
-        return self._connection.execute(_marked(query), parameters)
+        return _Rows(self._connection.execute(_marked(query), _storable(parameters)))
 
     def executemany(self, query: str, parameters: Iterable[Sequence[Any]], /) -> None:
         with self._connection.cursor() as cursor:
-            cursor.executemany(_marked(query), parameters)
+            cursor.executemany(_marked(query), map(_storable, parameters))
 
 
 def _marked(query: str) -> bytes:
     """None of our statements has a question mark or a percent sign of its own."""
     return query.replace("?", "%s").encode()
+
+
+def _storable(values: Sequence[Any]) -> Sequence[Any]:
+    """Write the character 0, which PostgreSQL's texts cannot hold, as ``ESCAPE`` and a digit."""
+    return [
+        value.replace(ESCAPE, f"{ESCAPE}1").replace("\0", f"{ESCAPE}0")
+        if isinstance(value, str) and ("\0" in value or ESCAPE in value)
+        else value
+        for value in values
+    ]
+
+
+def _restored(row: Sequence[Any]) -> tuple[Any, ...]:
+    return tuple(
+        value.replace(f"{ESCAPE}0", "\0").replace(f"{ESCAPE}1", ESCAPE)
+        if isinstance(value, str) and ESCAPE in value
+        else value
+        for value in row
+    )
 
 
 def _migrate(connection: Connection) -> None:

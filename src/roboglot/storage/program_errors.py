@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 from roboglot.programs.errors import StoreError
-from roboglot.storage.database import DiskFull
+from roboglot.storage.transactions import DatabaseError, DiskFull
 
 
 @contextmanager
@@ -15,5 +14,5 @@ def store_errors() -> Iterator[None]:
     """Raise StoreError where the database fails or the robot's disk is full."""
     try:
         yield
-    except (sqlite3.Error, DiskFull) as error:
+    except (DatabaseError, DiskFull) as error:
         raise StoreError(str(error)) from error

@@ -1,36 +1,36 @@
-"""Programs and their logs in SQLite. States are opaque words here."""
+"""Programs and their logs in a database. States are opaque words here."""
 
 from __future__ import annotations
 
-import sqlite3
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import astuple
 from typing import TypeVar
 
 from roboglot.programs.stores import LOG_MAX, LOG_TEXT_MAX, ListedProgram, LogEntry, StoredProgram, Stores
-from roboglot.storage.database import Database
-from roboglot.storage.journals import SqliteJournalStore
+from roboglot.storage.journals import DatabaseJournalStore
 from roboglot.storage.program_errors import store_errors
+from roboglot.storage.transactions import Connection, Transactions
 
 T = TypeVar("T")
 
 _COLUMNS = "id, describe, style, mode, condition, body, state, due, owner"
+_REPLACED = ", ".join(f"{name}=excluded.{name}" for name in _COLUMNS.split(", ") if name != "id")
 _LISTED = "id, describe, style, mode, condition, state"
 
 
-def program_stores(database: Database, robot: str) -> Stores:
+def program_stores(database: Transactions, robot: str) -> Stores:
     """Return the stores of one robot's programs."""
     return Stores(
-        SqliteProgramStore(database, robot),
-        SqliteProgramStore(database, robot, "module"),
-        SqliteJournalStore(database, robot),
+        DatabaseProgramStore(database, robot),
+        DatabaseProgramStore(database, robot, "module"),
+        DatabaseJournalStore(database, robot),
     )
 
 
-class SqliteProgramStore:
+class DatabaseProgramStore:
     """The tasks of one robot, or with ``kind="module"`` its modules; a `roboglot.programs.stores.ProgramStore`."""
 
-    def __init__(self, database: Database, robot: str, kind: str = "task") -> None:
+    def __init__(self, database: Transactions, robot: str, kind: str = "task") -> None:
         self._database = database
         self._key = (robot, kind)
 
@@ -43,7 +43,7 @@ class SqliteProgramStore:
     async def all(self, ids: Collection[str] = ()) -> list[ListedProgram]:
         """Return those of ``ids`` that exist, or all if ``ids`` is empty; by id, ascending."""
 
-        def work(connection: sqlite3.Connection) -> list[ListedProgram]:
+        def work(connection: Connection) -> list[ListedProgram]:
             query = f"SELECT {_LISTED} FROM program WHERE robot=? AND kind=?"
             if ids:
                 found = (
@@ -60,7 +60,7 @@ class SqliteProgramStore:
     async def count(self) -> int:
         """Return the number of programs."""
 
-        def work(connection: sqlite3.Connection) -> int:
+        def work(connection: Connection) -> int:
             query = "SELECT COUNT(*) FROM program WHERE robot=? AND kind=?"
             return int(connection.execute(query, self._key).fetchone()[0])
 
@@ -69,9 +69,10 @@ class SqliteProgramStore:
     async def put(self, program: StoredProgram, uses: Collection[str] | None = None) -> None:
         """Add a program or replace the one with the same id; ``uses``: the modules it calls, None: unchanged."""
 
-        def work(connection: sqlite3.Connection) -> None:
+        def work(connection: Connection) -> None:
             connection.execute(
-                f"INSERT OR REPLACE INTO program (robot, kind, {_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                f"INSERT INTO program (robot, kind, {_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"
+                f" ON CONFLICT (robot, kind, id) DO UPDATE SET {_REPLACED}",
                 (*self._key, *astuple(program)),
             )
             if uses is not None:
@@ -84,7 +85,7 @@ class SqliteProgramStore:
     def names_now(self) -> list[tuple[str, str, str, frozenset[str]]]:
         """Return id, condition, state and used modules of all programs; for start-up."""
 
-        def work(connection: sqlite3.Connection) -> list[tuple[str, str, str, frozenset[str]]]:
+        def work(connection: Connection) -> list[tuple[str, str, str, frozenset[str]]]:
             uses, _ = self._uses(connection)
             query = "SELECT id, condition, state FROM program WHERE robot=? AND kind=? ORDER BY id"
             return [(*row, frozenset(uses.get(row[0], ()))) for row in connection.execute(query, self._key)]
@@ -106,7 +107,7 @@ class SqliteProgramStore:
     async def set_state(self, id: str, state: str, log: Sequence[LogEntry] = ()) -> None:
         """Change the state and append to the log in one transaction."""
 
-        def work(connection: sqlite3.Connection) -> None:
+        def work(connection: Connection) -> None:
             self._set_states(connection, {id: state})
             self._append(connection, id, log)
 
@@ -115,7 +116,7 @@ class SqliteProgramStore:
     def settle_now(self, states: Mapping[str, str], note: LogEntry) -> None:
         """Change states by id and append the same note to each log; for start-up."""
 
-        def work(connection: sqlite3.Connection) -> None:
+        def work(connection: Connection) -> None:
             self._set_states(connection, states)
             for id in states:
                 self._append(connection, id, [note])
@@ -124,6 +125,8 @@ class SqliteProgramStore:
 
     def in_states_now(self, states: Collection[str]) -> list[StoredProgram]:
         """Return all programs in one of these states, by id; for start-up."""
+        if not states:
+            return []
         marks = ", ".join("?" * len(states))
         query = f"SELECT {_COLUMNS} FROM program WHERE robot=? AND kind=? AND state IN ({marks}) ORDER BY id"
         return self._run_now(
@@ -133,7 +136,7 @@ class SqliteProgramStore:
     async def remove(self, id: str) -> None:
         """Delete a program and its log; do nothing if there is none."""
 
-        def work(connection: sqlite3.Connection) -> None:
+        def work(connection: Connection) -> None:
             connection.execute("DELETE FROM program WHERE robot=? AND kind=? AND id=?", (*self._key, id))
             connection.execute("DELETE FROM program_log WHERE robot=? AND kind=? AND id=?", (*self._key, id))
             self._forget_uses(connection, id)
@@ -151,19 +154,19 @@ class SqliteProgramStore:
             lambda connection: [LogEntry(*row) for row in connection.execute(query, (*self._key, id))]
         )
 
-    async def _run(self, work: Callable[[sqlite3.Connection], T]) -> T:
+    async def _run(self, work: Callable[[Connection], T]) -> T:
         with store_errors():
             return await self._database.run(work)
 
-    async def _read(self, work: Callable[[sqlite3.Connection], T]) -> T:
+    async def _read(self, work: Callable[[Connection], T]) -> T:
         with store_errors():
             return await self._database.read(work)
 
-    def _run_now(self, work: Callable[[sqlite3.Connection], T]) -> T:
+    def _run_now(self, work: Callable[[Connection], T]) -> T:
         with store_errors():
             return self._database.run_now(work)
 
-    def _uses(self, connection: sqlite3.Connection) -> tuple[dict[str, list[str]], dict[str, list[str]]]:
+    def _uses(self, connection: Connection) -> tuple[dict[str, list[str]], dict[str, list[str]]]:
         """Return called modules by caller and, for modules, callers by module."""
         robot, kind = self._key
         uses: dict[str, list[str]] = {}
@@ -176,14 +179,14 @@ class SqliteProgramStore:
                 callers.append(id)  # a task and a module may share an id
         return uses, used_by
 
-    def _forget_uses(self, connection: sqlite3.Connection, id: str) -> None:
+    def _forget_uses(self, connection: Connection, id: str) -> None:
         connection.execute("DELETE FROM program_use WHERE robot=? AND kind=? AND id=?", (*self._key, id))
 
-    def _set_states(self, connection: sqlite3.Connection, states: Mapping[str, str]) -> None:
+    def _set_states(self, connection: Connection, states: Mapping[str, str]) -> None:
         rows = [(state, *self._key, id) for id, state in states.items()]
         connection.executemany("UPDATE program SET state=? WHERE robot=? AND kind=? AND id=?", rows)
 
-    def _append(self, connection: sqlite3.Connection, id: str, entries: Iterable[LogEntry]) -> None:
+    def _append(self, connection: Connection, id: str, entries: Iterable[LogEntry]) -> None:
         rows = [(*self._key, id, entry.at, entry.level, entry.text[:LOG_TEXT_MAX]) for entry in entries]
         if not rows:
             return

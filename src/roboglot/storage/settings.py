@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import json
-import sqlite3
 from collections.abc import Callable
 from typing import Any
 
 from roboglot.model.components.system.settings import Settings
-from roboglot.storage.database import Database
+from roboglot.storage.transactions import Connection, Transactions
 
 
 class StoredSettings(Settings):
     """The settings of one robot, with a copy in memory for reading."""
 
-    def __init__(self, database: Database, robot: str) -> None:
+    def __init__(self, database: Transactions, robot: str) -> None:
         self._database = database
         self._robot = robot
         rows = database.run_now(
@@ -30,7 +29,7 @@ class StoredSettings(Settings):
         await self._database.run(writing)
         self._values[key] = kept
 
-    def writing(self, key: str, value: Any) -> Callable[[sqlite3.Connection], object]:
+    def writing(self, key: str, value: Any) -> Callable[[Connection], object]:
         """Return the transaction that writes it."""
         row = (self._robot, key, json.dumps(value))
         return lambda connection: connection.execute(

@@ -3,9 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, Self, TypeVar
+
+from roboglot.model.components.system.disk import Disk
+from roboglot.model.errors import Refused
 
 T = TypeVar("T")
+
+
+class DatabaseError(Exception):
+    """The database failed; the work was not done, or (its connection broke at the end) perhaps."""
+
+
+class AlreadyThere(DatabaseError):
+    """A row of this key exists."""
+
+
+class DiskFull(Refused):
+    """Nothing is left on the robot's disk."""
 
 
 class Rows(Protocol):
@@ -35,10 +50,25 @@ class Connection(Protocol):
 
 
 class Transactions(Protocol):
-    """A database."""
+    """A database. Every call is one transaction, and raises DatabaseError; what ``work`` raises rolls it back.
+
+    What one caller writes with ``run`` and ``run_together`` is done in the order of the calls.
+    """
+
+    def on(self, disk: Disk) -> Self:
+        """Return the same for the robot that has this disk: while nothing is left on it, writing raises DiskFull."""
 
     async def run(self, work: Callable[[Connection], T]) -> T:
-        """Run ``work`` as one transaction: when this returns it is kept; an exception rolls it back."""
+        """Run ``work``: when this returns it is kept."""
+
+    async def run_together(self, work: Callable[[Connection], T]) -> T:
+        """Run what many do often; works that wait at the same time may be kept by one flush."""
+
+    async def read(self, work: Callable[[Connection], T]) -> T:
+        """Run ``work``, which changes nothing, beside what is being written; it sees all that is kept."""
+
+    def run_now(self, work: Callable[[Connection], T]) -> T:
+        """Run ``work`` and wait in place: for start-up, and where nothing else may go on."""
 
     def close(self) -> None:
         """Finish what is queued, then let go of the database."""

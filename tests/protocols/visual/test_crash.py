@@ -10,7 +10,7 @@ from typing import Any
 
 from roboglot.model.robot import Robot
 from roboglot.storage.database import Database
-from roboglot.storage.journals import SqliteJournalStore
+from roboglot.storage.journals import DatabaseJournalStore
 from roboglot.testing.process import child
 from tests.protocols.visual.front_end import FrontEnd
 
@@ -24,7 +24,7 @@ from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
 from roboglot.storage.programs import program_stores
-from roboglot.storage.journals import SqliteJournalStore
+from roboglot.storage.journals import DatabaseJournalStore
 
 async def main():
     stores = program_stores(Database(Path(sys.argv[1])), "a")
@@ -78,4 +78,4 @@ async def test_a_program_does_not_outlive_its_server(
         assert log[-1].text == "begun"
         assert (await app.ask("shutdown", "t"))[0]["state"] == 0
         assert await app.state("t") == "shutdown"
-        assert SqliteJournalStore(database, "a").headers_now() == {}
+        assert DatabaseJournalStore(database, "a").headers_now() == {}

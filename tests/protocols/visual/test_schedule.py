@@ -13,7 +13,7 @@ from roboglot.model.robot import Robot
 from roboglot.model.sensing import BatteryState
 from roboglot.programs.stores import StoredProgram
 from roboglot.storage.database import Database
-from roboglot.storage.programs import SqliteProgramStore
+from roboglot.storage.programs import DatabaseProgramStore
 from tests.protocols.visual.front_end import FrontEnd
 
 Connect = Callable[..., Coroutine[Any, Any, FrontEnd]]
@@ -136,7 +136,7 @@ async def test_the_schedule_survives_the_server(connect: Connect, plain_robot: R
 
 async def test_a_run_that_was_acknowledged_but_not_begun_begins(connect: Connect, plain_robot: Robot) -> None:
     database = Database(":memory:")
-    store = SqliteProgramStore(database, plain_robot.id)
+    store = DatabaseProgramStore(database, plain_robot.id)
     for id in ("t", "debug"):
         await store.put(StoredProgram(id, "", "", "single", "now", HELLO, "run_wait", due=1.0))
     app = await connect(plain_robot, database)

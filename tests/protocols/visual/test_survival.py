@@ -12,7 +12,7 @@ from typing import Any
 from roboglot.model.robot import Robot
 from roboglot.programs.stores import LogEntry, StoredProgram
 from roboglot.storage.database import Database
-from roboglot.storage.programs import SqliteProgramStore
+from roboglot.storage.programs import DatabaseProgramStore
 from tests.protocols.visual.front_end import FrontEnd, alive
 
 Connect = Callable[..., Coroutine[Any, Any, FrontEnd]]
@@ -64,7 +64,7 @@ async def test_the_state_is_stored_before_it_is_told(connect: Connect, plain_rob
 
 async def test_what_ran_when_the_server_died_is_ended_with_a_note(connect: Connect, plain_robot: Robot) -> None:
     database = Database(":memory:")
-    store = SqliteProgramStore(database, plain_robot.id)
+    store = DatabaseProgramStore(database, plain_robot.id)
     for id, mode, state in (("t1", "single", "run"), ("t2", "cycle", "suspend"), ("t3", "single", "wait_run")):
         await store.put(StoredProgram(id, "", "", mode, "now", "pass", state))
     await store.append_log("t1", [LogEntry(0.0, "print", "before")])

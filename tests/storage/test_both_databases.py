@@ -1,0 +1,243 @@
+"""Everything that robots remember is kept alike in a file and on a PostgreSQL server."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+from pathlib import Path
+
+import httpx
+import numpy as np
+import pytest
+
+from roboglot.config import Config, ConsoleConfig, RobotConfig
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.mapping.annotations import Annotations
+from roboglot.model.components.mapping.map_library import Label, StoredMap
+from roboglot.model.components.system.disk import Disk
+from roboglot.model.errors import InvalidGoal, NotFound
+from roboglot.model.events import EventStream
+from roboglot.model.geometry import Point, Pose
+from roboglot.model.maps import OccupancyGrid, PointOfInterest
+from roboglot.programs.errors import StoreError
+from roboglot.programs.stores import JournalEntry, LogEntry, StoredProgram
+from roboglot.runtime import Runtime
+from roboglot.storage.annotations import StoredAnnotations
+from roboglot.storage.apps import StoredApps
+from roboglot.storage.files import StoredFiles
+from roboglot.storage.journals import DatabaseJournalStore
+from roboglot.storage.ledger import StoredLedger
+from roboglot.storage.maps import StoredMaps
+from roboglot.storage.members import StoredMembers
+from roboglot.storage.opening import open_database
+from roboglot.storage.outbox import Outbox
+from roboglot.storage.places import StoredPlaces
+from roboglot.storage.programs import DatabaseProgramStore
+from roboglot.storage.settings import StoredSettings
+from roboglot.storage.transactions import Connection, DatabaseError, DiskFull, Transactions
+from tests.storage.postgresql_server import PostgreSQLServer, needs_postgresql
+
+ODD = "naïve 狗\0 \ue000 '; DROP TABLE place; --"
+
+
+class Room(Disk):
+    """A disk with ``left`` bytes."""
+
+    def __init__(self) -> None:
+        self.left = 1_000_000
+
+    @property
+    def size(self) -> int:
+        return 1_000_000
+
+    @property
+    def free(self) -> int:
+        return self.left
+
+    @property
+    def uses(self) -> dict[str, int]:
+        return {}
+
+    def take(self, name: str, size: int) -> None: ...
+    def release(self, name: str) -> None: ...
+
+
+@pytest.fixture
+def clock() -> LockstepClock:
+    return LockstepClock()
+
+
+async def test_settings_places_and_drawings(database: Transactions, clock: LockstepClock) -> None:
+    events = EventStream()
+    await StoredSettings(database, "a").put(ODD, {"x": ODD})
+    await StoredSettings(database, "a").put("speed", 0.5)
+    await StoredPlaces(database, "a", clock, events).put(
+        PointOfInterest("z", Pose(1.0, 2.0, 0.3), {"name": ODD}), PointOfInterest("b", Pose())
+    )
+    await StoredAnnotations(database, "a", clock, events).change(lambda _: Annotations(last_id=7))
+    settings, places = StoredSettings(database, "a"), StoredPlaces(database, "a", clock, events)
+    assert (settings.get(ODD), settings.get("speed")) == ({"x": ODD}, 0.5)
+    assert [place.id for place in places.all()] == ["z", "b"]  # as they came
+    assert (places.get("z").pose, dict(places.get("z").metadata)) == (Pose(1.0, 2.0, 0.3), {"name": ODD})
+    assert StoredAnnotations(database, "a", clock, events).current.last_id == 7
+    assert StoredSettings(database, "b").get("speed") is None
+
+
+async def test_maps(database: Transactions) -> None:
+    maps = StoredMaps(database, "a")
+    grid = OccupancyGrid(np.arange(12, dtype=np.int8).reshape(3, 4), 0.05, Point(-1.0, 2.0))
+    labels = (Label("kitchen", Point(1.0, 2.0), "room"),)
+    await maps.put(StoredMap("floor", grid, 5.0, labels, outdoor=False, number=2**64 - 1, dock=Pose(1, 2, 3)))
+    await maps.put(StoredMap("garden", grid, 6.0, (), outdoor=True, number=3))
+    assert list(await maps.names()) == ["floor", "garden"]
+    assert list(await maps.names(outdoor=True)) == ["garden"]
+    assert list(await maps.names(number=2**64 - 1)) == ["floor"]
+    kept = await maps.get("floor")
+    assert (kept.labels, kept.dock, kept.number) == (labels, Pose(1, 2, 3), 2**64 - 1)
+    assert (kept.grid.log_odds == grid.log_odds).all()
+    await maps.remove("floor")
+    with pytest.raises(NotFound):
+        await maps.get("floor")
+
+
+async def test_files_apps_and_members(database: Transactions, clock: LockstepClock) -> None:
+    files = StoredFiles(database, "a", clock)
+    await files.write(ODD, bytes(range(256)))
+    await files.write(ODD, b"newer\0")
+    assert (list(await files.names()), await files.read(ODD)) == ([ODD], b"newer\0")
+    package = bytes(range(256)) * 8192  # three pieces
+    await StoredApps(database, "a", clock, Room()).install("tour", "1.0", io.BytesIO(package))
+    apps = StoredApps(database, "a", clock, Room())
+    assert [(app.name, app.version, app.size) for app in apps.all()] == [("tour", "1.0", len(package))]
+    query = "SELECT data FROM app_piece WHERE name='tour' ORDER BY number"
+    pieces = await database.read(lambda connection: connection.execute(query).fetchall())
+    assert b"".join(bytes(data) for (data,) in pieces) == package
+    await apps.remove("tour")
+    assert not StoredApps(database, "a", clock, Room()).all()
+    members = StoredMembers(database, "a", clock, EventStream())
+    await members.add("anna", host=True)
+    await members.add("bo")
+    await members.set_face("bo", b"\0face")
+    with pytest.raises(InvalidGoal):
+        await members.rename("bo", "anna")
+    again = StoredMembers(database, "a", clock, EventStream())
+    assert [(m.name, m.host, m.face) for m in again.all()] == [("anna", True, None), ("bo", False, b"\0face")]
+
+
+async def test_two_that_add_the_same_member(database: Transactions, clock: LockstepClock) -> None:
+    one, other = (StoredMembers(database, "a", clock, EventStream()) for _ in range(2))
+    await one.add("anna")
+    with pytest.raises(InvalidGoal, match="already"):
+        await other.add("anna")
+
+
+async def test_programs_journals_ledger_and_outbox(database: Transactions) -> None:
+    tasks = DatabaseProgramStore(database, "a")
+    program = StoredProgram("t1", "describes", ODD, "single", "now", "print(1)", "wait_run", 12.5, "anna")
+    await tasks.put(program, uses=["m1", "m2"])
+    await tasks.put(program)
+    await tasks.set_state("t1", "run", [LogEntry(1.0, "print", ODD)])
+    kept = await tasks.get("t1")
+    assert kept is not None
+    assert (kept.style, kept.due, kept.owner, kept.state) == (ODD, 12.5, "anna", "run")
+    assert await tasks.log("t1") == [LogEntry(1.0, "print", ODD)]
+    assert await tasks.uses("t1") == ["m1", "m2"]
+    assert [listed.id for listed in await tasks.all()] == ["t1"]
+    assert [p.id for p in tasks.in_states_now(["run"])] == ["t1"]
+    assert tasks.in_states_now([]) == []
+    assert await tasks.count() == 1
+    journals = DatabaseJournalStore(database, "a")
+    await journals.begin("t1", "{}")
+    await asyncio.gather(*(journals.write("t1", [JournalEntry(n, "turn", None)]) for n in range(20)))
+    await journals.write("t1", [JournalEntry(3, "turn", b"done\0")])
+    entries = await journals.entries("t1")
+    assert [entry.seq for entry in entries] == list(range(20))
+    assert entries[3].answer == b"done\0"
+    ledger = StoredLedger(database, "a")
+    await ledger.write("order", {"2": {"to": ODD}, "1": {}})
+    await ledger.write("order", {"3": {}}, forget=["1"])
+    assert list(ledger.all("order")) == [("2", {"to": ODD}), ("3", {})]
+    outbox = Outbox(database, "a")
+    await outbox.put("first")
+    await outbox.put("second")
+    number, document = await outbox.first() or (0, "")
+    await outbox.remove(number)
+    assert (document, (await outbox.first() or (0, ""))[1]) == ("first", "second")
+
+
+async def test_a_failed_work_leaves_nothing(database: Transactions) -> None:
+    def half(connection: Connection) -> None:
+        connection.execute("INSERT INTO setting (robot, key, value) VALUES (?, ?, ?)", ("a", "x", "1"))
+        connection.execute("SELECT * FROM nothing_of_this_name")
+
+    with pytest.raises(DatabaseError):
+        await database.run(half)
+    assert StoredSettings(database, "a").get("x") is None
+
+
+async def test_a_full_disk_is_only_read(database: Transactions) -> None:
+    room = Room()
+    own = database.on(room)
+    await StoredSettings(own, "a").put("x", 1)
+    room.left = 0
+    with pytest.raises(DiskFull):
+        await StoredSettings(own, "a").put("x", 2)
+    with pytest.raises(StoreError):
+        await Outbox(own, "a").put("more")
+    assert StoredSettings(own, "a").get("x") == 1
+    await StoredSettings(database, "b").put("x", 3)  # another robot's disk has room
+
+
+@needs_postgresql
+async def test_a_robot_is_served_once(server: PostgreSQLServer, tmp_path: Path) -> None:
+    server.empty()
+    one = open_database(tmp_path / "unused", server.url, ["a", "b"])
+    with pytest.raises(OSError, match="robot b is served by another program"):
+        open_database(tmp_path / "unused", server.url, ["b", "c"])
+    other = open_database(tmp_path / "unused", server.url, ["c"])
+    other.close()
+    one.close()
+    open_database(tmp_path / "unused", server.url, ["b", "c"]).close()
+
+
+@needs_postgresql
+async def test_who_lost_a_robot_writes_nothing_for_it(server: PostgreSQLServer, tmp_path: Path) -> None:
+    server.empty()
+    first = open_database(tmp_path / "unused", server.url, ["a"])
+    settings = StoredSettings(first, "a")
+    await settings.put("who", "first")
+    server.stop()  # all connections break
+    server.start()
+    second = open_database(tmp_path / "unused", server.url, ["a"])
+    await StoredSettings(second, "a").put("who", "second")
+    with pytest.raises(DatabaseError, match="served by another program"):
+        await settings.put("who", "first again")
+    assert StoredSettings(second, "a").get("who") == "second"
+    second.close()
+    await settings.put("who", "first again")  # the robot is free: it is claimed anew
+    first.close()
+
+
+@needs_postgresql
+async def test_a_robot_moves_to_another_folder_with_its_places(server: PostgreSQLServer, tmp_path: Path) -> None:
+    server.empty()
+    poi = {"id": "door", "pose": {"x": 1.0, "y": 2.0, "yaw": 0.0}, "metadata": {"display_name": "狗"}}
+    for life in ("one machine", "another"):
+        robot = RobotConfig("a", address="127.0.0.143")
+        runtime = Runtime(
+            Config(
+                "empty",
+                (robot,),
+                lockstep=True,
+                data=tmp_path / life,
+                database=server.url,
+                console=ConsoleConfig(enabled=False),
+            )
+        )
+        await runtime.start()
+        async with httpx.AsyncClient(base_url="http://127.0.0.143:1448") as client:
+            if life == "one machine":
+                assert (await client.post("/api/core/artifact/v1/pois", json=poi)).status_code == 200
+            pois = (await client.get("/api/core/artifact/v1/pois")).json()
+        await runtime.close()
+        assert [kept["id"] for kept in pois] == ["door"]
