@@ -156,7 +156,7 @@ def origin_of(config: Config, version: str) -> Origin:
         "world": config.world,
         "seed": str(config.seed),
         "clock": "lockstep" if config.lockstep else f"x{config.speed:g}",
-        "robots": json.dumps({robot.name: _without_options(robot.body) for robot in config.robots}),
+        "robots": json.dumps({robot.name: _without_secrets(robot.body) for robot in config.robots}),
     }
     bodies = {robot.body for robot in config.robots if robot.is_simulated}
     sources = [*world_sources(config.world), *(body_source(body) for body in sorted(bodies))]
@@ -176,12 +176,12 @@ def _public(value: object) -> object:
             return [_public(inner) for inner in value]
         case bool() | int() | float() | None:
             return value
-    return URL_LOGIN.sub(r"\1", _without_options(str(value)))
+    return _without_secrets(str(value))
 
 
-def _without_options(url: str) -> str:
-    """Leave out what may be secret in a robot's URL."""
-    return url.partition("?")[0]
+def _without_secrets(url: str) -> str:
+    """Leave out what may be secret in a URL: its log-in and its options."""
+    return URL_LOGIN.sub(r"\1", url.partition("?")[0])
 
 
 def _add_memory(robot: Robot, clock: Clock, database: Transactions) -> None:
