@@ -14,9 +14,9 @@ from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
 from roboglot.model.components.sensing.lidar import Lidar
-from roboglot.model.geometry import Pose
+from roboglot.model.geometry import Pose, Twist
 from roboglot.storage.database import Database
-from tests.crowd import SHOVED, crowd, leave
+from tests.crowd import CORRIDOR, SHOVED, SURE, crowd, leave
 
 
 async def test_nothing_that_stands_is_shoved() -> None:
@@ -33,6 +33,39 @@ async def test_ten_robots_leave_one_corridor() -> None:
     assert not outcome.false_successes
     assert not outcome.sure_but_astray
     assert outcome.arrived >= 4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(2, 9))
+async def test_no_robot_of_a_convoy_believes_to_stand(seed: int) -> None:
+    outcome = await leave(seed, seconds=40.0)
+    assert not outcome.sure_but_astray
+    assert not outcome.silent
+    assert not outcome.false_successes
+
+
+async def test_a_robot_whose_neighbours_move_along_believes_its_wheels() -> None:
+    """Between two walls that show no way, most echoes say that it stands: those of robots that drive as fast."""
+    clock, database = LockstepClock(), Database(":memory:")
+    robots = [RobotConfig(f"r{n}", body="hermes") for n in range(5)]
+    fleet = build_fleet(CORRIDOR, robots, clock=clock, seed=1, database=database)
+    starts = [Pose(2.4 + 0.9 * n, 2.6 if n % 2 else 3.4) for n in range(5)]
+    for config, start in zip(robots, starts, strict=True):
+        fleet.world.hands.place(config.name, start)
+    await fleet.start(wait=True)
+    await clock.advance(1.0)
+    for robot in fleet.robots.values():
+        robot[Driving].drive(Twist(x=0.5), lifetime=5.0)
+    worst = 0.0
+    for _ in range(60):
+        await clock.advance(0.1)
+        for (name, robot), start in zip(fleet.robots.items(), starts, strict=True):
+            believed = start.compose(robot[Localization].pose)
+            if robot[Localization].quality > SURE:
+                worst = max(worst, believed.distance_to(fleet.world.truth.pose_of(name)))
+    await fleet.close()
+    database.close()
+    assert worst < 0.15
 
 
 @pytest.mark.parametrize(

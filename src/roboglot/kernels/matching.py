@@ -126,6 +126,32 @@ def _linearise(
     return fit, known
 
 
+@kernel(
+    "float64[::1](float32[:,:,::1], int16[:,::1], float64[:,::1], float64, float64, float64, float64[::1], float64)"
+)
+def gaps(
+    surface: Any, evidence: Any, points: Any, x: float, y: float, yaw: float, sensor: Any, resolution: float
+) -> Any:
+    """How far (m) each of ``points`` lies off its surface with base_link at the pose; inf: there is none near."""
+    found = np.empty(points.shape[0])
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    for i in range(points.shape[0]):
+        beam_x = cos * (points[i, 0] - sensor[0]) - sin * (points[i, 1] - sensor[1])
+        beam_y = sin * (points[i, 0] - sensor[0]) + cos * (points[i, 1] - sensor[1])
+        away = np.sqrt(beam_x * beam_x + beam_y * beam_y) + 1e-9
+        px, py = x + cos * points[i, 0] - sin * points[i, 1], y + sin * points[i, 0] + cos * points[i, 1]
+        mean_x, mean_y, nx, ny, weight = surface_near(
+            surface, evidence, px, py, beam_x / away, beam_y / away, resolution
+        )
+        if weight == 0.0:
+            found[i] = np.inf
+        elif nx == 0.0 and ny == 0.0:
+            found[i] = np.sqrt((px - mean_x) ** 2 + (py - mean_y) ** 2)
+        else:
+            found[i] = abs(nx * (px - mean_x) + ny * (py - mean_y))
+    return found
+
+
 @kernel("void(float64[:,::1], float64[::1], float64[:,::1])")
 def _covariance(information: Any, system: Any, result: Any) -> None:
     """``result`` = inverse of a symmetric 3x3 matrix plus the normal equations' upper triangle."""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from roboglot.autonomy.computing import compute_soon
 from roboglot.autonomy.slam.belief import Belief
+from roboglot.autonomy.slam.contest import contested
 from roboglot.autonomy.slam.displacement import DisplacementWatch
 from roboglot.autonomy.slam.loops import LoopCloser
 from roboglot.autonomy.slam.matcher import (
@@ -68,6 +69,7 @@ FILL_AFTER, FILL_AFTER_YAW = 0.4, math.radians(20.0)
 LOST_QUALITY, LOST_PERIOD = 0.4, 1.0  # below this it looks around, once in so many seconds
 WIDE, NARROW = (0.5, math.radians(20.0)), (0.2, math.radians(5.0))  # m, rad around the belief that are searched
 DOUBT_SHARE, DOUBT_SIGMAS = 0.85, 3.0  # a worse fit than usual, or a pose so far from odometry's: match without it
+CONTESTED_WAY_MAX, CONTESTED_TURN_MAX = 0.3, 0.3  # m, rad: a longer step of odometry is no witness against a scan
 DISPLACED_QUALITY = 0.15  # of a robot that was shoved, until the next scans
 JUMP, JUMP_YAW = 0.2, math.radians(10.0)  # corrections beyond this are reported as a jump
 
@@ -84,6 +86,7 @@ class Slam:
         self._added: Pose | None = None
         self._filled: Pose | None = None
         self._agreement = self._known = 1.0
+        self._contradicted = False  # whether the newest match was dropped for what the wheels say
         self._newest: ScanTaken | None = None
         self.noise, self.bias = LearntNoise(OdometryNoise()), LearntBias()
         self.whereabouts = Whereabouts(belief, robot.events)
@@ -207,8 +210,11 @@ class Slam:
         prior, start = belief.covariance, self._coarse(scan, before, stamp) if belief.localizing else before
         most = MATCH_POINTS_MAX if start is before else ALL_POINTS  # after a large step each one counts
         best = fit(belief.map, scan, before, prior, start=start, iterations=iterations, most=most)
+        driven = None
         if belief.localizing:
             best = self._doubted(best, scan, before, stamp)
+            driven = self._contested(best, scan, before, prior)
+        best, self._contradicted = driven or best, driven is not None
         self._agreement, self._known = best.agreement, best.known / max(1, best.points)
         usual = belief.quality
         belief.quality += (1.0 if belief.search else QUALITY_GAIN) * (best.quality - belief.quality)
@@ -219,14 +225,21 @@ class Slam:
         if best.fit < POINTS_MIN or best.agreement < AGREEMENT_MIN:
             return
         shoved = self._check_displaced(before, best, prior, stamp)
-        if shoved is None:
+        if shoved is None and driven is None:
             self._learn(before, best, prior, moved, seconds)
-        belief.covariance = best.covariance
+        belief.covariance = prior if driven else best.covariance
         belief.move_to(best.pose, odometry)
         if shoved is not None:
             self._doubt(shoved, stamp)
         if best.pose.distance_to(before) > JUMP or abs(wrap_angle(best.pose.yaw - before.yaw)) > JUMP_YAW:
             self._robot.events.publish(PoseJumped(stamp=stamp, pose=best.pose))
+
+    def _contested(self, best: Match, scan: ScanPoints, before: Pose, prior: NDArray[np.float64]) -> Match | None:
+        """Where odometry puts the robot while things that move around it would mislead the match."""
+        way = math.hypot(self._step.x, self._step.y)
+        if self._is_unsure or way > CONTESTED_WAY_MAX or abs(self._step.yaw) > CONTESTED_TURN_MAX:
+            return None
+        return contested(self._belief.map, scan, before, best, prior, way)
 
     def _check_displaced(self, before: Pose, best: Match, prior: NDArray[np.float64], stamp: float) -> float | None:
         """How far something else than its wheels has moved the robot; None if nothing did, as far as scans tell."""
@@ -323,6 +336,7 @@ class Slam:
             return True
         if self._belief.localizing and (
             not self.whereabouts.sure
+            or self._contradicted
             or self._way < self._mapped_from
             or (self._agreement < AGREEMENT_TO_MAP and self._known > NEW_GROUND)
         ):
