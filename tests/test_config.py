@@ -30,6 +30,7 @@ def test_defaults() -> None:
         "robomaster": [40923, 40921, 40922, 40925],
         "cyberdog": [50052],
         "visual": [50053],
+        "vda5050": [],
     }
 
 

@@ -11,7 +11,15 @@ import pytest
 
 from roboglot.cli.coverage import CONTRACTS, measure, page
 
-TOTALS = {"slamware": 167, "robomaster": 66, "cyberdog": 71, "visual": 169, "visual_frames": 203}
+TOTALS = {
+    "slamware": 167,
+    "robomaster": 66,
+    "cyberdog": 71,
+    "visual": 169,
+    "visual_frames": 203,
+    "vda5050": 34,
+    "vda5050_messages": 27,
+}
 
 
 @pytest.mark.parametrize("protocol", CONTRACTS)

@@ -20,7 +20,7 @@ class Refused(Exception):
 
 
 class ConsoleClient:
-    """One console at ``url`` (http://127.0.0.1:8080); ``token`` where access is asked for."""
+    """One console at ``url`` (http://127.0.0.1:50080); ``token`` where access is asked for."""
 
     def __init__(self, url: str, token: str = "") -> None:
         self._url = url.rstrip("/")

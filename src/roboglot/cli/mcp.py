@@ -12,7 +12,7 @@ import typer
 def command(
     console: Annotated[
         str, typer.Option(envvar="ROBOGLOT_CONSOLE", help="The console of a running `roboglot up`.")
-    ] = "http://127.0.0.1:8080",
+    ] = "http://127.0.0.1:50080",
     http: Annotated[
         int | None, typer.Option(help="Serve streamable HTTP on this port of 127.0.0.1, path /mcp; else stdio.")
     ] = None,

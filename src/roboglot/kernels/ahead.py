@@ -117,6 +117,8 @@ def _machine() -> str:
         with contextlib.suppress(PackageNotFoundError):
             versions.append(version(package))
     processor = os.uname().machine
+    if chosen := os.environ.get("NUMBA_CPU_NAME"):  # compiled for that one, wherever this runs
+        return f"{sys.version_info} {versions} {processor} {chosen} {os.environ.get('NUMBA_CPU_FEATURES')}"
     with contextlib.suppress(OSError):
         for line in Path("/proc/cpuinfo").read_text("utf-8", "replace").splitlines():
             if line.startswith(("model name", "flags", "Features")):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from roboglot.config import Config
-from roboglot.protocols import cyberdog, robomaster, slamware, visual
+from roboglot.protocols import cyberdog, robomaster, slamware, vda5050, visual
 from roboglot.protocols.door import Door, DoorType, Site
 
 DOORS: tuple[DoorType, ...] = (
@@ -11,6 +11,7 @@ DOORS: tuple[DoorType, ...] = (
     robomaster.DOOR,
     cyberdog.DOOR,
     visual.DOOR,
+    vda5050.DOOR,
 )
 
 

@@ -1,0 +1,54 @@
+"""VDA 5050 in front of a robot: fleet control sends orders over an MQTT broker, the robot reports its state there."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from roboglot.operations import OperationTable
+from roboglot.protocols.door import Contract, Door, DoorType, Implementation, Option, PortKind, PortSetting, Site
+from roboglot.protocols.vda5050.config import Vda5050Config
+from roboglot.wire.contracts import contract
+
+
+def _open(config: Vda5050Config, site: Site) -> Door:
+    from roboglot.protocols.vda5050.server import Vda5050Door
+
+    return Vda5050Door(site.robot, config)
+
+
+def _implementation() -> Implementation:
+    _table()
+    from roboglot.protocols.vda5050 import table
+
+    return table
+
+
+def _messages() -> Implementation:
+    from roboglot.protocols.vda5050.table import Messages
+
+    return Messages()
+
+
+def _table() -> OperationTable[Any]:
+    from roboglot.protocols.vda5050 import table
+    from roboglot.protocols.vda5050.chapters import actions, messages  # noqa: F401 - these fill the table
+
+    return table.TABLE
+
+
+DOOR = DoorType(
+    name="vda5050",
+    title="VDA 5050",
+    config=Vda5050Config,
+    contracts=(
+        Contract("vda5050", lambda: contract("vda5050"), _implementation),
+        Contract("vda5050_messages", lambda: contract("vda5050_messages"), _messages),
+    ),
+    table=_table,
+    ports=(PortSetting("VDA 5050 broker", "port", PortKind.APP),),
+    open=_open,
+    options=(
+        Option("--vda5050", "broker", "HOST or HOST:PORT of the MQTT broker where a VDA 5050 fleet control is."),
+        Option("--vda5050-version", "version", "The version that fleet control speaks: 3.0 or 2.1."),
+    ),
+)

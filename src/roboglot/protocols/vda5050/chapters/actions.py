@@ -1,0 +1,110 @@
+"""Chapter 6.2.3: the predefined actions that a robot here can do. Each returns when it is done, with its result."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.errors import InvalidGoal
+from roboglot.model.geometry import Pose
+from roboglot.operations import Right
+from roboglot.protocols.vda5050.session import SOURCE, Session
+from roboglot.protocols.vda5050.table import TABLE
+from roboglot.wire.vda5050.orders import Angle, Id, Metres
+
+
+@TABLE.on("startPause", right=Right.DRIVE)
+async def start_pause(session: Session) -> str:
+    """Stop driving until stopPause; the order is kept."""
+    session.pause(True)
+    return ""
+
+
+@TABLE.on("stopPause", right=Right.DRIVE)
+async def stop_pause(session: Session) -> str:
+    """Go on after startPause."""
+    session.pause(False)
+    return ""
+
+
+@TABLE.on("cancelOrder", right=Right.DRIVE)
+async def cancel_order(session: Session, *, orderId: str = "") -> str:  # noqa: N803 - the standard's word
+    """Stop, and forget what is left of the order; done when the robot stands."""
+    await session.cancel_order(orderId)
+    return ""
+
+
+@TABLE.on("stateRequest", right=Right.SEE)
+async def request_state(session: Session) -> str:
+    """Send the state now."""
+    session.touch()
+    return ""
+
+
+@TABLE.on("factsheetRequest", right=Right.SEE)
+async def request_factsheet(session: Session) -> str:
+    """Send the factsheet now."""
+    await session.send_factsheet()
+    return ""
+
+
+@TABLE.on("clearInstantActions", right=Right.DRIVE)
+async def clear_instant_actions(session: Session) -> str:
+    """Leave instant actions that ended out of the state from now on."""
+    session.clear_instant_actions()
+    return ""
+
+
+@TABLE.on("trigger", right=Right.DRIVE)
+async def trigger(session: Session) -> str:
+    """Let an action go on that waits for a trigger."""
+    session.release_trigger()
+    return ""
+
+
+@TABLE.on("waitForTrigger", right=Right.DRIVE)
+async def wait_for_trigger(session: Session, *, triggerType: str = "") -> str:  # noqa: N803
+    """Wait until the trigger action comes, or the order is cancelled."""
+    await session.wait_for_trigger()
+    return f"triggered {triggerType}".strip()
+
+
+@TABLE.on("initPosition", "initializePosition", right=Right.EDIT, needs=(Localization,))
+async def initialize_position(
+    session: Session,
+    *,
+    x: Metres,
+    y: Metres,
+    theta: Angle,
+    mapId: Id,  # noqa: N803
+    lastNodeId: Id = "",  # noqa: N803
+) -> str:
+    """Set where the robot is in its map."""
+    if mapId != session.map_id:
+        raise InvalidGoal(f"there is no map {mapId!r}; the robot's map is {session.map_id!r}")
+    session.robot[Localization].set_pose(Pose(x, y, theta))
+    session.set_last_node(lastNodeId)
+    return ""
+
+
+@TABLE.on("startCharging", right=Right.DRIVE, needs=(Docking,))
+async def start_charging(session: Session) -> str:
+    """Drive to the dock and onto its contacts."""
+    await _done(session.robot[Docking].dock(source=SOURCE))
+    return "charging"
+
+
+@TABLE.on("stopCharging", right=Right.DRIVE, needs=(Docking,))
+async def stop_charging(session: Session) -> str:
+    """Leave the dock."""
+    await _done(session.robot[Docking].undock(source=SOURCE))
+    return ""
+
+
+async def _done(action: Any) -> None:
+    """Wait for the end; who waits no longer wants it no longer."""
+    try:
+        await action.succeeded()
+    finally:
+        action.cancel("fleet control cancelled it")

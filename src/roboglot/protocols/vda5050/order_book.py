@@ -1,0 +1,153 @@
+"""The order that the robot holds: which messages it takes, what is left to do, how its actions are.
+
+Follows chapter 6.1 of the standard. Knows no robot and no clock: who drives says what was reached.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from roboglot.protocols.vda5050.errors import Rejected
+from roboglot.wire.vda5050.orders import Action, Edge, Node, Order, Part
+from roboglot.wire.vda5050.versions import ErrorKind
+
+ACTIONS_KEPT_MAX = 1000  # action states; the oldest ended ones go first
+
+
+class ActionStatus(StrEnum):
+    """How far an action is."""
+
+    WAITING = "WAITING"
+    INITIALIZING = "INITIALIZING"
+    RUNNING = "RUNNING"
+    PAUSED = "PAUSED"
+    FINISHED = "FINISHED"
+    FAILED = "FAILED"
+
+    @property
+    def ended(self) -> bool:
+        """True if nothing more will happen."""
+        return self in (ActionStatus.FINISHED, ActionStatus.FAILED)
+
+
+@dataclass(slots=True)
+class ActionState:
+    """One action and how it went."""
+
+    action: Action
+    status: ActionStatus = ActionStatus.WAITING
+    result: str = ""
+
+
+@dataclass(slots=True)
+class OrderBook:
+    """``nodes`` and ``edges`` are what is still to be passed; the first node is passed when the order is taken."""
+
+    order_id: str = ""
+    update_id: int = 0
+    nodes: list[Node] = field(default_factory=list)
+    edges: list[Edge] = field(default_factory=list)
+    actions: dict[str, ActionState] = field(default_factory=dict)
+    last_node: str = ""
+    last_sequence: int = 0
+    decision: Node | None = None  # the last released node of all messages so far
+    cancelled: bool = False
+    canceling: bool = False
+    last: Order | None = None
+
+    @property
+    def idle(self) -> bool:
+        """True if there is nothing left to pass, no horizon, and no action under way."""
+        return not self.nodes and all(state.status.ended for state in self.actions.values())
+
+    @property
+    def base(self) -> Iterator[tuple[Edge | None, Node]]:
+        """Yield the released nodes that are left, each with the edge that leads there."""
+        edges = {edge.sequence_id: edge for edge in self.edges}
+        for node in self.nodes:
+            if node.released:
+                yield edges.get(node.sequence_id - 1), node
+
+    def take(self, order: Order, near: Callable[[Node], bool]) -> bool:
+        """Take an order or an update; False if it is the one that is held. Raises Rejected, and changes nothing."""
+        known = {"orderId": order.order_id, "orderUpdateId": order.order_update_id}
+        if order.order_id != self.order_id:
+            self._check_new(order, near, known)
+            self.actions.clear()
+            self.order_id, self.cancelled = order.order_id, False
+            self.nodes, self.edges = [], []
+            self.last_node, self.last_sequence = "", 0
+            self._extend(order, order.nodes)
+        else:
+            if order.order_update_id == self.update_id and self.last is not None:
+                if (order.nodes, order.edges) == (self.last.nodes, self.last.edges):
+                    return False
+                raise Rejected(ErrorKind.SAME_UPDATE, "another order came with the same orderUpdateId", known)
+            self._check_update(order, known)
+            self._drop_horizon()
+            self._extend(order, order.nodes[1:])
+        self.update_id, self.last = order.order_update_id, order
+        return True
+
+    def _check_new(self, order: Order, near: Callable[[Node], bool], known: dict[str, object]) -> None:
+        if not self.idle or self.canceling:
+            raise Rejected(ErrorKind.OTHER_ORDER, f"order {self.order_id} is not finished", known)
+        if not near(order.nodes[0]):
+            first = order.nodes[0].node_id
+            raise Rejected(
+                ErrorKind.START_TOO_FAR, f"node {first} is not where the robot is", {**known, "nodeId": first}
+            )
+
+    def _check_update(self, order: Order, known: dict[str, object]) -> None:
+        if order.order_update_id < self.update_id:
+            raise Rejected(ErrorKind.OUTDATED, f"update {self.update_id} was taken already", known)
+        if self.cancelled or self.canceling:
+            raise Rejected(ErrorKind.AFTER_CANCEL, f"order {self.order_id} was cancelled", known)
+        first, decision = order.nodes[0], self.decision
+        if decision is None or (first.node_id, first.sequence_id) != (decision.node_id, decision.sequence_id):
+            where = f"{decision.node_id} ({decision.sequence_id})" if decision else "no node"
+            raise Rejected(
+                ErrorKind.NOT_A_CONTINUATION, f"the update must begin with {where}", {**known, "nodeId": first.node_id}
+            )
+        new = {action.action_id for part in order.parts if part is not first for action in part.actions}
+        if reused := sorted(new & {key for key, state in self.actions.items() if self._released(state.action)}):
+            raise Rejected(ErrorKind.NOT_A_CONTINUATION, "an actionId came before", {**known, "actionId": reused[0]})
+
+    def _extend(self, order: Order, nodes: tuple[Node, ...]) -> None:
+        self.nodes += nodes
+        self.edges += order.edges
+        parts: tuple[Part, ...] = (*nodes, *order.edges)
+        for part in parts:
+            for action in part.actions:
+                self.actions[action.action_id] = ActionState(action)
+        released = [node for node in order.nodes if node.released]
+        self.decision = released[-1]
+
+    def _drop_horizon(self) -> None:
+        parts: tuple[Part, ...] = (*self.nodes, *self.edges)
+        for part in parts:
+            for action in () if part.released else part.actions:
+                self.actions.pop(action.action_id, None)
+        self.nodes = [node for node in self.nodes if node.released]
+        self.edges = [edge for edge in self.edges if edge.released]
+
+    def _released(self, action: Action) -> bool:
+        """Return whether an action is no longer part of the horizon."""
+        parts: tuple[Part, ...] = (*self.nodes, *self.edges)
+        horizon = [part for part in parts if not part.released]
+        return not any(action.action_id == other.action_id for part in horizon for other in part.actions)
+
+    def pass_node(self, node: Node) -> None:
+        """Note that the robot is at ``node``, and all before it are behind."""
+        self.nodes = [left for left in self.nodes if left.sequence_id > node.sequence_id]
+        self.edges = [left for left in self.edges if left.sequence_id > node.sequence_id]
+        self.last_node, self.last_sequence = node.node_id, node.sequence_id
+
+    def drop_rest(self) -> None:
+        """Forget what is left, as cancelOrder wants; actions that wait fail."""
+        self.nodes, self.edges, self.cancelled = [], [], True
+        for state in self.actions.values():
+            if not state.status.ended:
+                state.status, state.result = ActionStatus.FAILED, "the order was cancelled"

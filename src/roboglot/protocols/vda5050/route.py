@@ -1,0 +1,197 @@
+"""Drives the base of an order: from node to node by the robot's navigation, with the actions at the nodes."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from roboglot.model.actions import Action as RobotAction
+from roboglot.model.actions import ActionStatus as Goal
+from roboglot.model.admission import Right
+from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions
+from roboglot.model.errors import RobotError
+from roboglot.model.events import ActionChanged
+from roboglot.model.geometry import Point
+from roboglot.protocols.vda5050.errors import Rejected, kind_of
+from roboglot.protocols.vda5050.order_book import ActionStatus
+from roboglot.protocols.vda5050.table import operation_of
+from roboglot.wire.vda5050.orders import Action, Node
+from roboglot.wire.vda5050.versions import ErrorKind, Level
+
+if TYPE_CHECKING:
+    from roboglot.protocols.vda5050.session import Session
+
+TOLERANCE = 0.05  # m: as near as the robot goes where the order allows no deviation
+STANDS = ("SOFT", "HARD")  # blocking types of actions that the robot stands for
+ALONE = ("SINGLE", "HARD")  # those that no other action runs beside
+
+
+@dataclass(slots=True)
+class Leg:
+    """Nodes that are driven through without a stop."""
+
+    nodes: list[Node] = field(default_factory=list)
+    speed: float = 1.0
+
+    @property
+    def options(self) -> NavigationOptions:
+        """How to drive it: the last node's heading, the narrowest deviation."""
+        places = [node.node_position for node in self.nodes]
+        reach = min(place.reach for place in places if place is not None)
+        last = places[-1]
+        yaw = last.theta if last is not None else None
+        return NavigationOptions(yaw=yaw, speed_ratio=self.speed, tolerance=max(TOLERANCE, reach))
+
+    @property
+    def points(self) -> list[Point]:
+        """Where the nodes are."""
+        return [Point(node.node_position.x, node.node_position.y) for node in self.nodes if node.node_position]
+
+
+class Route:
+    """What the robot drives now for one session."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._task: asyncio.Task[None] | None = None
+        self._beside: set[asyncio.Task[None]] = set()
+        self._driving: RobotAction | None = None
+        self._more = asyncio.Event()
+
+    def begin(self, first: Node) -> None:
+        """Drive a new order, whose first node is where the robot is."""
+        self._more.clear()
+        self._task = asyncio.get_running_loop().create_task(self._run(first))
+
+    def go_on(self) -> None:
+        """Look at the order again: there is more of it."""
+        self._more.set()
+        if self._task is None or self._task.done():
+            self._task = asyncio.get_running_loop().create_task(self._run(None))
+
+    def pause(self, on: bool) -> None:
+        """Hold where the robot is, or go on."""
+        if not on:
+            self._more.set()
+        if self._driving is not None:
+            if on:
+                self._driving.pause()
+            else:
+                self._driving.resume()
+
+    async def stop(self) -> None:
+        """End all; returns when the robot stands."""
+        doomed = [task for task in (self._task, *self._beside) if task is not None and not task.done()]
+        for task in doomed:
+            task.cancel()
+        await asyncio.gather(*doomed, return_exceptions=True)
+        if (driving := self._driving) is not None:
+            driving.cancel("fleet control cancelled the order")
+            await driving.done()
+        self._task = self._driving = None
+
+    async def _run(self, first: Node | None) -> None:
+        """Do the first node's actions, then leg after leg until nothing released is left."""
+        if first is not None:
+            await self._act(first.actions)
+        while True:
+            self._more.clear()
+            if self._session.paused:
+                await self._more.wait()
+                continue
+            leg = self._next_leg()
+            if leg is None:
+                break
+            if not await self._drive(leg):
+                return
+            await self._act(leg.nodes[-1].actions)
+        self._session.touch()
+
+    def _next_leg(self) -> Leg | None:
+        """Return the nodes up to the next where the robot has something to do, wants a heading or another speed."""
+        leg = Leg()
+        for edge, node in self._session.book.base:
+            speed = self._session.speed_ratio(edge)
+            if leg.nodes and speed != leg.speed:
+                break
+            leg.nodes.append(node)
+            leg.speed = speed
+            if node.actions or (node.node_position and node.node_position.theta is not None):
+                break
+        return leg if leg.nodes else None
+
+    async def _drive(self, leg: Leg) -> bool:
+        """Drive it and pass its nodes; False, with an error, where the order cannot go on."""
+        session = self._session
+        try:
+            session.check("order", Right.DRIVE)
+            action = session.robot[Navigation].navigate_to(leg.points, leg.options, source="vda5050")
+        except Rejected as rejected:
+            session.refuse(rejected)
+            return False
+        except RobotError as error:
+            self._give_up(leg.nodes[0], error)
+            return False
+        self._driving = action
+        passed = 0
+        try:
+            with session.robot.events.subscribe(ActionChanged) as changes:
+                while not action.status.ended:
+                    passed = self._pass(leg, passed, _reached(action, len(leg.nodes)))
+                    await changes.next()
+        finally:
+            if not action.status.ended:
+                action.cancel("fleet control cancelled the order")
+                await action.done()
+            self._driving = None
+        if action.status is Goal.SUCCEEDED:
+            self._pass(leg, passed, len(leg.nodes))
+            return True
+        at = leg.nodes[min(passed, len(leg.nodes) - 1)]
+        self._give_up(at, action.error or RobotError("something else moved the robot"))
+        return False
+
+    def _pass(self, leg: Leg, before: int, now: int) -> int:
+        for node in leg.nodes[before:now]:
+            self._session.book.pass_node(node)
+            self._session.touch()
+        return max(before, now)
+
+    def _give_up(self, node: Node, error: RobotError) -> None:
+        """The order cannot go on; it is kept until fleet control cancels it."""
+        book = self._session.book
+        references = {"orderId": book.order_id, "orderUpdateId": str(book.update_id), "nodeId": node.node_id}
+        self._session.report(kind_of(error), Level.CRITICAL, str(error), references)
+
+    async def _act(self, actions: tuple[Action, ...]) -> None:
+        """Do the actions of a node in order; returns when the robot may drive on."""
+        parallel: list[tuple[Action, asyncio.Task[None]]] = []
+        for action in actions:
+            if action.blocking_type in ALONE:
+                await asyncio.gather(*(task for _, task in parallel))
+                parallel.clear()
+            task = asyncio.get_running_loop().create_task(self._perform(action))
+            self._beside.add(task)
+            task.add_done_callback(self._beside.discard)
+            if action.blocking_type in ALONE:
+                await task
+            else:
+                parallel.append((action, task))
+        await asyncio.gather(*(task for action, task in parallel if action.blocking_type in STANDS))
+
+    async def _perform(self, action: Action) -> None:
+        state = self._session.book.actions.get(action.action_id)
+        operation = operation_of(action.action_type, self._session.version.level)
+        if state is None or state.status is not ActionStatus.WAITING:
+            return
+        if operation is None:
+            self._session.report(ErrorKind.ORDER_ACTION, Level.WARNING, f"there is no {action.action_type}")
+            return
+        await self._session.perform(state, operation)
+
+
+def _reached(action: RobotAction, count: int) -> int:
+    """Return how many of ``count`` goals the navigation has behind it."""
+    feedback = action.feedback
+    return count - len(feedback.milestones) if isinstance(feedback, NavigationFeedback) else 0

@@ -1,0 +1,260 @@
+"""The door: dials the MQTT broker, and dials again; takes messages from there and sends what the robot has to say."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import ssl
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import msgspec
+
+from roboglot.extras import explaining
+from roboglot.model.admission import Unknown
+from roboglot.model.client_context import ask_for
+from roboglot.model.robot import Robot
+from roboglot.operations import Right
+from roboglot.protocols.door import Endpoint
+from roboglot.protocols.vda5050 import vocabulary
+from roboglot.protocols.vda5050.chapters import actions, messages  # noqa: F401 - these fill the table
+from roboglot.protocols.vda5050.config import Vda5050Config
+from roboglot.protocols.vda5050.errors import Rejected
+from roboglot.protocols.vda5050.session import Error, Session
+from roboglot.protocols.vda5050.table import TABLE
+from roboglot.transport.seldom import Seldom
+from roboglot.wire.vda5050.orders import MESSAGE_MAX
+from roboglot.wire.vda5050.versions import VERSIONS
+
+log = logging.getLogger(__name__)
+RETRY = 2.0  # s between two tries to reach the broker
+LOOK_PERIOD = 0.2  # s of robot time between two looks whether the state changed by itself
+STATE_PERIOD = 30.0  # s after which the state is sent in any case
+QUEUE_MAX = 64  # messages that wait to be read; then they are dropped, and the log says so
+LINK_SECONDS = 5.0  # for the broker to answer
+KEEPALIVE = 15  # s after which the broker says that the robot is gone
+CLOSING = 1.0  # s to take leave of the broker
+
+
+class Vda5050Door:
+    """One robot at one broker; with no broker it is closed."""
+
+    name = vocabulary.DOOR
+
+    def __init__(self, robot: Robot, config: Vda5050Config) -> None:
+        self._robot, self._config = robot, config
+        self._version = VERSIONS[config.version]
+        self._serial = config.serials.get(robot.id) or _level(robot.description.serial or robot.id)
+        self._session = Session(robot, self._version, config.map, self._send_factsheet)
+        self._headers: dict[str, int] = {}
+        self._task: asyncio.Task[None] | None = None
+        self._client: Any = None
+        self._seldom = Seldom(log)
+        self._sent: Any = None
+
+    @property
+    def endpoints(self) -> Sequence[Endpoint]:
+        """The topics at the broker."""
+        if not self._config.broker:
+            return ()
+        host, port = self._config.address
+        listen = f"mosquitto_sub -h {host} -p {port} -v -t '{self._topic('#')}'"
+        return [Endpoint("VDA 5050", f"mqtt://{host}:{port}/{self._topic('')}", listen)]
+
+    def _topic(self, name: str) -> str:
+        config = self._config
+        return f"{config.interface}/{self._version.level}/{_level(config.manufacturer)}/{self._serial}/{name}"
+
+    async def start(self) -> None:
+        """Begin to dial. Raises MissingExtra without aiomqtt."""
+        if self._config.broker:
+            with explaining("the VDA 5050 door", "vda5050"):
+                import aiomqtt  # noqa: F401 - said now rather than at the first try
+            self._task = asyncio.get_running_loop().create_task(self._dial())
+
+    async def close(self) -> None:
+        """Say OFFLINE, and stop what fleet control began."""
+        await self._session.close()
+        if self._client is not None:
+            with contextlib.suppress(Exception):
+                async with asyncio.timeout(CLOSING):  # noqa: TID251 - the broker's time, not the robot's
+                    await self._send_connection("OFFLINE")
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.gather(self._task, return_exceptions=True)
+
+    async def _dial(self) -> None:
+        import aiomqtt
+
+        host, port = self._config.address
+        while True:
+            try:
+                await self._serve(host, port)
+            except (aiomqtt.MqttError, OSError) as error:
+                self._seldom.warning(
+                    "dial", "robot %s: no fleet control at %s:%d: %s", self._robot.id, host, port, error
+                )
+            finally:
+                self._client = None
+            await asyncio.sleep(RETRY)  # noqa: TID251 - the broker's time, not the robot's
+
+    async def _serve(self, host: str, port: int) -> None:
+        """One connection: hear and speak until it breaks."""
+        import aiomqtt
+
+        config = self._config
+        broken = "CONNECTION_BROKEN" if self._version.new_words else "CONNECTIONBROKEN"
+        context = ssl.create_default_context(cafile=config.ca or None) if config.tls else None
+        will = aiomqtt.Will(
+            self._topic("connection"), self._message("connection", {"connectionState": broken}), 1, True
+        )
+        async with aiomqtt.Client(
+            host,
+            port,
+            username=config.username or None,
+            password=config.password or None,
+            will=will,
+            keepalive=KEEPALIVE,
+            timeout=LINK_SECONDS,
+            tls_context=context,
+            max_queued_incoming_messages=QUEUE_MAX,
+        ) as client:
+            self._client = client
+            await self._introduce(f"{host}:{port}")
+            for name in ("order", "instantActions"):
+                await client.subscribe(self._topic(name), qos=1)
+            await self._send_connection("ONLINE")
+            await self._send_factsheet()
+            log.info(
+                "robot %s: fleet control may come over %s:%d, VDA 5050 %s",
+                self._robot.id,
+                host,
+                port,
+                self._version.number,
+            )
+            self._sent = None
+            speaking = [asyncio.create_task(self._report()), asyncio.create_task(self._visualize())]
+            try:
+                async for message in client.messages:
+                    await self._take(str(message.topic).rpartition("/")[2], message.payload)
+            finally:
+                for task in speaking:
+                    task.cancel()
+                await asyncio.gather(*speaking, return_exceptions=True)
+
+    async def _introduce(self, address: str) -> None:
+        """From here on, what is done is done for the fleet control behind this broker."""
+        who = ""
+        with contextlib.suppress(Unknown):
+            who = await self._robot.admission.admit(address)
+        ask_for(f"{self.name} {address.rpartition(':')[0]}", address, who)
+
+    async def _take(self, name: str, payload: Any) -> None:
+        """Do what one message asks for; a refusal is an error in the state."""
+        data = bytes(payload) if isinstance(payload, bytes | bytearray) else str(payload or "").encode()
+        tap, began, status, why = self._robot.tap, None, "accepted", ""
+        if tap.watched:
+            began = tap.request(self.name, name, data[:MESSAGE_MAX])
+        operation = TABLE.get(name)
+        try:
+            if operation is not None:
+                self._session.check(name, operation.right or Right.ADMIN)
+                await operation.call(self._session, {"payload": data})
+        except Rejected as rejected:
+            status, why = self._version.error(rejected.kind), str(rejected)
+            self._session.refuse(rejected)
+        if tap.watched:
+            tap.reply(self.name, name, b"", status, why, began)
+
+    async def _report(self) -> None:
+        """Send the state whenever it changed, and now and then."""
+        clock, session = self._robot.clock, self._session
+        last = clock.time()
+        async for now in clock.every(LOOK_PERIOD):
+            state = self._state()
+            if session.changed.is_set() or self._sent != _coarse(state) or now - last >= STATE_PERIOD:
+                session.changed.clear()
+                self._sent, last = _coarse(state), now
+                await self._send("state", state)
+
+    async def _visualize(self) -> None:
+        async for _ in self._robot.clock.every(self._config.visualization_period):
+            place = vocabulary.position(self._robot, self._version, self._config.map)
+            await self._send("visualization", place | vocabulary.velocity(self._robot))
+
+    def _state(self) -> dict[str, Any]:
+        """Return all that the robot says about itself."""
+        robot, session, version = self._robot, self._session, self._version
+        own = vocabulary.action_states(session.book.actions.values(), version)
+        instant = vocabulary.action_states(session.instant.values(), version)
+        return {
+            **vocabulary.progress(session.book),
+            **vocabulary.position(robot, version, self._config.map),
+            **vocabulary.velocity(robot),
+            "driving": vocabulary.is_driving(robot),
+            "paused": session.paused,
+            "newBaseRequest": session.needs_base,
+            **(
+                {"actionStates": own, "instantActionStates": instant}
+                if version.new_words
+                else {"actionStates": [*own, *instant]}
+            ),
+            **vocabulary.power(robot, version),
+            "operatingMode": vocabulary.operating_mode(robot),
+            "errors": [self._error(error) for error in (*session.errors, *session.faults())],
+            "information": [],
+            **vocabulary.safety(robot, version),
+        }
+
+    def _error(self, error: Error) -> dict[str, Any]:
+        references = [{"referenceKey": key, "referenceValue": value} for key, value in error.references]
+        return {
+            "errorType": self._version.error(error.kind),
+            "errorLevel": self._version.severity(error.level),
+            "errorDescription": error.why,
+            "errorReferences": references,
+        }
+
+    async def _send_connection(self, state: str) -> None:
+        await self._send("connection", {"connectionState": state}, qos=1, retain=True)
+
+    async def _send_factsheet(self) -> None:
+        period = self._config.visualization_period
+        sheet = vocabulary.factsheet(self._robot, self._version, STATE_PERIOD, period)
+        await self._send("factsheet", sheet, qos=0, retain=True)
+
+    def _message(self, name: str, values: Mapping[str, Any]) -> bytes:
+        """Return a message with its header."""
+        number = self._headers.get(name, 0)
+        self._headers[name] = number + 1
+        header = {
+            "headerId": number,
+            "timestamp": vocabulary.timestamp(self._robot.clock.epoch()),
+            "version": self._version.number,
+            "manufacturer": self._config.manufacturer,
+            "serialNumber": self._serial,
+        }
+        return msgspec.json.encode({**header, **values})
+
+    async def _send(self, name: str, values: Mapping[str, Any], qos: int = 0, retain: bool = False) -> None:
+        if self._client is None:
+            return
+        data = self._message(name, values)
+        if (tap := self._robot.tap).watched:
+            tap.push(self.name, "broker", name, data)
+        await self._client.publish(self._topic(name), data, qos=qos, retain=retain)
+
+
+def _level(text: str) -> str:
+    """Return a text as a level of a topic."""
+    return "".join("_" if sign in "/+#\0 " else sign for sign in text) or "_"
+
+
+def _coarse(state: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what counts as a change: all but where it is, how fast, and small changes of the charge."""
+    fine = ("agvPosition", "mobileRobotPosition", "velocity", "powerSupply", "batteryState")
+    power = state.get("powerSupply") or state.get("batteryState") or {}
+    charge = power.get("stateOfCharge", power.get("batteryCharge", 0.0))
+    kept = {key: value for key, value in state.items() if key not in fine}
+    return kept | {"charging": power.get("charging"), "charge": int(charge)}

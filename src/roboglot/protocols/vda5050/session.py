@@ -1,0 +1,305 @@
+"""Fleet control's session with one robot: takes its messages, has the robot drive orders, keeps errors and actions.
+
+Says nothing that is not so: a node is passed when the navigation says that the robot was there, an action is finished
+when it has ended.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from typing import Any
+
+from roboglot.model.admission import Forbidden, Right
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.system.health import FaultLevel, Health
+from roboglot.model.errors import RobotError
+from roboglot.model.geometry import Point
+from roboglot.model.robot import Robot
+from roboglot.operations import BadParameters, Operation
+from roboglot.protocols.vda5050.errors import Rejected
+from roboglot.protocols.vda5050.order_book import ACTIONS_KEPT_MAX, ActionState, ActionStatus, OrderBook
+from roboglot.protocols.vda5050.route import Route
+from roboglot.protocols.vda5050.table import AT_NODES, INSTANT, operation_of
+from roboglot.protocols.vda5050.vocabulary import DOOR
+from roboglot.wire.vda5050.orders import Action, Edge, InstantActions, Malformed, Node, Order, read
+from roboglot.wire.vda5050.versions import ErrorKind, Level, Version
+
+log = logging.getLogger(__name__)
+SOURCE = DOOR
+START_REACH = 0.5  # m from the first node of an order that still count as there
+ERRORS_MAX = 32
+LEVELS = {FaultLevel.WARNING: Level.WARNING, FaultLevel.ERROR: Level.URGENT, FaultLevel.FATAL: Level.FATAL}
+
+
+@dataclass(frozen=True, slots=True)
+class Error:
+    """Something wrong, until it is mended: ``order`` ones go with the next order that is taken."""
+
+    kind: ErrorKind
+    level: Level
+    why: str
+    references: tuple[tuple[str, str], ...] = ()
+    order: bool = True
+
+
+class Session:
+    """One robot and its fleet control."""
+
+    def __init__(
+        self, robot: Robot, version: Version, map_id: str, send_factsheet: Callable[[], Awaitable[None]]
+    ) -> None:
+        self.robot, self.version, self.map_id = robot, version, map_id
+        self.send_factsheet = send_factsheet
+        self.book = OrderBook()
+        self.instant: dict[str, ActionState] = {}
+        self.errors: list[Error] = []
+        self.paused = False
+        self.changed = asyncio.Event()
+        self._trigger = asyncio.Event()
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._route = Route(self)
+
+    def touch(self) -> None:
+        """Have the state sent."""
+        self.changed.set()
+
+    def check(self, operation: str, right: Right | None) -> None:
+        """Raise Rejected unless fleet control has the right."""
+        try:
+            self.robot.admission.check(DOOR, operation, right)
+        except Forbidden as refused:
+            raise Rejected(ErrorKind.FORBIDDEN, str(refused)) from None
+
+    def refuse(self, rejected: Rejected, *, order: bool = True) -> None:
+        """Report why a message or an action was not taken."""
+        self.report(rejected.kind, rejected.level, str(rejected), rejected.references, order=order)
+
+    def report(
+        self, kind: ErrorKind, level: Level, why: str, references: dict[str, str] | None = None, *, order: bool = True
+    ) -> None:
+        """Keep an error, and send it."""
+        error = Error(kind, level, why, tuple((references or {}).items()), order)
+        if error not in self.errors:
+            self.errors = [*self.errors, error][-ERRORS_MAX:]
+            log.info("robot %s: fleet control hears %s: %s", self.robot.id, self.version.error(kind), why)
+        self.touch()
+
+    def take_order(self, payload: bytes) -> None:
+        """Take an order or an update and drive it. Raises Rejected."""
+        order = self._read(payload, Order)
+        self._check_usable(order)
+        new = order.order_id != self.book.order_id
+        if not self.book.take(order, self.near):
+            return
+        self.errors = [error for error in self.errors if not error.order]
+        if new:
+            self._trigger.clear()
+            self.book.pass_node(order.nodes[0])
+            self._route.begin(order.nodes[0])
+        else:
+            self._route.go_on()
+        self.touch()
+
+    def near(self, node: Node) -> bool:
+        """Return whether the robot is where ``node`` is."""
+        place = node.node_position
+        if place is None or Localization not in self.robot:
+            return False
+        pose = self.robot[Localization].pose
+        return bool(pose.point.distance_to(_point(node)) <= max(START_REACH, place.reach))
+
+    def take_instant_actions(self, payload: bytes) -> None:
+        """Begin each of the actions; those that cannot be are FAILED, with an error. Raises Rejected."""
+        message = self._read(payload, InstantActions)
+        self.errors = [error for error in self.errors if error.kind is not ErrorKind.INSTANT_ACTION]
+        for action in message.actions:
+            if action.action_id in self.instant:
+                continue  # sent again
+            state = self.instant[action.action_id] = ActionState(action)
+            _forget_oldest(self.instant)
+            task = asyncio.get_running_loop().create_task(self._do_instantly(state))
+            self._tasks.add(task)
+            task.add_done_callback(self._tasks.discard)
+
+    def _read(self, payload: bytes, kind: type[Any]) -> Any:
+        try:
+            message = read(payload, kind)
+        except Malformed as malformed:
+            raise Rejected(ErrorKind.MALFORMED, str(malformed)) from None
+        if message.version.partition(".")[0] != self.version.number.partition(".")[0]:
+            why = f"the message is of version {message.version}, this robot speaks {self.version.number}"
+            raise Rejected(ErrorKind.MALFORMED, why, {"version": message.version})
+        return message
+
+    async def _do_instantly(self, state: ActionState) -> None:
+        name = state.action.action_type
+        operation = operation_of(name, self.version.level) if name in INSTANT else None
+        if operation is None:
+            state.status, state.result = ActionStatus.FAILED, "no such instant action"
+            why = f"this robot has no instant action {name}"
+            self.report(ErrorKind.INSTANT_ACTION, Level.WARNING, why, {"actionId": state.action.action_id}, order=False)
+            return
+        await self.perform(state, operation, instant=True)
+
+    async def perform(self, state: ActionState, operation: Operation[str], *, instant: bool = False) -> None:
+        """Do one action and keep how it goes."""
+        action = state.action
+        state.status = ActionStatus.RUNNING
+        self.touch()
+        try:
+            self.check(operation.key, operation.right)
+            state.result = await operation.call(self, action.values) or ""
+            state.status = ActionStatus.FINISHED
+        except asyncio.CancelledError:
+            state.status, state.result = ActionStatus.FAILED, "it was cancelled"
+            raise
+        except Rejected as rejected:
+            state.status, state.result = ActionStatus.FAILED, str(rejected)
+            references = {**rejected.references, "actionId": action.action_id}
+            self.report(rejected.kind, rejected.level, str(rejected), references)
+        except (RobotError, BadParameters, ValueError) as error:
+            state.status, state.result = ActionStatus.FAILED, str(error)
+            kind = ErrorKind.INSTANT_ACTION if instant else ErrorKind.ACTION_FAILED
+            self.report(kind, Level.WARNING, str(error), {"actionId": action.action_id}, order=not instant)
+        finally:
+            self.touch()
+
+    def _check_usable(self, order: Order) -> None:
+        """Raise Rejected for what this robot cannot use or do."""
+        for node in order.nodes:
+            place = node.node_position
+            if place is None:
+                raise _unsupported("nodePosition is required", {"nodeId": node.node_id})
+            if place.map_id != self.map_id:
+                why = f"there is no map {place.map_id!r}; the robot's map is {self.map_id!r}"
+                raise Rejected(ErrorKind.UNKNOWN_MAP, why, {"mapId": place.map_id, "nodeId": node.node_id})
+            for action in node.actions:
+                self._check_action(action)
+        for edge in order.edges:
+            self._check_edge(edge)
+
+    def _check_action(self, action: Action) -> None:
+        operation = operation_of(action.action_type, self.version.level)
+        if operation is None or action.action_type not in AT_NODES:
+            raise Rejected(
+                ErrorKind.ORDER_ACTION,
+                f"this robot cannot do {action.action_type} at a node",
+                {"actionId": action.action_id, "actionType": action.action_type},
+            )
+        if lacking := [kind.__name__ for kind in operation.needs if kind not in self.robot]:
+            raise Rejected(ErrorKind.ORDER_ACTION, f"this robot has no {lacking[0]}", {"actionId": action.action_id})
+        try:
+            operation.parse(action.values)
+        except BadParameters as bad:
+            raise Rejected(ErrorKind.ORDER_ACTION, str(bad), {"actionId": action.action_id}) from None
+
+    def _check_edge(self, edge: Edge) -> None:
+        unusable = {
+            "trajectory": edge.trajectory,
+            "corridor": edge.corridor,
+            "orientation": edge.orientation,
+            "direction": edge.direction or None,
+            "rotationAllowed": True if edge.rotation_allowed is False else None,
+        }
+        if named := [name for name, value in unusable.items() if value is not None]:
+            raise _unsupported(f"this robot plans its own way: {named[0]} cannot be used", {"edgeId": edge.edge_id})
+        if edge.actions:
+            first = edge.actions[0]
+            raise Rejected(
+                ErrorKind.ORDER_ACTION, f"this robot does {first.action_type} on no edge", {"actionId": first.action_id}
+            )
+        if edge.height is not None and edge.height < self.robot.description.height:
+            high = self.robot.description.height
+            raise _unsupported(f"the robot is {high} m high, the edge allows {edge.height}", {"edgeId": edge.edge_id})
+        if edge.speed is not None and edge.speed <= 0:
+            raise _unsupported("nothing moves at no speed", {"edgeId": edge.edge_id})
+
+    def speed_ratio(self, edge: Edge | None) -> float:
+        """Return the share of the robot's top speed that an edge allows."""
+        if edge is None or edge.speed is None or Base not in self.robot:
+            return 1.0
+        top = self.robot[Base].limits.twist.x
+        return min(1.0, edge.speed / top) if top > 0 else 1.0
+
+    @property
+    def needs_base(self) -> bool:
+        """Return whether the robot is at, or on its way to, the last released node of an order that goes on."""
+        nodes = self.book.nodes
+        return bool(nodes) and sum(node.released for node in nodes) <= 1 and not nodes[-1].released
+
+    def faults(self) -> list[Error]:
+        """Return what is wrong with the robot itself now."""
+        if Health not in self.robot:
+            return []
+        return [
+            Error(ErrorKind.FAULT, LEVELS[fault.level], fault.message, (("fault", fault.name),), order=False)
+            for fault in self.robot[Health].faults[:ERRORS_MAX]
+        ]
+
+    def pause(self, on: bool) -> None:
+        """Stop driving, or go on."""
+        self.paused = on
+        self._route.pause(on)
+        self.touch()
+
+    async def cancel_order(self, order_id: str) -> None:
+        """Stop and forget what is left; returns when the robot stands. Raises Rejected if nothing is left."""
+        if self.book.idle or self.book.canceling or order_id not in ("", self.book.order_id):
+            raise Rejected(ErrorKind.NO_ORDER, "there is no such order to cancel")
+        self.book.canceling = True
+        try:
+            await self._route.stop()
+            self.book.drop_rest()
+        finally:
+            self.book.canceling = False
+        self.errors = [error for error in self.errors if not error.order]
+        self.paused = False
+
+    def clear_instant_actions(self) -> None:
+        """Forget those that ended."""
+        self.instant = {key: state for key, state in self.instant.items() if not state.status.ended}
+
+    def release_trigger(self) -> None:
+        """Let go on what waits. Raises Rejected where nothing does."""
+        waiting = [
+            state
+            for state in self.book.actions.values()
+            if state.action.action_type == "waitForTrigger" and state.status is ActionStatus.RUNNING
+        ]
+        if not waiting:
+            raise Rejected(ErrorKind.INSTANT_ACTION, "nothing waits for a trigger")
+        self._trigger.set()
+
+    async def wait_for_trigger(self) -> None:
+        """Wait for the trigger, and use it up."""
+        self._trigger.clear()
+        await self._trigger.wait()
+
+    def set_last_node(self, node_id: str) -> None:
+        """Note the node where people placed the robot."""
+        self.book.last_node, self.book.last_sequence = node_id, 0
+
+    async def close(self) -> None:
+        """Stop what fleet control had the robot do."""
+        await self._route.stop()
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+
+
+def _unsupported(why: str, references: dict[str, object]) -> Rejected:
+    return Rejected(ErrorKind.UNSUPPORTED, why, references, Level.CRITICAL)
+
+
+def _point(node: Node) -> Point:
+    assert node.node_position is not None
+    return Point(node.node_position.x, node.node_position.y)
+
+
+def _forget_oldest(states: dict[str, ActionState]) -> None:
+    for key in [key for key, state in states.items() if state.status.ended][: max(0, len(states) - ACTIONS_KEPT_MAX)]:
+        del states[key]

@@ -1,0 +1,70 @@
+"""What fleet control may ask for: messages and actions by their names, and which rows of the contract are there."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from roboglot.operations import OperationTable
+
+TABLE: OperationTable[str] = OperationTable("vda5050")
+# Which version has an action, where only one has, and where it may stand, where not at both.
+ONLY_IN: dict[str, str] = {
+    "initPosition": "v2",
+    "initializePosition": "v3",
+    "clearInstantActions": "v3",
+    "trigger": "v3",
+}
+AT_NODES = frozenset({"initPosition", "initializePosition", "startCharging", "stopCharging", "waitForTrigger"})
+INSTANT = frozenset(
+    {
+        "startPause",
+        "stopPause",
+        "cancelOrder",
+        "stateRequest",
+        "factsheetRequest",
+        "clearInstantActions",
+        "trigger",
+        "initPosition",
+        "initializePosition",
+        "startCharging",
+        "stopCharging",
+    }
+)
+MESSAGES = ("state", "visualization", "connection", "factsheet")
+FIELDS = (
+    "order.nodes.nodePosition",
+    "order.nodes.nodePosition.theta",
+    "order.nodes.nodePosition.allowedDeviationXY",
+    "order.nodes.actions",
+    "order.edges.maximumSpeed",
+    "order.edges.maximumHeight",
+)
+
+
+def implemented() -> set[str]:
+    """Keys of the operations that are there."""
+    return {operation.key for operation in TABLE if not operation.partial}
+
+
+def partly() -> dict[str, str]:
+    """Keys of those that are there in part, with what is missing."""
+    return {operation.key: operation.partial for operation in TABLE if operation.partial}
+
+
+class Messages:
+    """What the robot sends, and which optional fields of orders it uses."""
+
+    @staticmethod
+    def implemented() -> set[str]:
+        """Keys of ``vda5050_messages``."""
+        return {*MESSAGES, *FIELDS}
+
+    @staticmethod
+    def partly() -> dict[str, str]:
+        """Nothing is there in part."""
+        return {}
+
+
+def operation_of(name: str, level: str) -> Any:
+    """Return the action of this name in this version, or None."""
+    return TABLE.get(name) if ONLY_IN.get(name, level) == level else None

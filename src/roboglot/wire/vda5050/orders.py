@@ -1,0 +1,205 @@
+"""Orders and instant actions as fleet control sends them, with the fields of both versions, bounded and checked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import pairwise
+from typing import Annotated, Any, Literal, TypeVar
+
+import msgspec
+
+MESSAGE_MAX = 1 << 20  # bytes
+NODES_MAX = 1000
+ACTIONS_MAX = 64  # of a node, of a message
+PARAMETERS_MAX = 64
+
+Id = Annotated[str, msgspec.Meta(min_length=1, max_length=256)]
+Text = Annotated[str, msgspec.Meta(max_length=4096)]
+Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
+Metres = Annotated[float, msgspec.Meta(ge=-100_000, le=100_000)]
+Angle = Annotated[float, msgspec.Meta(ge=-3.1416, le=3.1416)]
+NotNegative = Annotated[float, msgspec.Meta(ge=0, le=100_000)]
+
+
+class Malformed(ValueError):
+    """The bytes are no such message; the text says where."""
+
+
+class Parameter(msgspec.Struct, frozen=True):
+    """One value for an action."""
+
+    key: Id
+    value: Any
+
+
+class Action(msgspec.Struct, frozen=True, rename="camel"):
+    """Something to do at a node, on an edge or at once."""
+
+    action_type: Id
+    action_id: Id
+    blocking_type: Literal["NONE", "SINGLE", "SOFT", "HARD"] = "HARD"
+    action_parameters: Annotated[tuple[Parameter, ...], msgspec.Meta(max_length=PARAMETERS_MAX)] = ()
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """The parameters by their names."""
+        return {parameter.key: parameter.value for parameter in self.action_parameters}
+
+
+class Ellipse(msgspec.Struct, frozen=True):
+    """How far from a node still counts as there (3.0): half axes in m."""
+
+    a: NotNegative
+    b: NotNegative
+    theta: Angle = 0.0
+
+
+class NodePosition(msgspec.Struct, frozen=True):
+    """Where a node is in the map."""
+
+    x: Metres
+    y: Metres
+    map_id: Id = msgspec.field(name="mapId")
+    theta: Angle | None = None
+    deviation: NotNegative | Ellipse | None = msgspec.field(name="allowedDeviationXY", default=None)
+    deviation_theta: NotNegative | None = msgspec.field(name="allowedDeviationTheta", default=None)
+
+    @property
+    def reach(self) -> float:
+        """Metres from the node that count as there; 0: as near as the robot can."""
+        match self.deviation:
+            case Ellipse(a=a, b=b):
+                return min(a, b)
+            case None:
+                return 0.0
+            case radius:
+                return float(radius)
+
+
+Actions = Annotated[tuple[Action, ...], msgspec.Meta(max_length=ACTIONS_MAX)]
+
+
+class Part(msgspec.Struct, frozen=True, rename="camel", kw_only=True):
+    """What nodes and edges have in common: their number in the order, and whether they are of its base."""
+
+    sequence_id: Count
+    released: bool
+    actions: Actions
+
+
+class Node(Part, frozen=True, rename="camel", kw_only=True):
+    """A place to pass."""
+
+    node_id: Id
+    node_position: NodePosition | None = None
+
+
+class Edge(Part, frozen=True, rename="camel", kw_only=True):
+    """The way between two nodes; fields that no robot here can use are kept to be refused."""
+
+    edge_id: Id
+    start_node_id: Text | None = None
+    end_node_id: Text | None = None
+    max_speed: NotNegative | None = None
+    maximum_speed: NotNegative | None = None
+    max_height: NotNegative | None = None
+    maximum_height: NotNegative | None = None
+    orientation: Any = None
+    direction: Any = None
+    rotation_allowed: bool | None = None
+    trajectory: Any = None
+    corridor: Any = None
+
+    @property
+    def speed(self) -> float | None:
+        """The most that is allowed, m/s; None: as fast as the robot goes."""
+        return self.maximum_speed if self.max_speed is None else self.max_speed
+
+    @property
+    def height(self) -> float | None:
+        """The most that the robot may be high, m."""
+        return self.maximum_height if self.max_height is None else self.max_height
+
+
+class Order(msgspec.Struct, frozen=True, rename="camel"):
+    """A way through nodes, or more of one that is under way."""
+
+    header_id: Count
+    timestamp: Text
+    version: Text
+    manufacturer: Text
+    serial_number: Text
+    order_id: Id
+    order_update_id: Count
+    nodes: Annotated[tuple[Node, ...], msgspec.Meta(min_length=1, max_length=NODES_MAX)]
+    edges: Annotated[tuple[Edge, ...], msgspec.Meta(max_length=NODES_MAX)]
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """All nodes and edges."""
+        return (*self.nodes, *self.edges)
+
+
+class InstantActions(msgspec.Struct, frozen=True, rename="camel"):
+    """Actions to be done at once."""
+
+    header_id: Count
+    timestamp: Text
+    version: Text
+    manufacturer: Text
+    serial_number: Text
+    actions: Actions
+
+
+M = TypeVar("M", Order, InstantActions)
+
+
+def read(data: bytes, kind: type[M]) -> M:
+    """Return the message. Raises Malformed."""
+    if len(data) > MESSAGE_MAX:
+        raise Malformed(f"the message has {len(data)} bytes, at most {MESSAGE_MAX} are read")
+    try:
+        message = msgspec.json.decode(data, type=kind)
+    except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
+        raise Malformed(str(error)) from None
+    if isinstance(message, Order):
+        _check_graph(message)
+    _check_ids(message)
+    return message
+
+
+def _check_graph(order: Order) -> None:
+    """Raise Malformed unless nodes and edges take turns, numbered in step, released ones first."""
+    nodes, edges = order.nodes, order.edges
+    if len(edges) != len(nodes) - 1:
+        raise Malformed(f"{len(nodes)} nodes need {len(nodes) - 1} edges, not {len(edges)}")
+    first = nodes[0].sequence_id
+    if first % 2:
+        raise Malformed(f"nodes have even sequenceIds, not {first}")
+    for index, node in enumerate(nodes):
+        if node.sequence_id != first + 2 * index:
+            raise Malformed(f"node {node.node_id} has sequenceId {node.sequence_id}, not {first + 2 * index}")
+    for index, edge in enumerate(edges):
+        _check_edge(edge, nodes[index], nodes[index + 1])
+    if not nodes[0].released:
+        raise Malformed(f"node {nodes[0].node_id} is the first and not released")
+    if any(after.released and not before.released for before, after in pairwise(nodes)):
+        raise Malformed("a released node follows one that is not released")
+
+
+def _check_edge(edge: Edge, start: Node, end: Node) -> None:
+    if edge.sequence_id != start.sequence_id + 1:
+        raise Malformed(f"edge {edge.edge_id} has sequenceId {edge.sequence_id}, not {start.sequence_id + 1}")
+    if edge.released is not end.released:
+        raise Malformed(f"edge {edge.edge_id} and node {end.node_id}: one is released, the other not")
+    for said, node in ((edge.start_node_id, start), (edge.end_node_id, end)):
+        if said is not None and said != node.node_id:
+            raise Malformed(f"edge {edge.edge_id} names node {said} where {node.node_id} is")
+
+
+def _check_ids(message: Order | InstantActions) -> None:
+    """Raise Malformed for an actionId that comes twice."""
+    parts: Iterable[Part | InstantActions] = message.parts if isinstance(message, Order) else (message,)
+    ids = [action.action_id for part in parts for action in part.actions]
+    if len(ids) != len(set(ids)):
+        raise Malformed("an actionId comes twice")

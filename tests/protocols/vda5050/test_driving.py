@@ -1,0 +1,170 @@
+"""Orders are driven truthfully: what the state says is what the robot did, by mosquitto and a foreign client."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.emergency_stop import EmergencyStop
+from roboglot.model.components.system.lease import PERSON, Lease
+from roboglot.model.geometry import Twist
+from tests.protocols.vda5050.conftest import Opened, Yard
+from tests.protocols.vda5050.orders import action, instant, order
+
+
+def status(yard: Yard, id: str) -> str:
+    listed = [*yard.control.state["actionStates"], *yard.control.state.get("instantActionStates", [])]
+    return next((state["actionStatus"] for state in listed if state["actionId"] == id), "")
+
+
+def distance(yard: Yard, x: float, y: float) -> float:
+    pose = yard.robot[Localization].pose
+    return math.hypot(pose.x - x, pose.y - y)
+
+
+async def test_an_order_is_driven_node_by_node(yard: Opened) -> None:
+    one = await yard()
+    made = order("one", [(0, 0), (1, 0), (1.5, 0.5)])
+    one.control.send("order", made)
+    await one.until(lambda: one.control.state["driving"])
+    assert one.control.state["nodeStates"]
+    await one.until(lambda: one.control.state["lastNodeId"] == "n2")
+    assert distance(one, 1.5, 0.5) < 0.15
+    await one.until(lambda: not one.control.state["driving"])
+    state = one.control.state
+    assert (state["orderId"], state["nodeStates"], state["edgeStates"], state["errors"]) == ("one", [], [], [])
+    seen = [state["lastNodeSequenceId"] for state in one.control.heard["state"] if state["orderId"] == "one"]
+    assert seen == sorted(seen)
+    assert set(seen) >= {0, 2, 4}
+    for said in one.control.heard["state"]:  # what is left fits what was passed
+        assert all(node["sequenceId"] > said["lastNodeSequenceId"] for node in said["nodeStates"])
+
+
+async def test_the_robot_waits_at_the_decision_point_until_there_is_more(yard: Opened) -> None:
+    one = await yard()
+    one.control.send("order", order("one", [(0, 0), (0.6, 0), (1.2, 0)], released=2))
+    await one.until(lambda: one.control.state["lastNodeId"] == "n1" and not one.control.state["driving"])
+    assert one.control.state["newBaseRequest"] is False or one.control.state["nodeStates"]
+    assert [node["released"] for node in one.control.state["nodeStates"]] == [False]
+    one.control.send("order", order("one", [(0.6, 0), (1.2, 0)], update=1, first=1))
+    await one.until(lambda: one.control.state["lastNodeId"] == "n2")
+    assert distance(one, 1.2, 0) < 0.15
+
+
+async def test_actions_hold_the_robot_until_they_end(yard: Opened) -> None:
+    one = await yard()
+    made = order("one", [(0, 0), (0.5, 0), (1, 0)])
+    made["nodes"][1]["actions"] = [action("waitForTrigger", "w", "HARD")]
+    one.control.send("order", made)
+    await one.until(lambda: status(one, "w") == "RUNNING" and not one.control.state["driving"])
+    await one.clock.advance(5)
+    assert distance(one, 0.5, 0) < 0.15
+    one.control.send("instantActions", instant(action("trigger", "t", "NONE")))
+    await one.until(lambda: one.control.state["lastNodeId"] == "n2")
+    assert status(one, "w") == "FINISHED"
+    assert status(one, "t") == "FINISHED"
+
+
+async def test_pause_holds_and_cancel_ends(yard: Opened) -> None:
+    one = await yard()
+    one.control.send("order", order("one", [(0, 0), (3, 0)]))
+    await one.until(lambda: one.control.state["driving"])
+    one.control.send("instantActions", instant(action("startPause", "p", "NONE")))
+    await one.until(lambda: one.control.state["paused"] and not one.control.state["driving"])
+    held = one.robot[Localization].pose
+    await one.clock.advance(3)
+    assert distance(one, held.x, held.y) < 0.05
+    one.control.send("instantActions", instant(action("stopPause", "q", "NONE")))
+    await one.until(lambda: one.control.state["driving"])
+    one.control.send("instantActions", instant(action("cancelOrder", "c", "NONE")))
+    await one.until(lambda: status(one, "c") == "FINISHED" and not one.control.state["driving"])
+    assert one.control.state["nodeStates"] == []
+    assert one.control.state["orderId"] == "one"
+    assert distance(one, 3, 0) > 0.5
+    one.control.send("instantActions", instant(action("cancelOrder", "d", "NONE")))
+    await one.until(lambda: status(one, "d") == "FAILED")
+    assert "NO_ORDER_TO_CANCEL" in one.control.errors
+
+
+@pytest.mark.parametrize(
+    ("change", "error"),
+    [
+        (lambda o: o["nodes"][1]["nodePosition"].update(mapId="moon"), "UNKNOWN_MAP_ID"),
+        (lambda o: o["nodes"][1].pop("nodePosition"), "UNSUPPORTED_PARAMETER"),
+        (lambda o: o["nodes"][1].update(actions=[action("pick", "1")]), "INVALID_ORDER_ACTION"),
+        (lambda o: o["edges"][0].update(actions=[action("beep", "1")]), "INVALID_ORDER_ACTION"),
+        (lambda o: o["edges"][0].update(trajectory={"degree": 1}), "UNSUPPORTED_PARAMETER"),
+        (lambda o: o["edges"][0].update(maximumHeight=0.01), "UNSUPPORTED_PARAMETER"),
+        (lambda o: o["nodes"][0]["nodePosition"].update(x=9.0), "START_NODE_OUT_OF_RANGE"),
+        (lambda o: o.pop("nodes"), "VALIDATION_FAILURE"),
+        (lambda o: o.update(version="2.1.0"), "VALIDATION_FAILURE"),
+    ],
+)
+async def test_what_cannot_be_is_refused_in_the_standards_words(yard: Opened, change: Any, error: str) -> None:
+    one = await yard()
+    made = order("bad", [(0, 0), (1, 0)])
+    change(made)
+    one.control.send("order", made)
+    await one.until(lambda: one.control.errors == [error])
+    assert one.control.state["orderId"] == ""
+    one.control.send("order", order("good", [(0, 0)]))
+    await one.until(lambda: one.control.state["orderId"] == "good")
+    assert one.control.errors == []
+
+
+async def test_an_order_that_cannot_go_on_says_so_and_is_kept(yard: Opened) -> None:
+    one = await yard()
+    one.control.send("order", order("one", [(0, 0), (3, 0)]))
+    await one.until(lambda: one.control.state["driving"])
+    one.robot[EmergencyStop].engage()
+    await one.until(lambda: one.control.state["safetyState"]["activeEmergencyStop"] == "MANUAL")
+    await one.until(lambda: not one.control.state["driving"] and bool(one.control.errors))
+    assert one.control.state["nodeStates"]
+    assert one.control.state["errors"][0]["errorLevel"] == "CRITICAL"
+
+
+async def test_another_client_is_seen_and_control_is_respected(yard: Opened) -> None:
+    one = await yard()
+    moved = one.robot[Driving].drive(Twist(0.1, 0, 0), source="somewhere else")
+    await one.until(lambda: one.control.state["operatingMode"] == "MANUAL")
+    moved.cancel()
+    await one.until(lambda: one.control.state["operatingMode"] == "AUTOMATIC")
+    stood = one.robot[Localization].pose
+    await one.robot[Lease].take(PERSON)
+    one.control.send("order", order("one", [(0, 0), (1, 0)]))
+    await one.until(
+        lambda: any(
+            "control is taken" in e["errorDescription"]
+            for e in one.control.state["errors"]
+            if e["errorLevel"] == "CRITICAL"
+        )
+    )
+    await one.clock.advance(3)
+    assert distance(one, stood.x, stood.y) < 0.05
+
+
+async def test_version_2_1_has_its_own_words(yard: Opened) -> None:
+    one = await yard("2.1")
+    one.control.send("instantActions", instant(action("cancelOrder", "c", "NONE"), version="2.1.0"))
+    await one.until(lambda: status(one, "c") == "FAILED")
+    state = one.control.state
+    assert state["errors"][0]["errorType"] == "noOrderToCancel"
+    assert {"agvPosition", "batteryState"} <= state.keys()
+    assert "instantActionStates" not in state
+    assert state["agvPosition"]["positionInitialized"] is True
+    assert one.control.heard["factsheet"][0]["typeSpecification"]["agvClass"] == "CARRIER"
+
+
+async def test_the_broker_says_when_the_robot_is_gone(yard: Opened) -> None:
+    one = await yard()
+    assert one.control.heard["connection"][-1]["connectionState"] == "ONLINE"
+    await one.until(lambda: "visualization" in one.control.heard)
+    assert {"x", "y", "theta", "mapId", "localized"} <= one.control.heard["visualization"][-1][
+        "mobileRobotPosition"
+    ].keys()
+    await one.close()
+    await one.until(lambda: one.control.heard["connection"][-1]["connectionState"] == "OFFLINE", 0)

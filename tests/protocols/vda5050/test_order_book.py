@@ -1,0 +1,161 @@
+"""What the robot takes and what it refuses, by chapter 6.1; and that whatever comes, it stays consistent."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from roboglot.protocols.vda5050.errors import Rejected
+from roboglot.protocols.vda5050.order_book import ActionStatus, OrderBook
+from roboglot.wire.vda5050.orders import Malformed, Order, read
+from roboglot.wire.vda5050.versions import V2, V3, ErrorKind
+from tests.protocols.vda5050.orders import action, encoded, order, valid_orders
+
+
+def parsed(made: dict[str, Any]) -> Order:
+    return read(encoded(made), Order)
+
+
+def take(book: OrderBook, made: dict[str, Any], *, near: bool = True) -> bool:
+    return book.take(parsed(made), lambda _: near)
+
+
+def refusal(book: OrderBook, made: dict[str, Any], *, near: bool = True) -> ErrorKind:
+    before = (book.order_id, book.update_id, list(book.nodes), list(book.edges))
+    with pytest.raises(Rejected) as rejected:
+        take(book, made, near=near)
+    assert before == (book.order_id, book.update_id, book.nodes, book.edges)
+    return rejected.value.kind
+
+
+def finished(book: OrderBook) -> None:
+    for _, node in list(book.base):
+        book.pass_node(node)
+
+
+def test_an_update_extends_the_base_where_it_ends() -> None:
+    book = OrderBook()
+    take(book, order("one", [(0, 0), (1, 0), (2, 0)], released=2))
+    assert [node.released for node in book.nodes] == [True, True, False]
+    take(book, order("one", [(1, 0), (2, 1), (3, 1)], update=1, first=1))
+    assert [node.sequence_id for node in book.nodes] == [0, 2, 4, 6]
+    assert [edge.sequence_id for edge in book.edges] == [1, 3, 5]
+    assert all(node.released for node in book.nodes)
+
+
+def test_refusals_follow_the_standard() -> None:
+    book = OrderBook()
+    assert refusal(book, order("one", [(9, 9)]), near=False) is ErrorKind.START_TOO_FAR
+    take(book, order("one", [(0, 0), (1, 0)], update=3))
+    assert refusal(book, order("two", [(0, 0)])) is ErrorKind.OTHER_ORDER
+    assert refusal(book, order("one", [(0, 0), (1, 0)], update=2)) is ErrorKind.OUTDATED
+    assert refusal(book, order("one", [(5, 0), (1, 0)], update=3)) is ErrorKind.SAME_UPDATE
+    assert take(book, order("one", [(0, 0), (1, 0)], update=3)) is False  # sent again
+    assert refusal(book, order("one", [(0, 0), (4, 0)], update=4)) is ErrorKind.NOT_A_CONTINUATION
+    finished(book)
+    take(book, order("one", [(1, 0), (2, 0)], update=4, first=1))
+    book.drop_rest()
+    assert refusal(book, order("one", [(2, 0), (3, 0)], update=5, first=2)) is ErrorKind.AFTER_CANCEL
+    assert take(book, order("two", [(0, 0)]))
+
+
+def test_an_order_with_a_horizon_is_not_finished() -> None:
+    book = OrderBook()
+    take(book, order("one", [(0, 0), (1, 0)], released=1))
+    finished(book)
+    assert not book.idle
+    assert refusal(book, order("two", [(0, 0)])) is ErrorKind.OTHER_ORDER
+
+
+def test_what_waits_fails_when_the_order_is_cancelled() -> None:
+    book = OrderBook()
+    made = order("one", [(0, 0), (1, 0)])
+    made["nodes"][1]["actions"] = [action("waitForTrigger", "w")]
+    take(book, made)
+    book.drop_rest()
+    assert book.idle
+    assert book.actions["w"].status is ActionStatus.FAILED
+
+
+def test_the_horizon_takes_its_actions_along() -> None:
+    book = OrderBook()
+    made = order("one", [(0, 0), (1, 0)], released=1)
+    made["nodes"][1]["actions"] = [action("waitForTrigger", "w")]
+    take(book, made)
+    take(book, order("one", [(0, 0), (0, 2)], update=1))
+    assert book.actions == {}
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda o: o["edges"].pop(), "need 1 edges"),
+        (lambda o: o["nodes"][0].update(sequenceId=1), "even"),
+        (lambda o: o["nodes"][1].update(sequenceId=6), "sequenceId 6"),
+        (lambda o: o["edges"][0].update(endNodeId="x"), "names node x"),
+        (lambda o: o["nodes"][0].update(released=False), "first"),
+        (lambda o: o["nodes"][0].update(actions=[action("a", "1"), action("b", "1")]), "twice"),
+        (lambda o: o["nodes"][0]["nodePosition"].update(x="far"), "float"),
+        (lambda o: o.pop("orderId"), "orderId"),
+        (lambda o: o["nodes"].clear(), "length"),
+    ],
+)
+def test_malformed_orders_say_where(change: Any, words: str) -> None:
+    made = order("one", [(0, 0), (1, 0)])
+    change(made)
+    with pytest.raises(Malformed, match=words):
+        read(encoded(made), Order)
+
+
+def test_both_versions_have_their_words() -> None:
+    assert V3.error(ErrorKind.NO_ORDER) == "NO_ORDER_TO_CANCEL"
+    assert V2.error(ErrorKind.NO_ORDER) == "noOrderToCancel"
+    assert V2.error(ErrorKind.MALFORMED) == "validationError"
+
+
+@settings(max_examples=50)
+@given(valid_orders())
+def test_any_valid_order_is_read(made: dict[str, Any]) -> None:
+    assert parsed(made).order_id == made["orderId"]
+
+
+@pytest.mark.slow
+@settings(max_examples=10_000)
+@given(valid_orders())
+def test_ten_thousand_valid_orders_are_read(made: dict[str, Any]) -> None:
+    assert len(parsed(made).nodes) == len(made["nodes"])
+
+
+@settings(max_examples=50)
+@given(
+    st.binary(max_size=200)
+    | st.recursive(st.none() | st.integers() | st.text(), st.lists).map(lambda v: json.dumps(v).encode())
+)
+def test_anything_else_is_malformed(data: bytes) -> None:
+    with pytest.raises(Malformed):
+        read(data, Order)
+
+
+@settings(max_examples=50)
+@given(st.lists(valid_orders() | st.just("reach") | st.just("cancel"), max_size=8))
+def test_whatever_comes_the_book_stays_consistent(steps: list[Any]) -> None:
+    book = OrderBook()
+    for step in steps:
+        if step == "reach" and (left := list(book.base)):
+            book.pass_node(left[0][1])
+        elif step == "cancel":
+            book.drop_rest()
+        elif isinstance(step, dict):
+            try:
+                take(book, step)
+            except Rejected:
+                continue
+        numbers = [node.sequence_id for node in book.nodes]
+        assert numbers == sorted(set(numbers))
+        assert all(edge.sequence_id > numbers[0] - 2 for edge in book.edges) if numbers else not book.edges
+        released = [node.released for node in book.nodes]
+        assert released == sorted(released, reverse=True)
