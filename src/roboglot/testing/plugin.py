@@ -1,13 +1,15 @@
-"""pytest fixtures: ``clock``, ``forward``, ``fleet``, ``world``, ``robot``. Loaded by pytest itself (entry point).
+"""pytest fixtures, loaded by pytest itself (entry point); docs/testing.md.
 
-``@pytest.mark.world(name_or_path, robots=("a", "b"), body="universal", seed=3)`` chooses another world, more robots,
-another body, another seed. Needs pytest-asyncio (``pip install 'roboglot[testing]'``).
+Real ports: ``robot_server``, and its clients ``rest``, ``robomaster``, ``cyberdog``, ``program``. In-process and in
+lockstep, for asyncio tests: ``clock``, ``forward``, ``fleet``, ``world``, ``robot``. Markers: ``world``, ``body``,
+``seed``, ``fault``, ``recording``. Of a test that fails, recording, map picture and exchanges are kept.
 """
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable, Generator, Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -23,12 +25,32 @@ if TYPE_CHECKING:
     from roboglot.model.robot import Robot
     from roboglot.simulation.world.world import World
     from roboglot.testing import Forward
+    from roboglot.testing.server import RobotServer
+    from roboglot.testing.wanted import Wanted
+
+MARKERS = (
+    "world(name, robots=('a',), body='universal', seed=1, speed=4.0, lockstep=False, shared=False, doors={}):"
+    " the world of the roboglot fixtures; those after seed are robot_server's",
+    "body(name): the robots' body",
+    "seed(number): of everything that chance decides",
+    "fault(kind, robot=None, **options): a fault that acts from the start of the test; any number of them",
+    "recording(file): the robots of robot_server answer as in that recording",
+)
+OPTION = "--roboglot-failures"
+_SERVER = pytest.StashKey[Any]()
+_SHARED = pytest.StashKey[dict[Any, Any]]()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    from roboglot.testing.artifacts import FOLDER
+
+    group = parser.getgroup("roboglot")
+    group.addoption(OPTION, default=FOLDER, metavar="DIR", help="where failed tests leave recordings, maps, exchanges")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    config.addinivalue_line(
-        "markers", "world(name, robots=('a',), body='universal', seed=1): the world of the roboglot fixtures"
-    )
+    for line in MARKERS:
+        config.addinivalue_line("markers", line)
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -86,15 +108,14 @@ async def fleet(request: pytest.FixtureRequest, clock: LockstepClock) -> AsyncIt
     from roboglot.fleet import build_fleet
     from roboglot.storage.database import Database
 
-    marker = request.node.get_closest_marker("world")
-    name = marker.args[0] if marker and marker.args else "office"
-    options = marker.kwargs if marker else {}
-    body = options.get("body", "universal")
-    robots = [RobotConfig(name=robot, body=body) for robot in options.get("robots", ("a",))]
+    wanted = _wanted(request)
+    robots = [RobotConfig(name=robot, body=wanted.body) for robot in wanted.robots]
     _compile_kernels(request.config)
     database = Database(":memory:")
-    built = build_fleet(name, robots, clock=clock, seed=options.get("seed", 1), database=database)
+    built = build_fleet(wanted.world, robots, clock=clock, seed=wanted.seed, database=database)
     await built.start(wait=True)
+    for fault in wanted.faults:
+        built.world.hands.inject_fault(fault.kind, fault.robot, **dict(fault.options))
     yield built
     await built.close()
     database.close()
@@ -110,3 +131,99 @@ def world(fleet: Fleet) -> World:
 def robot(fleet: Fleet) -> Robot:
     """The first robot."""
     return next(iter(fleet.robots.values()))
+
+
+def _wanted(request: pytest.FixtureRequest) -> Wanted:
+    from roboglot.testing.wanted import wanted_by
+
+    try:
+        return wanted_by(request.node.iter_markers())
+    except (ValueError, IndexError) as error:
+        raise pytest.UsageError(f"{request.node.nodeid}: a marker of roboglot: {error}") from None
+
+
+# -- on real ports -----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def robot_server(request: pytest.FixtureRequest) -> Iterator[RobotServer]:
+    """Robots with all their doors on real ports, at loopback addresses of their own; new for each test.
+
+    With ``@pytest.mark.world(shared=True)`` the tests of a session that want the same share one; it is reset between.
+    """
+    from roboglot.testing.server import RobotServer
+
+    wanted = _wanted(request)
+    _compile_kernels(request.config)
+    if not wanted.shared:
+        with RobotServer(wanted) as server:
+            request.node.stash[_SERVER] = server
+            yield server
+        return
+    servers = request.session.stash.setdefault(_SHARED, {})
+    kept: RobotServer | None = servers.get(wanted.place)
+    if kept is None:
+        kept = servers[wanted.place] = RobotServer(wanted).start()
+    else:
+        kept.prepare(wanted)
+    request.node.stash[_SERVER] = kept
+    yield kept
+
+
+@pytest.fixture
+def reset(robot_server: RobotServer) -> Callable[[], None]:
+    """``reset()`` puts robots and world back as at the start of the test, faults of its markers left out."""
+    return robot_server.reset
+
+
+@pytest.fixture
+def rest(robot_server: RobotServer) -> Any:
+    """A client of the first robot's REST API (``SlamwareClient``) whose methods block."""
+    return robot_server.open(robot_server.new_rest())
+
+
+@pytest.fixture
+def robomaster(robot_server: RobotServer) -> Any:
+    """A client of its text protocol (``RoboMasterClient``), in SDK mode, whose methods block."""
+    return robot_server.open(robot_server.new_robomaster())
+
+
+@pytest.fixture
+def cyberdog(robot_server: RobotServer) -> Any:
+    """A client of its app protocol (``CyberDogClient``), by TLS, whose methods block."""
+    return robot_server.open(robot_server.new_cyberdog())
+
+
+@pytest.fixture
+def program(robot_server: RobotServer) -> Any:
+    """A client of its block programs (``ProgramClient``) whose methods block."""
+    return robot_server.open(robot_server.new_program())
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    for server in session.stash.get(_SHARED, {}).values():
+        server.close()
+
+
+# -- what failed tests leave -------------------------------------------------------------------------------------------
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    report = yield
+    server = item.stash.get(_SERVER, None)
+    if server is not None and report.failed and report.when != "teardown":
+        _attach(item, report, server)
+    return report
+
+
+def _attach(item: pytest.Item, report: pytest.TestReport, server: RobotServer) -> None:
+    """Keep what there is while the robot still stands there; JUnit's readers find it by the properties."""
+    from roboglot.testing.artifacts import folder_of, save
+
+    root = Path(item.config.getoption(OPTION))
+    folder = folder_of(root if root.is_absolute() else item.config.rootpath / root, item.nodeid)
+    saved = save(server, folder, item.nodeid, report.longreprtext)
+    lines = [f"[[ATTACHMENT|{path}]]" for path in saved]
+    report.sections.append(("roboglot", "\n".join(lines)))
+    item.user_properties += [(f"roboglot.{path.stem}", str(path)) for path in saved]

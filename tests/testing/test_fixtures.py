@@ -13,7 +13,7 @@ import roboglot.fleet
 from roboglot.model.geometry import Pose
 from roboglot.testing import assert_pose
 
-README = Path(__file__).parents[1] / "README.md"
+README = Path(__file__).parents[2] / "README.md"
 
 
 def test_readmes_example_passes_in_an_empty_folder(tmp_path: Path) -> None:

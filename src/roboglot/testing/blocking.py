@@ -1,0 +1,116 @@
+"""Objects of another thread's event loop for tests that have none: each call waits for its result."""
+
+from __future__ import annotations
+
+import asyncio
+import inspect
+from collections.abc import Callable, Iterator
+from concurrent.futures import TimeoutError as Late
+from typing import Any
+
+PATIENCE = 60.0  # real s until a call of a test fails
+
+
+class Loop:
+    """A loop that runs in another thread."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        self.loop = loop
+
+    def run(self, function: Callable[..., Any], *arguments: Any, within: float = PATIENCE, **named: Any) -> Any:
+        """Call it there, wait for what it awaits, and return its result. Raises what it raises, and TimeoutError."""
+
+        async def call() -> Any:
+            result = function(*arguments, **named)
+            return await result if inspect.isawaitable(result) and not _is_kept(result) else result
+
+        future = asyncio.run_coroutine_threadsafe(call(), self.loop)
+        try:
+            return future.result(within)
+        except Late:
+            if future.done():  # the call's own
+                raise
+            future.cancel()
+            raise TimeoutError(
+                f"{getattr(function, '__name__', 'the call')} has not ended after {within:g} s"
+            ) from None
+
+
+class Blocking:
+    """An asyncio object whose methods block. What they return can be waited for (``wait``) and iterated over, too."""
+
+    def __init__(self, target: Any, loop: Loop) -> None:
+        self._target, self._loop = target, loop
+
+    def __getattr__(self, name: str) -> Any:
+        value = getattr(self._target, name)
+        if not callable(value) or isinstance(value, type):
+            return self._wrapped(value)
+
+        def call(*arguments: Any, **named: Any) -> Any:
+            return self._wrapped(self._loop.run(value, *arguments, **named))
+
+        return call
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if name in ("_target", "_loop"):
+            object.__setattr__(self, name, value)
+        else:
+            setattr(self._target, name, value)
+
+    def __repr__(self) -> str:
+        return f"Blocking({self._target!r})"
+
+    def __enter__(self) -> Blocking:
+        self._loop.run(_enter, self._target)
+        return self
+
+    def __exit__(self, *failure: object) -> None:
+        self._loop.run(_exit, self._target, *failure)
+
+    def __iter__(self) -> Iterator[Any]:
+        while True:
+            try:
+                yield self.next()
+            except StopAsyncIteration:
+                return
+
+    def next(self, within: float = PATIENCE) -> Any:
+        """Return the next of what it yields. Raises TimeoutError, StopAsyncIteration."""
+        return self._loop.run(self._target.__anext__, within=within)
+
+    def wait(self, within: float = PATIENCE) -> Any:
+        """Wait for the end of an action or task; raises as ``await`` would, and TimeoutError."""
+
+        async def end() -> Any:
+            return await self._target
+
+        return self._loop.run(end, within=within)
+
+    def _wrapped(self, value: Any) -> Any:
+        return Blocking(value, self._loop) if _is_kept(value) else value
+
+
+def _is_kept(value: object) -> bool:
+    """Whether it is an object with methods to await, not a value."""
+    kind = type(value)
+    if not kind.__module__.startswith(("roboglot.clients", "roboglot.model.feed", "roboglot.testing")):
+        return False
+    names = {name for one in kind.__mro__ for name in vars(one)}
+    return not names.isdisjoint(("__await__", "__anext__")) or any(
+        inspect.iscoroutinefunction(getattr(kind, name, None)) for name in names
+    )
+
+
+async def _enter(target: Any) -> None:
+    if hasattr(target, "__aenter__"):
+        await target.__aenter__()
+    else:
+        target.__enter__()
+
+
+async def _exit(target: Any, *failure: object) -> None:
+    if hasattr(target, "__aexit__"):
+        await target.__aexit__(*failure)
+    else:
+        target.__exit__(*failure)

@@ -1,0 +1,76 @@
+"""unittest: a robot for each test of a class, with clients that block; no event loop, no pytest."""
+
+from __future__ import annotations
+
+import os
+import unittest
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar
+
+from roboglot.testing.artifacts import FOLDER, folder_of, save
+from roboglot.testing.server import RobotServer
+from roboglot.testing.wanted import Wanted, WantedFault, wanted_of
+
+
+class RobotTestCase(unittest.TestCase):
+    """``class TestPatrol(RobotTestCase): world = "empty"``; then ``self.server``, ``self.rest``, ``self.robomaster``…
+
+    ``world``, ``robots``, ``body``, ``seed``, ``speed``, ``lockstep``, ``recording``, ``doors`` are as in the pytest
+    marker; ``faults`` are names of faults, or pairs of name and options. What a failed test leaves is in
+    ``roboglot-failures``, or in the folder that ROBOGLOT_FAILURES names.
+    """
+
+    world: ClassVar[str] = "office"
+    robots: ClassVar[tuple[str, ...]] = ("a",)
+    body: ClassVar[str] = "universal"
+    seed: ClassVar[int] = 1
+    speed: ClassVar[float] = Wanted().speed
+    lockstep: ClassVar[bool] = False
+    recording: ClassVar[str] = ""
+    faults: ClassVar[tuple[str | tuple[str, Mapping[str, Any]], ...]] = ()
+    doors: ClassVar[Mapping[str, Any]] = {}
+    server: RobotServer
+
+    def run(self, result: unittest.TestResult | None = None) -> unittest.TestResult | None:
+        """Start the robot, run the test, keep what it leaves if it fails."""
+        names = ("world", "robots", "body", "seed", "speed", "lockstep", "recording", "doors")
+        faults = tuple(
+            WantedFault(fault) if isinstance(fault, str) else WantedFault(fault[0], None, tuple(fault[1].items()))
+            for fault in self.faults
+        )
+        with RobotServer(wanted_of({name: getattr(self, name) for name in names}, faults)) as self.server:
+            return super().run(result)
+
+    def doCleanups(self) -> None:  # noqa: N802 - unittest's name
+        """Clean up; unittest still knows here whether the test failed."""
+        super().doCleanups()
+        if not getattr(getattr(self, "_outcome", None), "success", True):
+            folder = folder_of(Path(os.environ.get("ROBOGLOT_FAILURES", FOLDER)), self.id())
+            save(self.server, folder, self.id(), "failed: see the test's own output")
+
+    @property
+    def rest(self) -> Any:
+        """A connected client of the REST API."""
+        return self._client("rest")
+
+    @property
+    def robomaster(self) -> Any:
+        """A connected client of the text protocol, in SDK mode."""
+        return self._client("robomaster")
+
+    @property
+    def cyberdog(self) -> Any:
+        """A connected client of the dog's app protocol."""
+        return self._client("cyberdog")
+
+    @property
+    def program(self) -> Any:
+        """A connected client of block programs."""
+        return self._client("program")
+
+    def _client(self, name: str) -> Any:
+        found = self.__dict__.get(f"_{name}")
+        if found is None:
+            found = self.__dict__[f"_{name}"] = self.server.open(getattr(self.server, f"new_{name}")())
+        return found

@@ -1,0 +1,413 @@
+"""A robot with all its doors on real ports, in a thread of the test's own process: any client may drive it."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import dataclasses
+import gc
+import os
+import shutil
+import socket
+import tempfile
+import threading
+from collections import deque
+from collections.abc import Callable, Coroutine, Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from roboglot.model.clock import LockstepClock
+from roboglot.testing.blocking import PATIENCE, Blocking, Loop
+from roboglot.testing.wanted import Wanted
+
+if TYPE_CHECKING:
+    from roboglot.clients.cyberdog import Certificates, CyberDogClient
+    from roboglot.clients.robomaster.client import RoboMasterClient
+    from roboglot.clients.slamware import SlamwareClient
+    from roboglot.model.geometry import Pose
+    from roboglot.model.robot import Robot
+    from roboglot.model.tap import Exchange
+    from roboglot.runtime import Runtime
+    from roboglot.testing.programs import ProgramClient
+
+T = TypeVar("T")
+KEPT_EXCHANGES = 2000
+LOOK_AGAIN = 0.05  # s of robot time between two looks at a condition
+START_SECONDS_MAX = 240.0  # kernels may have to be compiled
+FREE_TRIES = 100
+PROBED = (1448, 40923, 50052, 50053)
+_given: set[str] = set()
+
+
+class NotInTime(AssertionError):
+    """What the test waited for has not come true."""
+
+
+class RobotServer:
+    """A world and its robots, each at an address of its own, with every vendor's ports.
+
+    ``address`` is the first robot's. Its methods may be called from any thread but its own; they block.
+    """
+
+    def __init__(self, wanted: Wanted | None = None, *, data: Path | None = None) -> None:
+        self.wanted = wanted or Wanted()
+        self._given_data = data
+        self.data = data or Path(tempfile.mkdtemp(prefix="roboglot-test-"))
+        self.addresses: dict[str, str] = {}
+        self.app_port = 0
+        self.exchanges: deque[Exchange] = deque(maxlen=KEPT_EXCHANGES)
+        self.tracks: dict[str, list[tuple[float, float]]] = {}
+        self._runtime: Runtime | None = None
+        self._loop: Loop | None = None
+        self._thread: threading.Thread | None = None
+        self._origins: dict[str, Pose] = {}  # where each really stood at first
+        self._starts: dict[str, Pose] = {}  # and where it believed to stand
+        self._tracking: asyncio.Task[None] | None = None
+        self._clients = contextlib.ExitStack()
+
+    # -- life ----------------------------------------------------------------------------------------------------------
+
+    def __enter__(self) -> RobotServer:
+        return self.start()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def start(self) -> RobotServer:
+        """Start it; returns when every door answers and the robots know where they are. Raises as ``up`` does."""
+        configs = self.wanted.configs(free_addresses(len(self.wanted.robots)))
+        self.addresses = {robot.name: robot.address for robot in configs}
+        self.app_port = _free_port()
+        loop = _new_loop(lockstep=self.wanted.lockstep)
+        self._loop = Loop(loop)
+        self._thread = threading.Thread(target=_serve, args=(loop,), name="roboglot", daemon=True)
+        self._thread.start()
+        try:
+            self._loop.run(self._start, configs, within=START_SECONDS_MAX)
+        except BaseException:
+            self.close()
+            raise
+        return self
+
+    def close(self) -> None:
+        """Close its clients, stop it, and throw its data away."""
+        self._clients.close()
+        if self._loop is None or self._thread is None:
+            return
+        try:
+            if self._runtime is not None:
+                self._loop.run(self._runtime.close)
+        finally:
+            self._loop.loop.call_soon_threadsafe(self._loop.loop.stop)
+            self._thread.join()
+            self._loop = self._thread = self._runtime = None
+            for address in self.addresses.values():
+                _given.discard(address)
+            gc.unfreeze()  # what the runtime froze is garbage now
+            if self._given_data is None:
+                shutil.rmtree(self.data, ignore_errors=True)
+
+    async def _start(self, configs: tuple[Any, ...]) -> None:
+        from roboglot.config import ConsoleConfig, RecordConfig, config_of
+        from roboglot.protocols import sections
+        from roboglot.runtime import Runtime
+
+        wanted = self.wanted
+        doors = {"cyberdog": {"app": f"127.0.0.1:{self.app_port}"}} | dict(wanted.doors)
+        values = {"data": str(self.data), "world": wanted.world, "seed": wanted.seed, **doors}
+        values |= {"lockstep": True} if wanted.lockstep else {"speed": wanted.speed}
+        config = dataclasses.replace(
+            config_of(values, doors=sections()),
+            robots=configs,
+            console=ConsoleConfig(enabled=False),
+            record=RecordConfig(ring=_can_record()),
+        )
+        self._runtime = Runtime(config)
+        for name, robot in self._runtime.fleet.robots.items():
+            robot.tap.listen(self.exchanges.append)
+            self.tracks[name] = []
+        self._origins = {placed.name: placed.pose for placed in self._runtime.fleet.world.hands.robots}
+        await self._runtime.start()
+        self._tracking = asyncio.ensure_future(self._track())
+        if not wanted.recording:
+            await self._wait_for_places()
+        self._break_things()
+
+    async def _wait_for_places(self) -> None:
+        from roboglot.model.components.mapping.localization import Localization
+        from roboglot.model.components.mapping.mapping import Mapping
+
+        for name, robot in self.runtime.fleet.robots.items():
+            if Localization in robot and Mapping in robot:
+                while not robot[Mapping].grid.width:
+                    await self._pass(LOOK_AGAIN)
+                self._starts[name] = robot[Localization].pose
+
+    async def _track(self) -> None:
+        """Remember where the robots really were, for the picture."""
+        while True:
+            self._note_places()
+            await self.runtime.clock.sleep(0.2)
+
+    def _note_places(self) -> None:
+        for placed in self.runtime.fleet.world.hands.robots:
+            track = self.tracks.setdefault(placed.name, [])
+            here = (round(placed.pose.x, 3), round(placed.pose.y, 3))
+            if not track or track[-1] != here:
+                track.append(here)
+
+    # -- what is there -------------------------------------------------------------------------------------------------
+
+    @property
+    def runtime(self) -> Runtime:
+        """The program itself; touch it in its own thread only (``call``)."""
+        if self._runtime is None:
+            raise RuntimeError("the robot is not up")
+        return self._runtime
+
+    @property
+    def loop(self) -> Loop:
+        """Where it runs."""
+        if self._loop is None:
+            raise RuntimeError("the robot is not up")
+        return self._loop
+
+    def call(self, function: Callable[..., T | Coroutine[Any, Any, T]], *arguments: Any, **named: Any) -> T:
+        """Call a function, or run a coroutine function, where the robots run; returns its result."""
+        result: T = self.loop.run(function, *arguments, **named)
+        return result
+
+    @property
+    def address(self) -> str:
+        """The first robot's."""
+        return next(iter(self.addresses.values()))
+
+    @property
+    def url(self) -> str:
+        """The first robot's REST API."""
+        return f"http://{self.address}:1448"
+
+    @property
+    def programs_url(self) -> str:
+        """The first robot's WebSocket of block programs."""
+        return f"ws://{self.address}:50053/programs"
+
+    @property
+    def robot(self) -> Robot:
+        """The first robot, as programs see it."""
+        return next(iter(self.runtime.fleet.robots.values()))
+
+    @property
+    def truth(self) -> Any:
+        """What really is the case (``roboglot.simulation.world.truth``)."""
+        return _There(self.runtime.fleet.world.truth, self.loop)
+
+    @property
+    def stage(self) -> Any:
+        """Hands in the world: place, push, add_obstacle, inject_fault, person (``roboglot.model.stage``)."""
+        return _There(self.runtime.fleet.world.hands, self.loop)
+
+    def pose(self, robot: str = "") -> Pose:
+        """Return where a robot (the first) really is, in the world's frame."""
+        found: Pose = self.truth.pose_of(robot or next(iter(self.addresses)))
+        return found
+
+    def moved(self, robot: str = "") -> Pose:
+        """Return where it really is as seen from where it started: x ahead, y to the left."""
+        name = robot or next(iter(self.addresses))
+        return self.pose(name).relative_to(self._origins[name])
+
+    @property
+    def time(self) -> float:
+        """Robot time, s since the start."""
+        return self.runtime.clock.time()
+
+    # -- time ----------------------------------------------------------------------------------------------------------
+
+    def forward(self, seconds: float) -> None:
+        """Let so much robot time pass: as fast as it can in lockstep, else at the clock's speed."""
+        self.loop.run(self._pass, seconds, within=PATIENCE + seconds / self.wanted.speed)
+
+    def wait_until(self, condition: Callable[[], object], *, within: float, what: str = "") -> None:
+        """Wait until ``condition()`` holds, looked at where the robots run. Raises NotInTime after robot seconds."""
+        end = self.time + within
+        while not self.loop.run(condition):
+            if self.time >= end:
+                raise NotInTime(f"{what or 'the condition'} does not hold after {within:g} s")
+            self.forward(LOOK_AGAIN)
+
+    async def _pass(self, seconds: float) -> None:
+        clock = self.runtime.clock
+        await (clock.advance(seconds) if isinstance(clock, LockstepClock) else clock.sleep(seconds))
+
+    # -- between tests -------------------------------------------------------------------------------------------------
+
+    def reset(self) -> None:
+        """Put all back: actions end, robots stand charged where they started and know it; no faults, no boxes."""
+        self._clients.close()
+        self.loop.run(self._reset)
+        self.exchanges.clear()
+        for track in self.tracks.values():
+            track.clear()
+
+    async def _reset(self) -> None:
+        from roboglot.model.components.mapping.localization import Localization
+
+        fleet = self.runtime.fleet
+        stage = fleet.world.hands
+        for robot in fleet.robots.values():
+            await robot.actions.cancel(reason="the test has ended")
+        stage.clear_fault()
+        for box in stage.obstacles:
+            stage.remove_obstacle(box.number)
+        for person in stage.people:
+            stage.person(person.name).resume()
+        for name, robot in fleet.robots.items():
+            if name in self._origins:
+                stage.reset(name)
+            if name in self._starts:
+                robot[Localization].set_pose(self._starts[name])
+
+    def prepare(self, wanted: Wanted) -> None:
+        """Begin another test on this server: reset it, then break what that test wants broken."""
+        self.reset()
+        self.wanted = wanted
+        self.loop.run(self._break_things)
+
+    def _break_things(self) -> None:
+        stage = self.runtime.fleet.world.hands
+        for fault in self.wanted.faults:
+            stage.inject_fault(fault.kind, fault.robot, **dict(fault.options))
+
+    # -- clients -------------------------------------------------------------------------------------------------------
+
+    def new_rest(self, robot: str = "") -> SlamwareClient:
+        """Return an asyncio client of the REST API, not connected."""
+        from roboglot.clients.slamware import SlamwareClient
+
+        return SlamwareClient(self._address_of(robot))
+
+    def new_robomaster(self, robot: str = "") -> RoboMasterClient:
+        """Return an asyncio client of the text protocol; it connects from the robot's own address."""
+        from roboglot.clients.robomaster.client import RoboMasterClient
+
+        address = self._address_of(robot)
+        return RoboMasterClient(address, local=address)
+
+    def new_cyberdog(self, robot: str = "") -> CyberDogClient:
+        """Return an asyncio client of the dog's app protocol, with certificates."""
+        from roboglot.clients.cyberdog import CyberDogClient
+
+        return CyberDogClient(self._address_of(robot), self.certificates(), app_port=self.app_port)
+
+    def new_program(self, robot: str = "") -> ProgramClient:
+        """Return an asyncio client that runs block programs."""
+        from roboglot.testing.programs import ProgramClient
+
+        return ProgramClient(self._address_of(robot))
+
+    def certificates(self) -> Certificates:
+        """Return what an app of the dog needs to connect; the files are in ``data/app``."""
+        from roboglot.clients.cyberdog import Certificates
+        from roboglot.protocols.cyberdog.certificates import export_client
+        from roboglot.protocols.cyberdog.server import FOLDER
+
+        folder = self.data / "app"
+        if not folder.exists():
+            export_client(self.data / FOLDER, folder)
+        return Certificates.load(folder)
+
+    def open(self, client: Any) -> Any:
+        """Connect an asyncio client where the robots run; its methods block. It is closed with the server."""
+        return self._clients.enter_context(Blocking(client, self.loop))
+
+    def _address_of(self, robot: str) -> str:
+        return self.addresses[robot] if robot else self.address
+
+
+class _There:
+    """An object whose methods are called where the robots run, and so are those of what they return."""
+
+    def __init__(self, target: Any, loop: Loop) -> None:
+        self._target, self._loop = target, loop
+
+    def __getattr__(self, name: str) -> Any:
+        value = self._loop.run(lambda: getattr(self._target, name))
+        if not callable(value):
+            return value
+
+        def call(*arguments: Any, **named: Any) -> Any:
+            result = self._loop.run(value, *arguments, **named)
+            return _There(result, self._loop) if hasattr(result, "walk_to") else result
+
+        return call
+
+
+def _new_loop(*, lockstep: bool) -> asyncio.AbstractEventLoop:
+    if not lockstep:
+        with contextlib.suppress(ImportError):
+            import uvloop
+
+            return uvloop.new_event_loop()
+    return asyncio.SelectorEventLoop()
+
+
+def _serve(loop: asyncio.AbstractEventLoop) -> None:
+    asyncio.set_event_loop(loop)
+    try:
+        loop.run_forever()
+    finally:
+        for task in asyncio.all_tasks(loop):
+            task.cancel()
+        loop.run_until_complete(loop.shutdown_asyncgens())
+        loop.run_until_complete(loop.shutdown_default_executor())
+        loop.close()
+
+
+def _can_record() -> bool:
+    from importlib.util import find_spec
+
+    return all(find_spec(name) for name in ("mcap", "zstandard", "foxglove_schemas_protobuf"))
+
+
+def free_addresses(count: int) -> str:
+    """Return the first of so many loopback addresses in a row that nobody on this machine uses for robots."""
+    worker = int("".join(filter(str.isdigit, os.environ.get("PYTEST_XDIST_WORKER", ""))) or 0) % 250
+    for attempt in range(FREE_TRIES):
+        block = (os.getpid() + 7 * attempt) % 120
+        first = 1 + (attempt * 16) % 128
+        row = [f"127.{100 + block}.{1 + worker}.{first + number}" for number in range(count)]
+        if not _given.intersection(row) and all(map(_is_free, row)):
+            _given.update(row)
+            return row[0]
+    raise OSError("no loopback address is free for robots")
+
+
+def _is_free(address: str) -> bool:
+    for port in PROBED:
+        with socket.socket() as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind((address, port))
+            except OSError:
+                return False
+    return True
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+@contextlib.contextmanager
+def serving(**values: Any) -> Iterator[RobotServer]:
+    """Start a robot for a ``with``: ``with serving(world="empty", speed=8) as server``."""
+    from roboglot.testing.wanted import wanted_of
+
+    with RobotServer(wanted_of(values)) as server:
+        yield server

@@ -1,0 +1,129 @@
+"""Real ports for users' tests: each protocol's ready-made client, markers, reset, lockstep, and what failures leave."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, ClassVar
+
+import pytest
+
+from roboglot.recording.reader import read_recording
+from roboglot.testing.server import RobotServer
+from roboglot.wire.slamware.geometry import Location
+from roboglot.wire.slamware.motion import MoveOptions, MoveToOptions
+
+PROGRAM = "cyberdog.task.block('one');\nprint('hello')\ncyberdog.task.block('two');\n"
+
+
+@pytest.mark.world("empty")
+def test_a_robot_is_driven_by_rest(robot_server: RobotServer, rest: Any) -> None:
+    rest.begin("MoveToAction", MoveToOptions(Location(0.5, 0.0), MoveOptions())).wait()
+    assert robot_server.moved().x == pytest.approx(0.5, abs=0.15)
+    assert "slamware" in {exchange.door for exchange in robot_server.exchanges}
+
+
+@pytest.mark.world("empty")
+def test_a_robot_is_driven_by_text(robot_server: RobotServer, robomaster: Any) -> None:
+    robomaster.chassis.move(x=0.4, wait=True)
+    assert robot_server.moved().x == pytest.approx(0.4, abs=0.1)
+    assert robomaster.chassis.get_position().x == pytest.approx(0.4, abs=0.1)
+
+
+@pytest.mark.world("empty")
+def test_a_dog_calls_its_app_back(cyberdog: Any) -> None:
+    assert cyberdog.found() is not None
+    assert cyberdog.connected
+
+
+@pytest.mark.world("empty")
+def test_a_program_tells_its_blocks_and_what_it_prints(program: Any) -> None:
+    run = program.run(PROGRAM)
+    assert run.blocks == ["one", "two"]
+    assert run.printed == ["hello"]
+
+
+@pytest.mark.world("empty", robots=("a", "b"), body="hermes", lockstep=True)
+@pytest.mark.seed(5)
+def test_in_lockstep_time_stands_still_until_the_test_lets_it_pass(robot_server: RobotServer, rest: Any) -> None:
+    assert robot_server.runtime.config.seed == 5
+    before = robot_server.time
+    rest.begin("MoveToAction", MoveToOptions(Location(0.6, 0.0), MoveOptions()))
+    assert robot_server.time == before
+    robot_server.forward(15.0)
+    assert robot_server.time == pytest.approx(before + 15.0)
+    assert robot_server.moved("a").x == pytest.approx(0.6, abs=0.15)
+    assert robot_server.moved("b").x == 0.0
+
+
+@pytest.mark.world("empty")
+@pytest.mark.fault("lidar_gone")
+def test_a_fault_acts_from_the_start_until_reset(robot_server: RobotServer, reset: Callable[[], None]) -> None:
+    assert [fault.kind for fault in robot_server.stage.faults] == ["lidar_gone"]
+    reset()
+    assert not robot_server.stage.faults
+
+
+class TestShared:
+    """One server for both; what the first one does is gone for the second."""
+
+    servers: ClassVar[set[int]] = set()
+
+    @pytest.mark.world("empty", shared=True)
+    @pytest.mark.parametrize("_run", range(2))
+    def test_it_starts_where_it_started(self, robot_server: RobotServer, rest: Any, _run: int) -> None:
+        self.servers.add(id(robot_server))
+        assert len(self.servers) == 1
+        assert robot_server.moved().x == pytest.approx(0.0, abs=0.02)
+        assert rest.get_pose().x == pytest.approx(0.0, abs=0.05)
+        assert not robot_server.stage.obstacles
+        rest.begin("MoveToAction", MoveToOptions(Location(0.5, 0.0), MoveOptions())).wait()
+        robot_server.stage.add_obstacle(robot_server.pose().compose(robot_server.pose()))
+
+
+def run_pytest(folder: Path, source: str, *options: str) -> subprocess.CompletedProcess[str]:
+    (folder / "test_it.py").write_text(source)
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *options, str(folder)]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120, check=False)
+
+
+FAILING = """
+import unittest, pytest
+from roboglot.testing.case import RobotTestCase
+
+@pytest.mark.world("empty")
+def test_fails(robot_server, rest):
+    rest.get_power_status()
+    assert False, "<b>on purpose</b>"
+
+class TestCase(RobotTestCase):
+    world = "empty"
+    def test_passes(self):
+        self.assertGreater(self.robomaster.robot.get_battery(), 50)
+    def test_fails(self):
+        self.rest.get_power_status()
+        self.fail("on purpose")
+"""
+
+
+def test_failed_tests_leave_recording_map_and_exchanges(tmp_path: Path) -> None:
+    done = run_pytest(tmp_path, FAILING, "--junitxml", "junit.xml")
+    assert "2 failed, 1 passed" in done.stdout, done.stdout + done.stderr
+    left = sorted((tmp_path / "roboglot-failures").iterdir())
+    assert len(left) == 2
+    for folder in left:
+        assert (folder / "map.png").read_bytes().startswith(b"\x89PNG")
+        assert "power/status" in (folder / "exchanges.html").read_text()
+        recorded = read_recording(folder / "recording.mcap")
+        assert any("power/status" in exchange.operation for exchange in recorded.exchanges)
+    [page] = [text for folder in left if "on purpose&lt;/b" in (text := (folder / "exchanges.html").read_text())]
+    assert "<b>" not in page
+    assert "[[ATTACHMENT|" in done.stdout
+    assert 'name="roboglot.recording"' in (tmp_path / "junit.xml").read_text()
+
+
+def test_a_marker_with_a_word_that_it_does_not_know_is_an_error(tmp_path: Path) -> None:
+    done = run_pytest(tmp_path, "import pytest\n@pytest.mark.world(sede=1)\ndef test_it(robot_server): pass\n")
+    assert "world has no sede" in done.stdout + done.stderr
