@@ -19,6 +19,8 @@ from roboglot.hosting.logs import NamesRobot
 from roboglot.hosting.open_files import OpenFiles, ran_out
 from roboglot.model.client_context import concerned, concerning
 from roboglot.model.clock import LockstepClock
+from roboglot.simulation.bodies.schedule import Job, Schedule
+from roboglot.simulation.world.world import TICK
 from roboglot.storage.database import Database
 
 LIMITED = """
@@ -104,8 +106,9 @@ async def test_what_happens_in_the_world_belongs_to_a_robot() -> None:
             clock.call_later(0.1, partial(hear, place=f"timer of {place}"))
 
     for name, simulated in fleet.world._population.simulated.items():
-        simulated._controls.append(partial(hear, place=f"control of {name}"))
-        simulated._senses.append(partial(hear, place=f"senses of {name}"))
+        control, sense = (Job(partial(hear, place=f"{part} of {name}")) for part in ("control", "senses"))
+        simulated._controls = Schedule([*simulated._controls._jobs, control], TICK)
+        simulated._senses = Schedule([*simulated._senses._jobs, sense], TICK)
     await fleet.start(wait=True)
     await clock.advance(0.3)
     await fleet.close()
