@@ -78,8 +78,7 @@ class Hull:
         own = model.body_rootid[model.geom_bodyid] == model.body(name).id
         self.shape: list[int] = np.flatnonzero(own).tolist()  # all geoms, also those that bump into nothing
         self._forces = model.actuator_forcerange[self._drive].copy()
-        self._share = 1.0
-        self._free = False
+        self._share, self._free = 1.0, False
         self.leash: tuple[float, float] | None = None  # N in the world, the pull of a hand
         self.hand: float | None = None  # height in the world at which a hand holds the base_link, m
         self.standing = 1.0  # share of the wheels that touch the ground
