@@ -13,20 +13,25 @@ import logging
 import math
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 from roboglot.config import RobotConfig
 from roboglot.fleet import Fleet, build_fleet
+from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.interaction.light import Light
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.motion.legs import Legs
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
 from roboglot.model.components.sensing.touch import TouchKind
 from roboglot.model.errors import RobotError
-from roboglot.model.events import Event, SoundPlayed, Spoke
-from roboglot.model.geometry import Pose
+from roboglot.model.events import BumperPressed, Event, SoundPlayed, Spoke
+from roboglot.model.geometry import Pose, Twist
 from roboglot.model.perception import Gesture
+from roboglot.model.robot import Robot
 from roboglot.model.stage import Stage
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.engine.events import Call, Failed, Finished, Limits, Output
@@ -34,7 +39,7 @@ from roboglot.programs.engine.run import Run
 from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.functions.session import Session, TaskEnded
 from roboglot.programs.functions.table import call as call_function
-from roboglot.programs.rehearsing import Act, Played, Scene, Spot
+from roboglot.programs.rehearsing import Act, Hit, Played, Scene, Spot, Step, Tried
 from roboglot.storage.database import Database
 
 log = logging.getLogger(__name__)
@@ -43,6 +48,8 @@ ROBOT = "a"
 LOOK = 0.1  # s of robot time between two spots of the path
 QUEUE_MAX = 16  # plays that wait for their turn
 LIMITS = Limits(cpu=20, wall=120.0)
+HITS_MAX = 20
+R = TypeVar("R")
 Notice = Callable[[dict[str, Any]], None]
 
 
@@ -71,17 +78,32 @@ class Rehearsals:
         ``notice`` hears on the caller's loop of blocks, spots and prints as they happen. Raises ValueError for a scene
         that cannot be, RuntimeError where too many wait.
         """
-        if self._waiting >= QUEUE_MAX:
-            raise RuntimeError("too many rehearsals wait; try again soon")
         here = asyncio.get_running_loop()
 
         def tell(news: dict[str, Any]) -> None:
             if notice is not None:
                 here.call_soon_threadsafe(notice, news)
 
+        async def program(fleet: Fleet, clock: LockstepClock, engine: Engine) -> Played:
+            return await _Play(fleet, clock, scene, speed, tell).run(engine, source, dict(modules or {}))
+
+        return await self._in_turn(scene, program)
+
+    async def try_plan(self, steps: Sequence[Step], scene: Scene) -> Tried:
+        """Do a plan's steps in turn, as fast as it goes. Raises as ``play`` does."""
+
+        async def plan(fleet: Fleet, clock: LockstepClock, _: Engine) -> Tried:
+            return await _Trial(fleet, clock, scene).run(steps)
+
+        return await self._in_turn(scene, plan)
+
+    async def _in_turn(self, scene: Scene, act: Callable[[Fleet, LockstepClock, Engine], Awaitable[R]]) -> R:
+        """Do it in a copy of the world, on the thread, after what waits already."""
+        if self._waiting >= QUEUE_MAX:
+            raise RuntimeError("too many rehearsals wait; try again soon")
         self._waiting += 1
         try:
-            work = self._play(source, scene, dict(modules or {}), speed, tell)
+            work = self._in_copy(scene, act)
             return await asyncio.wrap_future(asyncio.run_coroutine_threadsafe(work, self._started()))
         finally:
             self._waiting -= 1
@@ -110,7 +132,7 @@ class Rehearsals:
         if self._engine is not None:
             await self._engine.close()
 
-    async def _play(self, source: str, scene: Scene, modules: dict[str, str], speed: float, tell: Notice) -> Played:
+    async def _in_copy(self, scene: Scene, act: Callable[[Fleet, LockstepClock, Engine], Awaitable[R]]) -> R:
         if self._turn is None:
             self._turn, self._engine = asyncio.Lock(), Engine(memory_together=self._memory_together)
         async with self._turn:
@@ -123,7 +145,7 @@ class Rehearsals:
                 await fleet.start(wait=True)
                 set_up(fleet.world.hands, scene)
                 await clock.advance(0.2)
-                return await _Play(fleet, clock, scene, speed, tell).run(self._engine, source, modules)
+                return await act(fleet, clock, self._engine)
             finally:
                 await fleet.close()
                 database.close()
@@ -237,6 +259,58 @@ class _Play:
             for zone in light.zones:
                 colour = light.state(zone).colour
                 self.played.colours.add((zone, colour.red, colour.green, colour.blue))
+
+
+@dataclass
+class _Trial:
+    """One plan on one copy."""
+
+    fleet: Fleet
+    clock: LockstepClock
+    scene: Scene
+    tried: Tried = field(default_factory=Tried)
+
+    async def run(self, steps: Sequence[Step]) -> Tried:
+        """Do the steps until one fails."""
+        robot = self.fleet.robots[ROBOT]
+        began = self.clock.time()
+        start = robot[Localization].pose
+        with robot.events.subscribe(BumperPressed) as pressed:
+            for step in steps:
+                try:
+                    action = _begin(robot, step, start)
+                except RobotError as error:
+                    self.tried.steps.append(("ABORTED", str(error)))
+                    break
+                while not action.status.ended and not self.tried.late:
+                    await self.clock.advance(LOOK)
+                    self._note(self.clock.time() - began, bool(pressed.drain()))
+                self.tried.steps.append((action.status.name if action.status.ended else "EXECUTING", action.reason))
+                if action.status is not ActionStatus.SUCCEEDED:
+                    break
+        return self.tried
+
+    def _note(self, now: float, touched: bool) -> None:
+        pose = self.fleet.world.truth.pose_of(ROBOT)
+        self.tried.path.append(Spot(round(now, 2), pose.x, pose.y, pose.yaw))
+        self.tried.seconds, self.tried.late = round(now, 2), now >= self.scene.longest
+        if touched and len(self.tried.hits) < HITS_MAX:
+            self.tried.hits.append(Hit(round(now, 2), pose.x, pose.y, self._what(pose)))
+
+    def _what(self, pose: Pose) -> str:
+        """Name what is nearest of people and boxes within reach; else it is the building."""
+        reach = self.fleet.robots[ROBOT].description.radius
+        near = [(pose.distance_to(at), f"person {name}", 0.4) for name, at in self.scene.people]
+        near += [(pose.distance_to(at), "a box", math.hypot(*size[:2]) / 2) for at, size in self.scene.boxes]
+        found = min(((far, what) for far, what, wide in near if far <= reach + wide + 0.05), default=None)
+        return found[1] if found else "a wall or furniture"
+
+
+def _begin(robot: Robot, step: Step, start: Pose) -> Action:
+    if step.goal is None:
+        return robot[Driving].drive(step.twist or Twist(), lifetime=step.seconds, source="rehearsal")
+    goal = start.compose(Pose(step.goal.x, step.goal.y, 0.0))
+    return robot[Navigation].navigate_to([goal.point], NavigationOptions(), source="rehearsal")
 
 
 def _words(event: Event) -> str:

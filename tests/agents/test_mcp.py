@@ -18,7 +18,7 @@ from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.geometry import Pose
 from tests.console.conftest import Shown
 
-TOOLS = {"robots", "where_am_i", "look", "map_picture", "go_to", "drive", "stop", "run_program"}
+TOOLS = {"robots", "where_am_i", "look", "map_picture", "go_to", "drive", "stop", "run_program", "rehearse"}
 PNG, JPEG = "iVBORw0KGgo", "/9j/"
 
 
@@ -141,3 +141,21 @@ async def test_refusals_say_why(shown: Shown) -> None:
         assert "no robot 'b'" in await refusal(client, "where_am_i", robot="b")
         async with Client(make_server(ConsoleClient("http://127.0.0.1:1"))) as lost:
             assert "start it with `roboglot up`" in await refusal(lost, "robots")
+
+
+async def test_a_plan_is_tried_before_the_robot_moves(shown: Shown) -> None:
+    before = shown.robot[Localization].pose
+    free = [{"do": "go_to", "x": 1.0, "y": 0.5}, {"do": "drive", "yaw": 1.0, "seconds": 1.0}]
+    async with tools(shown) as client:
+        told = await call(client, "rehearse", plan=free)
+        assert told["safe"], told
+        assert [step["status"] for step in told["steps"]] == ["SUCCEEDED", "SUCCEEDED"]
+        assert told["path"][-1] == pytest.approx([1.0, 0.5], abs=0.15)
+        (placed,) = shown.desk.stage.robots
+        shown.desk.stage.add_obstacle(placed.pose.compose(Pose(0.9, 0.0)))
+        told = await call(client, "rehearse", plan=[{"do": "drive", "x": 1.0, "seconds": 2.0}])
+        assert not told["safe"]
+        assert {hit["what"] for hit in told["hits"]} == {"a box"}
+        assert told["hits"][0]["point"][0] < 0.7
+        assert "at most 20" in await refusal(client, "rehearse", plan=free * 11)
+    assert shown.robot[Localization].pose == before

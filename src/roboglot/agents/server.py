@@ -6,12 +6,12 @@ import asyncio
 import math
 from collections.abc import Awaitable
 from importlib.metadata import version
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 from mcp.server import MCPServer
 from mcp.server.mcpserver import Image
 from mcp.server.mcpserver.exceptions import ToolError
-from pydantic import Field
+from pydantic import BaseModel, Field
 
 from roboglot.agents.console import ConsoleClient, Refused
 
@@ -24,8 +24,29 @@ Robot = Annotated[str, Field(min_length=1, max_length=80, description="The robot
 Meters = Annotated[float, Field(ge=-10_000, le=10_000)]
 Speed = Annotated[float, Field(ge=-10, le=10)]
 Wait = Annotated[float, Field(ge=0, le=SECONDS_MAX, description="Seconds to wait for its end; 0 returns at once.")]
+
+
+class GoTo(BaseModel):
+    """Drive to a point of the map, around obstacles."""
+
+    do: Literal["go_to"]
+    x: Meters
+    y: Meters
+
+
+class Drive(BaseModel):
+    """Drive with a velocity (m/s ahead, m/s left, rad/s), around nothing, then brake."""
+
+    do: Literal["drive"]
+    x: Speed = 0.0
+    y: Speed = 0.0
+    yaw: Speed = 0.0
+    seconds: Annotated[float, Field(gt=0, le=2)] = 1.0
+
+
+Plan = Annotated[list[Annotated[GoTo | Drive, Field(discriminator="do")]], Field(min_length=1, max_length=20)]
 INSTRUCTIONS = """Robots of roboglot. Positions are metres in the robot's map (x forward, y left where it woke up),
-angles radians counter-clockwise. Look first, then act. Refusals say why."""
+angles radians counter-clockwise. Look first, rehearse, then act. Refusals say why."""
 
 
 def make_server(console: ConsoleClient) -> MCPServer:
@@ -40,6 +61,7 @@ def make_server(console: ConsoleClient) -> MCPServer:
         tools.go_to,
         tools.drive,
         tools.stop,
+        tools.rehearse,
         tools.run_program,
         tools.inject_fault,
         tools.clear_faults,
@@ -101,6 +123,13 @@ class Tools:
         """Stop everything that moves the robot, whoever began it."""
         await _asked(self._console.post("robots", robot, "stop", values={}))
         return "it stands"
+
+    async def rehearse(self, plan: Plan, robot: Robot = DEFAULT) -> dict[str, Any]:
+        """Try a plan in a copy of the simulated world first: how each step ends, what the robot would hit, where it
+        would go. The robot itself does not move. `safe` is true if all succeeds and nothing is touched."""
+        steps = [step.model_dump() for step in plan]
+        found: dict[str, Any] = await _asked(self._console.post("robots", robot, "rehearse", values={"steps": steps}))
+        return found
 
     async def run_program(
         self,

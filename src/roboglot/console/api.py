@@ -18,6 +18,7 @@ from roboglot.console.openapi import document
 from roboglot.console.people.classes import Classes, Wish
 from roboglot.console.resend import resend
 from roboglot.console.studio import blocks, lessons
+from roboglot.console.studio.plans import rehearse
 from roboglot.console.thumbnails import thumbnail
 from roboglot.console.wire_log import readable
 from roboglot.model.admission import Right
@@ -110,20 +111,28 @@ class Api:
                 offer = (await read_json(receive)).get("offer")
                 answered = await self.calls.answer(self._desk.view(name).robot, str(offer))
                 await answer_json(send, {"answer": answered})
-            case "GET" | "POST", ["robots", name, "program"]:
-                await self._serve_program(method, name, receive, send)
+            case ("GET", ["robots", name, "program" as what]) | (
+                "POST",
+                ["robots", name, "program" | "rehearse" as what],
+            ):
+                await self._serve_program(method, name, what, receive, send)
             case "POST", ["robots", name, verb]:
                 values = await read_json(receive)
                 await answer_json(send, {"result": await self._desk.command(name, verb, values, client)})
             case _:
                 raise _nothing_here()
 
-    async def _serve_program(self, method: str, name: str, receive: Receive, send: Send) -> None:
-        if method == "GET":
+    async def _serve_program(self, method: str, name: str, what: str, receive: Receive, send: Send) -> None:
+        if method == "GET" and what == "program":
             await answer_json(send, await program_runs.program(self._desk, name))
             return
-        source = str((await read_json(receive)).get("source", ""))
-        await answer_json(send, await program_runs.start(self._desk, name, source))
+        if method == "GET":
+            raise _nothing_here()
+        values = await read_json(receive)
+        if what == "rehearse":
+            await answer_json(send, await rehearse(self._desk, name, values))
+        else:
+            await answer_json(send, await program_runs.start(self._desk, name, str(values.get("source", ""))))
 
     async def _send_file(self, robot: Robot, file: str, receive: Receive, send: Send) -> None:
         match file:

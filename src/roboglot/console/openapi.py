@@ -27,6 +27,7 @@ READS = {
     "/api/robots/{name}/camera.jpg": "A picture of this moment",
     "/api/robots/{name}/camera.mjpeg": "Pictures, one after the other",
     "/api/robots/{name}/map.zip": "The map as map_server of ROS reads it: a yaml file and a pgm image",
+    "/api/robots/{name}/rehearse": "POST {steps} tries a plan in a copy of the world: how it ends, what it would touch",
     "/api/robots/{name}/program": "The script's program: its state and its log; POST {source} saves and runs another",
     "/api/robots/{name}/wire/{number}": "One exchange of a door, as long as it is kept",
     "/api/robots/{name}/wire/{number}/{form}": "That request as curl, nc, grpcurl, websocat or python",

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from roboglot.model.geometry import Point, Pose
+from roboglot.model.geometry import Point, Pose, Twist
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,8 +66,41 @@ class Played:
     late: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One step of a plan: drive to ``goal`` (base_link at the plan's start), or with ``twist`` for ``seconds``."""
+
+    goal: Point | None = None
+    twist: Twist | None = None
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Hit:
+    """The hull touched something: seconds since the start, where the robot really was, what it was."""
+
+    at: float
+    x: float
+    y: float
+    what: str
+
+
+@dataclass(slots=True)
+class Tried:
+    """What a plan would do: how each step ended (the first that fails is the last), and what the robot touched."""
+
+    steps: list[tuple[str, str]] = field(default_factory=list)  # SUCCEEDED or ABORTED, and why
+    hits: list[Hit] = field(default_factory=list)
+    path: list[Spot] = field(default_factory=list)
+    seconds: float = 0.0
+    late: bool = False
+
+
 class Rehearse(Protocol):
-    """Plays a program in a copy of a world."""
+    """Plays a program or a plan in a copy of a world."""
+
+    async def try_plan(self, steps: Sequence[Step], scene: Scene) -> Tried:
+        """Do the steps in turn, as fast as it goes. Raises as ``play`` does."""
 
     async def play(
         self,
