@@ -120,8 +120,12 @@ def measure(claims: Claims, folder: Path, worlds: int, each: int, seconds: float
     rows = answer["shards"]
     pids = [fleet.pid, answer["nursery"], *(row["pid"] for row in rows)]
     claims.at_most(f"memory of all {robots} robots", sum(map(memory, pids)), 1600.0, "MB")
+    used, began = sum(row["cpu"] for row in look(folder / "fleet")["shards"]), time.monotonic()
     times = polled([row["robots"][0]["address"] for row in rows], seconds)
-    factors = [row["factor"] for row in look(folder / "fleet")["shards"]]
+    after, passed = look(folder / "fleet")["shards"], time.monotonic() - began
+    factors = [row["factor"] for row in after]
+    share = (sum(row["cpu"] for row in after) - used) / passed / statistics.median(factors)
+    claims.at_most(f"processor time of {robots} polled robots", share, 2.0, "cores")  # whatever else the machine does
     claims.at_least("slowest world", min(factors), 0.98, "x real time")
     late = sorted(times)[-len(times) // 100] * 1e3
     print(f"median world {statistics.median(factors):.2f} x; p99 of a polled pose {late:.0f} ms")

@@ -129,3 +129,18 @@ async def test_a_search_through_unknown_floor_is_bounded(tour: Tour) -> None:
     assert far < 60.0
     assert tour.clock.time() - begun < 90.0
     assert "driving" in stages
+
+
+@pytest.mark.world("office", body="hermes")
+async def test_what_closes_a_known_way_for_a_moment_is_waited_for(tour: Tour) -> None:
+    """Rather than looking for a way through rooms that it never saw: robots in a corridor close it all the time."""
+    action = tour.head_for((18.0, 10.0))
+    await tour.until(lambda: tour.truth.x < 21.5)
+    crowd = tour.world.hands.add_obstacle(Pose(19.6, 10.0), (0.3, 2.98, 1.0))
+    for _ in range(90):
+        await tour.clock.advance(0.1)
+        assert 8.5 < tour.truth.y < 11.5
+        assert action.status is ActionStatus.EXECUTING, action.reason
+    tour.world.hands.remove_obstacle(crowd)
+    await tour.end_of(action)
+    assert action.status is ActionStatus.SUCCEEDED, action.reason

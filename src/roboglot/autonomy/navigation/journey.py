@@ -25,6 +25,7 @@ class Journey:
     obeyed: Annotations | None = None
     far: float = 0.0  # m driven
     far_max: float = math.inf  # m that it may drive; finite once the way leads through unknown floor
+    closed_since: float = math.inf  # since when something has stood on a way over known floor
     since: float = math.inf
     published: bool = False
 

@@ -80,9 +80,33 @@ class Replanner:
                 route = await course.plan(start, goals, options, things=False, straight=straight)
             except Unreachable:
                 return None
-        journey.obeyed = rules if route.unknown <= self._tuning.unknown_seam and route.ends_known else None
+        if await self._closed_for_now(route, start, goals):
+            return None
+        journey.obeyed = rules if self._is_known(route) else None
         self._bound(route)
         return route
+
+    async def _closed_for_now(self, route: Route, start: Point, goals: tuple[Point, ...]) -> bool:
+        """True while ``route`` leads through unknown floor only because something stands on a known way.
+
+        It may be another robot, or a person: for a while it is better to wait for them than to search the building.
+        """
+        journey, now = self._journey, self._clock.time()
+        if self._is_known(route):
+            journey.closed_since = math.inf
+            return False
+        if journey.obeyed is not self._course.drawn:  # otherwise there was one earlier in this drive
+            try:
+                known = await self._course.plan(start, goals, self._goal.options, obstacles=False)
+            except Unreachable:
+                return False
+            if not self._is_known(known):
+                return False
+        journey.closed_since = min(journey.closed_since, now)
+        return now - journey.closed_since < self._tuning.search_after
+
+    def _is_known(self, route: Route) -> bool:
+        return route.unknown <= self._tuning.unknown_seam and route.ends_known
 
     def _bound(self, route: Route) -> None:
         """Bound the search of a building for a way that may not exist."""
