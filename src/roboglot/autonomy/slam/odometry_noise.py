@@ -54,14 +54,15 @@ class LearntNoise:
     def __init__(self, described: OdometryNoise) -> None:
         self.described = described
         self.way_factor, self.yaw_factor = UNKNOWN_WHEELS**2, 1.0  # of the variances
-        self._described = self._before = np.zeros((3, 3))
+        self._described, self._before = (0.0, 0.0), np.zeros((3, 3))
 
     def spread(self, covariance: NDArray[np.float64], way: float, turn: float) -> NDArray[np.float64]:
         """``covariance`` (x, y, yaw) after odometry moved by ``way`` m and ``turn`` rad."""
-        along, around = self.described.variances(way, turn)
-        self._described, self._before = np.diag((along, along, around)), covariance
-        factors = np.array((self.way_factor, self.way_factor, self.yaw_factor))
-        wider: NDArray[np.float64] = covariance + self._described * factors
+        along, around = self._described = self.described.variances(way, turn)
+        self._before, wider = covariance, covariance.copy()
+        wider[0, 0] += along * self.way_factor
+        wider[1, 1] += along * self.way_factor
+        wider[2, 2] += around * self.yaw_factor
         return wider
 
     def learn(
@@ -75,25 +76,31 @@ class LearntNoise:
 
         The robot drove in ``direction`` (rad, in map): errors across it come from turning, and say nothing of the way.
         """
-        along = np.array((math.cos(direction), math.sin(direction), 0.0))
-        for axis, is_yaw in ((along, False), (np.array((0.0, 0.0, 1.0)), True)):
-            before, after, described, described_before = (
-                float(axis @ matrix @ axis) for matrix in (prior, posterior, self._described, self._before)
-            )
-            share = 1.0 - after / before
-            if share < LEARNT_MIN:  # the scan does not see this direction
-                continue
-            surprise = (float(axis @ np.array(correction)) / share) ** 2 - after / share - described_before
-            ratio = min(max(surprise, 0.0) / described, SURPRISE_MAX)
-            if is_yaw:
-                self.yaw_factor = _followed(self.yaw_factor, ratio)
-            else:
-                self.way_factor = _followed(self.way_factor, ratio)
+        c, s = math.cos(direction), math.sin(direction)
+        matrices = (prior, posterior, self._before)
+        along = [_along(matrix, c, s) for matrix in matrices]
+        self.way_factor = _learnt(self.way_factor, c * correction[0] + s * correction[1], *along, self._described[0])
+        around = [float(matrix[2, 2]) for matrix in matrices]
+        self.yaw_factor = _learnt(self.yaw_factor, correction[2], *around, self._described[1])
 
     @property
     def factors(self) -> tuple[float, float]:
         """Of the standard deviations of way and yaw: 1 is as described."""
         return math.sqrt(self.way_factor), math.sqrt(self.yaw_factor)
+
+
+def _along(matrix: NDArray[np.float64], c: float, s: float) -> float:
+    """The variance in the direction whose cosine and sine these are."""
+    return float(c * c * matrix[0, 0] + 2.0 * c * s * matrix[0, 1] + s * s * matrix[1, 1])
+
+
+def _learnt(factor: float, correction: float, prior: float, posterior: float, before: float, described: float) -> float:
+    """``factor`` after a correction in one direction; variances of it, and the step's as described."""
+    share = 1.0 - posterior / prior
+    if share < LEARNT_MIN:  # the scan does not see this direction
+        return factor
+    surprise = (correction / share) ** 2 - posterior / share - before
+    return _followed(factor, min(max(surprise, 0.0) / described, SURPRISE_MAX))
 
 
 def _followed(factor: float, ratio: float) -> float:

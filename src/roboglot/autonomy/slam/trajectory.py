@@ -42,7 +42,8 @@ class Trajectory:
         self.newest = stamp
         number, origin = anchor or (-1, Pose())
         local = pose.relative_to(origin)
-        self._steps.extend((stamp, number, local.x, local.y, local.yaw, *covariance[np.triu_indices(3)].tolist()))
+        (xx, xy, xw), (_, yy, yw), (_, _, ww) = covariance.tolist()
+        self._steps.extend((stamp, number, local.x, local.y, local.yaw, xx, xy, xw, yy, yw, ww))
         if len(self._steps) > STEPS_MAX * FIELDS:
             del self._steps[: len(self._steps) // FIELDS // 2 * FIELDS]
 
