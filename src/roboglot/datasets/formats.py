@@ -8,7 +8,9 @@ from roboglot.datasets.carmen import read_carmen
 from roboglot.datasets.columns import read_columns
 from roboglot.datasets.coreslam import COLUMNS, read_coreslam
 from roboglot.datasets.drive_log import FILE_BYTES_MAX, BadDriveLog, DriveLog
+from roboglot.datasets.own_recording import MAGIC, read_own_recording
 from roboglot.datasets.rawlog import read_rawlog
+from roboglot.datasets.rosbag import is_bag, read_bag
 
 HEAD_BYTES = 65_536
 GZIP = b"\x1f\x8b"
@@ -16,11 +18,19 @@ CARMEN_WORDS = ("FLASER", "ROBOTLASER", "RAWLASER", "ODOM", "PARAM", "# message_
 
 
 def read_drive_log(path: Path) -> DriveLog:
-    """Read the recording at ``path``. Raises BadDriveLog, OSError."""
-    if not path.is_dir() and path.stat().st_size > FILE_BYTES_MAX:
+    """Read the recording at ``path``. Raises BadDriveLog, MissingExtra, OSError."""
+    if path.is_dir():
+        if is_bag(path, b""):
+            return read_bag(path)
+        raise BadDriveLog(f"{path.name}: a folder without metadata.yaml, so no bag of ROS")
+    if path.stat().st_size > FILE_BYTES_MAX:
         raise BadDriveLog(f"{path.name}: larger than {FILE_BYTES_MAX} bytes")
     with path.open("rb") as file:
         head = file.read(HEAD_BYTES)
+    if is_bag(path, head):
+        return read_bag(path)
+    if head.startswith(MAGIC):
+        return read_own_recording(path)
     if head.startswith(GZIP) or b"\0" in head:
         return read_rawlog(path)
     lines = head.decode("ascii", "replace").splitlines()

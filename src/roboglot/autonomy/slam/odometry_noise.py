@@ -77,11 +77,14 @@ class LearntNoise:
         The robot drove in ``direction`` (rad, in map): errors across it come from turning, and say nothing of the way.
         """
         c, s = math.cos(direction), math.sin(direction)
-        matrices = (prior, posterior, self._before)
-        along = [_along(matrix, c, s) for matrix in matrices]
-        self.way_factor = _learnt(self.way_factor, c * correction[0] + s * correction[1], *along, self._described[0])
-        around = [float(matrix[2, 2]) for matrix in matrices]
-        self.yaw_factor = _learnt(self.yaw_factor, correction[2], *around, self._described[1])
+        before, (way, around) = self._before, self._described
+        correction_along = c * correction[0] + s * correction[1]
+        self.way_factor = _learnt(
+            self.way_factor, correction_along, _along(prior, c, s), _along(posterior, c, s), _along(before, c, s), way
+        )
+        self.yaw_factor = _learnt(
+            self.yaw_factor, correction[2], float(prior[2, 2]), float(posterior[2, 2]), float(before[2, 2]), around
+        )
 
     @property
     def factors(self) -> tuple[float, float]:

@@ -1,0 +1,122 @@
+"""Our own recordings (``roboglot up --record``): scans and odometry out of the MCAP file, one robot's.
+
+Of several robots the one with most scans is read. The lidar's limits are not in the file: the farthest echo counts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from roboglot.datasets.drive_log import RAYS_MAX, SCANS_MAX, BadDriveLog, DriveLog, RecordedScan
+from roboglot.datasets.track import Track
+from roboglot.extras import explaining
+from roboglot.model.geometry import ORIGIN, Pose
+from roboglot.model.sensing import LaserScan
+
+MAGIC = b"\x89MCAP0"
+SCAN, TRANSFORMS = "foxglove.LaserScan", "foxglove.FrameTransforms"
+RANGE_MIN = 0.05  # m
+RECORD_MAX = 1 << 30  # bytes
+
+
+def read_own_recording(path: Path) -> DriveLog:
+    """Read the recording at ``path``, up to where it is cut off. Raises BadDriveLog, MissingExtra, OSError."""
+    with explaining("reading recordings", "recording"):
+        decoding = import_module("google.protobuf.message")
+        from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+        from foxglove_schemas_protobuf.LaserScan_pb2 import LaserScan as Message
+    scans: dict[str, list[Any]] = {}
+    tracks: dict[str, Track] = {}
+    mounts: dict[str, Pose] = {}
+    unread: Counter[str] = Counter()
+    for schema, data in _messages(path):
+        try:
+            if schema == SCAN:
+                message = Message.FromString(data)
+                _keep(scans.setdefault(message.frame_id.removesuffix("/laser"), []), message, path)
+            else:
+                for transform in FrameTransforms.FromString(data).transforms:
+                    _take(transform, tracks, mounts)
+        except decoding.DecodeError:
+            unread["damaged messages"] += 1
+    if not scans:
+        raise BadDriveLog(f"{path.name}: no scans; a folder of rosbag2 is read by its folder")
+    robot = max(sorted(scans), key=lambda name: len(scans[name]))
+    unread.update({f"scans of {name}": len(found) for name, found in scans.items() if name != robot})
+    track, recorded = tracks.get(robot, Track()), []
+    reach = max((_farthest(message) for message in scans[robot]), default=0.0) or RANGE_MIN
+    for message in scans[robot]:
+        stamp = _seconds(message.timestamp)
+        odometry = track.at(stamp)
+        if odometry is None:
+            unread["scans without odometry"] += 1
+        else:
+            recorded.append(RecordedScan(_scan(message, stamp, reach, mounts.get(robot, ORIGIN)), odometry))
+    if not recorded:
+        raise BadDriveLog(f"{path.name}: no scan of {robot} has odometry near its time")
+    return DriveLog(path.stem, recorded, dict(unread))
+
+
+def _messages(path: Path) -> Iterator[tuple[str, bytes]]:
+    """Schema and bytes of the scans and transforms."""
+    with explaining("reading recordings", "recording"):
+        from mcap.exceptions import McapError
+        from mcap.records import Channel, Message, Schema
+        from mcap.stream_reader import StreamReader
+    schemas: dict[int, str] = {}
+    channels: dict[int, str] = {}
+    with path.open("rb") as file:
+        try:
+            for record in StreamReader(file, record_size_limit=RECORD_MAX).records:
+                if isinstance(record, Schema):
+                    schemas[record.id] = record.name
+                elif isinstance(record, Channel):
+                    channels[record.id] = schemas.get(record.schema_id, "")
+                elif isinstance(record, Message) and (kind := channels.get(record.channel_id)) in (SCAN, TRANSFORMS):
+                    yield str(kind), record.data
+        except (McapError, ValueError, EOFError, KeyError, OverflowError):
+            return  # its program was killed: what there is, is read
+
+
+def _keep(found: list[Any], message: Any, path: Path) -> None:
+    if len(found) >= SCANS_MAX or len(message.ranges) > RAYS_MAX:
+        raise BadDriveLog(f"{path.name}: more than {SCANS_MAX} scans or {RAYS_MAX} rays")
+    found.append(message)
+
+
+def _take(transform: Any, tracks: dict[str, Track], mounts: dict[str, Pose]) -> None:
+    robot, _, frame = transform.child_frame_id.rpartition("/")
+    pose = Pose(
+        transform.translation.x, transform.translation.y, 2.0 * math.atan2(transform.rotation.z, transform.rotation.w)
+    )
+    if not all(map(math.isfinite, (pose.x, pose.y, pose.yaw))):
+        return
+    if frame == "base_link" and transform.parent_frame_id == f"{robot}/odom":
+        tracks.setdefault(robot, Track()).add(_seconds(transform.timestamp), pose)
+    elif frame == "laser":
+        mounts[robot] = pose
+
+
+def _farthest(message: Any) -> float:
+    ranges = np.array(message.ranges)
+    return float(ranges[np.isfinite(ranges)].max(initial=0.0))
+
+
+def _scan(message: Any, stamp: float, reach: float, mount: Pose) -> LaserScan:
+    ranges = np.array(message.ranges, np.float32)
+    with np.errstate(invalid="ignore"):
+        ranges[ranges < RANGE_MIN] = np.nan
+    ranges.setflags(write=False)
+    increment = (message.end_angle - message.start_angle) / max(1, len(ranges) - 1)
+    return LaserScan(stamp, ranges, message.start_angle, increment, RANGE_MIN, reach + 1e-3, mount=mount)
+
+
+def _seconds(stamp: Any) -> float:
+    return float(stamp.seconds) + 1e-9 * float(stamp.nanos)

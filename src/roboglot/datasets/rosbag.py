@@ -1,0 +1,142 @@
+"""Bags of ROS: rosbag2 (a folder with SQLite or MCAP files) and ROS 1's ``.bag``; ``roboglot[logs]`` reads them.
+
+One laser (the topic with most scans), one odometry (``nav_msgs/Odometry``; without it tf's odom to base), and where the
+laser is mounted as tf says, else in the middle.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from roboglot.datasets.drive_log import RAYS_MAX, SCANS_MAX, BadDriveLog, DriveLog, RecordedScan
+from roboglot.datasets.track import Track
+from roboglot.extras import explaining
+from roboglot.model.geometry import ORIGIN, Pose, wrap_angle
+from roboglot.model.sensing import LaserScan
+
+SCAN, ODOMETRY = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry"
+TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
+ODOM_FRAMES, BASE_FRAMES = ("odom",), ("base_link", "base_footprint")
+CHAIN_MAX = 16  # frames between base and laser
+RAY_SECONDS_MAX = 0.01  # s between two rays that can be believed
+
+
+def is_bag(path: Path, head: bytes) -> bool:
+    """Whether this is a bag: a folder of rosbag2, a ROS 1 bag; a lone file of rosbag2 has its folder beside it."""
+    if path.is_dir():
+        return (path / "metadata.yaml").is_file()
+    return head.startswith(b"#ROSBAG V2.0") or (path.suffix in (".db3", ".mcap") and _folder(path) is not None)
+
+
+def _folder(path: Path) -> Path | None:
+    return path.parent if (path.parent / "metadata.yaml").is_file() else None
+
+
+def read_bag(path: Path) -> DriveLog:
+    """Read the bag at ``path``. Raises BadDriveLog, MissingExtra, OSError."""
+    with explaining("reading bags of ROS", "logs"):
+        from rosbags.highlevel import AnyReader, AnyReaderError
+        from rosbags.typesys import Stores, get_typestore
+    bag = path if path.is_dir() or path.suffix == ".bag" else path.parent
+    try:
+        with AnyReader([bag], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+            counts = Counter({c.topic: c.msgcount for c in reader.connections if c.msgtype == SCAN})
+            if not counts:
+                raise BadDriveLog(f"{path.name}: no topic of type {SCAN}")
+            laser = max(sorted(counts), key=lambda topic: counts[topic])
+            wanted = [c for c in reader.connections if c.topic == laser or c.msgtype in (ODOMETRY, *TRANSFORMS)]
+            messages = ((c.msgtype, at, reader.deserialize(raw, c.msgtype)) for c, at, raw in reader.messages(wanted))
+            log = _assembled(path.stem, messages)
+    except (AnyReaderError, AssertionError, ValueError, KeyError) as error:
+        raise BadDriveLog(f"{path.name}: {error}") from None
+    for topic, count in counts.items():
+        if topic != laser:
+            log.unread[f"scans of {topic}"] = count
+    return log
+
+
+def _assembled(name: str, messages: Iterator[tuple[str, int, Any]]) -> DriveLog:
+    """The scans with their odometry, from messages in the order of their arrival."""
+    scans: list[Any] = []
+    wheels, tf_wheels = Track(), Track()
+    fixed: dict[str, tuple[str, Pose]] = {}  # frame: the one above it, and where it is in that
+    unread: Counter[str] = Counter()
+    for kind, _, message in messages:
+        if kind == SCAN:
+            if len(scans) >= SCANS_MAX or len(message.ranges) > RAYS_MAX:
+                raise BadDriveLog(f"{name}: more than {SCANS_MAX} scans or {RAYS_MAX} rays")
+            scans.append(message)
+        elif kind == ODOMETRY:
+            wheels.add(_seconds(message.header.stamp), _pose(message.pose.pose.position, message.pose.pose.orientation))
+        else:
+            for transform in message.transforms:
+                _take(transform, fixed, tf_wheels)
+    track, recorded = wheels if len(wheels) else tf_wheels, []
+    if not len(track):
+        raise BadDriveLog(f"{name}: no odometry: neither {ODOMETRY} nor tf from odom to base_link")
+    for message in scans:
+        stamp = _seconds(message.header.stamp)
+        odometry = track.at(stamp)
+        if odometry is None:
+            unread["scans without odometry"] += 1
+        else:
+            recorded.append(RecordedScan(_scan(message, stamp, _mount(fixed, message.header.frame_id)), odometry))
+    if not recorded:
+        raise BadDriveLog(f"{name}: no scan has odometry near its time")
+    recorded.sort(key=lambda item: item.scan.stamp)
+    return DriveLog(name, recorded, dict(unread))
+
+
+def _take(transform: Any, fixed: dict[str, tuple[str, Pose]], wheels: Track) -> None:
+    """What tf says: where the base is in odom, and where parts are on the robot."""
+    above, frame = (name.strip("/") for name in (transform.header.frame_id, transform.child_frame_id))
+    pose = _pose(transform.transform.translation, transform.transform.rotation)
+    if above in ODOM_FRAMES and frame in BASE_FRAMES:
+        wheels.add(_seconds(transform.header.stamp), pose)
+    elif above not in ("map", *ODOM_FRAMES) and len(fixed) < 1000:
+        fixed[frame] = above, pose
+
+
+def _mount(fixed: dict[str, tuple[str, Pose]], frame: str) -> Pose:
+    """Where the laser is on the robot: up tf's tree as far as it goes."""
+    mount, frame = ORIGIN, frame.strip("/")
+    for _ in range(CHAIN_MAX):
+        if frame in BASE_FRAMES or frame not in fixed:
+            break
+        frame, pose = fixed[frame]
+        mount = pose.compose(mount)
+    return mount
+
+
+def _scan(message: Any, stamp: float, mount: Pose) -> LaserScan:
+    ranges = np.array(message.ranges, np.float32)
+    with np.errstate(invalid="ignore"):
+        ranges[ranges > message.range_max] = np.inf
+        ranges[ranges < message.range_min] = np.nan  # drivers send 0 for what they did not see
+    ranges.setflags(write=False)
+    least, most = float(message.range_min), float(message.range_max)
+    if not (math.isfinite(most) and 0.0 <= least < most and math.isfinite(message.angle_increment)):
+        raise BadDriveLog("a scan without limits or angles")
+    increment = float(message.time_increment)
+    increment = increment if 0.0 < increment < RAY_SECONDS_MAX else 0.0
+    angles = float(message.angle_min), float(message.angle_increment)
+    return LaserScan(stamp, ranges, *angles, least, most, mount=mount, time_increment=increment)
+
+
+def _seconds(stamp: Any) -> float:
+    return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
+
+
+def _pose(position: Any, q: Any) -> Pose:
+    """The planar part; a rotation by pi around x (a laser upside down) is not one and is left out."""
+    yaw = math.atan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z))
+    x, y = float(position.x), float(position.y)
+    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(yaw)):
+        raise BadDriveLog("a pose is no number")
+    return Pose(x, y, wrap_angle(yaw))

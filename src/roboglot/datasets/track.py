@@ -1,0 +1,41 @@
+"""Poses over time, from messages that come at other times than scans."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+
+from roboglot.model.geometry import Pose
+
+APART_MAX = 1.0  # s between a scan and the odometry beside it
+
+
+class Track:
+    """Poses over time, asked for in between."""
+
+    def __init__(self) -> None:
+        self._stamps: list[float] = []
+        self._poses: list[Pose] = []
+
+    def __len__(self) -> int:
+        return len(self._stamps)
+
+    def add(self, stamp: float, pose: Pose) -> None:
+        """The next one; one that is not later than the last is left out."""
+        if not self._stamps or stamp > self._stamps[-1]:
+            self._stamps.append(stamp)
+            self._poses.append(pose)
+
+    def at(self, stamp: float) -> Pose | None:
+        """The pose then; None where none is near."""
+        index = bisect_left(self._stamps, stamp)
+        if index == len(self._stamps):
+            return self._poses[-1] if self._stamps and stamp - self._stamps[-1] < APART_MAX else None
+        after, pose = self._stamps[index], self._poses[index]
+        if index == 0:
+            return pose if after - stamp < APART_MAX else None
+        begin, first = self._stamps[index - 1], self._poses[index - 1]
+        if after - begin > APART_MAX:
+            return None
+        share = (stamp - begin) / (after - begin)
+        step = pose.relative_to(first)
+        return first.compose(Pose(share * step.x, share * step.y, share * step.yaw))
