@@ -24,6 +24,7 @@ COMMANDS = {
     "record": "record everything that robots say, hear and do; show and mend recordings",
     "replay": "send the requests of a recording to a robot again and compare its answers",
     "compare": "two recordings, value by value, and how much of them agrees",
+    "test": "play test scenarios (YAML) on simulated robots, with a JUnit report",
     "mirror": "live state of any robot in the terminal",
     "map": "ROS maps to a robot, its map to a ROS map, and maps from recorded drives",
     "program": "check, run, save and list block programs, and read their logs",
@@ -35,7 +36,7 @@ COMMANDS = {
 }
 # The extra to install for a command whose modules are missing; else the one that brings the module.
 EXTRAS = {"demo": "demo", "mcp": "mcp"} | dict.fromkeys(
-    ("up", "coverage", "capabilities", "doctor", "cloud", "map"), "up"
+    ("up", "coverage", "capabilities", "doctor", "cloud", "map", "test"), "up"
 )
 
 

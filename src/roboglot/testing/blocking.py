@@ -93,6 +93,8 @@ class Blocking:
 
 def _is_kept(value: object) -> bool:
     """Whether it is an object with methods to await, not a value."""
+    if inspect.isasyncgen(value):
+        return True
     kind = type(value)
     if not kind.__module__.startswith(("roboglot.clients", "roboglot.model.feed", "roboglot.testing")):
         return False

@@ -6,9 +6,7 @@ import asyncio
 import contextlib
 import dataclasses
 import gc
-import os
 import shutil
-import socket
 import tempfile
 import threading
 from collections import deque
@@ -18,6 +16,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from roboglot.model.clock import LockstepClock
+from roboglot.testing.addresses import free_addresses, free_port, give_back
 from roboglot.testing.blocking import PATIENCE, Blocking, Loop
 from roboglot.testing.wanted import Wanted
 
@@ -35,9 +34,6 @@ T = TypeVar("T")
 KEPT_EXCHANGES = 2000
 LOOK_AGAIN = 0.05  # s of robot time between two looks at a condition
 START_SECONDS_MAX = 240.0  # kernels may have to be compiled
-FREE_TRIES = 100
-PROBED = (1448, 40923, 50052, 50053)
-_given: set[str] = set()
 
 
 class NotInTime(AssertionError):
@@ -80,7 +76,7 @@ class RobotServer:
         """Start it; returns when every door answers and the robots know where they are. Raises as ``up`` does."""
         configs = self.wanted.configs(free_addresses(len(self.wanted.robots)))
         self.addresses = {robot.name: robot.address for robot in configs}
-        self.app_port = _free_port()
+        self.app_port = free_port()
         loop = _new_loop(lockstep=self.wanted.lockstep)
         self._loop = Loop(loop)
         self._thread = threading.Thread(target=_serve, args=(loop,), name="roboglot", daemon=True)
@@ -104,8 +100,7 @@ class RobotServer:
             self._loop.loop.call_soon_threadsafe(self._loop.loop.stop)
             self._thread.join()
             self._loop = self._thread = self._runtime = None
-            for address in self.addresses.values():
-                _given.discard(address)
+            give_back(self.addresses.values())
             gc.unfreeze()  # what the runtime froze is garbage now
             if self._given_data is None:
                 shutil.rmtree(self.data, ignore_errors=True)
@@ -371,37 +366,6 @@ def _can_record() -> bool:
     from importlib.util import find_spec
 
     return all(find_spec(name) for name in ("mcap", "zstandard", "foxglove_schemas_protobuf"))
-
-
-def free_addresses(count: int) -> str:
-    """Return the first of so many loopback addresses in a row that nobody on this machine uses for robots."""
-    worker = int("".join(filter(str.isdigit, os.environ.get("PYTEST_XDIST_WORKER", ""))) or 0) % 250
-    for attempt in range(FREE_TRIES):
-        block = (os.getpid() + 7 * attempt) % 120
-        first = 1 + (attempt * 16) % 128
-        row = [f"127.{100 + block}.{1 + worker}.{first + number}" for number in range(count)]
-        if not _given.intersection(row) and all(map(_is_free, row)):
-            _given.update(row)
-            return row[0]
-    raise OSError("no loopback address is free for robots")
-
-
-def _is_free(address: str) -> bool:
-    for port in PROBED:
-        with socket.socket() as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            try:
-                probe.bind((address, port))
-            except OSError:
-                return False
-    return True
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
 
 
 @contextlib.contextmanager

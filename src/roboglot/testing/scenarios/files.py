@@ -1,0 +1,246 @@
+"""Scenario files: what they may say, read strictly; ``schema`` is the same as a JSON schema for editors."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+
+from roboglot.testing.wanted import SPEED, Wanted, WantedFault
+
+BYTES_MAX = 1 << 20
+Seconds = Annotated[float, msgspec.Meta(gt=0, le=86_400)]
+Meters = Annotated[float, msgspec.Meta(ge=-10_000, le=10_000)]
+Count = Annotated[int, msgspec.Meta(ge=0)]
+
+
+class BadScenario(ValueError):
+    """The file is no scenario; the message says where and why."""
+
+
+class _Strict(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """No field may be misspelt."""
+
+
+class Given(_Strict, frozen=True, forbid_unknown_fields=True):
+    """The world, its robots, and what is broken from the start; as in the test kit's marker ``world``."""
+
+    world: str = "office"
+    robots: Annotated[tuple[str, ...], msgspec.Meta(min_length=1, max_length=16)] = ("a",)
+    body: str = "universal"
+    seed: int = 1
+    speed: Annotated[float, msgspec.Meta(gt=0, le=100)] = SPEED
+    lockstep: bool = False
+    recording: str = ""
+    faults: tuple[str | dict[str, Any], ...] = ()
+    doors: dict[str, Any] = {}
+
+    def wanted(self, folder: Path) -> Wanted:
+        """Return it for a server; paths are relative to the scenario's folder. Raises BadScenario."""
+        world = str(folder / self.world) if self.world.endswith((".toml", ".yaml")) else self.world
+        recording = str(folder / self.recording) if self.recording else ""
+        faults = tuple(map(fault_of, self.faults))
+        values = {field.name: getattr(self, field.name) for field in msgspec.structs.fields(Given)}
+        return Wanted(**(values | {"world": world, "recording": recording, "faults": faults}))
+
+
+class Placing(_Strict, frozen=True, forbid_unknown_fields=True):
+    """Where a robot is put by hand: m and degrees of the world."""
+
+    x: Meters
+    y: Meters
+    degrees: float = 0.0
+    robot: str = ""
+
+
+class Box(_Strict, frozen=True, forbid_unknown_fields=True):
+    """A box that is put into the world, m."""
+
+    x: Meters
+    y: Meters
+    width: float = 0.4
+    depth: float = 0.4
+    height: float = 1.0
+
+
+class Place(_Strict, frozen=True, forbid_unknown_fields=True):
+    """Where a robot should be: in the world (``pose``) or from where it started (``moved``); m and degrees."""
+
+    x: Meters | None = None
+    y: Meters | None = None
+    degrees: float | None = None
+    within: Annotated[float, msgspec.Meta(gt=0)] = 0.1
+    within_degrees: Annotated[float, msgspec.Meta(gt=0)] = 5.0
+    robot: str = ""
+
+
+class Visits(_Strict, frozen=True, forbid_unknown_fields=True):
+    """Places [x, y] of the world that a robot must have come to, in this order; m."""
+
+    places: Annotated[tuple[tuple[float, float], ...], msgspec.Meta(min_length=1)]
+    within: Annotated[float, msgspec.Meta(gt=0)] = 0.3
+    robot: str = ""
+
+
+class Range(_Strict, frozen=True, forbid_unknown_fields=True):
+    """Bounds of a number."""
+
+    at_least: float | None = None
+    at_most: float | None = None
+    robot: str = ""
+
+
+class Exchanged(_Strict, frozen=True, forbid_unknown_fields=True):
+    """How many requests there must have been: at a door, of an operation, with that status; empty: any."""
+
+    door: str = ""
+    operation: str = ""
+    status: str = ""
+    at_least: Count = 1
+    at_most: Count | None = None
+    robot: str = ""
+
+
+class Check(_Strict, frozen=True, forbid_unknown_fields=True):
+    """One thing that must be true; exactly one of its fields is given.
+
+    ``travelled``: metres driven; ``battery``: percent; ``faults``: the robot's own, exactly these; ``refused``: so many
+    requests were refused at most; ``printed``: a text that a program or command printed.
+    """
+
+    pose: Place | None = None
+    moved: Place | None = None
+    visited: Visits | None = None
+    travelled: Range | None = None
+    battery: Range | None = None
+    faults: tuple[str, ...] | None = None
+    exchanged: Exchanged | None = None
+    refused: Count | None = None
+    printed: str | None = None
+
+
+class Step(_Strict, frozen=True, forbid_unknown_fields=True):
+    """One thing that happens; exactly one of ``STEPS`` is given, the rest belongs to it.
+
+    ``run``: a command of the shell that must end with 0 within ``within`` real seconds; its variables ROBOGLOT_ADDRESS,
+    ROBOGLOT_URL, ROBOGLOT_PROGRAMS, ROBOGLOT_CERTIFICATES and ROBOGLOT_APP_PORT lead it to the robot. ``rest``: a
+    request ("GET /path") with ``body``, expecting ``status`` and an ``answer`` with at least these fields. ``text``: a
+    command of the text protocol, expecting ``answer``. ``dog``: a code of the app protocol with ``body`` as its
+    parameters, expecting ``answer`` among its answers. ``program``: a file with a block program. ``wait``: s of robot
+    time. ``until``: something that must become true ``within`` s of robot time.
+    """
+
+    run: str | None = None
+    rest: str | None = None
+    text: str | None = None
+    dog: int | None = None
+    program: str | None = None
+    fault: str | dict[str, Any] | None = None
+    clear_faults: bool | None = None
+    place: Placing | None = None
+    box: Box | None = None
+    wait: Seconds | None = None
+    until: Check | None = None
+    within: Seconds = 60.0
+    body: Any = None
+    status: int | None = None
+    answer: Any = None
+    robot: str = ""
+
+
+STEPS = ("run", "rest", "text", "dog", "program", "fault", "clear_faults", "place", "box", "wait", "until")
+CHECKS = tuple(field.name for field in msgspec.structs.fields(Check))
+
+
+class Scenario(_Strict, frozen=True, forbid_unknown_fields=True):
+    """One test: ``given`` a world, ``when`` this happens in order, ``then`` all of that is true."""
+
+    name: str
+    when: tuple[Step, ...]
+    then: Annotated[tuple[Check, ...], msgspec.Meta(min_length=1)]
+    given: Given = Given()
+    about: str = ""
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Found:
+    """A scenario and where it was."""
+
+    path: Path
+    scenario: Scenario
+
+
+def fault_of(value: str | Mapping[str, Any]) -> WantedFault:
+    """Return the fault of a file: its name, or a mapping with ``kind``, ``robot`` and options. Raises BadScenario."""
+    if isinstance(value, str):
+        return WantedFault(value)
+    options = dict(value)
+    if not isinstance(kind := options.pop("kind", None), str):
+        raise BadScenario("a fault needs a kind")
+    robot = options.pop("robot", None)
+    return WantedFault(kind, robot, tuple(sorted(options.items())))
+
+
+def verb_of(value: Step | Check, verbs: Sequence[str]) -> str:
+    """Return the one verb that is given. Raises BadScenario."""
+    given = [verb for verb in verbs if getattr(value, verb) is not None]
+    if len(given) != 1:
+        raise BadScenario(f"one of {', '.join(verbs)} is needed, not {' and '.join(given) or 'none'}")
+    return given[0]
+
+
+def read(path: Path) -> Found:
+    """Read one file. Raises BadScenario."""
+    import yaml
+
+    try:
+        if path.stat().st_size > BYTES_MAX:
+            raise BadScenario(f"longer than {BYTES_MAX} bytes")
+        values = yaml.safe_load(path.read_text(encoding="utf-8"))
+        if isinstance(values, dict):
+            values.pop("$schema", None)
+        scenario = msgspec.convert(values, Scenario)
+        _check(scenario)
+        scenario.given.wanted(path.parent)
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, msgspec.ValidationError, BadScenario, RecursionError) as error:
+        raise BadScenario(f"{path}: {' '.join(str(error).split())}") from None
+    return Found(path, scenario)
+
+
+def _check(scenario: Scenario) -> None:
+    """Raise BadScenario for what a schema of single fields cannot see."""
+    parts: list[tuple[str, Step | Check, Sequence[str]]] = []
+    for number, step in enumerate(scenario.when, 1):
+        parts.append((f"when {number}", step, STEPS))
+        if step.until is not None:
+            parts.append((f"when {number}: until", step.until, CHECKS))
+    parts += [(f"then {number}", check, CHECKS) for number, check in enumerate(scenario.then, 1)]
+    for where, part, verbs in parts:
+        try:
+            value = getattr(part, verb_of(part, verbs))
+        except BadScenario as error:
+            raise BadScenario(f"{where}: {error}") from None
+        for robot in {getattr(part, "robot", ""), getattr(value, "robot", "")} - {"", *scenario.given.robots}:
+            raise BadScenario(f"{where}: there is no robot {robot!r}, only {', '.join(scenario.given.robots)}")
+
+
+def find(paths: Sequence[Path]) -> Sequence[Found]:
+    """Read files, and all ``*.yaml`` and ``*.yml`` below folders. Raises BadScenario, also if there are none."""
+    files: list[Path] = []
+    for path in paths:
+        files += sorted(one for one in path.rglob("*") if one.suffix in (".yaml", ".yml")) if path.is_dir() else [path]
+    if not files:
+        raise BadScenario(f"no scenario in {', '.join(map(str, paths))}")
+    return [read(file) for file in files]
+
+
+def schema() -> dict[str, Any]:
+    """Return the JSON schema (2020-12) of a scenario file."""
+    made = msgspec.json.schema(Scenario)
+    for name, verbs in (("Step", STEPS), ("Check", CHECKS)):
+        made["$defs"][name]["oneOf"] = [{"required": [verb]} for verb in verbs]
+    made["$defs"]["Scenario"]["properties"]["$schema"] = {"type": "string"}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "roboglot scenario"} | made

@@ -1,0 +1,94 @@
+"""Plays scenarios one after the other, each on robots of its own; keeps what failed ones leave; writes JUnit."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+from roboglot.testing.artifacts import folder_of, save
+from roboglot.testing.scenarios.checks import Checker
+from roboglot.testing.scenarios.files import Found
+from roboglot.testing.scenarios.steps import StepFailed, Steps
+from roboglot.testing.server import RobotServer
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a scenario went: ``failures`` in plain words (none: it passed), real seconds, and what it left."""
+
+    found: Found
+    failures: Sequence[str]
+    seconds: float
+    left: Sequence[Path] = ()
+    broken: bool = False  # it could not be played at all
+
+
+def play(found: Found, leave: Path) -> Outcome:
+    """Play one scenario; what a failed one leaves goes into a folder below ``leave``."""
+    began = time.monotonic()  # noqa: TID251 - what CI shows as the test's time
+    try:
+        with RobotServer(found.scenario.given.wanted(found.path.parent)) as server:
+            failures = _play_on(server, found)
+            left: Sequence[Path] = ()
+            if failures:
+                left = save(server, folder_of(leave, found.path.stem), found.scenario.name, "\n".join(failures))
+    except (OSError, ValueError) as error:
+        return Outcome(found, [f"given: {error}"], time.monotonic() - began, broken=True)  # noqa: TID251
+    return Outcome(found, failures, time.monotonic() - began, left)  # noqa: TID251
+
+
+def _play_on(server: RobotServer, found: Found) -> Sequence[str]:
+    checker = Checker(server)
+    steps = Steps(server, checker, found.path.parent)
+    for number, step in enumerate(found.scenario.when, 1):
+        try:
+            steps.play(step)
+        except StepFailed as failure:
+            return [f"when {number}: {failure}"]
+    wrong = ((number, checker.wrong(check)) for number, check in enumerate(found.scenario.then, 1))
+    return [f"then {number}: {reason}" for number, reason in wrong if reason]
+
+
+def play_all(all_found: Sequence[Found], leave: Path, report: Callable[[Outcome], None]) -> Sequence[Outcome]:
+    """Play them in order; ``report`` is called after each."""
+    outcomes: list[Outcome] = []
+    for found in all_found:
+        outcomes.append(play(found, leave))
+        report(outcomes[-1])
+    return outcomes
+
+
+def junit(outcomes: Sequence[Outcome]) -> bytes:
+    """Return the report as CI systems read it, with what failed scenarios left as attachments."""
+    failed, broken = sum(bool(o.failures) and not o.broken for o in outcomes), sum(o.broken for o in outcomes)
+    suite = ElementTree.Element(
+        "testsuite",
+        name="roboglot",
+        tests=str(len(outcomes)),
+        failures=str(failed),
+        errors=str(broken),
+        time=f"{sum(o.seconds for o in outcomes):.3f}",
+    )
+    for outcome in outcomes:
+        names = {"classname": str(outcome.found.path), "name": outcome.found.scenario.name}
+        case = ElementTree.SubElement(suite, "testcase", names, time=f"{outcome.seconds:.3f}")
+        if outcome.failures:
+            kind = "error" if outcome.broken else "failure"
+            ElementTree.SubElement(case, kind, message=_clean(outcome.failures[0])).text = _clean(
+                "\n".join(outcome.failures)
+            )
+        if outcome.left:
+            lines = "\n".join(f"[[ATTACHMENT|{path}]]" for path in outcome.left)
+            ElementTree.SubElement(case, "system-out").text = lines
+    root = ElementTree.Element("testsuites")
+    root.append(suite)
+    document: bytes = ElementTree.tostring(root, "utf-8", xml_declaration=True)
+    return document
+
+
+def _clean(text: str) -> str:
+    """Return it without what XML cannot carry."""
+    return "".join(c if c in "\t\n" or (c >= " " and not 0xD800 <= ord(c) <= 0xDFFF) else "\ufffd" for c in text)

@@ -1,0 +1,175 @@
+"""What happens in a scenario: each step does one thing, and raises StepFailed where it does not go as written."""
+
+from __future__ import annotations
+
+import contextlib
+import http.client
+import json
+import math
+import os
+import signal
+import subprocess
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from roboglot.clients.errors import ClientError
+from roboglot.model.errors import RobotError
+from roboglot.model.geometry import Pose
+from roboglot.testing.programs import ProgramFailed
+from roboglot.testing.scenarios.checks import Checker
+from roboglot.testing.scenarios.files import STEPS, BadScenario, Step, fault_of, verb_of
+from roboglot.testing.server import NotInTime, RobotServer
+
+OUTPUT_MAX = 1 << 20  # characters of a command that are kept
+SHOWN_MAX = 2000  # of its end, when it fails
+ANSWER_MAX = 16 << 20
+
+
+class StepFailed(AssertionError):
+    """A step did not go as written; the message says how it went."""
+
+
+class Steps:
+    """Plays the steps of one scenario."""
+
+    def __init__(self, server: RobotServer, checker: Checker, folder: Path) -> None:
+        self._server, self._checker, self._folder = server, checker, folder
+        self._clients: dict[str, Any] = {}
+        self._verbs: Mapping[str, Callable[[Step], None]] = {name: getattr(self, f"_{name}") for name in STEPS}
+
+    def play(self, step: Step) -> None:
+        """Do it. Raises StepFailed."""
+        verb = verb_of(step, STEPS)
+        try:
+            self._verbs[verb](step)
+        except (ClientError, RobotError, ProgramFailed, NotInTime, TimeoutError, ValueError, OSError) as error:
+            raise StepFailed(f"{verb}: {error or type(error).__name__}") from None
+
+    def environment(self) -> dict[str, str]:
+        """Return the variables of a command that lead it to the robots."""
+        server, found = self._server, dict(os.environ)
+        for name, address in server.addresses.items():
+            found[f"ROBOGLOT_ADDRESS_{name.upper()}"] = address
+        found |= {
+            "ROBOGLOT_ADDRESS": server.address,
+            "ROBOGLOT_URL": server.url,
+            "ROBOGLOT_PROGRAMS": server.programs_url.removesuffix("/programs"),
+            "ROBOGLOT_APP_PORT": str(server.app_port),
+        }
+        with contextlib.suppress(ImportError, OSError):
+            server.certificates()
+            found["ROBOGLOT_CERTIFICATES"] = str(server.data / "app")
+        return found
+
+    def _run(self, step: Step) -> None:
+        command = step.run or ""
+        process = subprocess.Popen(
+            command,
+            shell=True,
+            cwd=self._folder,
+            env=self.environment(),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors="replace",
+            start_new_session=True,
+        )
+        try:
+            output, _ = process.communicate(timeout=step.within)
+        except subprocess.TimeoutExpired:
+            _end_group(process)
+            output, _ = process.communicate()
+            raise StepFailed(f"{command!r} has not ended after {step.within:g} s\n{output[-SHOWN_MAX:]}") from None
+        self._checker.printed += output[-OUTPUT_MAX:].splitlines()
+        if process.returncode:
+            raise StepFailed(f"{command!r} ended with {process.returncode}\n{output[-SHOWN_MAX:]}")
+
+    def _rest(self, step: Step) -> None:
+        method, _, path = (step.rest or "").partition(" ")
+        body = None if step.body is None else json.dumps(step.body)
+        host = self._server.addresses[step.robot] if step.robot else self._server.address
+        with contextlib.closing(http.client.HTTPConnection(host, 1448, timeout=step.within)) as connection:
+            connection.request(method, path.strip(), body, {"Content-Type": "application/json"} if body else {})
+            response = connection.getresponse()
+            data = response.read(ANSWER_MAX)
+        wanted = step.status or 200
+        if response.status != wanted and (step.status is not None or response.status >= 400):
+            raise StepFailed(
+                f"{step.rest}: {response.status}, not {wanted}: {data[:SHOWN_MAX].decode(errors='replace')}"
+            )
+        if step.answer is not None and not _has(json.loads(data or b"null"), step.answer):
+            raise StepFailed(f"{step.rest} answered {data[:SHOWN_MAX].decode(errors='replace')}, not {step.answer}")
+
+    def _text(self, step: Step) -> None:
+        answer = self._client("robomaster", step.robot).ask(step.text, step.within)
+        if answer != (wanted := "ok" if step.answer is None else str(step.answer)):
+            raise StepFailed(f"{step.text!r} was answered {answer!r}, not {wanted!r}")
+
+    def _dog(self, step: Step) -> None:
+        from roboglot.wire.cyberdog.codes import Code
+
+        code = Code(step.dog or 0)
+        answers = list(self._client("cyberdog", step.robot).answers(code, step.body or {}))
+        if step.answer is not None and not any(_has(json.loads(text or "null"), step.answer) for text in answers):
+            raise StepFailed(f"{step.dog} was answered {answers}, not {step.answer}")
+
+    def _program(self, step: Step) -> None:
+        source = (self._folder / (step.program or "")).read_text(encoding="utf-8")
+        run = self._client("program", step.robot).run(source, within=step.within)
+        self._checker.printed += run.printed
+
+    def _fault(self, step: Step) -> None:
+        fault = fault_of(step.fault or "")
+        self._server.stage.inject_fault(fault.kind, fault.robot, **dict(fault.options))
+
+    def _clear_faults(self, _: Step) -> None:
+        self._server.stage.clear_fault()
+
+    def _place(self, step: Step) -> None:
+        assert step.place is not None
+        name = step.place.robot or next(iter(self._server.addresses))
+        self._server.stage.place(name, Pose(step.place.x, step.place.y, math.radians(step.place.degrees)))
+
+    def _box(self, step: Step) -> None:
+        assert step.box is not None
+        box = step.box
+        self._server.stage.add_obstacle(Pose(box.x, box.y, 0.0), (box.width, box.depth, box.height))
+
+    def _wait(self, step: Step) -> None:
+        self._server.forward(step.wait or 0.0)
+
+    def _until(self, step: Step) -> None:
+        assert step.until is not None
+        end, wrong = self._server.time + step.within, self._checker.wrong(step.until)
+        while wrong:
+            if self._server.time >= end:
+                raise StepFailed(f"not within {step.within:g} s: {wrong}")
+            self._server.forward(0.1)
+            wrong = self._checker.wrong(step.until)
+
+    def _client(self, kind: str, robot: str) -> Any:
+        if (found := self._clients.get(kind + robot)) is None:
+            if robot and robot not in self._server.addresses:
+                raise BadScenario(f"there is no robot {robot!r}")
+            made = getattr(self._server, f"new_{kind}")(robot)
+            found = self._clients[kind + robot] = self._server.open(made)
+        return found
+
+
+def _end_group(process: subprocess.Popen[str]) -> None:
+    """End a command and all that it started."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+
+
+def _has(have: Any, wanted: Any) -> bool:
+    """Whether an answer has all that is wanted, and maybe more."""
+    if isinstance(wanted, dict):
+        return isinstance(have, dict) and all(key in have and _has(have[key], value) for key, value in wanted.items())
+    if isinstance(wanted, list):
+        return isinstance(have, list) and len(have) == len(wanted) and all(map(_has, have, wanted))
+    if isinstance(wanted, float) and isinstance(have, (int, float)):
+        return math.isclose(have, wanted, rel_tol=1e-6, abs_tol=1e-9)
+    return type(have) is type(wanted) and bool(have == wanted)

@@ -1,0 +1,68 @@
+"""The CI kit: the script that GitHub's action and GitLab's template call, both files, and the sample app's tests."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from roboglot.recording.reader import read_recording
+
+ROOT = Path(__file__).parents[2]
+ROBOT = ROOT / "deploy/ci/robot"
+ADDRESS = "127.0.0.222"
+
+
+def robot(folder: Path, *arguments: str, **more: str) -> str:
+    environment = os.environ | {"ROBOGLOT_CI": str(folder / "ci"), "ROBOGLOT_VENV": sys.prefix} | more
+    done = subprocess.run(
+        [ROBOT, *arguments], env=environment, cwd=folder, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def test_a_job_starts_a_robot_drives_it_and_keeps_what_happened(tmp_path: Path) -> None:
+    address = robot(tmp_path, "up", ARGUMENTS=f"--address {ADDRESS} --no-console --world empty --speed 4").strip()
+    try:
+        assert address == ADDRESS
+        app = [sys.executable, str(ROOT / "examples/ci/courier.py"), f"http://{address}:1448", "0.4", "0.0"]
+        assert subprocess.run(app, capture_output=True, text=True, timeout=60, check=True).stdout.startswith("arrived")
+    finally:
+        robot(tmp_path, "down")
+    [recording] = (tmp_path / "ci/artifacts").glob("*.mcap")
+    assert any("actions" in exchange.operation for exchange in read_recording(recording).exchanges)
+    assert (tmp_path / "ci/artifacts/log.txt").exists()
+
+
+def test_a_robot_that_does_not_come_up_fails_the_job_with_its_reason(tmp_path: Path) -> None:
+    with pytest.raises(AssertionError, match="nowhere"):
+        robot(tmp_path, "up", ARGUMENTS="--world nowhere")
+
+
+def test_action_and_template_call_what_is_there() -> None:
+    action = yaml.safe_load((ROOT / "action.yml").read_text())
+    steps = action["runs"]["steps"]
+    called = {found for step in steps for found in re.findall(r'deploy/ci/robot" (\w+)', step.get("run", ""))}
+    assert called == {"install", "up", "test", "down"}
+    used = set(re.findall(r"inputs\.(\w+)", (ROOT / "action.yml").read_text()))
+    assert used == set(action["inputs"])
+    template = yaml.safe_load((ROOT / "deploy/ci/gitlab.yml").read_text())[".roboglot"]
+    lines = " ".join((*template["before_script"], *template["after_script"]))
+    assert set(re.findall(r'deploy/ci/robot" (\w+)', lines)) == {"install", "up", "down"}
+    workflow = yaml.safe_load((ROOT / ".github/workflows/check.yml").read_text())
+    assert workflow["jobs"]["action"]["steps"][-1]["with"] == {"do": "down"}
+
+
+@pytest.mark.slow
+def test_the_sample_apps_tests_pass_side_by_side(tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "examples/ci", tmp_path / "app")
+    command = [sys.executable, "-m", "pytest", "-q", "-n", "2", "-p", "no:cacheprovider"]
+    done = subprocess.run(command, cwd=tmp_path / "app", capture_output=True, text=True, timeout=120, check=False)
+    assert "20 passed" in done.stdout, done.stdout + done.stderr

@@ -1,0 +1,113 @@
+"""Scenario files: read strictly, played on real ports, judged by the truth; JUnit and artefacts of those that fail."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from roboglot.testing.scenarios.files import BadScenario, find, read, schema
+
+SAMPLE = Path(__file__).parents[2] / "examples/ci"
+WRONG = {
+    "name: x": "`when`",
+    "name: x\nwhen: []\nthen: []\n": "length",
+    "name: x\nwhen: []\nthen: [{moved: {z: 1}}]\n": "unknown field `z`",
+    "name: x\nwhen: [{run: a, text: b}]\nthen: [{refused: 0}]\n": "when 1: one of run, rest",
+    "name: x\nwhen: [{within: 3}]\nthen: [{refused: 0}]\n": "not none",
+    "name: x\nwhen: [{until: {}}]\nthen: [{refused: 0}]\n": "when 1: until: one of pose",
+    "name: x\nwhen: []\nthen: [{battery: {at_least: 3, robot: b}}]\n": "no robot 'b', only a",
+    "name: x\nwhen: []\nthen: [{refused: 0}]\ngiven: {robots: []}\n": "length",
+    "a: [": "while parsing",
+    "!!python/object/apply:os.system [true]": "constructor",
+}
+
+
+@pytest.mark.parametrize("text", WRONG)
+def test_what_is_no_scenario_is_refused_with_the_place(tmp_path: Path, text: str) -> None:
+    file = tmp_path / "x.yaml"
+    file.write_text(text)
+    with pytest.raises(BadScenario, match=WRONG[text]) as refused:
+        read(file)
+    assert str(refused.value).startswith(f"{file}: ")
+    assert "\n" not in str(refused.value)
+
+
+def test_an_empty_folder_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(BadScenario, match="no scenario"):
+        find([tmp_path])
+
+
+def test_the_samples_schema_is_that_of_the_code() -> None:
+    assert json.loads((SAMPLE / "scenario.schema.json").read_text()) == json.loads(json.dumps(schema()))
+
+
+PASSES = """
+name: it drives by text
+given: {world: empty}
+when:
+  - text: chassis move x 0.3 wait_for_complete true
+  - dog: 5001
+    body: {}
+  - program: hello.py
+  - run: test -n "$ROBOGLOT_CERTIFICATES" && echo "at $ROBOGLOT_ADDRESS"
+  - rest: GET /api/core/nothing
+    status: 404
+  - fault: {kind: low_battery, charge: 0.1}
+  - until: {battery: {at_most: 10.5}}
+    within: 5
+then:
+  - moved: {x: 0.3, y: 0.0}
+  - travelled: {at_least: 0.25, at_most: 1}
+  - printed: hello
+  - printed: at 127.
+  - exchanged: {door: slamware, status: "404", at_most: 1}
+"""
+FAILS = """
+name: it does not drive & "quotes"
+given: {world: empty}
+when:
+  - wait: 0.2
+then:
+  - moved: {x: 1.0}
+  - refused: 0
+  - printed: never
+"""
+STOPS = """
+name: a step fails
+given: {world: empty}
+when:
+  - rest: GET /api/core/nothing
+then: [{refused: 0}]
+"""
+BROKEN = "name: no such world\ngiven: {world: nowhere}\nwhen: []\nthen: [{refused: 0}]\n"
+
+
+def test_scenarios_are_played_and_reported(tmp_path: Path) -> None:
+    folder = tmp_path / "scenarios"
+    folder.mkdir()
+    (folder / "hello.py").write_text("print('hello')\n")
+    for name, text in (("a", PASSES), ("b", FAILS), ("c", STOPS), ("d", BROKEN)):
+        (folder / f"{name}.yaml").write_text(text)
+    command = [sys.executable, "-m", "roboglot", "test", str(folder), "--junit", str(tmp_path / "out/j.xml")]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert "ok     it drives by text" in done.stdout
+    assert "1 of 4 scenarios passed" in done.stdout
+    assert "then 1: moved: x is 0.000, not 1.000" in done.stdout
+    assert "then 3: printed: 'never' was not printed" in done.stdout
+    assert "when 1: GET /api/core/nothing: 404, not 200" in done.stdout
+    suite = ElementTree.parse(tmp_path / "out/j.xml").getroot()[0]
+    assert {key: suite.get(key) for key in ("tests", "failures", "errors")} == {
+        "tests": "4",
+        "failures": "2",
+        "errors": "1",
+    }
+    assert suite[1].get("name") == 'it does not drive & "quotes"'
+    assert (tmp_path / "roboglot-failures/b/recording.mcap").stat().st_size > 1000
+    assert (tmp_path / "roboglot-failures/b/exchanges.html").exists()
+    assert "[[ATTACHMENT|" in (suite[1].findtext("system-out") or "")
