@@ -179,6 +179,30 @@ async def test_a_program_is_built_run_broken_stepped_and_mended_by_keyboard_alon
     await until(page, "studio.runner.printed.value.length === 1 && studio.runner.phase.value === 'idle'")
     await page.keyboard.press("Delete")
     await until(page, "studio.editor.isEmpty()")
+    await page.keyboard.press("Control+z")
+    await until(page, "studio.editor.code.value.includes('print(')")
+    await page.keyboard.press("Control+y")
+    await until(page, "studio.editor.isEmpty()")
+
+
+async def test_values_stand_at_their_blocks(studio: Open) -> None:
+    page = await loaded(await studio(), COUNTING)
+    await page.evaluate("studio.editor.toggleBreak('say')")
+    await page.keyboard.press("F5")
+    await phase(page, "paused")
+    bubble = "document.querySelector('.value-bubble[data-of=more] text')?.textContent"
+    await until(page, f"{bubble} === 'n = 6'")
+    await page.keyboard.press("F5")
+    await phase(page, "paused")
+    await until(page, f"{bubble} === 'n = 9'")
+    await page.keyboard.press("Shift+F5")
+    await phase(page, "idle")
+    reads = {"type": "text_print", "id": "see", "x": 30, "y": 30, "inputs": {
+        "TEXT": {"block": {"type": "value cyberdog.bms.get_data"}}}}  # fmt: skip
+    await loaded(page, {"blocks": {"languageVersion": 0, "blocks": [reads]}})
+    await page.keyboard.press("F5")
+    await until(page, "document.querySelector('.value-bubble[data-of=see] text')?.textContent")
+    assert page.errors == []
 
 
 async def test_python_opens_as_text_with_the_checkers_words(studio: Open) -> None:

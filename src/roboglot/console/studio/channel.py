@@ -7,8 +7,10 @@ relay, rights are the same, sizes and rates are bounded.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import dataclasses
 import logging
+import re
 import time
 from collections import deque
 from collections.abc import Awaitable, Callable
@@ -35,7 +37,9 @@ log = logging.getLogger(__name__)
 MESSAGE_MAX = FRAME_MAX + 64 * 1024  # characters of one message of a page
 MESSAGES_PER_SECOND_MAX = 50
 PENDING_MAX = 16  # messages of one page that are being answered
+LIGHT_EVERY = 0.02  # s: a page is shown the newest block at most so often
 WAITING_MAX = 2000  # messages that wait for a page that reads slowly; beyond, the oldest insights are dropped
+_BLOCK = re.compile(r'"block": \{"type": "(begin|end)"')
 Send = Callable[[str], Awaitable[None]]
 Id = Annotated[str, msgspec.Meta(max_length=ID_MAX)]
 
@@ -67,11 +71,12 @@ class Check(msgspec.Struct, tag="check", tag_field="type"):
 
 
 class Fetch(msgspec.Struct, tag="fetch", tag_field="type"):
-    """A stored program, or module, with its text and its log."""
+    """A stored program, or module, with its text and, if wished, its log."""
 
     id: int
     program: Id
     module: bool = False
+    log: bool = True
 
 
 Message = Open | Frame | Debug | Check | Fetch | TrialWish | TrialEnd | Member
@@ -89,6 +94,7 @@ class Session:
         self._leaving: list[Callable[[], None]] = []
         self._waiting: deque[dict[str, Any]] = deque()
         self._due = asyncio.Event()
+        self._light: dict[str, Any] | None = None  # of the last begin of a block, while it waits
         self._pending: set[asyncio.Task[None]] = set()
         self._trial = Trial(self.tell)
         self._seat = classroom.seat(self.tell)
@@ -96,11 +102,19 @@ class Session:
 
     async def run(self) -> None:
         """Send until cancelled."""
+        lit = 0.0
         while True:
             await self._due.wait()
             self._due.clear()
             while self._waiting:
-                await self._send(msgspec.json.encode(self._waiting.popleft()).decode())
+                if self._waiting[-1] is self._light and len(self._waiting) == 1:
+                    with contextlib.suppress(TimeoutError):
+                        await asyncio.wait_for(self._due.wait(), max(0.0, lit + LIGHT_EVERY - time.monotonic()))
+                    lit = time.monotonic()
+                message = self._waiting.popleft()
+                if message is self._light:
+                    self._light = None
+                await self._send(msgspec.json.encode(message).decode())
 
     def tell(self, message: dict[str, Any]) -> None:
         """Send a message when its turn comes."""
@@ -123,7 +137,15 @@ class Session:
         """An answer to a frame."""
         self.tell({"type": "frame", "text": text})
 
-    publish = answer
+    def publish(self, text: str) -> None:
+        """A report of a task. Of blocks that begin quickly one after the other only the newest counts."""
+        if (block := _BLOCK.search(text)) is None:
+            self.answer(text)
+        elif block[1] == "begin":
+            if self._light is None or self._waiting[-1] is not self._light:
+                self._light = {"type": "frame"}
+                self.tell(self._light)
+            self._light["text"] = text
 
     async def room(self) -> None:
         """Programs wait for no page."""
@@ -201,7 +223,7 @@ class Session:
     async def _fetch(self, programs: Programs, wish: Fetch) -> None:
         service = programs.service
         found = await (service.library.get(wish.program) if wish.module else service.get(wish.program))
-        entries = [] if wish.module else await service.log(wish.program)
+        entries = await service.log(wish.program) if wish.log and not wish.module else []
         where = await service.whereabouts(wish.program)
         self.tell(
             {

@@ -18,7 +18,7 @@ from roboglot.programs.rehearsing import Act, Played, Scene
 
 log = logging.getLogger(__name__)
 
-FOLDER = Path(__file__).parents[4] / "examples" / "lessons"  # of a clone; a wheel has none
+FOLDER = Path(__file__).parent / "missions"  # examples/lessons leads here
 LESSONS_MAX, FILE_MAX = 200, 64 * 1024
 STARS_MAX = 3
 

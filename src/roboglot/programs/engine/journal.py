@@ -30,12 +30,16 @@ _READING = (
 
 
 class Header(msgspec.Struct, frozen=True):
-    """What a run was started with; nothing else than its answers makes it do what it does."""
+    """What a run was started with; nothing else than its answers makes it do what it does.
+
+    ``watched``: it could be stepped through, and can be again.
+    """
 
     body: str
     modules: dict[str, str]
     utc_offset: int
     seed: int
+    watched: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,9 +58,9 @@ def does_something(name: str) -> bool:
     return not name.startswith("time.") and not name.endswith(_READING)
 
 
-def header_of(body: str, modules: Mapping[str, str], utc_offset: int) -> Header:
+def header_of(body: str, modules: Mapping[str, str], utc_offset: int, *, watched: bool = False) -> Header:
     """Of a new run, with a seed of its own."""
-    return Header(body, dict(modules), utc_offset, secrets.randbits(63))
+    return Header(body, dict(modules), utc_offset, secrets.randbits(63), watched)
 
 
 class Journal:

@@ -113,9 +113,10 @@ class Runner:
         journal = Journal(self._journals, task.id)
         try:
             modules = await self._library.sources(uses)
-            header = header_of(task.body, modules, int(here.total_seconds()) if here else 0)
-            await journal.open(header)
             stops = self.stops.get(task.id, Stops() if task.id == DEBUG else None)
+            offset = int(here.total_seconds()) if here else 0
+            header = header_of(task.body, modules, offset, watched=stops is not None)
+            await journal.open(header)
             living = await self._living(task, header, journal, stops=stops)
         except (SandboxUnavailable, EngineError, ValueError, LookupError, ProgramError) as error:
             note = LogEntry(self._robot.clock.epoch(), "error", str(error))
@@ -132,7 +133,8 @@ class Runner:
         now = self._robot.clock.epoch()
         try:
             history = await journal.reopen(header)
-            living = await self._living(task, history.header, journal, history.answers)
+            stops = Stops(watched=True) if history.header.watched else None
+            living = await self._living(task, history.header, journal, history.answers, stops)
         except (SandboxUnavailable, EngineError, ValueError, msgspec.MsgspecError) as error:
             words = f"the server ended while the task was under way; it cannot go on: {error}"
             state = state_after(TaskState.SUSPEND, TaskOperation.SHUTDOWN, task.mode)

@@ -111,7 +111,9 @@ function tidied(state) {
 }
 
 export function clear() { quiet = true; workspace.clear(); workspace.clearUndo(); refresh(); setTimeout(() => { quiet = false; }); }
-export const undo = (/** @type {boolean} */ redo) => workspace.undo(redo);
+/** Undo, once what was just done has been noted: Blockly notes it a frame later. */
+export const undo = (/** @type {boolean} */ redo) => noted(() => workspace.undo(redo));
+function noted(/** @type {() => void} */ act) { requestAnimationFrame(() => setTimeout(act)); }
 export const isEmpty = () => !workspace || workspace.getAllBlocks(false).length === 0;
 
 /** Show only what a mission allows, or everything. @param {string[] | null} types */
@@ -178,3 +180,8 @@ Blockly.ContextMenuRegistry.registry.register({
 Blockly.ShortcutRegistry.registry.register({
   name: "breakpoint", keyCodes: [Blockly.utils.KeyCodes.F9 ?? 120], preconditionFn: (ws) => !ws.isFlyout, callback: () => { toggleBreak(); return true; },
 });
+for (const name of ["undo", "redo"]) {
+  const { registry } = Blockly.ShortcutRegistry, was = registry.getRegistry()[name];
+  registry.unregister(name);
+  registry.register({ ...was, allowCollision: true, callback: (ws, event, ...more) => { event.preventDefault(); noted(() => was.callback(ws, event, ...more)); return true; } });
+}

@@ -92,6 +92,8 @@ function App() {
     const key = (event) => {
       if (event.key === "Escape" && !event.repeat && !shown.value && !event.defaultPrevented && runner.phase.value !== "idle") { runner.stop(); command("stop"); return; }
       if (event.key === "F5" && event.shiftKey) { event.preventDefault(); runner.stop(); return; }
+      if (/^[zy]$/i.test(event.key) && (event.ctrlKey || event.metaKey) && !event.defaultPrevented && program.value.kind === "blocks" && !shown.value
+          && !event.target.closest?.("input, textarea, [contenteditable], .blocklyWidgetDiv")) { event.preventDefault(); editor.undo(event.shiftKey || event.key.toLowerCase() === "y"); return; }
       if (keys[event.key] && !event.ctrlKey) { event.preventDefault(); keys[event.key](); }
     };
     addEventListener("keydown", key);

@@ -63,6 +63,12 @@ export const saveFrame = () => frame({
   type: "task", operate: "save", target_id: [program.value.id], describe: (program.value.name || t("studio.untitled")).replaceAll('"""', "'"), style: style(),
   mode: "single", condition: "now", body: python() });
 
+/** Whether the robot has exactly this program, and it is right: then it need not be saved and checked before it runs. */
+export async function isStored() {
+  const { program: found } = await ask({ type: "fetch", program: program.value.id, log: false });
+  return Boolean(found) && found.body === python() && found.style === style() && found.state !== "error" && found.mode === "single" && found.condition === "now";
+}
+
 async function saveToRobot() {
   if (online.value !== "open" || !python().trim()) return;
   try {

@@ -2,9 +2,10 @@
 import { computed, signal } from "@preact/signals";
 import { language, say, t } from "../base.js";
 import { blocksOfLines } from "./blocks.js";
+import * as bubbles from "./bubbles.js";
 import * as editor from "./editor.js";
 import { ask, debug, frame, listen, opened } from "./link.js";
-import { program, python, saveFrame } from "./program.js";
+import { isStored, program, python, saveFrame } from "./program.js";
 
 const LINES_MAX = 500, READINGS_MAX = 40;
 export const phase = signal(/** @type {"idle" | "starting" | "running" | "paused"} */ ("idle"));
@@ -38,10 +39,10 @@ export async function run(step = false) {
   if (!python().trim()) { say(t("studio.empty")); return undefined; }
   phase.value = "starting";
   began = performance.now();
-  printed.value = []; readings.value = []; variables.value = {}; failure.value = null;
+  printed.value = []; readings.value = []; variables.value = {}; failure.value = null; bubbles.clear();
   try {
-    const saved = await saveFrame();
-    if (saved.feedback.state) {
+    const saved = await isStored() ? null : await saveFrame();
+    if (saved?.feedback.state) {
       phase.value = "idle";
       await check();
       say(t("studio.wrong", { why: problems.value.length ? words(problems.value[0]) : saved.feedback.describe }), true);
@@ -79,7 +80,7 @@ export async function operate(operation, id = program.value.id) {
 }
 
 /** Breakpoints were changed while it runs. */
-export async function tellStops() { if (phase.value !== "idle" && phase.value !== "starting") await debug(stops()).catch(() => undefined); }
+export async function tellStops() { const wish = stops(); if (phase.peek() === "running" || phase.peek() === "paused") await debug(wish).catch(() => undefined); }
 
 let checking = 0;
 /** Ask what is wrong with the program as it stands. */
@@ -96,6 +97,7 @@ export async function check() {
 
 /** Put problems, and the last run's failure, to their blocks. */
 export function show() {
+  bubbles.draw();
   if (program.value.kind !== "blocks") return;
   const owners = blocksOfLines(editor.code.value), wrong = new Map();
   for (const found of problems.value) if (owners[found.line - 1]) wrong.set(owners[found.line - 1], words(found));
@@ -112,12 +114,13 @@ export async function catchUp() {
   printed.value = log.slice(-LINES_MAX).map(entry);
   phase.value = where.state === "suspend" ? "paused" : "running";
   place(where.block, where.line, where.module);
+  if (phase.value === "paused" && !where.block && !where.line) setTimeout(() => { if (phase.value === "paused" && !lit.value) look(); }, 500); // it is on its way back to where it was
 }
 
 /** Another program was opened: what was shown is the other's. */
 export function forget() {
   settle("idle");
-  printed.value = []; readings.value = []; variables.value = {}; failure.value = null; problems.value = []; textBreaks.value = [];
+  printed.value = []; readings.value = []; variables.value = {}; failure.value = null; problems.value = []; textBreaks.value = []; bubbles.clear();
 }
 
 function settle(now) {
@@ -154,8 +157,15 @@ listen((message) => {
       printed.value = [...printed.value, entry(message)].slice(-LINES_MAX);
       if (message.level === "error") blameRun(message);
       break;
-    case "variables": if (mine(message.task)) variables.value = message.variables; break;
-    case "reading": if (mine(message.task)) readings.value = [{ ...message, key: next++ }, ...readings.value].slice(0, READINGS_MAX);
+    case "variables":
+      if (!mine(message.task)) break;
+      variables.value = message.variables;
+      bubbles.held(message.variables);
+      break;
+    case "reading":
+      if (!mine(message.task)) break;
+      readings.value = [{ ...message, key: next++ }, ...readings.value].slice(0, READINGS_MAX);
+      if (!message.module) bubbles.answered(message.block, message.value);
   }
 });
 

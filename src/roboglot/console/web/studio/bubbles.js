@@ -1,0 +1,68 @@
+// Values in bubbles at their blocks: what a function answered there, what the variables of a block hold.
+import * as editor from "./editor.js";
+
+const NS = "http://www.w3.org/2000/svg", LONG = 40, PAD = 6, HEIGHT = 22; // characters, workspace units
+/** By id of the block: what is shown there. @type {Map<string, string>} */
+const shown = new Map();
+let due = false;
+
+/** Python's name of a variable. @param {string} name */
+const pythonic = (name) => encodeURI(name.replaceAll(" ", "_")).replace(/\W/g, "_").replace(/^(\d)/, "my_$1");
+
+/** What a function answered at a block. @param {string} id @param {string} value */
+export function answered(id, value) { put(id, value); }
+
+/** What variables hold, at the statements that name them. @param {Record<string, string>} held */
+export function held(held) {
+  for (const block of editor.workspace?.getAllBlocks(false) ?? []) {
+    if (block.outputConnection || block.isInsertionMarker()) continue;
+    const names = block.getVarModels().map((model) => model.getName()).filter((name) => pythonic(name) in held);
+    if (names.length) put(block.id, names.map((name) => `${name} = ${held[pythonic(name)]}`).join(", "));
+  }
+}
+
+export function clear() { shown.clear(); soon(); }
+
+/** @param {string} id @param {string} text */
+function put(id, text) {
+  const short = text.length > LONG ? `${text.slice(0, LONG - 1)}…` : text;
+  if (!id || shown.get(id) === short) return;
+  shown.set(id, short);
+  soon();
+}
+
+function soon() {
+  if (due) return;
+  due = true;
+  requestAnimationFrame(() => { due = false; draw(); });
+}
+
+/** Draw what is new, take away what is no more; also after the blocks were made anew. */
+export function draw() {
+  for (const old of document.querySelectorAll(".blocklyBlockCanvas .value-bubble")) if (!shown.has(/** @type {any} */ (old).dataset.of)) old.remove();
+  for (const [id, text] of shown) {
+    const root = editor.workspace?.getBlockById(id)?.getSvgRoot();
+    if (root) bubble(root, id, text);
+  }
+}
+
+/** One bubble, above the right end of its block. @param {SVGGElement} root @param {string} id @param {string} text */
+function bubble(root, id, text) {
+  let group = root.querySelector(":scope > .value-bubble");
+  if (!group) {
+    group = document.createElementNS(NS, "g");
+    group.setAttribute("class", "value-bubble");
+    group.setAttribute("aria-hidden", "true"); // the list of values is read
+    /** @type {any} */ (group).dataset.of = id;
+    group.append(document.createElementNS(NS, "rect"), document.createElementNS(NS, "text"));
+    root.append(group);
+  }
+  const [box, words] = /** @type {any} */ (group.children);
+  if (words.textContent === text) return;
+  words.textContent = text;
+  const block = editor.workspace.getBlockById(id), width = words.getComputedTextLength() + 2 * PAD;
+  group.setAttribute("transform", `translate(${block.width + 4}, 4)`);
+  for (const [name, value] of Object.entries({ width, height: HEIGHT, rx: 8 })) box.setAttribute(name, value);
+  words.setAttribute("x", PAD);
+  words.setAttribute("y", HEIGHT - 7);
+}

@@ -1,0 +1,111 @@
+"""The server is killed while a program runs: the page comes back to the program held at its block, and steps on."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import sys
+from collections.abc import AsyncIterator, Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import pytest_asyncio
+
+from tests.browser.served import until
+from tests.browser.test_studio import READY
+
+pytestmark = pytest.mark.asyncio(loop_scope="session")
+ADDRESS = "127.0.93.1"
+HALTED = {
+    "blocks": {
+        "languageVersion": 0,
+        "blocks": [
+            {
+                "type": "variables_set", "id": "set", "x": 30, "y": 30, "fields": {"VAR": {"name": "n"}},
+                "inputs": {"VALUE": {"shadow": {"type": "math_number", "fields": {"NUM": 7}}}},
+                "next": {"block": {
+                    "type": "text_print", "id": "say", "data": "breakpoint",
+                    "inputs": {"TEXT": {"block": {"type": "variables_get", "fields": {"VAR": {"name": "n"}}}}},
+                    "next": {"block": {
+                        "type": "text_print", "id": "end",
+                        "inputs": {"TEXT": {"shadow": {"type": "text", "fields": {"TEXT": "end"}}}},
+                    }},
+                }},
+            }
+        ],
+    }
+}  # fmt: skip
+HELD = "(studio.runner.phase.value === 'paused' ? document.querySelector('.lit')?.dataset.id : '')"
+Life = Callable[[], Awaitable[asyncio.subprocess.Process]]
+
+
+def _port() -> int:
+    with socket.socket() as probe:
+        probe.bind((ADDRESS, 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def server(tmp_path: Path) -> AsyncIterator[tuple[str, Life]]:
+    """Where a server of its own is, and what starts it; the last life is ended with the test."""
+    port, lives = _port(), []
+    settings = tmp_path / "settings.toml"
+    settings.write_text(
+        f'data = "{tmp_path / "data"}"\nworld = "empty"\n[console]\naddress = "{ADDRESS}"\nport = {port}\n'
+        f'[[robots]]\nname = "a"\nbody = "cyberdog2"\naddress = "{ADDRESS}"\n'
+    )
+
+    async def start() -> asyncio.subprocess.Process:
+        life = await asyncio.create_subprocess_exec(
+            sys.executable, "-m", "roboglot", "up", "--config", str(settings),
+            stdout=asyncio.subprocess.DEVNULL, stderr=asyncio.subprocess.DEVNULL,
+        )  # fmt: skip
+        lives.append(life)
+        for _ in range(1200):
+            try:
+                _, writer = await asyncio.open_connection(ADDRESS, port)
+            except OSError:
+                assert life.returncode is None, f"the server ended with {life.returncode}"
+                await asyncio.sleep(0.05)
+            else:
+                writer.close()
+                return life
+        raise TimeoutError("the server did not start")
+
+    yield f"http://{ADDRESS}:{port}", start
+    for life in lives:
+        if life.returncode is None:
+            life.kill()
+        await life.wait()
+
+
+async def test_a_killed_server_gives_the_program_back(server: tuple[str, Life], browser: Any) -> None:
+    url, start = server
+    first = await start()
+    context = await browser.new_context()
+    page = await context.new_page()
+    await page.goto(f"{url}/studio/")
+    await until(page, READY)
+    await page.evaluate("state => { studio.editor.load(state); studio.editor.changes.value += 1; }", HALTED)
+    await until(page, "studio.editor.code.value.includes('end')")
+    await page.keyboard.press("F5")
+    await until(page, f"{HELD} === 'say'")
+    first.kill()
+    await first.wait()
+    await until(page, "document.querySelector('.banner.bad')")
+    await start()
+    await until(page, f"{HELD} === 'say'")
+    second = await context.new_page()  # another tab sees the same
+    await second.goto(f"{url}/studio/")
+    await until(second, f"window.studio && {HELD} === 'say'")
+    await page.bring_to_front()
+    await page.keyboard.press("F8")
+    await until(page, f"{HELD} === 'end'")
+    await until(second, "studio.runner.lit.value === 'end'")
+    await page.keyboard.press("F5")
+    await until(page, "studio.runner.phase.value === 'idle'")
+    texts = "studio.runner.printed.value.filter(e => e.level === 'print').map(e => e.text).join()"
+    assert await page.evaluate(texts) == "7,end"
+    await context.close()
