@@ -27,6 +27,7 @@ from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.inertial_displacement import InertialDisplacement
 from roboglot.autonomy.slam.localization import LidarLocalization
 from roboglot.autonomy.slam.mapping import LidarMapping
+from roboglot.autonomy.slam.odometry_memory import OdometryMemory
 from roboglot.autonomy.stairs.alignment import SeenStairAlignment
 from roboglot.autonomy.training import HeardWords
 from roboglot.kernels import NAVIGATION, loading
@@ -66,7 +67,7 @@ from roboglot.model.components.sensing.vision import Vision
 from roboglot.model.components.system.health import FaultLevel, Health
 from roboglot.model.components.system.ledger import Ledger
 from roboglot.model.components.system.settings import Settings
-from roboglot.model.errors import NotReady, Refused
+from roboglot.model.errors import NotReady, Refused, RobotError
 from roboglot.model.events import ScanTaken
 from roboglot.model.robot import Robot
 
@@ -95,6 +96,7 @@ class Autonomy:
         self._carried: CarriedLegs | None = None
         self._loading: asyncio.Task[None] | None = None
         self._slam: Slam | None = None
+        self._memory: OdometryMemory | None = None
         self._stop_treading: Callable[[], None] = lambda: None
         self._localization: LidarLocalization | None = None
         self._shoves: InertialDisplacement | None = None
@@ -172,6 +174,9 @@ class Autonomy:
         if self._loading is not None:
             self._loading.cancel()
         self._stop_treading()
+        if self._memory is not None:
+            with contextlib.suppress(RobotError):  # its disk is full
+                await self._memory.close()
         if self._slam is not None:
             self._slam.close()
         for part in (
@@ -211,6 +216,8 @@ class Autonomy:
         self._report(None, "")
         course.unavailable = None
         self._slam = slam_class(self._robot, course.belief)
+        if Settings in self._robot:
+            self._memory = OdometryMemory(self._robot, self._slam)
         if self._localization:
             self._localization.estimator = self._slam
         course.planner = planner = planner_class(course.belief, self._robot.description.radius, course.load)

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable
+from pathlib import Path
 from typing import Protocol
 
 from roboglot.model.components.energy.battery import Battery, DockContact
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.components.sensing.lidar import Lidar
-from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.components.sensing.odometry import Odometry, OdometryNoise
 from roboglot.model.errors import Unconnected
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.sensing import BatteryState, ImuReading, LaserScan, OdometryReading
+
+DESCRIBED = Path(__file__).parent / "odometry.toml"
 
 
 class ReportedLidar(Lidar):
@@ -29,10 +33,15 @@ class ReportedLidar(Lidar):
 
 
 class ReportedOdometry(Odometry):
-    """Odometry as reported by the robot or dead-reckoned by the driver."""
+    """Odometry as reported by the robot or dead-reckoned by the driver; ``kind``: its section of odometry.toml."""
 
-    def __init__(self, reported: Callable[[], OdometryReading]) -> None:
+    def __init__(self, reported: Callable[[], OdometryReading], kind: str) -> None:
         self._reported = reported
+        self._noise = OdometryNoise(**tomllib.loads(DESCRIBED.read_text("utf-8"))[kind])
+
+    @property
+    def noise(self) -> OdometryNoise:
+        return self._noise
 
     @property
     def reading(self) -> OdometryReading:

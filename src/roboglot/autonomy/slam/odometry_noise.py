@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
+from roboglot.model.components.sensing.odometry import OdometryNoise
 from roboglot.model.geometry import Pose
 
 RISE, FALL = 0.2, 0.02  # share of a surprise, of a confirmation, that is learnt at once
@@ -20,29 +21,6 @@ BIAS_GAIN = 0.02  # share of a correction that is learnt
 TURN_BIAS_MAX, SCALE_BIAS_MAX = 0.05, 0.25  # rad/s; share of the way
 LEARNT_TURN_MAX, LEARNT_WAY_MAX = math.radians(1.0), 0.05  # rad, m: larger corrections have other reasons
 LEARNT_WAY_MIN = 0.03  # m driven from which a correction says something of the wheels' scale
-
-
-@dataclass(frozen=True, slots=True)
-class OdometryNoise:
-    """Standard deviations of what odometry says between two scans.
-
-    ``still`` (m) and ``yaw_still`` (rad) always; ``along`` (m per m driven), ``turning`` (m per rad turned: a base that
-    is off its centre), ``yaw_per_rad`` (rad per rad turned), ``yaw_per_metre`` (rad per m driven).
-    """
-
-    still: float = 0.001
-    along: float = 0.1
-    turning: float = 0.0
-    yaw_still: float = 0.0005
-    yaw_per_rad: float = 0.05
-    yaw_per_metre: float = 0.02
-
-    def variances(self, way: float, turn: float) -> tuple[float, float]:
-        """Of the position (m2, in each direction) and of the yaw (rad2) after ``way`` m and ``turn`` rad."""
-        return (
-            (self.still + self.along * way + self.turning * turn) ** 2,
-            (self.yaw_still + self.yaw_per_rad * turn + self.yaw_per_metre * way) ** 2,
-        )
 
 
 class LearntNoise:
@@ -87,6 +65,17 @@ class LearntNoise:
         )
 
     @property
+    def kept(self) -> dict[str, float]:
+        """What to keep for the next start."""
+        return {"way_factor": self.way_factor, "yaw_factor": self.yaw_factor}
+
+    def restore(self, kept: Mapping[str, object]) -> None:
+        """Go on from ``kept``; what is no sensible number is left out."""
+        for name in self.kept:
+            if (value := _number(kept.get(name))) is not None:
+                setattr(self, name, min(max(value, 1.0), FACTOR_MAX**2))
+
+    @property
     def factors(self) -> tuple[float, float]:
         """Of the standard deviations of way and yaw: 1 is as described."""
         return math.sqrt(self.way_factor), math.sqrt(self.yaw_factor)
@@ -118,6 +107,17 @@ class LearntBias:
         self.turn = 0.0  # rad/s that odometry turns too slowly
         self.scale_x = self.scale_y = 0.0  # share of the way ahead and to the left that it leaves out
 
+    @property
+    def kept(self) -> dict[str, float]:
+        """What to keep for the next start."""
+        return {"turn": self.turn, "scale_x": self.scale_x, "scale_y": self.scale_y}
+
+    def restore(self, kept: Mapping[str, object]) -> None:
+        """Go on from ``kept``; what is no sensible number is left out."""
+        for name in self.kept:
+            if (value := _number(kept.get(name))) is not None:
+                setattr(self, name, _bounded(value, TURN_BIAS_MAX if name == "turn" else SCALE_BIAS_MAX))
+
     def missing(self, moved: Pose, seconds: float) -> Pose:
         """What to add, in base_link, to odometry that ``moved`` (base_link before) in ``seconds``."""
         back = Pose(yaw=-moved.yaw).compose(Pose(self.scale_x * moved.x, self.scale_y * moved.y))
@@ -138,3 +138,8 @@ class LearntBias:
 
 def _bounded(value: float, most: float) -> float:
     return max(-most, min(most, value))
+
+
+def _number(value: object) -> float | None:
+    usable = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    return float(value) if usable and isinstance(value, (int, float)) else None

@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ from roboglot.autonomy.slam.matcher import (
     search,
     supported,
 )
-from roboglot.autonomy.slam.odometry_noise import LearntBias, LearntNoise, OdometryNoise
+from roboglot.autonomy.slam.odometry_noise import LearntBias, LearntNoise
 from roboglot.autonomy.slam.painting import paint
 from roboglot.autonomy.slam.scan_points import ScanPoints
 from roboglot.autonomy.slam.slip import SlipWatch
@@ -88,7 +88,7 @@ class Slam:
         self._agreement = self._known = 1.0
         self._contradicted = False  # whether the newest match was dropped for what the wheels say
         self._newest: ScanTaken | None = None
-        self.noise, self.bias = LearntNoise(OdometryNoise()), LearntBias()
+        self.noise, self.bias = LearntNoise(belief.odometry.noise), LearntBias()
         self.whereabouts = Whereabouts(belief, robot.events)
         self._looked_at, self._looking = -math.inf, False
         self._mapped_from = 0.0  # m driven from which scans are added to the map again
@@ -112,6 +112,16 @@ class Slam:
         self.whereabouts.check_silence(clock.time())
         self._timer = clock.call_later(SILENCE_PERIOD, self._listen)
 
+    @property
+    def learnt(self) -> dict[str, float]:
+        """What is known of this robot's odometry, to be kept for its next start."""
+        return self.noise.kept | self.bias.kept
+
+    def remember(self, learnt: Mapping[str, object]) -> None:
+        """Go on from what was ``learnt`` before."""
+        self.noise.restore(learnt)
+        self.bias.restore(learnt)
+
     def placing(self, region: Region | None) -> tuple[Pose, Callable[[], list[Match]]] | None:
         """Odometry at the newest scan, and what finds the places of the map (of ``region``) that look like it.
 
@@ -121,6 +131,11 @@ class Slam:
             return None
         grid, scan = self._belief.map, self._belief.reader.read(self._newest.scan)
         return (self._newest.odometry, lambda: places(grid, scan, region)) if len(scan.points) >= POINTS_MIN else None
+
+    @property
+    def way(self) -> float:
+        """Metres driven."""
+        return self._way
 
     def settle(self) -> None:
         """Finish straightening the map, however long that takes."""

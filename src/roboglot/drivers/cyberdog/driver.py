@@ -101,7 +101,7 @@ class CyberDogDriver(Driver):
         self._base = CyberDogBase(self._client, robot.clock, self.link, reported)
         robot.add(Base, self._base)
         robot.add(Legs, CyberDogLegs(robot, self._client, self.supervisor, self._base))
-        robot.add(Odometry, ReportedOdometry(lambda: reported.reckon(robot.clock.time())))
+        robot.add(Odometry, ReportedOdometry(lambda: reported.reckon(robot.clock.time()), "cyberdog"))
         robot.add(Battery, ReportedBattery(lambda: reported.battery))
         robot.add(DockContact, ReportedDockContact(lambda: reported.docked))
         robot.add(Localization, CyberDogLocalization(self._skills))

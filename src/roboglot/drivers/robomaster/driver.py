@@ -70,7 +70,7 @@ class RoboMasterDriver(Driver):
         self._telemetry = TelemetryListener(robot, self._client, self.link, reported, self._optional.refreshed)
         self._base = RoboMasterBase(self._client, robot.clock, self.link, reported, bounded=endpoint.bounded)
         robot.add(Base, self._base)
-        robot.add(Odometry, ReportedOdometry(lambda: reported.odometry))
+        robot.add(Odometry, ReportedOdometry(lambda: reported.odometry, "robomaster"))
         robot.add(Imu, ReportedImu(lambda: reported.imu))
         robot.add(MotionStatus, RoboMasterMotionStatus(reported))
         robot.add(Battery, ReportedBattery(lambda: reported.battery))

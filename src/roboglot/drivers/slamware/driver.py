@@ -61,7 +61,7 @@ class SlamwareDriver(Driver):
         self.link.stop_others_by(self._stop_others)
         self._base = SlamwareBase(robot, self._client, self.link, reported, self._runner)
         robot.add(Base, self._base)
-        robot.add(Odometry, ReportedOdometry(lambda: reported.odometry))
+        robot.add(Odometry, ReportedOdometry(lambda: reported.odometry, "slamware"))
         robot.add(Battery, ReportedBattery(lambda: reported.battery))
         robot.add(DockContact, ReportedDockContact(lambda: reported.docked))
         driving = robot.add(Driving, SlamwareDriving(robot, self._base, self.link, reported))

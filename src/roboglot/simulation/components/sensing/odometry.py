@@ -5,25 +5,38 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from msgspec import Struct
+from msgspec import Struct, structs
 
-from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.components.sensing.odometry import Odometry, OdometryNoise
 from roboglot.model.geometry import Pose, Twist, wrap_angle
 from roboglot.model.sensing import OdometryReading
 from roboglot.simulation.bodies.part import Fitting, Part
-from roboglot.simulation.bodies.quantities import NotNegative
+from roboglot.simulation.bodies.quantities import NotNegative, Positive
 from roboglot.simulation.components.motion.base import SimulatedBase
 from roboglot.simulation.components.sensing.imu import SimulatedImu
 
+USUAL = OdometryNoise()
 DRAWN = 64  # ticks whose noise is drawn at once
 
 
+class DescribedNoise(Struct, frozen=True, forbid_unknown_fields=True):
+    """What the robot's maker says of it: see ``OdometryNoise``."""
+
+    still: Positive = USUAL.still
+    along: NotNegative = USUAL.along
+    turning: NotNegative = USUAL.turning
+    yaw_still: Positive = USUAL.yaw_still
+    yaw_per_rad: NotNegative = USUAL.yaw_per_rad
+    yaw_per_metre: NotNegative = USUAL.yaw_per_metre
+
+
 class OdometrySection(Struct, frozen=True, forbid_unknown_fields=True):
-    """Standard deviations of the wheels' scale error and of the noise per way travelled."""
+    """Standard deviations of the wheels' scale error and of the noise per way travelled; ``described``: as believed."""
 
     scale_error: NotNegative
     noise: NotNegative
     still_rate: NotNegative
+    described: DescribedNoise = DescribedNoise()
 
 
 class SimulatedOdometry(Odometry):
@@ -44,6 +57,10 @@ class SimulatedOdometry(Odometry):
             stamp, x, y, yaw, vx, vy, rate, way = self._state
             self._reading = OdometryReading(stamp, Pose(x, y, yaw), Twist(vx, vy, rate), way)
         return self._reading
+
+    @property
+    def noise(self) -> OdometryNoise:
+        return OdometryNoise(**structs.asdict(self._section.described))
 
     def sense(self, stamp: float, seconds: float) -> None:
         """Add one tick's way."""

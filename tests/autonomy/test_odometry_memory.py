@@ -1,0 +1,61 @@
+"""What a robot learnt of its wheels is there after a restart, and what its body says of them is believed."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from roboglot.autonomy.slam.odometry_memory import KEY
+from roboglot.autonomy.slam.odometry_noise import FACTOR_MAX, SCALE_BIAS_MAX, LearntBias, LearntNoise
+from roboglot.config import RobotConfig
+from roboglot.fleet import build_fleet
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.sensing.odometry import Odometry, OdometryNoise
+from roboglot.model.components.system.settings import Settings
+from roboglot.model.geometry import Pose
+from roboglot.simulation.bodies.files import BODIES
+from roboglot.storage.database import Database
+
+
+def misjudged(folder: Path) -> str:
+    """A body whose wheels are wronger than most, as its file says."""
+    text = (BODIES / "universal.toml").read_text()
+    text = re.sub(r"(?m)^scale_error = .*$", "scale_error = 0.1\ndescribed = { along = 0.02 }", text)
+    (folder / "misjudged.toml").write_text(text)
+    return str(folder / "misjudged.toml")
+
+
+async def test_what_was_learnt_outlives_a_restart(tmp_path: Path) -> None:
+    database, learnt = Database(tmp_path / "data.db", in_place=True), []
+    for _ in range(2):
+        clock = LockstepClock()
+        fleet = build_fleet("office", [RobotConfig(body=misjudged(tmp_path))], clock=clock, seed=3, database=database)
+        await fleet.start(wait=True)
+        robot = fleet.robots["a"]
+        assert robot[Odometry].noise.along == 0.02
+        learnt.append(robot[Localization].estimator.learnt)  # type: ignore[attr-defined]
+        await clock.advance(1.0)
+        robot[Driving].move_by(Pose(3.0), speed=0.6)
+        await clock.advance(8.0)
+        learnt.append(robot[Localization].estimator.learnt)  # type: ignore[attr-defined]
+        await fleet.close()
+        assert robot[Settings].get(KEY) == learnt[-1]
+    database.close()
+    new, driven, restarted, _ = learnt
+    assert new["scale_x"] == 0.0
+    assert driven != new
+    assert restarted == driven
+
+
+def test_nonsense_in_the_settings_is_left_out() -> None:
+    noise, bias = LearntNoise(OdometryNoise()), LearntBias()
+    before = noise.kept, bias.kept
+    for restored in (noise, bias):
+        restored.restore({"way_factor": float("nan"), "yaw_factor": "9", "turn": None, "scale_x": True})
+    assert (noise.kept, bias.kept) == before
+    noise.restore({"way_factor": 1e30})
+    bias.restore({"scale_x": -5.0})
+    assert noise.way_factor == FACTOR_MAX**2
+    assert bias.scale_x == -SCALE_BIAS_MAX
