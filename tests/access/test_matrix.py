@@ -19,9 +19,9 @@ from roboglot.model.client_context import ask_for
 from roboglot.operations import OperationTable, Right
 from roboglot.programs.functions import table as functions
 from roboglot.programs.functions.session import Session
-from roboglot.protocols.cyberdog.table import operations as DOG  # noqa: N812
+from roboglot.protocols.cyberdog.table import TABLE as DOG
 from roboglot.protocols.robomaster.table import TABLE as TEXT
-from roboglot.protocols.slamware.table import OPERATIONS as REST
+from roboglot.protocols.slamware.table import TABLE as REST
 from roboglot.runtime import Runtime
 from roboglot.wire.contracts import contract
 from roboglot.wire.cyberdog.codes import Code, FileError
@@ -197,4 +197,4 @@ async def test_programs_do_what_the_right_allows(runtime: Runtime) -> None:
 
 def runtime_session(runtime: Runtime) -> Any:
     """The text door's session of robot a."""
-    return next(door.session for door in runtime.doors["a"]._doors if door.name == "robomaster")  # type: ignore[attr-defined]
+    return next(door.context for door in runtime.doors["a"]._doors if door.name == "robomaster")  # type: ignore[attr-defined]

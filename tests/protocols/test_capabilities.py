@@ -21,10 +21,10 @@ from roboglot.cli.capabilities import BODIES, Kind
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.server import CyberDogDoor
-from roboglot.protocols.cyberdog.table import operations as codes
+from roboglot.protocols.cyberdog.table import TABLE as CODES
 from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.table import TABLE
 from roboglot.testing import Forward
 from roboglot.wire.cyberdog.codes import SILENT_WITHOUT_SERVICE
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
@@ -94,7 +94,7 @@ async def rest(kind: Kind, robot: Robot, forward: Forward) -> dict[str, object]:
     # What is refused may have something else against the request before it asks for the part: never a success.
     return {
         operation.key: statuses
-        for operation in OPERATIONS
+        for operation in TABLE
         if (statuses := seen[operation.key])
         and (min(statuses) < REFUSED if kind.judge(operation.needs) == "refused" else NOT_IMPLEMENTED in statuses)
     }
@@ -111,7 +111,7 @@ async def dog(kind: Kind, robot: Robot, forward: Forward, data: Path) -> dict[st
             return [answer.data async for answer in send(pb.SendRequest(nameCode=code, params=params))]
 
         for code, params, _ in examples("cyberdog.md"):
-            operation = codes.get(code)
+            operation = CODES.get(code)
             if operation is None or code in REBOOT:
                 continue
             answers = await meanwhile(ask(code, params), forward)

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
-from roboglot.protocols.slamware import application
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware import dispatch
+from roboglot.protocols.slamware.table import TABLE
 from roboglot.testing import Forward
 from roboglot.wire.contracts import contract
 from roboglot.wire.slamware import artifact, delivery, devices, industry, motion, multi_floor, network
@@ -176,9 +176,9 @@ async def test_every_operation_reaches_the_door_and_its_answer_is_understood(
     class Recorder:
         def get(self, key: str) -> object:
             asked.append(key)
-            return OPERATIONS.get(key)
+            return TABLE.get(key)
 
-    monkeypatch.setattr(application, "OPERATIONS", Recorder())
+    monkeypatch.setattr(dispatch, "TABLE", Recorder())
     await forward(seconds=2)
     drawn = await client.get_composite_map()
     cargo = (await client.get_cargos())[0]
@@ -188,7 +188,7 @@ async def test_every_operation_reaches_the_door_and_its_answer_is_understood(
         name = method_of(row.name)
         for before in BEFORE.get(name, ()):
             await getattr(client, before)(**values.get(before, {}))
-        wanted = REFUSED.get(name, 200) if row.key in OPERATIONS else 501
+        wanted = REFUSED.get(name, 200) if row.key in TABLE else 501
         given = values.get(name, {}) | ({"cargo_id": cargo.id} if "cargo_id" in values.get(name, {}) else {})
         if name in LISTED:
             given["id"] = (await getattr(client, LISTED[name])(given["usage"]))[-1].id

@@ -60,7 +60,7 @@ async def test_a_heartbeat_tells_the_robot_s_states(phoned, app, robot, passing:
 
 
 async def test_heartbeats_come_every_half_second(phoned, app, clock: LockstepClock, passing: Passing) -> None:
-    await passing(lambda: phoned._dog.app.connected)
+    await passing(lambda: phoned._context.app.connected)
     await asyncio.sleep(0.05)
     for beats in range(len(app.ticks) + 1, len(app.ticks) + 5):
         await clock.advance(0.5)
@@ -93,7 +93,7 @@ async def test_a_lying_dog_gets_up_for_its_first_app(door, client, app, robot, f
 async def test_a_lost_app_is_dialled_again(
     phoned: CyberDogDoor, app: App, messages: Messages, pems: Pems, passing: Passing, clock: LockstepClock
 ) -> None:
-    link = phoned._dog.app
+    link = phoned._context.app
     await passing(lambda: link.connected)
     await app.stop()
     lost_from = clock.time()
@@ -107,7 +107,7 @@ async def test_a_lost_app_is_dialled_again(
 
 
 async def test_a_silent_app_is_a_lost_one(phoned, app, passing: Passing) -> None:
-    link = phoned._dog.app
+    link = phoned._context.app
     await passing(lambda: link.connected)
     app.silent = True
     await passing(lambda: not link.connected)
@@ -135,8 +135,8 @@ async def test_an_app_with_a_strange_certificate_gets_nothing(
 
 async def test_a_second_client_does_not_take_the_app_s_place(door, client, app, pems, messages, passing) -> None:
     await client.ask(10001)
-    await passing(lambda: door._dog.app.connected)
-    door._dog.app.seen("ipv4:127.0.0.99:4711")
+    await passing(lambda: door._context.app.connected)
+    door._context.app.seen("ipv4:127.0.0.99:4711")
     seen = len(app.ticks)
     await passing(lambda: len(app.ticks) > seen + 2)
 
@@ -166,9 +166,9 @@ async def test_a_call_during_an_attempt_leads_to_the_next_at_once(clock: Lockste
 
 async def test_disconnect_forgets_the_app_until_it_calls_again(door, client, app, passing, forward) -> None:
     await client.ask(10001)
-    await passing(lambda: door._dog.app.connected)
+    await passing(lambda: door._context.app.connected)
     assert await client.ask(55001) == ""
-    await passing(lambda: not door._dog.app.connected)
+    await passing(lambda: not door._context.app.connected)
     seen = len(app.ticks)
     await forward(seconds=3)
     await asyncio.sleep(0.02)
@@ -178,7 +178,7 @@ async def test_disconnect_forgets_the_app_until_it_calls_again(door, client, app
 
 
 async def test_pushes_without_an_app_are_dropped(door, app, client, passing: Passing) -> None:
-    link = door._dog.app
+    link = door._context.app
     link.push(TO_APP, "too early")
     await client.ask(10001)
     await passing(lambda: link.connected)
@@ -192,7 +192,7 @@ async def test_pushes_without_an_app_are_dropped(door, app, client, passing: Pas
 
 
 async def test_a_slow_app_gets_the_newest_and_delays_no_other_code(door, app, client, passing: Passing) -> None:
-    link = door._dog.app
+    link = door._context.app
     await client.ask(10001)
     await passing(lambda: link.connected)
     app.gate.clear()
@@ -208,7 +208,7 @@ async def test_a_slow_app_gets_the_newest_and_delays_no_other_code(door, app, cl
 
 
 async def test_an_app_that_never_answers_a_push_blocks_it_for_three_seconds(door, app, client, passing, clock) -> None:
-    link = door._dog.app
+    link = door._context.app
     await client.ask(10001)
     await passing(lambda: link.connected)
     app.gate.clear()
@@ -247,7 +247,7 @@ async def test_program_frames_pass_through(robot, data, app, pems, messages, pas
     async with pems.channel(door.port) as channel:
         client = Client(channel, messages)
         await client.ask(10001)
-        await passing(lambda: door._dog.app.connected)
+        await passing(lambda: door._context.app.connected)
         frame = '{ "type":"task",   "body":"1+1\\n" }'
         assert await client.raw(2002, frame) == []
         assert programs.got == [frame]

@@ -133,7 +133,7 @@ async def test_what_the_network_swallowed_after_the_last_byte_was_written_is_kep
         with pytest.raises(grpc.aio.AioRpcError):
             await fetching
         seen = len(app.ticks)
-        await passing(lambda: not door._dog.app.connected)
+        await passing(lambda: not door._context.app.connected)
         app.silent = False
         await client.ask(10001)
         await passing(lambda: len(app.ticks) > seen)

@@ -149,8 +149,8 @@ async def test_certificates_that_are_replaced_count_at_the_next_connection(
         new = proof()
         app = App(messages)
         await app.start(grpc.ssl_server_credentials(((new.key, new.certificate),), new.ca, require_client_auth=True))
-        door._dog.app._app_port = app.port
-        door._dog.app.seen("ipv4:127.0.0.1:1")
+        door._context.app._app_port = app.port
+        door._context.app.seen("ipv4:127.0.0.1:1")
         await passing(lambda: app.ticks)  # dialled with the new ones
         await app.stop()
     finally:

@@ -6,7 +6,7 @@ import ast
 from pathlib import Path
 
 from roboglot.protocols.cyberdog import server  # noqa: F401 - fills the tables
-from roboglot.protocols.cyberdog.table import extras, files, operations, pushes
+from roboglot.protocols.cyberdog.table import TABLE, extras, files, pushes
 from roboglot.wire.contracts import contract
 
 SWEEPS = ("examples", "every_code", "fuzz", "hostile")  # they ask for all, and look at no effect
@@ -38,7 +38,7 @@ def _is_number(node: ast.expr) -> bool:
 
 
 def test_every_request_is_asked_for_and_every_push_read() -> None:
-    requests = {int(operation.key) for operation in operations} | {int(code) for code in files}
+    requests = {int(operation.key) for operation in TABLE} | {int(code) for code in files}
     assert {int(row.key) for row in contract("cyberdog")} <= requests | set(pushes)
     assert {code for code, there in extras().items() if there} <= requests | set(pushes)
     assert requests - numbers(ASKS) == set()

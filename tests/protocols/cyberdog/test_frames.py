@@ -89,7 +89,7 @@ async def phone(
         stack.push_async_callback(door.close)
         client = Client(await stack.enter_async_context(pems.channel(door.port)), messages)
         await client.ask(10001)
-        await passing(lambda: door._dog.app.connected)
+        await passing(lambda: door._context.app.connected)
         yield Phone(client, app, service, door)
 
 
@@ -122,7 +122,7 @@ async def test_an_inquiry_overtakes_what_programs_do(phone: Phone) -> None:
 async def test_a_program_waits_for_a_slow_phone(phone: Phone) -> None:
     phone.app.gate.clear()
     await phone.start("t", "for n in range(10000): cyberdog.task.block(str(n))\nprint('through')")
-    queue = phone.door._dog.frames
+    queue = phone.door._context.frames
     await until(lambda: queue._news >= ROOM)
     await asyncio.sleep(0.2)
     assert queue._news < 2 * ROOM

@@ -16,7 +16,7 @@ from roboglot.model.components.system.firmware import Firmware
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.dispatch import answer
 from roboglot.protocols.cyberdog.server import CyberDogDoor
-from roboglot.protocols.cyberdog.table import Call, operations
+from roboglot.protocols.cyberdog.table import TABLE, Call
 from roboglot.testing import Forward
 from roboglot.wire.cyberdog.text import NotJson, write
 from tests.protocols.cyberdog.phone import PATIENCE, Client, examples
@@ -49,7 +49,7 @@ def broken(rng: random.Random, params: Any) -> Any:
 
 def requests(rng: random.Random) -> list[tuple[int, Any]]:
     """Of every code, some as they should be, most of them not."""
-    names = {int(operation.key): operation.names or () for operation in operations}
+    names = {int(operation.key): operation.names or () for operation in TABLE}
     known: dict[int, list[Any]] = {code: [] for code in names}
     for code, params, _ in examples("cyberdog.md"):
         known[code].append(json.loads(params))
@@ -72,7 +72,7 @@ async def test_requests_of_any_shape_at_a_whole_dog(
 ) -> None:
     rng, told = random.Random(7), list[Any]()
     assert {Firmware, Power} <= set(robot.interfaces)
-    dog = door._dog
+    dog = door._context
     assert dog
 
     async def ask(code: int, params: Any) -> None:

@@ -85,18 +85,18 @@ def dog_of_no_robot() -> Any:
         def forget(self) -> None:
             """Whom?"""
 
-    class Dog:
+    class Context:
         robot = Robot("a", plate, LockstepClock())
         app, tasks, stored_map, pursuit, relay, address, files = Nobody(), Tasks(), "", None, None, "", None
 
-    Dog.gaits = Gaits(Dog.robot)  # type: ignore[attr-defined]
-    return Dog()
+    Context.gaits = Gaits(Context.robot)  # type: ignore[attr-defined]
+    return Context()
 
 
 def _names(code: int) -> list[str]:
-    from roboglot.protocols.cyberdog.table import operations
+    from roboglot.protocols.cyberdog.table import TABLE
 
-    operation = operations.get(code)
+    operation = TABLE.get(code)
     return list(operation.names) if operation and operation.names else ["x"]
 
 

@@ -216,6 +216,6 @@ async def test_nobody_looks_ahead_for_a_walk_whose_door_has_closed(client, door,
 
     asking = asyncio.ensure_future(client.ask(1004, {"motion_id": 343, "vel_des": [0.1, 0, 0], "duration": 5000}))
     await until(looking)
-    door._dog.gaits.close()
+    door._context.gaits.close()
     await until(lambda: not looking())
     asking.cancel()

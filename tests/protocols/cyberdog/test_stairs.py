@@ -131,10 +131,10 @@ async def test_it_stops_when_the_app_is_lost(
     world.hands.lift("a", 0.0)  # held, it never gets there
     app.silent = False
     await client.ask(10001)
-    await passing(lambda: door._dog.app.connected)
+    await passing(lambda: door._context.app.connected)
     assert not action.status.ended
     app.silent = True
-    await passing(lambda: not door._dog.app.connected)
+    await passing(lambda: not door._context.app.connected)
     await passing(lambda: action.status.ended)
     assert action.status is ActionStatus.CANCELED
     assert action.reason == "the app is lost"

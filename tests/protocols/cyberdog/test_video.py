@@ -64,7 +64,7 @@ class Watcher:
 @pytest.fixture
 async def watch(client, app, door, passing) -> AsyncIterator[Callable[..., Any]]:
     await client.ask(10001)
-    await passing(lambda: door._dog.app.connected)
+    await passing(lambda: door._context.app.connected)
     watchers: list[Watcher] = []
 
     def begin(uid: str = "phone") -> Watcher:
@@ -218,7 +218,7 @@ async def test_more_apps_than_there_is_room_for(watch, client, door, monkeypatch
     for watcher in watchers:
         await watcher.offer()
     await until(lambda: watchers[0].signals("answer_sdp") and watchers[1].signals("answer_sdp"))
-    assert door._dog.video.viewers == 2
+    assert door._context.video.viewers == 2
     assert not watchers[2].signals("answer_sdp")
 
 

@@ -65,7 +65,7 @@ async def main(cable: str) -> None:
         run("nsenter", "-t", cable, "-n", "ip", "link", "set", "vb", "down")
         told["ordered"] = await until(lambda: not robot.actions.running() or robot[Base].velocity.x < 0.3, 6)
         told["stopped"] = told["ordered"] + await until(lambda: robot[Base].velocity.speed < 0.02, 2)
-        told["forgotten"] = told["stopped"] + await until(lambda: not door.session.active, 8)
+        told["forgotten"] = told["stopped"] + await until(lambda: not door.context.active, 8)
     finally:
         client.kill()
         await client.wait()

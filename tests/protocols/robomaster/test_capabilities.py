@@ -9,8 +9,8 @@ from roboglot.cli.capabilities import BODIES, Kind
 from roboglot.media.audio import AudioStream
 from roboglot.media.video import VideoStream
 from roboglot.model.robot import Robot
+from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.dispatch import answer
-from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.wire.robomaster.replies import PROFILES
 
@@ -61,11 +61,11 @@ def commands() -> Iterator[tuple[str, str]]:
 @pytest.mark.parametrize("body", [pytest.param(b, marks=pytest.mark.world("office", body=b)) for b in BODIES])
 async def test_every_command_answers_as_the_page_says(body: str, robot: Robot) -> None:
     kind = Kind(body, frozenset(robot.interfaces), {})
-    session = Session(robot, PROFILES["spec"], Outlets(robot))  # type: ignore[arg-type]
+    context = Context(robot, PROFILES["spec"], Outlets(robot))  # type: ignore[arg-type]
     wrong = {}
     for key, text in commands():
-        await answer(session, "command")
-        asked = asyncio.ensure_future(answer(session, text))
+        await answer(context, "command")
+        asked = asyncio.ensure_future(answer(context, text))
         for _ in range(60):
             await robot.clock.advance(0.1)
             if asked.done():
@@ -77,6 +77,6 @@ async def test_every_command_answers_as_the_page_says(body: str, robot: Robot) -
         assert operation
         if refused != (kind.judge(operation.needs) == "refused"):
             wrong[text] = (got.reply, got.why)
-        session.end("the next one")
+        context.end("the next one")
         await robot.clock.advance(0.6)
     assert not wrong

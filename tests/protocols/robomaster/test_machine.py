@@ -270,7 +270,7 @@ class Machine(RuleBasedStateMachine):
     def the_robot_is_as_the_modes_say(self) -> None:
         if not hasattr(self, "door"):
             return
-        session, modes = self.door.session, self.modes or Modes()
+        session, modes = self.door.context, self.modes or Modes()
         assert session.active == (self.modes is not None)
         assert (self.door.video.on, self.door.audio.on) == (modes.stream, modes.audio)
         assert session.part(EventSwitches)._stops.keys() == ({"armor"} if modes.hits else set())

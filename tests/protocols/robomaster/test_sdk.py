@@ -7,8 +7,7 @@ import pytest
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.gimbal import Gimbal
-from roboglot.protocols.robomaster.dispatch import implemented
-from roboglot.protocols.robomaster.table import TABLE
+from roboglot.protocols.robomaster.table import TABLE, implemented
 from roboglot.wire.contracts import contract
 
 PARSE_ERROR = "command format error: command parse error;"

@@ -13,9 +13,9 @@ from roboglot.fleet import Fleet, build_fleet
 from roboglot.media.audio import AudioStream
 from roboglot.media.video import VideoStream
 from roboglot.model.clock import LockstepClock
+from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.dispatch import answer
 from roboglot.protocols.robomaster.ports.media_port import MediaPort
-from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.storage.database import Database
 from roboglot.wire.robomaster.lines import LineSplitter
@@ -44,19 +44,19 @@ def lab() -> Iterator[Lab]:
         database.close()
 
 
-def session_of(lab: Lab, profile: str) -> Session:
+def session_of(lab: Lab, profile: str) -> Context:
     outlets = SimpleNamespace(
         video=MediaPort(lab.robot, VideoStream),
         audio=MediaPort(lab.robot, AudioStream),
         push=lambda _datagram, _host: None,
         tell=lambda _event: None,
     )
-    return Session(lab.robot, PROFILES[profile], outlets)
+    return Context(lab.robot, PROFILES[profile], outlets)
 
 
-async def finish(lab: Lab, session: Session) -> None:
+async def finish(lab: Lab, context: Context) -> None:
     """End it and let the robot come to rest."""
-    session.end("over")
+    context.end("over")
     for _ in range(50):
         if not lab.robot.actions.running():
             return
@@ -135,13 +135,13 @@ commands = st.one_of(
 @given(st.lists(commands, min_size=1, max_size=25))
 def test_every_sequence_answers_as_the_modes_say(lab: Lab, texts: list[str]) -> None:
     async def run() -> None:
-        session, model = session_of(lab, "spec"), Model()
+        context, model = session_of(lab, "spec"), Model()
         for text in ["command", *texts]:
-            said = asyncio.ensure_future(answer(session, text))
+            said = asyncio.ensure_future(answer(context, text))
             while not said.done():
                 await lab.clock.advance(0.05)
             assert said.result().reply.decode() == f"{model.answer(text)};", text
-        await finish(lab, session)
+        await finish(lab, context)
 
     lab.runner.run(run())
 
@@ -162,18 +162,18 @@ words = st.one_of(
 @given(head=heads, tail=st.lists(words, max_size=8))
 def test_whatever_comes_is_answered_once_and_nothing_breaks(lab: Lab, profile: str, head: str, tail: list[str]) -> None:
     async def run() -> None:
-        session = session_of(lab, profile)
-        session.begin()
+        context = session_of(lab, profile)
+        context.begin()
         text = " ".join([head, *tail, "wait_for_complete false"]).replace(";", "")
         if head.endswith("?"):
             text += " ?"
-        result = await answer(session, text)
+        result = await answer(context, text)
         assert result.reply
         assert "internal error" not in result.why
         if profile == "spec":
             reply = result.reply.decode()
             assert reply in KNOWN or reply.endswith(";")
-        await finish(lab, session)
+        await finish(lab, context)
 
     lab.runner.run(run())
 

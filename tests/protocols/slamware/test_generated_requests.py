@@ -11,7 +11,7 @@ import httpx
 import pytest
 
 from roboglot.protocols.slamware.routes import ALIASES
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.table import TABLE
 from roboglot.testing import Forward
 from tests.protocols.slamware.generated import SILENCING, Generator, tell
 
@@ -44,7 +44,7 @@ async def test_whatever_the_document_allows_is_answered_as_it_says(
         problem = generator.problem(request, reply)
         assert not problem, tell(request, reply, problem)
         statuses.setdefault(request.key, Counter())[reply.status_code] += 1
-    assert statuses.keys() == ({operation.key for operation in OPERATIONS} | ALIASES.keys()) - SILENCING
+    assert statuses.keys() == ({operation.key for operation in TABLE} | ALIASES.keys()) - SILENCING
     # The requests are good for something: most operations were carried out.
     carried_out = {key for key, seen in statuses.items() if seen.keys() & {200, 204}}
     assert len(carried_out) > 0.75 * len(statuses), statuses.keys() - carried_out

@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 
 from roboglot.model.robot import Robot
 from roboglot.operations import OperationTable
-from roboglot.protocols.slamware import application
+from roboglot.protocols.slamware import dispatch
 from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.errors import reason_phrase
 from roboglot.protocols.slamware.http_connection import with_reason
 from roboglot.protocols.slamware.routes import BEYOND, Routes
 from roboglot.protocols.slamware.server import SlamwareDoor
-from roboglot.protocols.slamware.table import OPERATIONS, implemented
+from roboglot.protocols.slamware.table import TABLE, implemented
 from roboglot.wire.contracts import contract
 
 ROWS = contract("slamware")
@@ -26,16 +26,16 @@ POIS = "/api/core/artifact/v1/pois"
 
 def test_every_handler_is_in_the_contract() -> None:
     beyond = {row.key for row in BEYOND}
-    assert {operation.key for operation in OPERATIONS} - beyond <= {row.key for row in ROWS}
+    assert {operation.key for operation in TABLE} - beyond <= {row.key for row in ROWS}
     assert implemented() < {row.key for row in ROWS}
-    others = [operation for operation in OPERATIONS if operation.key not in implemented() | beyond]
+    others = [operation for operation in TABLE if operation.key not in implemented() | beyond]
     assert all(operation.partial for operation in others)
 
 
 async def test_what_is_not_there_says_so_with_its_name(
     bare_client: httpx.AsyncClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("roboglot.protocols.slamware.application.OPERATIONS", OperationTable("none"))
+    monkeypatch.setattr("roboglot.protocols.slamware.dispatch.TABLE", OperationTable("none"))
     for row in ROWS:
         method, path = row.key.split(" ")
         reply = await bare_client.request(method, path.replace("{", "").replace("}", ""))
@@ -172,7 +172,7 @@ async def test_empty_answers_are_empty_and_say_so(bare_client: httpx.AsyncClient
 
 
 async def test_bodies_are_bounded(bare_door: SlamwareDoor, bare_client: httpx.AsyncClient) -> None:
-    reply = await bare_client.post(POIS, content=b"x" * (application.BODY_MAX + 1))
+    reply = await bare_client.post(POIS, content=b"x" * (dispatch.BODY_MAX + 1))
     assert reply.status_code == 413
 
     async def chunks():  # type: ignore[no-untyped-def]
@@ -221,7 +221,7 @@ JSON = st.recursive(
     ),
     max_leaves=12,
 )
-WITH_BODY = [operation.key for operation in OPERATIONS if "body" in operation.names]
+WITH_BODY = [operation.key for operation in TABLE if "body" in operation.names]
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -91,7 +91,7 @@ async def test_head_is_get_without_a_body(bare: Robot, bare_client: httpx.AsyncC
 
 
 async def test_verbose_logs_each_request(bare_client: httpx.AsyncClient, caplog: pytest.LogCaptureFixture) -> None:
-    with caplog.at_level(logging.DEBUG, "roboglot.protocols.slamware.application"):
+    with caplog.at_level(logging.DEBUG, "roboglot.protocols.slamware.dispatch"):
         await bare_client.get(HEALTH)
         await bare_client.get("/api/%1b[31m")
     asked, refused = (record.getMessage() for record in caplog.records if "slamware" in record.name)

@@ -6,7 +6,7 @@ import httpx
 
 from roboglot.protocols.slamware.openapi import document, summaries
 from roboglot.protocols.slamware.routes import ALIASES
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.table import TABLE
 from roboglot.wire.contracts import contract
 
 
@@ -25,7 +25,7 @@ def references(node: object) -> set[str]:
 def test_it_describes_what_is_served_and_nothing_else() -> None:
     described = document()
     keys = {f"{method.upper()} {path}" for path, methods in described["paths"].items() for method in methods}
-    assert keys == {operation.key for operation in OPERATIONS} | ALIASES.keys()
+    assert keys == {operation.key for operation in TABLE} | ALIASES.keys()
     ids = [operation["operationId"] for methods in described["paths"].values() for operation in methods.values()]
     assert len(set(ids)) == len(ids)
     for reference in references(described):

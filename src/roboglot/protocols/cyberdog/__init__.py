@@ -26,7 +26,7 @@ def _implementation() -> Implementation:
 def _table() -> OperationTable[Any]:
     from roboglot.protocols.cyberdog import server, table  # noqa: F401
 
-    return table.operations
+    return table.TABLE
 
 
 def _notes() -> Sequence[str]:

@@ -25,7 +25,7 @@ from roboglot.wire.visual.relay import FrameRelay
 
 
 @dataclass(slots=True)
-class Dog:
+class Context:
     """The context of every handler. ``stored_map`` is the name under which the map in use was saved, if it was."""
 
     robot: Robot

@@ -26,7 +26,7 @@ from roboglot.protocols.cyberdog.chapters.system import (  # noqa: F401
     upkeep,
 )
 from roboglot.protocols.cyberdog.errors import codes_of
-from roboglot.protocols.cyberdog.table import Call, operations, unread
+from roboglot.protocols.cyberdog.table import TABLE, Call, unread
 from roboglot.wire.contracts import contract
 from roboglot.wire.cyberdog.codes import SILENT_WITHOUT_SERVICE, TEXT_ONLY, UNPUBLISHED, InBandError
 from roboglot.wire.cyberdog.text import NotJson, fitting, misfits, read_params, write
@@ -44,7 +44,7 @@ def error(code: InBandError) -> dict[str, int]:
 
 async def answer(call: Call) -> object | None:
     """Run the request; returns its last answer (None: there is none). Raises NotJson, and nothing else."""
-    tap = call.dog.robot.tap
+    tap = call.context.robot.tap
     if not tap.watched:
         last = await _outcome(call)
     else:
@@ -59,14 +59,14 @@ async def answer(call: Call) -> object | None:
         if last is not None or call.why:
             text, status = ("", "silent") if last is None else (write(last), _status(last))
             tap.reply(DOOR, key, text, status, call.why, began)
-    if delay := lateness(call.dog.robot):
-        await call.dog.robot.clock.sleep(delay)
+    if delay := lateness(call.context.robot):
+        await call.context.robot.clock.sleep(delay)
     return last
 
 
 async def _outcome(call: Call) -> object | None:
     """Return the last answer, of the robot or of another who answers in its place."""
-    if (stand_in := call.dog.robot.stand_in) is None:
+    if (stand_in := call.context.robot.stand_in) is None:
         return await _answered(call)
     try:
         return await _ask_stand_in(call, stand_in)
@@ -78,9 +78,9 @@ async def _outcome(call: Call) -> object | None:
 
 async def _ask_stand_in(call: Call, stand_in: StandIn) -> object | None:
     """Have another answer in the robot's place: all but the last answer at once."""
-    operation = operations.get(call.code)
-    if call.dog.robot.admission.asks:
-        call.dog.robot.admission.check(DOOR, str(int(call.code)), operation.right if operation else Right.ADMIN)
+    operation = TABLE.get(call.code)
+    if call.context.robot.admission.asks:
+        call.context.robot.admission.check(DOOR, str(int(call.code)), operation.right if operation else Right.ADMIN)
     reads = operation is not None and operation.right is Right.SEE
     async for reply in stand_in.answer(DOOR, str(int(call.code)), call.text.encode(), reads=reads):
         text = reply.payload.decode("utf-8", "replace")
@@ -92,14 +92,14 @@ async def _ask_stand_in(call: Call, stand_in: StandIn) -> object | None:
 
 async def _answered(call: Call) -> object | None:
     values = {} if call.code in unread else read_params(call.text)
-    operation = operations.get(call.code)
+    operation = TABLE.get(call.code)
     if operation is None:
         call.why = "no robot of this program does that"
         return _not_there(call.code)
     wrong: list[str] = []
     try:
-        if call.dog.robot.admission.asks:
-            call.dog.robot.admission.check(DOOR, str(int(call.code)), operation.right)
+        if call.context.robot.admission.asks:
+            call.context.robot.admission.check(DOOR, str(int(call.code)), operation.right)
         if values and operation.names:
             taken = fitting(values, operation.parameters)
             if len(taken) < len(values):

@@ -19,7 +19,7 @@ class ErrorCodes:
 
 
 # The first row whose class fits counts.
-TABLE: tuple[tuple[type[errors.RobotError], ErrorCodes], ...] = (
+CODES: tuple[tuple[type[errors.RobotError], ErrorCodes], ...] = (
     (errors.ComponentMissing, ErrorCodes(InBandError.UNAVAILABLE, MotionCode.UNSUPPORTED, Feedback.ACTIVATION_FAILED)),
     (errors.InvalidGoal, ErrorCodes(InBandError.BAD_PARAMETERS, MotionCode.PARAMETERS, Feedback.NO_PATH)),
     (
@@ -37,4 +37,4 @@ TABLE: tuple[tuple[type[errors.RobotError], ErrorCodes], ...] = (
 
 def codes_of(error: errors.RobotError) -> ErrorCodes:
     """Return the codes for ``error``."""
-    return next(codes for kind, codes in TABLE if isinstance(error, kind))
+    return next(codes for kind, codes in CODES if isinstance(error, kind))

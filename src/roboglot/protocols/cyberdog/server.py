@@ -40,12 +40,12 @@ from roboglot.protocols.cyberdog.chapters.system.status import status_of, ticks
 from roboglot.protocols.cyberdog.chapters.system.stored_settings import APP, kept
 from roboglot.protocols.cyberdog.chapters.system.update_jobs import UpdateJobs
 from roboglot.protocols.cyberdog.config import CyberDogConfig
-from roboglot.protocols.cyberdog.context import Dog
+from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.dispatch import answer, error
 from roboglot.protocols.cyberdog.handshakes import Handshakes
 from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.protocols.cyberdog.reflection import add_reflection
-from roboglot.protocols.cyberdog.table import Call, operations
+from roboglot.protocols.cyberdog.table import TABLE, Call
 from roboglot.protocols.door import Endpoint
 from roboglot.transport.limiter import pay
 from roboglot.wire.cyberdog.channel import MESSAGE_MAX, ROBOT_NAME, server_options
@@ -79,7 +79,7 @@ class CyberDogDoor:
         self._robot = robot
         self._relay = frames
         self._server: Any = None
-        self._dog: Dog | None = None
+        self._context: Context | None = None
         self._handshakes: Handshakes
         self._resting: asyncio.Task[None] | None = None
         self._writing: set[asyncio.Task[Any]] = set()
@@ -88,17 +88,17 @@ class CyberDogDoor:
     async def start(self) -> None:
         """Bind and listen, and dial the app if its address is configured."""
         certificates = None if self._config.plaintext else CertificateStore(self._data / FOLDER)
-        self._dog = self._assemble(certificates)
+        self._context = self._assemble(certificates)
         self._server = grpc.aio.server(options=server_options(), maximum_concurrent_rpcs=CALLS_MAX)
         self._handshakes = Handshakes(self._address, self._config.port)
         self._cleanup.append(self._handshakes.close)
-        add_GrpcAppServicer_to_server(_Service(self._dog, self._handshakes), self._server)
+        add_GrpcAppServicer_to_server(_Service(self._context, self._handshakes), self._server)
         if self._config.reflection:
             add_reflection(self._server)
         self.port = self._bind(certificates)
         self._handshakes.port = self.port
         await self._server.start()
-        self._dog.app.start()
+        self._context.app.start()
 
     async def close(self) -> None:
         """Stop listening, end all streams and what they commanded."""
@@ -108,9 +108,9 @@ class CyberDogDoor:
             self._resting.cancel()
         if self._server:
             await self._server.stop(None)
-        if self._dog:
+        if self._context:
             call_off(self._robot, "the door closes", SOURCE)
-            await self._dog.close()
+            await self._context.close()
         await asyncio.gather(*self._writing, return_exceptions=True)
 
     @property
@@ -125,40 +125,40 @@ class CyberDogDoor:
         line = f"grpcurl {security} {proto} {request} {where} grpcapi.GrpcApp/sendMsg"
         return [Endpoint("CyberDog 2 gRPC", where, line, None if self._config.plaintext else tls)]
 
-    def _assemble(self, certificates: CertificateStore | None) -> Dog:
+    def _assemble(self, certificates: CertificateStore | None) -> Context:
         """The parts of the door, wired to one another."""
         robot = self._robot
         app = AppLink(
             robot.clock,
             partial(_as_client, certificates) if certificates else None,
             AppRoute(self._address, self._config.app, self._config.app_port, str(kept(robot, APP, ""))),
-            ticks=lambda own: ticks(dog, own),
+            ticks=lambda own: ticks(context, own),
             tap=robot.tap,
             on_host=self._keep_app,
         )
-        dog = self._parts(app)
-        reports = dog.reports
-        dog.tasks.on_change.append(reports.follow)
-        app.on_lost += [dog.tasks.unbind, dog.jobs.unbind, reports.forget_app, lambda: _leave_stairs(robot)]
-        app.on_found.append(_once(lambda: _greet(dog)))
-        self._cleanup.append(robot.events.listen(BatteryChanged, lambda _: self._rest_if_empty(dog)))
-        self._cleanup.append(robot.admission.on_lost(lambda who: app.forget() if who == dog.owner else None))
-        self._cleanup.append(robot.events.listen(MapReplaced, lambda _: dog.map_replaced()))
+        context = self._parts(app)
+        reports = context.reports
+        context.tasks.on_change.append(reports.follow)
+        app.on_lost += [context.tasks.unbind, context.jobs.unbind, reports.forget_app, lambda: _leave_stairs(robot)]
+        app.on_found.append(_once(lambda: _greet(context)))
+        self._cleanup.append(robot.events.listen(BatteryChanged, lambda _: self._rest_if_empty(context)))
+        self._cleanup.append(robot.admission.on_lost(lambda who: app.forget() if who == context.owner else None))
+        self._cleanup.append(robot.events.listen(MapReplaced, lambda _: context.map_replaced()))
         if robot.stand_in is not None:
             self._cleanup.append(robot.stand_in.join(self.name, self._play, _reads()))
         if self._relay:
-            dog.frames = queue_to(app, robot.clock)
-            self._cleanup += [dog.frames.close, self._relay.attach(dog.frames)]
-        return dog
+            context.frames = queue_to(app, robot.clock)
+            self._cleanup += [context.frames.close, self._relay.attach(context.frames)]
+        return context
 
-    def _parts(self, app: AppLink) -> Dog:
+    def _parts(self, app: AppLink) -> Context:
         """What the chapters keep."""
         robot, gaits, updates = self._robot, Gaits(self._robot), Updates(self._robot, app)
         files = CameraFiles(robot, self._data / FOLDER / "camera" / robot.id)
         voice = Voice(robot, gaits, lambda code, id: app.push(TRAINED, {"code": code, "voiceprint_id": id}))
         voice.adapt()
         app.on_found.append(lambda: app.push(ASK_VOICEPRINTS, {}) if activated(robot) else None)
-        return Dog(
+        return Context(
             robot=robot,
             app=app,
             gaits=gaits,
@@ -179,8 +179,8 @@ class CyberDogDoor:
 
     def _play(self, operation: str, message: bytes) -> None:
         """Send the app what a stand-in pushes."""
-        if self._dog and self._dog.app.connected:
-            sending = self._dog.app.send(int(operation), message.decode("utf-8", "replace"))
+        if self._context and self._context.app.connected:
+            sending = self._context.app.send(int(operation), message.decode("utf-8", "replace"))
             task = asyncio.get_running_loop().create_task(sending, name="play a push")
             self._writing.add(task)
             task.add_done_callback(self._writing.discard)
@@ -192,10 +192,14 @@ class CyberDogDoor:
             self._writing.add(task)
             task.add_done_callback(self._writing.discard)
 
-    def _rest_if_empty(self, dog: Dog) -> None:
+    def _rest_if_empty(self, context: Context) -> None:
         """In low power the task under way is stopped."""
-        if dog.gaits.state is MachineState.LOW_POWER and dog.tasks.current and not dog.tasks.current.stopping:
-            self._resting = asyncio.get_running_loop().create_task(dog.tasks.stop())
+        if (
+            context.gaits.state is MachineState.LOW_POWER
+            and context.tasks.current
+            and not context.tasks.current.stopping
+        ):
+            self._resting = asyncio.get_running_loop().create_task(context.tasks.stop())
 
     def _bind(self, certificates: CertificateStore | None) -> int:
         where = f"[{self._address}]" if ":" in self._address else self._address
@@ -214,68 +218,68 @@ class CyberDogDoor:
 
 def _reads() -> set[str]:
     """Return the requests that change nothing."""
-    return {str(int(operation.key)) for operation in operations if operation.right is Right.SEE}
+    return {str(int(operation.key)) for operation in TABLE if operation.right is Right.SEE}
 
 
 class _Service(GrpcAppServicer):  # type: ignore[misc]
     """The three calls of the service as the robot serves them."""
 
-    def __init__(self, dog: Dog, handshakes: Handshakes) -> None:
-        self._dog, self._handshakes = dog, handshakes
+    def __init__(self, context: Context, handshakes: Handshakes) -> None:
+        self._context, self._handshakes = context, handshakes
 
-    async def sendMsg(self, request: Any, context: Any) -> None:  # noqa: N802 - the service's name
+    async def sendMsg(self, request: Any, rpc: Any) -> None:  # noqa: N802 - the service's name
         """One request: any number of answers; the status is always OK."""
-        peer, code = context.peer(), request.nameCode
+        peer, code = rpc.peer(), request.nameCode
         self._handshakes.asked(peer)
-        await self._enter(context, peer)
+        await self._enter(rpc, peer)
         await self._count(peer, len(request.params))
-        tap = self._dog.robot.tap
+        tap = self._context.robot.tap
 
         async def reply(value: object) -> None:
             if tap.watched:
                 tap.reply("cyberdog", str(int(code)), write(value), "ok")
-            await context.write(_answer(code, value))
+            await rpc.write(_answer(code, value))
 
         try:
-            last = await answer(Call(code, request.params, self._dog, reply))
+            last = await answer(Call(code, request.params, self._context, reply))
         except NotJson as bad:
             log.info("%d: %s", code, bad)
             last, code = error(InBandError.BAD_PARAMETERS), 0
         if last is not None:
-            await context.write(_answer(code, last))
+            await rpc.write(_answer(code, last))
 
-    async def getFile(self, request: Any, context: Any) -> None:  # noqa: N802
+    async def getFile(self, request: Any, rpc: Any) -> None:  # noqa: N802
         """Photos and recordings in chunks; errors are chunks, too."""
-        peer, tap = context.peer(), self._dog.robot.tap
+        peer, tap = rpc.peer(), self._context.robot.tap
         self._handshakes.asked(peer)
-        await self._enter(context, peer)
+        await self._enter(rpc, peer)
         if tap.watched:
             tap.request("cyberdog", str(int(request.nameCode)), request.params)
         try:
             fields = read_params(request.params)
         except NotJson:
             fields = {}
-        async with contextlib.aclosing(get_file(self._dog, request.nameCode, fields)) as chunks:
+        async with contextlib.aclosing(get_file(self._context, request.nameCode, fields)) as chunks:
             async for chunk in chunks:
                 if tap.watched:
                     tap.reply("cyberdog", str(int(request.nameCode)), chunk.SerializeToString(), "ok")
-                await context.write(chunk)
+                await rpc.write(chunk)
                 await self._count(peer, len(chunk.buffer))
 
     async def _count(self, peer: str, size: int) -> None:
         """Bytes to or from a client; one that has had too many waits."""
-        admission = self._dog.robot.admission
+        admission = self._context.robot.admission
         if admission.asks:
             await pay(admission.spend(identity() or host_of(peer), size))
 
-    async def _enter(self, context: Any, peer: str) -> None:
+    async def _enter(self, rpc: Any, peer: str) -> None:
         """From here on it is asked for who calls; only who may see becomes the app that the robot talks to."""
-        admission, app = self._dog.robot.admission, self._dog.app
+        admission, app = self._context.robot.admission, self._context.app
         if not admission.asks:
             app.seen(peer)
             ask_for(f"cyberdog {host_of(peer)}", peer)
             return
-        names = context.auth_context().get("x509_common_name", [])
+        names = rpc.auth_context().get("x509_common_name", [])
         proof = Proof(ProofKind.CERTIFICATE, names[0].decode()) if names else NO_PROOF
         address = unquote(peer).partition(":")[2]
         who = admission.known(address, proof) or admission.known(address) or ""
@@ -284,11 +288,11 @@ class _Service(GrpcAppServicer):  # type: ignore[misc]
         ask_for(f"cyberdog {who or host_of(peer)}", peer, who)
         if admission.may(Right.SEE):
             app.seen(peer)
-            self._dog.owner = who
+            self._context.owner = who
 
-    async def heartbeat(self, _request: Any, context: Any) -> None:
+    async def heartbeat(self, _request: Any, rpc: Any) -> None:
         """Only the app serves heartbeats."""
-        await context.abort(grpc.StatusCode.UNIMPLEMENTED, "the robot sends heartbeats, it takes none")
+        await rpc.abort(grpc.StatusCode.UNIMPLEMENTED, "the robot sends heartbeats, it takes none")
 
 
 def _as_client(store: CertificateStore) -> Any:
@@ -329,10 +333,10 @@ def _once(action: Callable[[], None]) -> Callable[[], None]:
     return lambda: left.pop()() if left else None
 
 
-def _greet(dog: Dog) -> None:
+def _greet(context: Context) -> None:
     """A dog that lies about gets up when its app connects for the first time, unless it hangs on a cable."""
-    robot = dog.robot
-    if Legs in robot and robot[Legs].posture is Posture.LYING and not status_of(dog).wired_charging:
+    robot = context.robot
+    if Legs in robot and robot[Legs].posture is Posture.LYING and not status_of(context).wired_charging:
         with contextlib.suppress(RobotError):  # not now: it gets up on command
             robot[Legs].stand(source=SOURCE)
 

@@ -68,7 +68,7 @@ async def follow(call: Call, stream: Stream, seconds: float) -> object:
             await call.reply(message)
 
     try:
-        await call.dog.robot.clock.wait_for(pass_on(), seconds)
+        await call.context.robot.clock.wait_for(pass_on(), seconds)
     except TimeoutError:
         return {"error_code": int(InBandError.TIMEOUT)}
     finally:

@@ -11,9 +11,9 @@ from roboglot.wire.contracts import contract
 from roboglot.wire.cyberdog.codes import UNPUBLISHED
 
 if TYPE_CHECKING:
-    from roboglot.protocols.cyberdog.context import Dog
+    from roboglot.protocols.cyberdog.context import Context
 
-operations: OperationTable[int] = OperationTable("cyberdog")
+TABLE: OperationTable[int] = OperationTable("cyberdog")
 
 
 @dataclass(slots=True)  # not frozen: one is made for every request, and frozen ones take four times as long
@@ -26,7 +26,7 @@ class Call:
 
     code: int
     text: str  # params as it came
-    dog: Dog
+    context: Context
     reply: Callable[[object], Awaitable[None]]
     why: str = ""  # it was refused, in plain words
 
@@ -68,7 +68,7 @@ def partly() -> dict[str, str]:
 
 def extras() -> dict[int, bool]:
     """Codes of real robots that the text leaves out, and whether they are there."""
-    there = {int(operation.key) for operation in operations} | pushes.keys() | files
+    there = {int(operation.key) for operation in TABLE} | pushes.keys() | files
     return {code: code in there for code in sorted(UNPUBLISHED)}
 
 
@@ -76,7 +76,7 @@ def _rows() -> dict[str, str]:
     """What each row that is there cannot do; one row may be a request and a push."""
     whys: dict[str, list[str]] = {}
     for key, partial in (
-        [(op.key, op.partial) for op in operations]
+        [(op.key, op.partial) for op in TABLE]
         + [(p.code, p.partial) for p in pushes.values()]
         + [(code, "") for code in files]
     ):

@@ -19,9 +19,9 @@ def _open(config: RoboMasterConfig, site: Site) -> Door:
 
 
 def _implementation() -> Implementation:
-    from roboglot.protocols.robomaster import dispatch
+    from roboglot.protocols.robomaster import dispatch, table  # noqa: F401 - dispatch's chapters fill the table
 
-    return dispatch
+    return table
 
 
 def _table() -> OperationTable[Any]:

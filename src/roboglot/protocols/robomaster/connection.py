@@ -10,6 +10,7 @@ from functools import cache
 from typing import cast
 
 from roboglot.model.components.system.network import late
+from roboglot.protocols.robomaster.context import Context, speak_as
 from roboglot.protocols.robomaster.dispatch import Answer, answer
 from roboglot.protocols.robomaster.keepalive import hung_up, probe_for_life
 from roboglot.protocols.robomaster.limits import (
@@ -22,7 +23,6 @@ from roboglot.protocols.robomaster.limits import (
     TEXT_SHOWN_MAX,
 )
 from roboglot.protocols.robomaster.liveness import Driver
-from roboglot.protocols.robomaster.session import Session, speak_as
 from roboglot.protocols.robomaster.strangers import Greeting, turn_away_strangers
 from roboglot.wire.robomaster.lines import LineSplitter
 
@@ -39,14 +39,14 @@ class ControlConnection(asyncio.Protocol):
 
     def __init__(
         self,
-        session: Session,
+        context: Context,
         connections: set[ControlConnection],
         explain: Callable[[Callable[[], str]], None],
         *,
         lenient: bool = False,
         line_end: bytes = b"",
     ) -> None:
-        self._session = session
+        self._context = context
         self._connections = connections
         self._explain = explain
         self._lenient = lenient  # text that came without its `;` is run at once
@@ -96,8 +96,8 @@ class ControlConnection(asyncio.Protocol):
             self._resting.cancel()
         if self._worker:
             self._worker.cancel()
-        self._session.stop_speaker(self._name)
-        self._session.leave(self)
+        self._context.stop_speaker(self._name)
+        self._context.leave(self)
         log.info("robomaster: %s disconnected", self.host)
 
     def pause_writing(self) -> None:
@@ -138,7 +138,7 @@ class ControlConnection(asyncio.Protocol):
 
     async def _work(self) -> None:
         """Answer what waits, but not too much at a stretch: the next task goes on."""
-        speak_as(self._name, self._session.robot.admission.known(self._name) or "")
+        speak_as(self._name, self._context.robot.admission.known(self._name) or "")
         for _ in range(BATCH_MAX):
             if not self._commands:
                 return
@@ -148,9 +148,9 @@ class ControlConnection(asyncio.Protocol):
 
     async def _answer(self, text: str | None) -> None:
         self._join()
-        result = await answer(self._session, text)
+        result = await answer(self._context, text)
         self._join()
-        await late(self._session.robot)
+        await late(self._context.robot)
         self.transport.write(result.reply + self._line_end)
         if result.explain:
             explained = cache(lambda: self._refusal(text, result))
@@ -165,5 +165,5 @@ class ControlConnection(asyncio.Protocol):
 
     def _join(self) -> None:
         """A command while the robot is in SDK mode keeps it there."""
-        if self._session.active:
-            self._session.join(self, self.host)
+        if self._context.active:
+            self._context.join(self, self.host)

@@ -30,12 +30,11 @@ from roboglot.protocols.robomaster.chapters import (  # noqa: F401
     sound,
 )
 from roboglot.protocols.robomaster.chapters.sdk import OUTSIDE_SDK_MODE
+from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.errors import reply_to
 from roboglot.protocols.robomaster.explain import completed, nearest_command, nearest_values
-from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.shapes import Shape, shape_of
 from roboglot.protocols.robomaster.table import TABLE
-from roboglot.wire.contracts import contract
 from roboglot.wire.robomaster.commands import Command, Malformed, Value, parse
 from roboglot.wire.robomaster.lines import LINE_MAX
 from roboglot.wire.robomaster.replies import Number, Reply
@@ -43,19 +42,6 @@ from roboglot.wire.robomaster.replies import Number, Reply
 log = logging.getLogger(__name__)
 
 DOOR = "robomaster"
-SENT = "> "  # how the contract marks what the robot sends by itself
-MESSAGES = frozenset(
-    {
-        "> chassis push",
-        "> gimbal push",
-        "> armor event",
-        "> sound event",
-        "> sensor_adapter event",
-        "> AI push",
-        "> robot ip",
-        "> game_msg push",
-    }
-)  # those that this door really sends
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,30 +77,11 @@ class _Refusal(Exception):
         self.why = why
 
 
-def implemented() -> set[str]:
-    """The contract's keys that this door serves wholly, commands and messages."""
-    return {row.key for row in contract("robomaster")} & (
-        {operation.key for operation in TABLE if not operation.partial} | MESSAGES
-    )
-
-
-def partly() -> dict[str, str]:
-    """Keys that are there in part, with what they cannot do yet."""
-    return {operation.key: operation.partial for operation in TABLE if operation.partial}
-
-
-def key_of(message: bytes) -> str:
-    """The contract's key of what the robot sends by itself; empty if it is none of it."""
-    words = message.split(None, 3)[:3]
-    key = SENT + (" ".join(word.decode("ascii", "replace") for word in words[:2]))
-    return "> game_msg push" if key == "> game msg" else key if key in MESSAGES else ""
-
-
-async def answer(session: Session, text: str | None) -> Answer:
+async def answer(context: Context, text: str | None) -> Answer:
     """Run one command (None: it was too long to be kept) and word its answer; never raises but when cancelled."""
-    asked, tap = _Asked(), session.robot.tap
-    stand_in = session.robot.stand_in
-    result = await (_answered(session, text, asked) if stand_in is None else _stood_in(session, stand_in, text, asked))
+    asked, tap = _Asked(), context.robot.tap
+    stand_in = context.robot.stand_in
+    result = await (_answered(context, text, asked) if stand_in is None else _stood_in(context, stand_in, text, asked))
     if tap.watched:
         if asked.began is None:  # it was refused before it was understood
             asked.began = tap.request(DOOR, asked.key, text or "")
@@ -124,39 +91,39 @@ async def answer(session: Session, text: str | None) -> Answer:
     return result
 
 
-async def _answered(session: Session, text: str | None, asked: _Asked) -> Answer:
+async def _answered(context: Context, text: str | None, asked: _Asked) -> Answer:
     seq = None
     try:
         if text is None:
             raise _Refusal(Reply.PARSE_ERROR, lambda: f"longer than {LINE_MAX} bytes")
         command = parse(text)
         seq = command.seq
-        operation, words = _find(session, command)
+        operation, words = _find(context, command)
         asked.key = operation.key
-        if session.robot.tap.watched:
-            asked.began = session.robot.tap.request(DOOR, operation.key, text)
-        if session.robot.admission.asks:
-            session.robot.admission.check(DOOR, operation.key, operation.right)
-        result = await _run(session, operation, words)
+        if context.robot.tap.watched:
+            asked.began = context.robot.tap.request(DOOR, operation.key, text)
+        if context.robot.admission.asks:
+            context.robot.admission.check(DOOR, operation.key, operation.right)
+        result = await _run(context, operation, words)
     except (Malformed, _Refusal) as refusal:
-        if refusal.reply is Reply.PARSE_ERROR and not session.active:
-            return Answer(session.profile.result(Reply.NOT_IN_SDK_MODE, seq), lambda: "send `command;` first")
-        return Answer(session.profile.result(refusal.reply, seq), refusal.why)
+        if refusal.reply is Reply.PARSE_ERROR and not context.active:
+            return Answer(context.profile.result(Reply.NOT_IN_SDK_MODE, seq), lambda: "send `command;` first")
+        return Answer(context.profile.result(refusal.reply, seq), refusal.why)
     except RobotError as error:
-        return Answer(session.profile.result(reply_to(error), seq), partial(str, error))
+        return Answer(context.profile.result(reply_to(error), seq), partial(str, error))
     except Exception as error:
         log.exception("robomaster: %r broke", text)
-        return Answer(session.profile.result(Reply.FAIL, seq), partial("internal error: {}".format, error))
+        return Answer(context.profile.result(Reply.FAIL, seq), partial("internal error: {}".format, error))
     match result:
         case None:
-            return Answer(session.profile.result(Reply.OK, seq))
+            return Answer(context.profile.result(Reply.OK, seq))
         case str():  # a Reply, or a text of its own
-            return Answer(session.profile.result(result, seq))
+            return Answer(context.profile.result(result, seq))
         case _:
-            return Answer(session.profile.values(result, seq))
+            return Answer(context.profile.values(result, seq))
 
 
-async def _stood_in(session: Session, stand_in: StandIn, text: str | None, asked: _Asked) -> Answer:
+async def _stood_in(context: Context, stand_in: StandIn, text: str | None, asked: _Asked) -> Answer:
     """Have another answer in the robot's place."""
     seq = None
     try:
@@ -164,21 +131,21 @@ async def _stood_in(session: Session, stand_in: StandIn, text: str | None, asked
             raise _Refusal(Reply.PARSE_ERROR, lambda: f"longer than {LINE_MAX} bytes")
         command = parse(text)
         seq = command.seq
-        return await _ask_stand_in(session, stand_in, command, text, asked)
+        return await _ask_stand_in(context, stand_in, command, text, asked)
     except (Malformed, _Refusal) as refusal:
-        return Answer(session.profile.result(refusal.reply, seq), refusal.why)
+        return Answer(context.profile.result(refusal.reply, seq), refusal.why)
     except RobotError as error:
-        return Answer(session.profile.result(reply_to(error), seq), partial(str, error))
+        return Answer(context.profile.result(reply_to(error), seq), partial(str, error))
 
 
-async def _ask_stand_in(session: Session, stand_in: StandIn, command: Command, text: str, asked: _Asked) -> Answer:
+async def _ask_stand_in(context: Context, stand_in: StandIn, command: Command, text: str, asked: _Asked) -> Answer:
     """Return the first answer. Raises _Refusal where there is none."""
     operation = next((found for key, _ in command.keys if (found := TABLE.get(key))), None)
     asked.key = operation.key if operation else ""
-    if session.robot.tap.watched:
-        asked.began = session.robot.tap.request(DOOR, asked.key, text)
-    if session.robot.admission.asks:
-        session.robot.admission.check(DOOR, asked.key, operation.right if operation else Right.ADMIN)
+    if context.robot.tap.watched:
+        asked.began = context.robot.tap.request(DOOR, asked.key, text)
+    if context.robot.admission.asks:
+        context.robot.admission.check(DOOR, asked.key, operation.right if operation else Right.ADMIN)
     try:
         reads = text.rstrip(" ;").endswith("?")
         async for reply in stand_in.answer(DOOR, asked.key, text.encode(), reads=reads):
@@ -189,23 +156,23 @@ async def _ask_stand_in(session: Session, stand_in: StandIn, command: Command, t
 
 
 async def _run(
-    session: Session, operation: Operation[str], words: Sequence[str]
+    context: Context, operation: Operation[str], words: Sequence[str]
 ) -> str | Sequence[Number | str] | None:
-    shape = shape_of(operation, session.profile.as_robots)
+    shape = shape_of(operation, context.profile.as_robots)
     values = _values(operation.key, shape, words)
     try:
         checked = shape.check(values)
     except BadParameters as error:
         why = str(error)
         raise _Refusal(Reply.FAIL, lambda: nearest_values(operation.key, shape, values) or why) from None
-    result: str | Sequence[Number | str] | None = await operation.handler(session, **checked)
+    result: str | Sequence[Number | str] | None = await operation.handler(context, **checked)
     return result
 
 
-def _find(session: Session, command: Command) -> tuple[Operation[str], Sequence[str]]:
+def _find(context: Context, command: Command) -> tuple[Operation[str], Sequence[str]]:
     """The operation that is meant and the words left for its parameters."""
     for key, words in command.keys:
-        if not session.active and key not in OUTSIDE_SDK_MODE:
+        if not context.active and key not in OUTSIDE_SDK_MODE:
             continue
         if operation := TABLE.get(key):
             return operation, words

@@ -9,7 +9,7 @@ from roboglot.model.components.interaction.armor import Armor
 from roboglot.model.components.sensing.adapter import SensorAdapters
 from roboglot.model.components.sensing.hearing import Hearing
 from roboglot.model.events import AdapterLevelChanged, ArmorHit
-from roboglot.protocols.robomaster.session import Session
+from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.vocabulary import ARMOR, HITS
 
 CLAPS_MIN = 2  # a single bang is no applause
@@ -18,8 +18,8 @@ CLAPS_MIN = 2  # a single bang is no applause
 class EventSwitches:
     """Off by default; each one listens only while it is on. Twice on is no matter."""
 
-    def __init__(self, session: Session) -> None:
-        self._session, self._robot = session, session.robot
+    def __init__(self, context: Context) -> None:
+        self._context, self._robot = context, context.robot
         self._stops: dict[str, Callable[[], object]] = {}
 
     def armor(self, on: bool) -> None:
@@ -49,7 +49,7 @@ class EventSwitches:
             self._stops.pop(name)()
 
     def _tell(self, text: str) -> None:
-        self._session.outlets.tell(self._session.profile.event(text))
+        self._context.outlets.tell(self._context.profile.event(text))
 
     def _on_hit(self, hit: ArmorHit) -> None:
         self._tell(f"armor event hit {ARMOR[hit.place]} {HITS[hit.kind]}")

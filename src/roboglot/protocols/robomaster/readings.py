@@ -19,15 +19,15 @@ from roboglot.protocols.robomaster.vocabulary import wheels_in_rpm
 from roboglot.wire.robomaster.replies import Number
 
 if TYPE_CHECKING:
-    from roboglot.protocols.robomaster.session import Session
+    from roboglot.protocols.robomaster.context import Context
 
 
-def position(session: Session) -> tuple[float, float, float]:
+def position(context: Context) -> tuple[float, float, float]:
     """x m, y m, z degrees since power-on (robots: since ``command``), by odometry (so it drifts); z in (-180, 180]."""
-    require_heard(session.robot)
-    pose = session.robot[Odometry].reading.pose
-    if session.origin is not ORIGIN:
-        pose = pose.relative_to(session.origin)
+    require_heard(context.robot)
+    pose = context.robot[Odometry].reading.pose
+    if context.origin is not ORIGIN:
+        pose = pose.relative_to(context.origin)
     return pose.x, -pose.y, -math.degrees(pose.yaw)
 
 
@@ -38,12 +38,12 @@ def attitude(robot: Robot) -> tuple[float, float, float]:
     return -math.degrees(orientation.pitch), math.degrees(orientation.roll), -math.degrees(orientation.yaw)
 
 
-def speed(session: Session) -> tuple[float | int, ...]:
+def speed(context: Context) -> tuple[float | int, ...]:
     """x m/s, y m/s, z degrees/s as odometry measures them, and the four wheels in whole rpm."""
-    robot = session.robot
+    robot = context.robot
     require_heard(robot)
     twist = robot[Odometry].reading.twist
-    wheels = wheels_in_rpm(robot[Base].wheel_speeds, session.profile.as_robots)
+    wheels = wheels_in_rpm(robot[Base].wheel_speeds, context.profile.as_robots)
     return (twist.x, -twist.y, -math.degrees(twist.yaw), *wheels)
 
 
@@ -61,11 +61,11 @@ def gimbal_attitude(robot: Robot) -> tuple[float, float]:
 
 
 # What can be pushed, by module, in the manual's order. The position push carries no angle.
-PUSHED: dict[str, dict[str, Callable[[Session], tuple[Number, ...]]]] = {
+PUSHED: dict[str, dict[str, Callable[[Context], tuple[Number, ...]]]] = {
     "chassis": {
-        "position": lambda session: position(session)[:2],
-        "attitude": lambda session: attitude(session.robot),
-        "status": lambda session: status(session.robot),
+        "position": lambda context: position(context)[:2],
+        "attitude": lambda context: attitude(context.robot),
+        "status": lambda context: status(context.robot),
     },
-    "gimbal": {"attitude": lambda session: gimbal_attitude(session.robot)},
+    "gimbal": {"attitude": lambda context: gimbal_attitude(context.robot)},
 }

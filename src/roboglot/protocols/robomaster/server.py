@@ -15,8 +15,8 @@ from roboglot.protocols.door import Endpoint
 from roboglot.protocols.gate import Gate
 from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.connection import ControlConnection
+from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.datagrams import Datagrams, broadcast_address
-from roboglot.protocols.robomaster.dispatch import implemented, key_of
 from roboglot.protocols.robomaster.limits import CONTROL_CONNECTIONS_MAX, MEDIA_CONNECTIONS_MAX, PILOTS_MAX
 from roboglot.protocols.robomaster.liveness import Vigil
 from roboglot.protocols.robomaster.ports.discovery import announce
@@ -24,7 +24,7 @@ from roboglot.protocols.robomaster.ports.event_port import Readers
 from roboglot.protocols.robomaster.ports.media_port import MediaPort
 from roboglot.protocols.robomaster.ports.pilot_port import Pilots
 from roboglot.protocols.robomaster.ports.serial_line import LINE_END, SerialLine
-from roboglot.protocols.robomaster.session import Session
+from roboglot.protocols.robomaster.table import implemented, key_of
 from roboglot.wire.robomaster.replies import PROFILES
 
 __all__ = ["RoboMasterDoor", "implemented"]
@@ -43,14 +43,14 @@ class RoboMasterDoor:
     def __init__(self, robot: Robot, address: str, config: RoboMasterConfig) -> None:
         self.video = MediaPort(robot, VideoStream)
         self.audio = MediaPort(robot, AudioStream)
-        self.session = Session(robot, PROFILES[config.profile], self)
+        self.context = Context(robot, PROFILES[config.profile], self)
         self._address = address
         self._config = config
         self._connections: set[ControlConnection] = set()
         self._vigil = Vigil(
             lambda: [connection.driver for connection in self._connections],
-            self.session.moves,
-            self.session.stop_speaker,
+            self.context.moves,
+            self.context.stop_speaker,
         )
         self._gate = Gate(robot.admission)
         self._events = Readers()
@@ -90,11 +90,11 @@ class RoboMasterDoor:
         except OSError:
             await self.close()
             raise
-        if (stand_in := self.session.robot.stand_in) is not None:
+        if (stand_in := self.context.robot.stand_in) is not None:
             self._leave_stand_in = stand_in.join(self.name, self._play)
         if not everywhere and self._address not in KNOWN_ADDRESSES:
             self._announcing = loop.create_task(
-                announce(self.session, self._address, self._broadcast), name="robomaster ip"
+                announce(self.context, self._address, self._broadcast), name="robomaster ip"
             )
 
     async def close(self) -> None:
@@ -110,7 +110,7 @@ class RoboMasterDoor:
             connection.transport.abort()
         for port in (self._events, self._explanations, self._pilots, self.video, self.audio):
             port.close()
-        self.session.end("the door closes")
+        self.context.end("the door closes")
         for server in self._servers.values():
             await server.wait_closed()
         if self._datagrams:
@@ -143,7 +143,7 @@ class RoboMasterDoor:
 
     def push(self, datagram: bytes, host: str) -> None:
         """A datagram to the client's host, from the robot's own address; or down the serial line."""
-        place, admission = f"{host}:{self._config.push_port}", self.session.robot.admission
+        place, admission = f"{host}:{self._config.push_port}", self.context.robot.admission
         self._note(datagram, place)
         if self._serial and host == str(self._serial_link):
             self._serial.write(datagram + LINE_END)
@@ -169,17 +169,17 @@ class RoboMasterDoor:
 
     def _control_connection(self) -> asyncio.Protocol:
         self._vigil.begin()
-        return ControlConnection(self.session, self._connections, self._explain, lenient=self._config.lenient)
+        return ControlConnection(self.context, self._connections, self._explain, lenient=self._config.lenient)
 
     def _serial_connection(self) -> asyncio.Protocol:
-        return ControlConnection(self.session, self._connections, self._explain, line_end=LINE_END)
+        return ControlConnection(self.context, self._connections, self._explain, line_end=LINE_END)
 
     def _explain(self, text: Callable[[], str]) -> None:
         if self._explanations:
             self._explanations.tell(f"{text()}\n".encode())
 
     def _note(self, message: bytes, to: str) -> None:
-        tap = self.session.robot.tap
+        tap = self.context.robot.tap
         if tap.watched:
             tap.push("robomaster", to, key_of(message), message)
 

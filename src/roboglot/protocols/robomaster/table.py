@@ -1,5 +1,40 @@
-"""The table of this door's commands; the chapters fill it, dispatch.py reads it."""
+"""What this door can do: commands by their key, and the messages that it sends. The chapters fill the table."""
+
+from __future__ import annotations
 
 from roboglot.operations import OperationTable
+from roboglot.wire.contracts import contract
 
 TABLE: OperationTable[str] = OperationTable("robomaster")
+SENT = "> "  # how the contract marks what the robot sends by itself
+MESSAGES = frozenset(
+    {
+        "> chassis push",
+        "> gimbal push",
+        "> armor event",
+        "> sound event",
+        "> sensor_adapter event",
+        "> AI push",
+        "> robot ip",
+        "> game_msg push",
+    }
+)  # those that this door really sends
+
+
+def implemented() -> set[str]:
+    """The contract's keys that this door serves wholly, commands and messages."""
+    return {row.key for row in contract("robomaster")} & (
+        {operation.key for operation in TABLE if not operation.partial} | MESSAGES
+    )
+
+
+def partly() -> dict[str, str]:
+    """Keys that are there in part, with what they cannot do yet."""
+    return {operation.key: operation.partial for operation in TABLE if operation.partial}
+
+
+def key_of(message: bytes) -> str:
+    """The contract's key of what the robot sends by itself; empty if it is none of it."""
+    words = message.split(None, 3)[:3]
+    key = SENT + (" ".join(word.decode("ascii", "replace") for word in words[:2]))
+    return "> game_msg push" if key == "> game msg" else key if key in MESSAGES else ""

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.errors import Expired, RobotError
+from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.limits import WAIT_MAX
-from roboglot.protocols.robomaster.session import Session
 
 
-async def ended(session: Session, action: Action) -> None:
+async def ended(context: Context, action: Action) -> None:
     """Return when it has succeeded; raise why it hasn't, or after WAIT_MAX that it goes on."""
     try:
-        status = await session.robot.clock.wait_for(action.done(), WAIT_MAX)
+        status = await context.robot.clock.wait_for(action.done(), WAIT_MAX)
     except TimeoutError:
         raise Expired(f"it is not over after {WAIT_MAX:g} s and goes on") from None
     if status is not ActionStatus.SUCCEEDED:

@@ -17,15 +17,15 @@ def _open(config: SlamwareConfig, site: Site) -> Door:
 
 
 def _implementation() -> Implementation:
-    from roboglot.protocols.slamware import application, table  # noqa: F401 - the chapters fill the table
+    from roboglot.protocols.slamware import dispatch, table  # noqa: F401 - the chapters fill the table
 
     return table
 
 
 def _table() -> OperationTable[Any]:
-    from roboglot.protocols.slamware import application, table  # noqa: F401 - the chapters fill the table
+    from roboglot.protocols.slamware import dispatch, table  # noqa: F401 - the chapters fill the table
 
-    return table.OPERATIONS
+    return table.TABLE
 
 
 DOOR = DoorType(

@@ -14,7 +14,7 @@ from roboglot.operations import Operation
 from roboglot.protocols.slamware.chapters.motion.action_factories import FACTORIES
 from roboglot.protocols.slamware.chapters.uploads import Upload
 from roboglot.protocols.slamware.routes import ALIASES, BEYOND, SHORTHANDS
-from roboglot.protocols.slamware.table import OPERATIONS, NoContent, Text
+from roboglot.protocols.slamware.table import TABLE, NoContent, Text
 from roboglot.wire.contracts import contract
 
 BODIES = (bytes, Upload)  # what is no JSON
@@ -29,7 +29,7 @@ def document() -> Schema:
     chinese = summaries()
     paths: Schema = {}
     for row in (*contract("slamware"), *BEYOND):
-        if (operation := OPERATIONS.get(row.key)) is not None:
+        if (operation := TABLE.get(row.key)) is not None:
             method, _, path = row.key.partition(" ")
             described = schemas.describe(operation, path)
             described |= {"operationId": row.name, "tags": [row.chapter], "x-summary-zh": chinese.get(row.name, "")}
@@ -66,7 +66,7 @@ class _Schemas:
 
     def __init__(self) -> None:
         self._types: list[Any] = []
-        for operation in OPERATIONS:
+        for operation in TABLE:
             self._types += [kind for kind in _members(operation.answer) if _is_json(kind)]
             self._types += [f.type for f in msgspec.structs.fields(operation.parameters) if f.type not in BODIES]
         self._types += [factory.options for factory in FACTORIES.values()]

@@ -15,7 +15,6 @@ from roboglot.model.robot import Robot
 from roboglot.protocols.browsers import Browsers
 from roboglot.protocols.door import Endpoint
 from roboglot.protocols.gate import Gate
-from roboglot.protocols.slamware.application import Application
 from roboglot.protocols.slamware.chapters.artifact.poi_shifts import PoiShifts
 from roboglot.protocols.slamware.chapters.cloud import CloudFolder
 from roboglot.protocols.slamware.chapters.delivery.box_log import BoxLog
@@ -32,6 +31,7 @@ from roboglot.protocols.slamware.chapters.system.laser import Laser
 from roboglot.protocols.slamware.chapters.updater import Updater
 from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.context import Context
+from roboglot.protocols.slamware.dispatch import Application
 from roboglot.protocols.slamware.http_connection import CONNECTIONS_MAX, KEEP_ALIVE_SECONDS, HttpConnection
 from roboglot.transport.tls import Tls
 from roboglot.wire.slamware.platform import GeneralEvent

@@ -14,7 +14,7 @@ from enum import Enum
 from roboglot.operations import OperationTable
 from roboglot.protocols.slamware.routes import BEYOND
 
-OPERATIONS: OperationTable[str] = OperationTable("slamware")
+TABLE: OperationTable[str] = OperationTable("slamware")
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,9 +36,9 @@ NO_CONTENT = NoContent.NO_CONTENT
 def implemented() -> set[str]:
     """Return the keys of the contract's operations that do all that the manual says."""
     beyond = {row.key for row in BEYOND}
-    return {operation.key for operation in OPERATIONS if not operation.partial and operation.key not in beyond}
+    return {operation.key for operation in TABLE if not operation.partial and operation.key not in beyond}
 
 
 def partly() -> dict[str, str]:
     """Return the keys that are there in part, with what they cannot do yet."""
-    return {operation.key: operation.partial for operation in OPERATIONS if operation.partial}
+    return {operation.key: operation.partial for operation in TABLE if operation.partial}

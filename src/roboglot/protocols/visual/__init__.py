@@ -34,7 +34,7 @@ def _functions() -> Implementation:
 
 
 def _frames() -> Implementation:
-    from roboglot.protocols.visual import table
+    from roboglot.protocols.visual import dispatch, table  # noqa: F401 - the chapters fill the table
 
     return table
 

@@ -6,8 +6,7 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import Protocol
 
 from roboglot.model.tap import Tap
-from roboglot.programs.stores import ListedProgram, StoredProgram
-from roboglot.protocols.visual.table import key_of
+from roboglot.protocols.visual.vocabulary import key_of
 from roboglot.wire.visual.codes import FeedbackState
 from roboglot.wire.visual.replies import feedback, responses
 from roboglot.wire.visual.requests import Request
@@ -81,30 +80,3 @@ class Answers:
             status, why = "ok" if done else f"state {int(state)}", "" if done else describe
             self._tap.reply(DOOR, key_of(request), text, status, why, self._began)
         self._outlet.answer(text)
-
-
-def program(request: Request) -> StoredProgram:
-    """What a frame wants saved."""
-    return StoredProgram(
-        id=request.targets[0],
-        describe=request.describe,
-        style=request.style,
-        mode=request.mode,
-        condition=request.condition,
-        body=request.body,
-        state="null",
-    )
-
-
-def item(listed: ListedProgram) -> dict[str, object]:
-    """One row of a list (0.2.1.2.2.3 and .4); "operate" is the manual's name for the state."""
-    return {
-        "id": listed.id,
-        "describe": listed.describe,
-        "style": listed.style,
-        "operate": listed.state,
-        "mode": listed.mode,
-        "condition": listed.condition,
-        "dependent": listed.uses,
-        "be_depended": listed.used_by,
-    }

@@ -1,28 +1,18 @@
-"""What of the frames and of the manual's three tables is there, for the coverage page; from the tables' own data."""
+"""What this door can do: the frames by what they ask for, and the manual's three tables of states. Chapters fill it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-from roboglot.operations import Right
+from roboglot.operations import OperationTable
 from roboglot.programs.library.modules import MODULE_TRANSITIONS, ModuleOperation
 from roboglot.programs.tasks.robot_modes import ALLOWED
 from roboglot.programs.tasks.states import TRANSITIONS, TaskOperation
 from roboglot.wire.visual.cloud import KINDS, RECORD
-from roboglot.wire.visual.requests import MODES, OPERATIONS, Kind, Request
 
+TABLE: OperationTable[str] = OperationTable("visual_frames")
 ILLEGAL = "illegal"
 ANSWERS = ("feedback", "block", "response")  # 0.2.1.2; roboglot.wire.visual.replies
-
-
-def key_of(request: Request) -> str:
-    """The contract's key of a frame's wish."""
-    return f"{request.kind} {request.operate if request.kind in (Kind.TASK, Kind.MODULE) else request.mode}"
-
-
-def right_of(request: Request) -> Right:
-    """What a front end needs for a frame: looking is free to all who see."""
-    return Right.SEE if request.operate == "inquiry" else Right.PROGRAM
 
 
 def implemented() -> set[str]:
@@ -36,10 +26,7 @@ def partly() -> dict[str, str]:
 
 
 def _frames() -> Iterator[str]:
-    for kind in (Kind.TASK, Kind.MODULE):
-        yield from (f"{kind} {operation}" for operation in OPERATIONS[kind])
-    for kind in (Kind.AI, Kind.SLAM):
-        yield from (f"{kind} {mode}" for mode in MODES[kind])
+    yield from (operation.key for operation in TABLE)
     yield from (f"robot {answer}" for answer in ANSWERS)
     yield from (f"cloud {kind}" for kind in (*KINDS, RECORD))
 

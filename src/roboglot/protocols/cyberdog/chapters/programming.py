@@ -6,7 +6,7 @@ from roboglot.model.clock import Clock
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.app_link import AppLink
 from roboglot.protocols.cyberdog.frame_queue import FrameQueue
-from roboglot.protocols.cyberdog.table import Call, operations, push, unread
+from roboglot.protocols.cyberdog.table import TABLE, Call, push, unread
 from roboglot.wire.cyberdog.channel import PUSH_MAX
 from roboglot.wire.cyberdog.codes import Code
 
@@ -22,9 +22,9 @@ def queue_to(app: AppLink, clock: Clock) -> FrameQueue:
     return queue
 
 
-@operations.on(Code.PROGRAM_TO_ROBOT, right=Right.SEE)
+@TABLE.on(Code.PROGRAM_TO_ROBOT, right=Right.SEE)
 async def receive_frame(call: Call) -> None:
     """Pass the frame on, JSON or not; whatever is answered comes as push 2001. Without a relay it goes nowhere."""
-    if call.dog.relay and call.dog.frames:
-        await call.dog.frames.room_for_answers()
-        await call.dog.relay.receive(call.text)
+    if call.context.relay and call.context.frames:
+        await call.context.frames.room_for_answers()
+        await call.context.relay.receive(call.text)

@@ -13,9 +13,9 @@ from roboglot.model.components.sensing.vision import Vision
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.perception import Box, GestureSeen, LineSeen, MarkerSeen, PersonSeen, RobotSeen
 from roboglot.operations import Right
+from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.limits import TARGETS_MAX
 from roboglot.protocols.robomaster.ranges import LineColour, MarkerColour, MarkerDistance, OnOff
-from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.protocols.robomaster.vocabulary import GESTURES, MARKERS
 from roboglot.wire.robomaster.replies import Number
@@ -30,8 +30,8 @@ LOOKING = 0.04  # s between looks whether a detector has something new; detector
 class Ai:
     """Which kinds are pushed, and what of them counts."""
 
-    def __init__(self, session: Session) -> None:
-        self._session, self._robot = session, session.robot
+    def __init__(self, context: Context) -> None:
+        self._context, self._robot = context, context.robot
         self._open: dict[str, contextlib.ExitStack] = {}
         self._told: dict[str, float] = {}
         self._task: asyncio.Task[None] | None = None
@@ -67,7 +67,7 @@ class Ai:
         self._open.clear()
 
     async def _push(self) -> None:
-        vision, profile = self._robot[Vision], self._session.profile
+        vision, profile = self._robot[Vision], self._context.profile
         async for _ in self._robot.clock.every(LOOKING):
             attributes: list[tuple[str, Numbers]] = []
             for name in tuple(self._open):
@@ -77,10 +77,10 @@ class Ai:
                     word = ROBOTS_NAMES.get(name, name) if profile.as_robots else name
                     attributes.append((word, self._numbers(name, sighting.seen)))
             if profile.as_robots and attributes:  # one datagram, and no `;` between the kinds
-                self._session.send(profile.push("AI", *attributes, separator=" "))
+                self._context.send(profile.push("AI", *attributes, separator=" "))
             elif attributes:
                 for attribute in attributes:
-                    self._session.send(profile.push("AI", attribute))
+                    self._context.send(profile.push("AI", attribute))
 
     def _numbers(self, name: str, seen: Sequence[Any]) -> Numbers:
         """How many, then the numbers of each."""
@@ -141,15 +141,15 @@ def _detector(vision: Vision, name: str) -> Detector[Any]:
 
 @TABLE.on("AI attribute", right=Right.SEE, needs=(Vision,))
 async def set_attribute(
-    session: Session,
+    context: Context,
     *,
     line_color: LineColour | None = None,
     marker_color: MarkerColour | None = None,
     marker_dist: MarkerDistance | None = None,
 ) -> None:
     """Which lines and markers count: colour, and from how many m on (3.2.15.1)."""
-    _ = session.robot[Vision]
-    ai = session.part(Ai)
+    _ = context.robot[Vision]
+    ai = context.part(Ai)
     ai.line_colour = line_color or ai.line_colour
     ai.marker_colour = marker_color or ai.marker_colour
     ai.marker_distance = marker_dist or ai.marker_distance
@@ -157,7 +157,7 @@ async def set_attribute(
 
 @TABLE.on("AI push", right=Right.SEE)
 async def push(
-    session: Session,
+    context: Context,
     *,
     person: OnOff | None = None,
     people: OnOff | None = None,
@@ -174,4 +174,4 @@ async def push(
     words = {"person": person or people, "gesture": gesture or pose, "marker": marker, "robot": robot, "line": line}
     if {person, people} == {"on", "off"} or {gesture, pose} == {"on", "off"}:
         raise InvalidGoal("the same thing on and off")
-    session.part(Ai).switch({name: word == "on" for name, word in words.items() if word})
+    context.part(Ai).switch({name: word == "on" for name, word in words.items() if word})

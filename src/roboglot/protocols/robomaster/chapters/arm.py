@@ -11,28 +11,28 @@ from roboglot.model.actions import Action
 from roboglot.model.components.motion.arm import Arm, ArmPosition
 from roboglot.model.errors import InvalidGoal
 from roboglot.operations import Right
+from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.ranges import ArmDistance
-from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.protocols.robomaster.waiting import ended
 
 CENTIMETRE, MILLIMETRE = 0.01, 0.001
 
 
-def _scale(session: Session) -> tuple[float, ArmPosition]:
+def _scale(context: Context) -> tuple[float, ArmPosition]:
     """Metres per unit, and the origin."""
-    if session.profile.as_robots:
+    if context.profile.as_robots:
         return MILLIMETRE, ArmPosition()
-    return CENTIMETRE, session.robot[Arm].home  # where it is at power-on
+    return CENTIMETRE, context.robot[Arm].home  # where it is at power-on
 
 
-def _go(session: Session, goal: ArmPosition, command: str, start: ArmPosition) -> Action:
+def _go(context: Context, goal: ArmPosition, command: str, start: ArmPosition) -> Action:
     """Go to ``goal``; out of reach, InvalidGoal names the nearest ``command`` (which counts from ``start``)."""
-    arm = session.robot[Arm]
+    arm = context.robot[Arm]
     try:
-        return arm.move_to(goal, source=session.source)
+        return arm.move_to(goal, source=context.source)
     except InvalidGoal:
-        unit, low, high = _scale(session)[0], arm.reach.lowest, arm.reach.highest
+        unit, low, high = _scale(context)[0], arm.reach.lowest, arm.reach.highest
         x, z = min(max(goal.x, low.x), high.x), min(max(goal.z, low.z), high.z)
         share = min(1.0, arm.reach.radius / math.hypot(x, z))
         near = ((x * share - start.x) / unit, (z * share - start.z) / unit)
@@ -40,44 +40,44 @@ def _go(session: Session, goal: ArmPosition, command: str, start: ArmPosition) -
         raise InvalidGoal(f"that is out of the arm's reach; did you mean `{command} {words}`?") from None
 
 
-async def _finish(session: Session, action: Action, wait: bool) -> None:
+async def _finish(context: Context, action: Action, wait: bool) -> None:
     if wait:
-        await ended(session, action)
+        await ended(context, action)
 
 
 @TABLE.on("robotic_arm move", right=Right.DRIVE, needs=(Arm,))
-async def move(session: Session, *, x: ArmDistance, y: ArmDistance, wait_for_complete: bool = False) -> None:
+async def move(context: Context, *, x: ArmDistance, y: ArmDistance, wait_for_complete: bool = False) -> None:
     """Move the end point by x forward and y up; `fail` beyond the arm's reach (3.2.13.1)."""
-    unit, _ = _scale(session)
-    now = session.robot[Arm].position
+    unit, _ = _scale(context)
+    now = context.robot[Arm].position
     goal = ArmPosition(now.x + x * unit, now.z + y * unit)
-    await _finish(session, _go(session, goal, "robotic_arm move", now), wait_for_complete)
+    await _finish(context, _go(context, goal, "robotic_arm move", now), wait_for_complete)
 
 
 @TABLE.on("robotic_arm moveto", right=Right.DRIVE, needs=(Arm,))
-async def move_to(session: Session, *, x: ArmDistance, y: ArmDistance, wait_for_complete: bool = False) -> None:
+async def move_to(context: Context, *, x: ArmDistance, y: ArmDistance, wait_for_complete: bool = False) -> None:
     """Move the end point to x, y (3.2.13.2)."""
-    unit, origin = _scale(session)
+    unit, origin = _scale(context)
     goal = ArmPosition(origin.x + x * unit, origin.z + y * unit)
-    await _finish(session, _go(session, goal, "robotic_arm moveto", origin), wait_for_complete)
+    await _finish(context, _go(context, goal, "robotic_arm moveto", origin), wait_for_complete)
 
 
 @TABLE.on("robotic_arm recenter", right=Right.DRIVE, needs=(Arm,))
-async def recenter(session: Session, *, wait_for_complete: bool = False) -> None:
+async def recenter(context: Context, *, wait_for_complete: bool = False) -> None:
     """Back to where it was at power-on (3.2.13.3)."""
-    await _finish(session, session.robot[Arm].recenter(source=session.source), wait_for_complete)
+    await _finish(context, context.robot[Arm].recenter(source=context.source), wait_for_complete)
 
 
 @TABLE.on("robotic_arm stop", right=Right.DRIVE, needs=(Arm,))
-async def stop(session: Session) -> None:
+async def stop(context: Context) -> None:
     """Stay where it is (3.2.13.4)."""
-    session.robot[Arm].stop()
+    context.robot[Arm].stop()
 
 
 @TABLE.on("robotic_arm position ?", right=Right.SEE, needs=(Arm,))
-async def get_position(session: Session) -> tuple[float | int, ...]:
+async def get_position(context: Context) -> tuple[float | int, ...]:
     """x y of the end point (3.2.13.5); whole mm from robots."""
-    unit, origin = _scale(session)
-    now = session.robot[Arm].position
+    unit, origin = _scale(context)
+    now = context.robot[Arm].position
     x, y = (now.x - origin.x) / unit, (now.z - origin.z) / unit
-    return (round(x), round(y)) if session.profile.as_robots else (x, y)
+    return (round(x), round(y)) if context.profile.as_robots else (x, y)

@@ -4,29 +4,29 @@ from __future__ import annotations
 
 from roboglot.model.components.interaction.armor import Armor
 from roboglot.operations import Right
+from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.event_switches import EventSwitches
 from roboglot.protocols.robomaster.ranges import OnOff, Sensitivity
-from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
 
 SENSITIVITY = 5  # the default, and what it is again when the session ends
 
 
 @TABLE.on("armor sensitivity", right=Right.DRIVE, needs=(Armor,))
-async def set_sensitivity(session: Session, value: Sensitivity) -> None:
+async def set_sensitivity(context: Context, value: Sensitivity) -> None:
     """How light a blow is felt: 1 hard ones only, 10 every touch (3.2.6.1)."""
-    armor = session.robot[Armor]
+    armor = context.robot[Armor]
     armor.set_sensitivity(value)
-    session.at_end("armor sensitivity", lambda: armor.set_sensitivity(SENSITIVITY))
+    context.at_end("armor sensitivity", lambda: armor.set_sensitivity(SENSITIVITY))
 
 
 @TABLE.on("armor sensitivity ?", right=Right.SEE, needs=(Armor,))
-async def get_sensitivity(session: Session) -> tuple[int, ...]:
+async def get_sensitivity(context: Context) -> tuple[int, ...]:
     """The same, asked (3.2.6.2)."""
-    return (session.robot[Armor].sensitivity,)
+    return (context.robot[Armor].sensitivity,)
 
 
 @TABLE.on("armor event", right=Right.SEE, needs=(Armor,))
-async def switch_events(session: Session, *, hit: OnOff) -> None:
+async def switch_events(context: Context, *, hit: OnOff) -> None:
     """Tell hits on the event port, or stop (3.2.6.3)."""
-    session.part(EventSwitches).armor(hit == "on")
+    context.part(EventSwitches).armor(hit == "on")

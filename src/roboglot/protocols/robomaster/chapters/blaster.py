@@ -4,28 +4,28 @@ from __future__ import annotations
 
 from roboglot.model.components.interaction.blaster import Blaster
 from roboglot.operations import Right
+from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.ranges import Beads
-from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
 
 
 @TABLE.on("blaster bead", right=Right.DRIVE, needs=(Blaster,))
-async def set_beads(session: Session, num: Beads) -> None:
+async def set_beads(context: Context, num: Beads) -> None:
     """How many beads a shot fires (3.2.5.1); 1 again when the session ends."""
-    blaster = session.robot[Blaster]
+    blaster = context.robot[Blaster]
     blaster.set_beads(num)
-    session.at_end("blaster bead", lambda: blaster.set_beads(1))
+    context.at_end("blaster bead", lambda: blaster.set_beads(1))
 
 
 @TABLE.on("blaster bead ?", right=Right.SEE, needs=(Blaster,))
-async def get_beads(session: Session) -> tuple[int, ...]:
+async def get_beads(context: Context) -> tuple[int, ...]:
     """The same, asked (3.2.5.3)."""
-    return (session.robot[Blaster].beads,)
+    return (context.robot[Blaster].beads,)
 
 
 @TABLE.on("blaster fire", right=Right.DRIVE, needs=(Blaster,))
-async def fire(session: Session) -> None:
+async def fire(context: Context) -> None:
     """Fire a shot, one bead after the other; `fail` with an empty magazine or during a shot (3.2.5.2)."""
-    blaster = session.robot[Blaster]
+    blaster = context.robot[Blaster]
     blaster.fire()
-    session.at_end("blaster fire", blaster.cease)
+    context.at_end("blaster fire", blaster.cease)

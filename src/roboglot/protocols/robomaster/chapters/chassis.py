@@ -14,6 +14,7 @@ from roboglot.model.errors import Refused
 from roboglot.model.geometry import STILL, Twist
 from roboglot.operations import Right
 from roboglot.protocols.robomaster import readings
+from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.ranges import (
     AngleZ,
     DistanceXY,
@@ -25,7 +26,6 @@ from roboglot.protocols.robomaster.ranges import (
     TopSpeedZ,
     WheelSpeed,
 )
-from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.protocols.robomaster.vocabulary import offset_of, twist_of, wheels_of, without_yaw
 from roboglot.protocols.robomaster.waiting import ended
@@ -33,41 +33,41 @@ from roboglot.protocols.robomaster.waiting import ended
 LET_GO_AFTER = 0.5  # s that a command to stand still keeps hold of the base, so that a joystick's zero makes no gap
 
 
-def _drive(session: Session, command: Twist | WheelSpeeds) -> None:
+def _drive(context: Context, command: Twist | WheelSpeeds) -> None:
     """Keep ``command`` until another comes, the session ends or another door takes over."""
     still = command in (STILL, WheelSpeeds())
-    session.robot[Driving].drive(command, lifetime=LET_GO_AFTER if still else None, source=session.source)
+    context.robot[Driving].drive(command, lifetime=LET_GO_AFTER if still else None, source=context.source)
 
 
 @TABLE.on("chassis speed", right=Right.DRIVE, needs=(Driving,))
-async def set_speed(session: Session, *, x: SpeedXY = 0.0, y: SpeedXY = 0.0, z: SpeedZ = 0.0) -> None:
+async def set_speed(context: Context, *, x: SpeedXY = 0.0, y: SpeedXY = 0.0, z: SpeedZ = 0.0) -> None:
     """Drive at x, y m/s and z degrees/s until the next command; a missing axis is 0 (3.2.3.1).
 
     In gimbal_lead z is ignored: the chassis turns after the gimbal.
     """
-    _drive(session, twist_of(x, y, 0.0 if session.mode is FollowMode.GIMBAL_LEAD else z))
+    _drive(context, twist_of(x, y, 0.0 if context.mode is FollowMode.GIMBAL_LEAD else z))
 
 
 @TABLE.on("chassis wheel", right=Right.DRIVE, needs=(Driving,))
 async def set_wheels(
-    session: Session, *, w1: WheelSpeed = 0.0, w2: WheelSpeed = 0.0, w3: WheelSpeed = 0.0, w4: WheelSpeed = 0.0
+    context: Context, *, w1: WheelSpeed = 0.0, w2: WheelSpeed = 0.0, w3: WheelSpeed = 0.0, w4: WheelSpeed = 0.0
 ) -> None:
     """Turn the wheels (front right, front left, rear right, rear left) at so many rpm (3.2.3.2).
 
     In gimbal_lead without what would turn the chassis; robots refuse it then.
     """
-    as_robots = session.profile.as_robots
+    as_robots = context.profile.as_robots
     speeds = wheels_of(round(w1), round(w2), round(w3), round(w4), as_robots)
-    if session.mode is FollowMode.GIMBAL_LEAD:
+    if context.mode is FollowMode.GIMBAL_LEAD:
         if as_robots:
             raise Refused("robots drive no single wheels in gimbal_lead")
         speeds = without_yaw(speeds)
-    _drive(session, speeds)
+    _drive(context, speeds)
 
 
 @TABLE.on("chassis move", right=Right.DRIVE, needs=(Driving,))
 async def move(
-    session: Session,
+    context: Context,
     *,
     x: DistanceXY = 0.0,
     y: DistanceXY = 0.0,
@@ -77,47 +77,47 @@ async def move(
     wait_for_complete: bool = False,
 ) -> None:
     """Move by x, y m and z degrees; answers at once, or with ``wait_for_complete true`` at the end (3.2.3.3)."""
-    turn = 0.0 if session.mode is FollowMode.GIMBAL_LEAD else z  # the chassis turns after the gimbal there
-    action = session.robot[Driving].move_by(
-        offset_of(x, y, turn), speed=vxy, yaw_speed=math.radians(vz), source=session.source
+    turn = 0.0 if context.mode is FollowMode.GIMBAL_LEAD else z  # the chassis turns after the gimbal there
+    action = context.robot[Driving].move_by(
+        offset_of(x, y, turn), speed=vxy, yaw_speed=math.radians(vz), source=context.source
     )
     if wait_for_complete:
-        await ended(session, action)
+        await ended(context, action)
 
 
 @TABLE.on("chassis stop", right=Right.DRIVE, needs=(Driving,))
-async def stop(session: Session) -> None:
+async def stop(context: Context) -> None:
     """Stand still; in no manual, but real robots and their users know it."""
-    _drive(session, STILL)
+    _drive(context, STILL)
 
 
 @TABLE.on("chassis speed ?", right=Right.SEE, needs=(Base, Odometry))
-async def get_speed(session: Session) -> tuple[float | int, ...]:
+async def get_speed(context: Context) -> tuple[float | int, ...]:
     """x y m/s, z degrees/s and four wheels in rpm (3.2.3.4)."""
-    return readings.speed(session)
+    return readings.speed(context)
 
 
 @TABLE.on("chassis position ?", right=Right.SEE, needs=(Odometry,))
-async def get_position(session: Session) -> tuple[float, ...]:
+async def get_position(context: Context) -> tuple[float, ...]:
     """x y m and z degrees since power-on (3.2.3.5)."""
-    return readings.position(session)
+    return readings.position(context)
 
 
 @TABLE.on("chassis attitude ?", right=Right.SEE, needs=(Imu,))
-async def get_attitude(session: Session) -> tuple[float, ...]:
+async def get_attitude(context: Context) -> tuple[float, ...]:
     """pitch roll yaw in degrees (3.2.3.6)."""
-    return readings.attitude(session.robot)
+    return readings.attitude(context.robot)
 
 
 @TABLE.on("chassis status ?", right=Right.SEE, needs=(MotionStatus,))
-async def get_status(session: Session) -> tuple[int, ...]:
+async def get_status(context: Context) -> tuple[int, ...]:
     """Eleven flags of 0 or 1 (3.2.3.7)."""
-    return readings.status(session.robot)
+    return readings.status(context.robot)
 
 
 @TABLE.on("chassis push", right=Right.SEE)
 async def push(
-    session: Session,
+    context: Context,
     *,
     position: Switch | None = None,
     pfreq: Rate | None = None,
@@ -130,4 +130,4 @@ async def push(
     """Switch the attributes' pushes on and off and set their rates in Hz; ``freq`` overrides the others (3.2.3.8)."""
     switches = {"on": True, "off": False, "": None, None: None}
     for name, switch, rate in (("position", position, pfreq), ("attitude", attitude, afreq), ("status", status, sfreq)):
-        session.pushes.switch("chassis", name, switches[switch], freq or rate)
+        context.pushes.switch("chassis", name, switches[switch], freq or rate)

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 from roboglot.model.components.interaction.input_device import Input, InputDevice, MouseButton
 from roboglot.operations import Right
+from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.limits import KEYS_MAX
-from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
 
 PERIOD = 0.1  # s between two datagrams while nothing changes; a change is sent at once
@@ -29,8 +29,8 @@ def numbers(state: Input, seq: int) -> list[int]:
 class GamePushes:
     """Sends what the pilot does while it is on."""
 
-    def __init__(self, session: Session) -> None:
-        self._session, self._robot = session, session.robot
+    def __init__(self, context: Context) -> None:
+        self._context, self._robot = context, context.robot
         self._seq = 0
         self._task: asyncio.Task[None] | None = None
         self._deafen: Callable[[], None] | None = None
@@ -51,7 +51,7 @@ class GamePushes:
         self.switch(False)
 
     def _tell(self, state: Input) -> None:
-        self._session.send(self._session.profile.game(numbers(state, self._seq)))
+        self._context.send(self._context.profile.game(numbers(state, self._seq)))
         self._seq = (self._seq + 1) % 256
 
     async def _beat(self) -> None:
@@ -60,12 +60,12 @@ class GamePushes:
 
 
 @TABLE.on("game_msg on", right=Right.SEE)
-async def game_on(session: Session) -> None:
+async def game_on(context: Context) -> None:
     """Push keys and mouse (3.2.20.1)."""
-    session.part(GamePushes).switch(True)
+    context.part(GamePushes).switch(True)
 
 
 @TABLE.on("game_msg off", right=Right.SEE)
-async def game_off(session: Session) -> None:
+async def game_off(context: Context) -> None:
     """No more (3.2.20.2)."""
-    session.part(GamePushes).switch(False)
+    context.part(GamePushes).switch(False)

@@ -12,6 +12,7 @@ from roboglot.model.components.motion.gimbal import FollowMode, Frame, Gimbal
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.operations import Right
 from roboglot.protocols.robomaster import readings
+from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.ranges import (
     GimbalSpeed,
     GimbalTopSpeed,
@@ -22,7 +23,6 @@ from roboglot.protocols.robomaster.ranges import (
     YawBy,
     YawTo,
 )
-from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.protocols.robomaster.waiting import ended
 
@@ -30,18 +30,18 @@ THERE = math.radians(0.5)
 
 
 @TABLE.on("gimbal speed", right=Right.DRIVE, needs=(Gimbal,))
-async def set_speed(session: Session, *, p: GimbalSpeed = 0.0, y: GimbalSpeed = 0.0) -> None:
+async def set_speed(context: Context, *, p: GimbalSpeed = 0.0, y: GimbalSpeed = 0.0) -> None:
     """Turn at p and y degrees/s until the next command (3.2.4.1); in chassis_lead y does nothing, and robots say so."""
-    idle_yaw = session.mode is FollowMode.CHASSIS_LEAD
-    gimbal = session.robot[Gimbal]
-    gimbal.set_speed(-math.radians(p), 0.0 if idle_yaw else -math.radians(y), source=session.source)
-    if idle_yaw and y and session.profile.as_robots:
+    idle_yaw = context.mode is FollowMode.CHASSIS_LEAD
+    gimbal = context.robot[Gimbal]
+    gimbal.set_speed(-math.radians(p), 0.0 if idle_yaw else -math.radians(y), source=context.source)
+    if idle_yaw and y and context.profile.as_robots:
         raise Refused("in chassis_lead the gimbal's yaw follows the chassis; pitch is done")
 
 
 @TABLE.on("gimbal move", right=Right.DRIVE, needs=(Gimbal,))
 async def move(
-    session: Session,
+    context: Context,
     *,
     p: PitchBy = 0.0,
     y: YawBy = 0.0,
@@ -53,20 +53,20 @@ async def move(
 
     Answers at the end unless ``wait_for_complete`` is false, as robots do. In chassis_lead y does nothing.
     """
-    turn = 0.0 if session.mode is FollowMode.CHASSIS_LEAD else y
-    action = session.robot[Gimbal].move_by(
+    turn = 0.0 if context.mode is FollowMode.CHASSIS_LEAD else y
+    action = context.robot[Gimbal].move_by(
         pitch=-math.radians(p),
         yaw=-math.radians(turn),
         pitch_speed=_top("vp", vp) if p else None,
         yaw_speed=_top("vy", vy) if turn else None,
-        source=session.source,
+        source=context.source,
     )
-    await _finish(session, action, wait_for_complete)
+    await _finish(context, action, wait_for_complete)
 
 
 @TABLE.on("gimbal moveto", right=Right.DRIVE, needs=(Gimbal,))
 async def move_to(
-    session: Session,
+    context: Context,
     *,
     p: PitchTo | None = None,
     y: YawTo | None = None,
@@ -75,9 +75,9 @@ async def move_to(
     wait_for_complete: bool = True,
 ) -> None:
     """Turn to p against the horizon and y against the chassis (3.2.4.3); the rest as ``gimbal move``."""
-    gimbal = session.robot[Gimbal]
+    gimbal = context.robot[Gimbal]
     pitch = None if p is None else -math.radians(p)
-    yaw = None if y is None or session.mode is FollowMode.CHASSIS_LEAD else -math.radians(y)
+    yaw = None if y is None or context.mode is FollowMode.CHASSIS_LEAD else -math.radians(y)
     if not vp and _near(pitch, gimbal.attitude.pitch):
         pitch = None
     if not vy and _near(yaw, gimbal.angles.yaw):
@@ -88,52 +88,52 @@ async def move_to(
         frame=Frame.STABILIZED,
         pitch_speed=None if pitch is None else _top("vp", vp),
         yaw_speed=None if yaw is None else _top("vy", vy),
-        source=session.source,
+        source=context.source,
     )
-    await _finish(session, action, wait_for_complete)
+    await _finish(context, action, wait_for_complete)
 
 
 @TABLE.on("gimbal recenter", right=Right.DRIVE, needs=(Gimbal,))
-async def recenter(session: Session, *, wait_for_complete: bool = True) -> None:
+async def recenter(context: Context, *, wait_for_complete: bool = True) -> None:
     """Turn both axes to the chassis' front (3.2.4.6)."""
-    await _finish(session, session.robot[Gimbal].recenter(source=session.source), wait_for_complete)
+    await _finish(context, context.robot[Gimbal].recenter(source=context.source), wait_for_complete)
 
 
 @TABLE.on("gimbal stop", right=Right.DRIVE, needs=(Gimbal,))
-async def stop(session: Session) -> None:
+async def stop(context: Context) -> None:
     """Hold where it is; in no manual, but real robots know it."""
-    session.robot[Gimbal].set_speed(0.0, 0.0, source=session.source)
+    context.robot[Gimbal].set_speed(0.0, 0.0, source=context.source)
 
 
 @TABLE.on("gimbal suspend", right=Right.DRIVE, needs=(Gimbal,))
-async def suspend(session: Session) -> None:
+async def suspend(context: Context) -> None:
     """Release the motors; until ``gimbal resume`` (or the session's end) it takes no commands (3.2.4.4)."""
-    gimbal = session.robot[Gimbal]
+    gimbal = context.robot[Gimbal]
     gimbal.suspend()
-    session.at_end("gimbal suspend", gimbal.resume)
+    context.at_end("gimbal suspend", gimbal.resume)
 
 
 @TABLE.on("gimbal resume", right=Right.DRIVE, needs=(Gimbal,))
-async def resume(session: Session) -> None:
+async def resume(context: Context) -> None:
     """Wake it (3.2.4.5)."""
-    session.robot[Gimbal].resume()
+    context.robot[Gimbal].resume()
 
 
 @TABLE.on("gimbal attitude ?", right=Right.SEE, needs=(Gimbal,))
-async def get_attitude(session: Session) -> tuple[float, ...]:
+async def get_attitude(context: Context) -> tuple[float, ...]:
     """pitch yaw, in the same frame as ``gimbal moveto`` (3.2.4.7)."""
-    return readings.gimbal_attitude(session.robot)
+    return readings.gimbal_attitude(context.robot)
 
 
 @TABLE.on("gimbal push", right=Right.SEE, needs=(Gimbal,))
 async def push(
-    session: Session, *, attitude: Switch | None = None, afreq: Rate | None = None, freq: Rate | None = None
+    context: Context, *, attitude: Switch | None = None, afreq: Rate | None = None, freq: Rate | None = None
 ) -> None:
     """Push the attitude or stop it, at afreq Hz (3.2.4.8); rates without the attribute and its switch are refused."""
-    _ = session.robot[Gimbal]
+    _ = context.robot[Gimbal]
     if not attitude:
         raise InvalidGoal("say which attribute, and on or off: `gimbal push attitude on afreq 10`")
-    session.pushes.switch("gimbal", "attitude", attitude == "on", afreq or freq)
+    context.pushes.switch("gimbal", "attitude", attitude == "on", afreq or freq)
 
 
 def _near(goal: float | None, now: float) -> bool:
@@ -148,6 +148,6 @@ def _top(name: str, speed: float) -> float:
     return math.radians(speed)
 
 
-async def _finish(session: Session, action: Action, wait: bool) -> None:
+async def _finish(context: Context, action: Action, wait: bool) -> None:
     if wait:
-        await ended(session, action)
+        await ended(context, action)

@@ -4,31 +4,31 @@ from __future__ import annotations
 
 from roboglot.model.components.motion.gripper import Gripper
 from roboglot.operations import Right
+from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.ranges import Level
-from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.protocols.robomaster.vocabulary import GRIPPER, GRIPPER_OF_ROBOTS
 
 
 @TABLE.on("robotic_gripper open", right=Right.DRIVE, needs=(Gripper,))
-async def open_(session: Session, level: Level = 1) -> None:
+async def open_(context: Context, level: Level = 1) -> None:
     """Open the jaws; ``open 1``, ``open leve 1`` and ``open level 1`` are the same (3.2.14.1). Answers at once."""
-    session.robot[Gripper].open(level, source=session.source)
+    context.robot[Gripper].open(level, source=context.source)
 
 
 @TABLE.on("robotic_gripper close", right=Right.DRIVE, needs=(Gripper,))
-async def close(session: Session, level: Level = 1) -> None:
+async def close(context: Context, level: Level = 1) -> None:
     """Close the jaws until they meet or hold something; a higher level is faster and stronger (3.2.14.2)."""
-    session.robot[Gripper].close(level, source=session.source)
+    context.robot[Gripper].close(level, source=context.source)
 
 
 @TABLE.on("robotic_gripper stop", right=Right.DRIVE, needs=(Gripper,))
-async def stop(session: Session) -> None:
+async def stop(context: Context) -> None:
     """Keep the jaws where they are; in no manual, but robots know it."""
-    session.robot[Gripper].stop()
+    context.robot[Gripper].stop()
 
 
 @TABLE.on("robotic_gripper status ?", right=Right.SEE, needs=(Gripper,))
-async def get_status(session: Session) -> tuple[int, ...]:
+async def get_status(context: Context) -> tuple[int, ...]:
     """0 closed, 1 between, 2 open (3.2.14.3); robots count 0 between, 1 open, 2 closed."""
-    return ((GRIPPER_OF_ROBOTS if session.profile.as_robots else GRIPPER)[session.robot[Gripper].status],)
+    return ((GRIPPER_OF_ROBOTS if context.profile.as_robots else GRIPPER)[context.robot[Gripper].status],)

@@ -7,30 +7,30 @@ import math
 from roboglot.model.components.sensing.range_sensor import RangeSensors
 from roboglot.model.errors import NotFound
 from roboglot.operations import Right
+from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.ranges import OnOff, RangeSensorId
-from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
 
 
 @TABLE.on("ir_distance_sensor measure", right=Right.SEE, needs=(RangeSensors,))
-async def measure(session: Session, switch: OnOff) -> None:
+async def measure(context: Context, switch: OnOff) -> None:
     """Switch all sensors (3.2.11.1); off again when the session ends."""
-    sensors = session.robot[RangeSensors]
+    sensors = context.robot[RangeSensors]
     sensors.measure(switch == "on")
-    session.at_end("ir measure", lambda: sensors.measure(False))
+    context.at_end("ir measure", lambda: sensors.measure(False))
 
 
 @TABLE.on("ir_distance_sensor distance ?", right=Right.SEE, needs=(RangeSensors,))
-async def get_distance(session: Session, id: RangeSensorId) -> tuple[float, ...]:
+async def get_distance(context: Context, id: RangeSensorId) -> tuple[float, ...]:
     """mm to what sensor id (front, left, rear, right) sees (3.2.11.2); robots tell cm.
 
     0 while nothing is measured, the end of the sensor's range when nothing is within it.
     """
-    sensors = session.robot[RangeSensors]
+    sensors = context.robot[RangeSensors]
     if id > len(sensors.names):
         raise NotFound(f"this robot has {len(sensors.names)} distance sensors")
     reading = sensors.reading(sensors.names[id - 1])
     if reading is None:
         return (0.0,)
     distance = reading.distance if math.isfinite(reading.distance) else reading.range_max
-    return (round(distance * (100 if session.profile.as_robots else 1000), 1),)
+    return (round(distance * (100 if context.profile.as_robots else 1000), 1),)

@@ -5,15 +5,15 @@ from __future__ import annotations
 from roboglot.model.components.interaction.light import Colour, Light, LightEffect
 from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.operations import Right
+from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.ranges import BlinkRate, ColourPart, Effect, LampNumber
-from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.protocols.robomaster.vocabulary import EFFECTS, ZONES
 
 
 @TABLE.on("led control", right=Right.DRIVE, needs=(Light,))
 async def control(
-    session: Session,
+    context: Context,
     *,
     comp: str,
     effect: Effect,
@@ -28,7 +28,7 @@ async def control(
     scrolling goes to the gimbal's rings only, and fails where none is meant. blink_freq (Hz) and single_led_index (one
     lamp of a ring, solid or off) are in no manual.
     """
-    light, kind = session.robot[Light], EFFECTS[effect]
+    light, kind = context.robot[Light], EFFECTS[effect]
     zones = [zone for zone in _zones(comp, light) if zone in light.zones]
     if kind is LightEffect.SCROLLING or single_led_index is not None:
         zones = [zone for zone in zones if light.zones[zone] > 1]

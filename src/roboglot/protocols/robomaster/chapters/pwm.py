@@ -4,36 +4,36 @@ from __future__ import annotations
 
 from roboglot.model.components.system.pwm import PwmPorts
 from roboglot.operations import Right
+from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.ranges import Hertz, Percent, PortMask
-from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
 
 ROBOTS_DUTY = 0.075  # where robots leave their outputs when a session ends
 
 
-def _ports(session: Session, mask: int) -> list[int]:
+def _ports(context: Context, mask: int) -> list[int]:
     """The outputs that the mask names: bit n-1 is output n; bits without an output are ignored."""
-    pwm = session.robot[PwmPorts]
-    session.at_end("pwm", lambda: _restore(session))
+    pwm = context.robot[PwmPorts]
+    context.at_end("pwm", lambda: _restore(context))
     return [number for number in range(1, pwm.count + 1) if mask >> (number - 1) & 1]
 
 
-def _restore(session: Session) -> None:
-    pwm = session.robot[PwmPorts]
+def _restore(context: Context) -> None:
+    pwm = context.robot[PwmPorts]
     pwm.reset()
-    for number in range(1, pwm.count + 1) if session.profile.as_robots else ():
+    for number in range(1, pwm.count + 1) if context.profile.as_robots else ():
         pwm.set_duty(number, ROBOTS_DUTY)
 
 
 @TABLE.on("pwm value", right=Right.DRIVE, needs=(PwmPorts,))
-async def set_value(session: Session, port: PortMask, data: Percent) -> None:
+async def set_value(context: Context, port: PortMask, data: Percent) -> None:
     """Duty of the masked outputs in percent: ``pwm value 1 50``, or by name as robots have it (3.2.8.1)."""
-    for number in _ports(session, port):
-        session.robot[PwmPorts].set_duty(number, data / 100)
+    for number in _ports(context, port):
+        context.robot[PwmPorts].set_duty(number, data / 100)
 
 
 @TABLE.on("pwm freq", right=Right.DRIVE, needs=(PwmPorts,))
-async def set_frequency(session: Session, port: PortMask, data: Hertz) -> None:
+async def set_frequency(context: Context, port: PortMask, data: Hertz) -> None:
     """Frequency of the masked outputs in Hz (3.2.8.2)."""
-    for number in _ports(session, port):
-        session.robot[PwmPorts].set_frequency(number, float(data))
+    for number in _ports(context, port):
+        context.robot[PwmPorts].set_frequency(number, float(data))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from roboglot.model.components.sensing.camera import Camera
 from roboglot.operations import Right
-from roboglot.protocols.robomaster.session import Session
+from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.wire.robomaster.replies import Reply
 
@@ -12,27 +12,27 @@ OUTSIDE_SDK_MODE = frozenset({"command", "quit", "version", "version ?"})  # the
 
 
 @TABLE.on("command", right=Right.SEE)
-async def command(session: Session) -> Reply | None:
+async def command(context: Context) -> Reply | None:
     """Enter SDK mode (3.2.1.1)."""
-    if session.active:
+    if context.active:
         return Reply.ALREADY_IN_SDK_MODE
-    session.begin()
-    if Camera in session.robot:
-        session.robot[Camera].prepare()  # clients want the first picture within a second of `stream on`
+    context.begin()
+    if Camera in context.robot:
+        context.robot[Camera].prepare()  # clients want the first picture within a second of `stream on`
     return None
 
 
 @TABLE.on("quit", right=Right.DRIVE)
-async def quit_(session: Session) -> Reply | None:
+async def quit_(context: Context) -> Reply | None:
     """Leave SDK mode, stop and reset everything; answers when the robot stands (3.2.1.2)."""
-    if not session.active:
+    if not context.active:
         return Reply.QUIT_FAILED
-    for action in session.end("quit"):
+    for action in context.end("quit"):
         await action.done()
     return None
 
 
 @TABLE.on("version", "version ?", right=Right.SEE)
-async def version(session: Session) -> str:
+async def version(context: Context) -> str:
     """The version of the text SDK: ``version 00.00.00.70``."""
-    return f"version {session.profile.version}"
+    return f"version {context.profile.version}"

@@ -4,35 +4,35 @@ from __future__ import annotations
 
 from roboglot.model.components.sensing.adapter import SensorAdapters
 from roboglot.operations import Right
+from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.event_switches import EventSwitches
 from roboglot.protocols.robomaster.ranges import AdapterId, AdapterPort, OnOff
-from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
 
 RAW_MAX = 1023  # what robots' converters say at full scale
 
 
 @TABLE.on("sensor_adapter adc ?", right=Right.SEE, needs=(SensorAdapters,))
-async def get_voltage(session: Session, *, id: AdapterId, port: AdapterPort) -> tuple[float | int, ...]:
+async def get_voltage(context: Context, *, id: AdapterId, port: AdapterPort) -> tuple[float | int, ...]:
     """V at the input (3.2.10.1); robots tell the converter's raw number."""
-    adapters = session.robot[SensorAdapters]
+    adapters = context.robot[SensorAdapters]
     voltage = adapters.voltage(id, port)
-    return (round(voltage / adapters.voltage_max * RAW_MAX) if session.profile.as_robots else round(voltage, 3),)
+    return (round(voltage / adapters.voltage_max * RAW_MAX) if context.profile.as_robots else round(voltage, 3),)
 
 
 @TABLE.on("sensor_adapter io_level ?", right=Right.SEE, needs=(SensorAdapters,))
-async def get_level(session: Session, *, id: AdapterId, port: AdapterPort) -> tuple[int, ...]:
+async def get_level(context: Context, *, id: AdapterId, port: AdapterPort) -> tuple[int, ...]:
     """0 or 1 (3.2.10.2)."""
-    return (int(session.robot[SensorAdapters].level(id, port)),)
+    return (int(context.robot[SensorAdapters].level(id, port)),)
 
 
 @TABLE.on("sensor_adapter pulse_period", "sensor_adapter pulse_period ?", right=Right.SEE, needs=(SensorAdapters,))
-async def get_pulse_period(session: Session, *, id: AdapterId, port: AdapterPort) -> tuple[int, ...]:
+async def get_pulse_period(context: Context, *, id: AdapterId, port: AdapterPort) -> tuple[int, ...]:
     """ms between the last two changes of the level (3.2.10.3). The manual asks without ``?``, robots with it."""
-    return (round(session.robot[SensorAdapters].pulse_period(id, port) * 1000),)
+    return (round(context.robot[SensorAdapters].pulse_period(id, port) * 1000),)
 
 
 @TABLE.on("sensor_adapter event", right=Right.SEE, needs=(SensorAdapters,))
-async def switch_events(session: Session, *, io_level: OnOff) -> None:
+async def switch_events(context: Context, *, io_level: OnOff) -> None:
     """Tell changes of levels on the event port, or stop (3.2.10.4)."""
-    session.part(EventSwitches).adapters(io_level == "on")
+    context.part(EventSwitches).adapters(io_level == "on")

@@ -6,39 +6,39 @@ import math
 
 from roboglot.model.components.motion.servo import Servos
 from roboglot.operations import Right
+from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.ranges import ServoAngle, ServoId, ServoSpeed
-from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.protocols.robomaster.waiting import ended
 
 
 @TABLE.on("servo angle", right=Right.DRIVE, needs=(Servos,))
-async def set_angle(session: Session, *, id: ServoId, angle: ServoAngle, wait_for_complete: bool = False) -> None:
+async def set_angle(context: Context, *, id: ServoId, angle: ServoAngle, wait_for_complete: bool = False) -> None:
     """Turn a servo to an angle in degrees (3.2.12.1); answers at once unless ``wait_for_complete`` is true."""
-    action = session.robot[Servos].move_to(id, math.radians(angle), source=session.source)
+    action = context.robot[Servos].move_to(id, math.radians(angle), source=context.source)
     if wait_for_complete:
-        await ended(session, action)
+        await ended(context, action)
 
 
 @TABLE.on("servo recenter", right=Right.DRIVE, needs=(Servos,))
-async def recenter(session: Session, *, id: ServoId, wait_for_complete: bool = False) -> None:
+async def recenter(context: Context, *, id: ServoId, wait_for_complete: bool = False) -> None:
     """Turn a servo to 0; in no manual, but robots know it."""
-    await set_angle(session, id=id, angle=0.0, wait_for_complete=wait_for_complete)
+    await set_angle(context, id=id, angle=0.0, wait_for_complete=wait_for_complete)
 
 
 @TABLE.on("servo speed", right=Right.DRIVE, needs=(Servos,))
-async def set_speed(session: Session, *, id: ServoId, speed: ServoSpeed) -> None:
+async def set_speed(context: Context, *, id: ServoId, speed: ServoSpeed) -> None:
     """Keep turning a servo at degrees/s until it is stopped (3.2.12.2)."""
-    session.robot[Servos].set_speed(id, math.radians(speed), source=session.source)
+    context.robot[Servos].set_speed(id, math.radians(speed), source=context.source)
 
 
 @TABLE.on("servo stop", right=Right.DRIVE, needs=(Servos,))
-async def stop(session: Session, id: ServoId | None = None) -> None:
+async def stop(context: Context, id: ServoId | None = None) -> None:
     """Stop all servos, or the one named (3.2.12.3)."""
-    session.robot[Servos].stop(id)
+    context.robot[Servos].stop(id)
 
 
 @TABLE.on("servo angle ?", right=Right.SEE, needs=(Servos,))
-async def get_angle(session: Session, *, id: ServoId) -> tuple[float, ...]:
+async def get_angle(context: Context, *, id: ServoId) -> tuple[float, ...]:
     """Where a servo stands, degrees in [-180, 180] (3.2.12.4)."""
-    return (round(math.degrees(session.robot[Servos].angle(id)), 1) + 0.0,)
+    return (round(math.degrees(context.robot[Servos].angle(id)), 1) + 0.0,)

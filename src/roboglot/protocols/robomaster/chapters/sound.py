@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from roboglot.model.components.sensing.hearing import Hearing
 from roboglot.operations import Right
+from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.event_switches import EventSwitches
 from roboglot.protocols.robomaster.ranges import OnOff
-from roboglot.protocols.robomaster.session import Session
 from roboglot.protocols.robomaster.table import TABLE
 
 
 @TABLE.on("sound event", right=Right.SEE, needs=(Hearing,))
-async def switch_events(session: Session, *, applause: OnOff) -> None:
+async def switch_events(context: Context, *, applause: OnOff) -> None:
     """Tell applause on the event port, or stop (3.2.7.1)."""
-    session.part(EventSwitches).applause(applause == "on")
+    context.part(EventSwitches).applause(applause == "on")

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from roboglot.protocols.robomaster.session import Session
+from roboglot.protocols.robomaster.context import Context
 
 PERIOD = 2.0  # s between two broadcasts
 
 
-async def announce(session: Session, address: str, send: Callable[[bytes], None]) -> None:
+async def announce(context: Context, address: str, send: Callable[[bytes], None]) -> None:
     """Broadcast ``address`` until cancelled."""
-    message = session.profile.broadcast(address)
-    async for _ in session.robot.clock.every(PERIOD):
-        if not session.active:
+    message = context.profile.broadcast(address)
+    async for _ in context.robot.clock.every(PERIOD):
+        if not context.active:
             send(message)

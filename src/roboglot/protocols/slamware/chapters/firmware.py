@@ -14,7 +14,7 @@ from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.uploads import Upload
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import HttpError
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.table import TABLE
 from roboglot.wire.slamware.apk import read_apk
 from roboglot.wire.slamware.firmware import FirmwareInfo
 from roboglot.wire.slamware.packages import BadPackage, read_firmware
@@ -70,7 +70,7 @@ class InstalledApp(msgspec.Struct):
     version: str
 
 
-@OPERATIONS.on(f"GET {API}/newversion", right=Right.SEE, needs=(Firmware,))
+@TABLE.on(f"GET {API}/newversion", right=Right.SEE, needs=(Firmware,))
 async def get_new_version(context: Context) -> FirmwareInfo:
     """What the maker offers, if it is newer than what runs."""
     plate = context.robot.description
@@ -79,19 +79,19 @@ async def get_new_version(context: Context) -> FirmwareInfo:
     return FirmwareInfo(plate.maker, plate.model, package.version, str(uuid.UUID(package.digest)))
 
 
-@OPERATIONS.on(f"GET {API}/autoupdate/:enable", right=Right.SEE, needs=(Firmware,))
+@TABLE.on(f"GET {API}/autoupdate/:enable", right=Right.SEE, needs=(Firmware,))
 async def get_enable_auto_update(context: Context) -> bool:
     """Whether the robot updates itself on its dock."""
     return context.robot[Firmware].automatic
 
 
-@OPERATIONS.on(f"PUT {API}/autoupdate/:enable", right=Right.ADMIN, needs=(Firmware,))
+@TABLE.on(f"PUT {API}/autoupdate/:enable", right=Right.ADMIN, needs=(Firmware,))
 async def set_enable_auto_update(context: Context, body: Switch) -> None:
     """Let it, or not."""
     await context.robot[Firmware].set_automatic(body.enable)
 
 
-@OPERATIONS.on(f"POST {API}/autoupdate/:start", right=Right.ADMIN, needs=(Firmware,))
+@TABLE.on(f"POST {API}/autoupdate/:start", right=Right.ADMIN, needs=(Firmware,))
 async def start_update(context: Context) -> Outcome:
     """Download the newest version, install it and restart."""
     firmware = context.robot[Firmware]
@@ -103,7 +103,7 @@ async def start_update(context: Context) -> Outcome:
     return Outcome(result=True, reason="")
 
 
-@OPERATIONS.on(f"POST {API}/update/:start", right=Right.ADMIN, needs=(Disk, Firmware))
+@TABLE.on(f"POST {API}/update/:start", right=Right.ADMIN, needs=(Disk, Firmware))
 async def upload_and_start_update(context: Context, body: Upload) -> UploadOutcome:
     """Install the uploaded package, whatever its version, and restart; a zip archive with ``firmware.json``."""
     firmware, plate = context.robot[Firmware], context.robot.description
@@ -121,7 +121,7 @@ async def upload_and_start_update(context: Context, body: Upload) -> UploadOutco
     return UploadOutcome(result=True, msg="", data={"version": found.version})
 
 
-@OPERATIONS.on(f"GET {API}/progress", right=Right.SEE, needs=(Firmware,))
+@TABLE.on(f"GET {API}/progress", right=Right.SEE, needs=(Firmware,))
 async def get_firmware_progress(context: Context) -> UpdateProgress:
     """How far the update is."""
     progress = context.robot[Firmware].progress
@@ -132,13 +132,13 @@ async def get_firmware_progress(context: Context) -> UpdateProgress:
     return UpdateProgress(step, STEPS[step], share, len(STEPS), status, int(status == ERROR))
 
 
-@OPERATIONS.on(f"GET {APPS}", right=Right.SEE, needs=(Apps,))
+@TABLE.on(f"GET {APPS}", right=Right.SEE, needs=(Apps,))
 async def get_apps(context: Context) -> list[InstalledApp]:
     """The apps that people installed."""
     return [InstalledApp(app.name, app.version) for app in context.robot[Apps].all()]
 
 
-@OPERATIONS.on(f"POST {APPS}", right=Right.ADMIN, needs=(Apps,))
+@TABLE.on(f"POST {APPS}", right=Right.ADMIN, needs=(Apps,))
 async def install_app(context: Context, body: Upload) -> None:
     """Install an Android package (APK) or a newer version of one; 400 for what is none, 500 without room."""
     try:
@@ -149,7 +149,7 @@ async def install_app(context: Context, body: Upload) -> None:
         raise HttpError(status, "Failed to install application", str(error)) from None
 
 
-@OPERATIONS.on(f"DELETE {APPS}/{{app_name}}", right=Right.ADMIN, needs=(Apps,))
+@TABLE.on(f"DELETE {APPS}/{{app_name}}", right=Right.ADMIN, needs=(Apps,))
 async def delete_app(context: Context, app_name: str) -> None:
     """Remove one, or 404."""
     await context.robot[Apps].remove(app_name)

@@ -30,7 +30,7 @@ from roboglot.protocols.slamware.chapters.delivery.tasks import StatusFilter, is
 from roboglot.protocols.slamware.chapters.delivery.vocabulary import name_of, reason_of, ride_word
 from roboglot.protocols.slamware.chapters.system.system import device_id
 from roboglot.protocols.slamware.context import Context
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.table import TABLE
 from roboglot.protocols.slamware.vocabulary import pose3d
 from roboglot.wire.slamware.industry import (
     CommonResponse,
@@ -62,7 +62,7 @@ STAGES = {
 }
 
 
-@OPERATIONS.on(f"POST {TEMPLATES}", right=Right.EDIT, needs=(Industry,))
+@TABLE.on(f"POST {TEMPLATES}", right=Right.EDIT, needs=(Industry,))
 async def create_task_template(context: Context, body: TemplateRequest) -> TaskTemplate:
     """Keep it, in place of one with the same key; 404 for a place that is not on the map."""
     operations = tuple(Operation(entry.display_name, entry.action, entry.wait_time) for entry in body.action_list)
@@ -71,20 +71,20 @@ async def create_task_template(context: Context, body: TemplateRequest) -> TaskT
     return _template(context, template)
 
 
-@OPERATIONS.on(f"GET {TEMPLATES}", right=Right.SEE, needs=(Industry,))
+@TABLE.on(f"GET {TEMPLATES}", right=Right.SEE, needs=(Industry,))
 async def get_task_templates(context: Context) -> list[TaskTemplate]:
     """In the order in which they were made."""
     return [_template(context, template) for template in context.robot[Industry].templates]
 
 
-@OPERATIONS.on(f"DELETE {TEMPLATES}/{{key_id}}", right=Right.EDIT, needs=(Industry,))
+@TABLE.on(f"DELETE {TEMPLATES}/{{key_id}}", right=Right.EDIT, needs=(Industry,))
 async def delete_task_template(context: Context, key_id: str) -> CommonResponse:
     """Forget it; 404 if there is none."""
     await context.robot[Industry].remove_template(key_id)
     return CommonResponse(result=True, msg="", data={})
 
 
-@OPERATIONS.on(f"GET {TASKS}", right=Right.SEE, needs=(Delivery, Industry, Places))
+@TABLE.on(f"GET {TASKS}", right=Right.SEE, needs=(Delivery, Industry, Places))
 async def get_industry_tasks(
     context: Context,
     type: Literal["carry_calling_by_template", "carry_calling", "industry"] | None = None,
@@ -102,7 +102,7 @@ async def get_industry_tasks(
     return calls + [_round(context, order) for order in orders if is_asked(order.status, status)]
 
 
-@OPERATIONS.on("POST /api/industry/v1/generate_landing_pose", right=Right.SEE, needs=(Localization,))
+@TABLE.on("POST /api/industry/v1/generate_landing_pose", right=Right.SEE, needs=(Localization,))
 async def generate_landing_pose(context: Context, body: LandingRequest) -> LandingPose:
     """Where the robot is, and the place ahead of it from which it would come back here: what MoveToTag takes as target.
 
@@ -114,7 +114,7 @@ async def generate_landing_pose(context: Context, body: LandingRequest) -> Landi
     return LandingPose(pose3d(ahead), pose3d(here))
 
 
-@OPERATIONS.on(f"POST {TASKS}/events", right=Right.DRIVE, needs=(Industry,))
+@TABLE.on(f"POST {TASKS}/events", right=Right.DRIVE, needs=(Industry,))
 async def post_task_event(context: Context, body: TaskEvent) -> None:
     """The client that carries out a call says how it goes; 404 for an unknown one, 403 for one that has ended."""
     await context.robot[Industry].report(body.task_id, OrderStatus(body.status.lower()))

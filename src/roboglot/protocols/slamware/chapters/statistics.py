@@ -5,18 +5,18 @@ from __future__ import annotations
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.operations import Right
 from roboglot.protocols.slamware.context import Context
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.table import TABLE
 
 API = "/api/core/statistics/v1"
 
 
-@OPERATIONS.on(f"GET {API}/odometry", right=Right.SEE, needs=(Odometry,))
+@TABLE.on(f"GET {API}/odometry", right=Right.SEE, needs=(Odometry,))
 async def get_odometry(context: Context) -> float:
     """Metres travelled."""
     return round(context.totals.metres, 3)
 
 
-@OPERATIONS.on(f"GET {API}/runtime", right=Right.SEE)
+@TABLE.on(f"GET {API}/runtime", right=Right.SEE)
 async def get_runtime(context: Context) -> float:
     """Seconds of robot time."""
     return round(context.totals.seconds, 3)

@@ -8,25 +8,37 @@ from roboglot.model.components.interaction.members import Members
 from roboglot.model.components.mapping.map_library import MapLibrary
 from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
+from roboglot.operations import Right
 from roboglot.programs.functions.senses.people import known_words
-from roboglot.programs.tasks.service import ProgramService
 from roboglot.programs.tasks.states import TaskOperation
-from roboglot.protocols.visual.answers import Answers
+from roboglot.protocols.visual.context import Context
+from roboglot.protocols.visual.table import TABLE
 from roboglot.wire.visual.codes import FeedbackState
 from roboglot.wire.visual.requests import Kind, Request
 
 Item = dict[str, str]
 
 
-async def answer(service: ProgramService, request: Request, answers: Answers) -> None:
+@TABLE.on(
+    "AI all",
+    "AI personnel",
+    "AI face",
+    "AI voiceprint",
+    "AI training_words",
+    "SLAM map",
+    "SLAM preset",
+    right=Right.SEE,
+)
+async def inquire(context: Context) -> None:
     """List the saved maps, the preset points of the newest, the robot's members, or the words it listens for."""
-    service.allow(TaskOperation.INQUIRY)
+    request = context.request
+    context.service.allow(TaskOperation.INQUIRY)
     try:
-        items = await _items(service.robot, request)
+        items = await _items(context.robot, request)
     except RobotError as error:
-        answers.refuse(FeedbackState.OTHER, str(error))
+        context.answers.refuse(FeedbackState.OTHER, str(error))
         return
-    answers.list([item for item in items if not request.targets or item["id"] in request.targets])
+    context.answers.list([item for item in items if not request.targets or item["id"] in request.targets])
 
 
 async def _items(robot: Robot, request: Request) -> list[Item]:

@@ -2,26 +2,34 @@
 
 from __future__ import annotations
 
+from roboglot.operations import Right
 from roboglot.programs.errors import ProgramError
-from roboglot.programs.library.library import ModuleLibrary
-from roboglot.protocols.visual.answers import Answers, item, program
+from roboglot.protocols.visual.context import Context
 from roboglot.protocols.visual.errors import state_of
-from roboglot.wire.visual.requests import Request
+from roboglot.protocols.visual.table import TABLE
+from roboglot.protocols.visual.vocabulary import item, program
 
 
-async def answer(library: ModuleLibrary, request: Request, answers: Answers) -> None:
-    """Do what the frame asks; raises ProgramError for what concerns it as a whole."""
-    match request.operate:
-        case "save":
-            await library.save(program(request))
-            await answers.accept()
-        case "delete":
-            for id in request.targets:
-                try:
-                    await library.delete(id)
-                except ProgramError as refusal:
-                    answers.refuse(state_of(refusal), str(refusal), id)
-                else:
-                    await answers.accept(id)
-        case "inquiry":
-            answers.list([item(module) for module in await library.modules(request.targets)])
+@TABLE.on("module save", right=Right.PROGRAM)
+async def save(context: Context) -> None:
+    """Keep a module. Raises ProgramError for what concerns the frame as a whole, as all of these do."""
+    await context.library.save(program(context.request))
+    await context.answers.accept()
+
+
+@TABLE.on("module delete", right=Right.PROGRAM)
+async def delete(context: Context) -> None:
+    """Remove modules; one feedback per target."""
+    for id in context.request.targets:
+        try:
+            await context.library.delete(id)
+        except ProgramError as refusal:
+            context.answers.refuse(state_of(refusal), str(refusal), id)
+        else:
+            await context.answers.accept(id)
+
+
+@TABLE.on("module inquiry", right=Right.SEE)
+async def inquire(context: Context) -> None:
+    """List the modules."""
+    context.answers.list([item(module) for module in await context.library.modules(context.request.targets)])

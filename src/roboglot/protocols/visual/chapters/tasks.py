@@ -2,39 +2,50 @@
 
 from __future__ import annotations
 
+from roboglot.operations import Right
 from roboglot.programs.errors import ProgramError
-from roboglot.programs.tasks.service import ProgramService
 from roboglot.programs.tasks.states import TaskOperation
-from roboglot.protocols.visual.answers import Answers, item, program
+from roboglot.protocols.visual.context import Context
 from roboglot.protocols.visual.errors import state_of
-from roboglot.wire.visual.requests import Request
+from roboglot.protocols.visual.table import TABLE
+from roboglot.protocols.visual.vocabulary import item, program
 
 
-async def answer(service: ProgramService, request: Request, answers: Answers) -> None:
-    """Do what the frame asks; raises ProgramError for what concerns it as a whole."""
-    match request.operate:
-        case "save":
-            await service.save(program(request))
-            await answers.accept()
-        case "debug":
-            await service.debug(program(request))
-            await answers.accept()
-        case "run":  # the first target counts, as in save
-            await service.run(request.targets[0], request.mode, request.condition)
-            await answers.accept()
-        case "suspend" | "recover" | "shutdown":
-            await _control(service, request, answers)
-        case "delete":
-            await _delete(service, request, answers)
-        case "inquiry":
-            answers.list([item(task) for task in await service.tasks(request.targets)])
+@TABLE.on("task save", right=Right.PROGRAM)
+async def save(context: Context) -> None:
+    """Keep a task. Raises ProgramError for what concerns the frame as a whole, as all of these do."""
+    await context.service.save(program(context.request))
+    await context.answers.accept()
 
 
-async def _control(service: ProgramService, request: Request, answers: Answers) -> None:
+@TABLE.on("task debug", right=Right.PROGRAM)
+async def debug(context: Context) -> None:
+    """Run a task that is not kept."""
+    await context.service.debug(program(context.request))
+    await context.answers.accept()
+
+
+@TABLE.on("task run", right=Right.PROGRAM)
+async def run(context: Context) -> None:
+    """Run a kept task, now or when its condition says; the first target counts, as in save."""
+    request = context.request
+    await context.service.run(request.targets[0], request.mode, request.condition)
+    await context.answers.accept()
+
+
+@TABLE.on("task inquiry", right=Right.SEE)
+async def inquire(context: Context) -> None:
+    """List the tasks."""
+    context.answers.list([item(task) for task in await context.service.tasks(context.request.targets)])
+
+
+@TABLE.on("task suspend", "task recover", "task shutdown", right=Right.PROGRAM)
+async def control(context: Context) -> None:
     """Two feedbacks: the first for the request, the second (from the service) when each task has really obeyed."""
-    operation = TaskOperation(request.operate)
+    service, answers = context.service, context.answers
+    operation = TaskOperation(context.request.operate)
     legal = []
-    for id in request.targets:
+    for id in context.request.targets:
         if (refusal := await service.refusal(operation, id)) is None:
             legal.append(id)
         else:
@@ -53,12 +64,13 @@ async def _control(service: ProgramService, request: Request, answers: Answers) 
             answers.refuse(state_of(late), str(late), id)
 
 
-async def _delete(service: ProgramService, request: Request, answers: Answers) -> None:
-    """One feedback per target."""
-    for id in request.targets:
+@TABLE.on("task delete", right=Right.PROGRAM)
+async def delete(context: Context) -> None:
+    """Remove tasks; one feedback per target."""
+    for id in context.request.targets:
         try:
-            await service.delete(id)
+            await context.service.delete(id)
         except ProgramError as refusal:
-            answers.refuse(state_of(refusal), str(refusal), id)
+            context.answers.refuse(state_of(refusal), str(refusal), id)
         else:
-            await answers.accept(id)
+            await context.answers.accept(id)

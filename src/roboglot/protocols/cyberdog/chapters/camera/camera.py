@@ -19,13 +19,13 @@ from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.app_link import AppLink
 from roboglot.protocols.cyberdog.chapters.camera.camera_files import CameraFiles
-from roboglot.protocols.cyberdog.table import Call, files, operations, push
+from roboglot.protocols.cyberdog.table import TABLE, Call, files, push
 from roboglot.wire.cyberdog.codes import Code, FileError
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.text import Int32
 
 if TYPE_CHECKING:
-    from roboglot.protocols.cyberdog.context import Dog
+    from roboglot.protocols.cyberdog.context import Context
 
 log = logging.getLogger(__name__)
 LEFT_FILES = push(Code.LEFT_FILES)
@@ -124,11 +124,11 @@ class Transfers:
             log.warning("the recording was lost: %s", error)
 
 
-def get_file(dog: Dog, code: int, fields: Mapping[str, object]) -> AsyncGenerator[Any, None]:
+def get_file(context: Context, code: int, fields: Mapping[str, object]) -> AsyncGenerator[Any, None]:
     """The chunks that answer a ``getFile``."""
-    if Camera not in dog.robot or Recorder not in dog.robot:
+    if Camera not in context.robot or Recorder not in context.robot:
         return _refused(FileError.CAMERA_SILENT if code in (Code.CAMERA, Code.SAVED_FILE) else FileError.WRONG_CODE)
-    camera_files, admission = dog.files, dog.robot.admission
+    camera_files, admission = context.files, context.robot.admission
     if admission.asks:
         try:
             admission.check("cyberdog", str(int(code)), Right.SEE if code == Code.SAVED_FILE else Right.DRIVE)
@@ -136,11 +136,11 @@ def get_file(dog: Dog, code: int, fields: Mapping[str, object]) -> AsyncGenerato
             return _refused(FileError.CAMERA_SILENT)
     match code, fields.get("command"):
         case Code.SAVED_FILE, _:
-            return dog.transfers.send(lambda: _saved(camera_files, str(fields.get("file_name", ""))))
+            return context.transfers.send(lambda: _saved(camera_files, str(fields.get("file_name", ""))))
         case Code.CAMERA, 1:
-            return dog.transfers.send(camera_files.photograph)
+            return context.transfers.send(camera_files.photograph)
         case Code.CAMERA, 3:
-            return dog.transfers.send(camera_files.stop)
+            return context.transfers.send(camera_files.stop)
         case Code.CAMERA, _:
             return _refused(FileError.ARGUMENTS)
     return _refused(FileError.WRONG_CODE)
@@ -154,10 +154,10 @@ async def _refused(error: FileError) -> AsyncGenerator[Any, None]:
     yield pb.FileChunk(error_code=error)
 
 
-@operations.on(Code.CAMERA, right=Right.DRIVE, needs=(Camera, Recorder))
+@TABLE.on(Code.CAMERA, right=Right.DRIVE, needs=(Camera, Recorder))
 async def camera(call: Call, *, command: Int32) -> dict[str, int]:
     """2 begins a recording; 1 and 3 take a photo and end a recording that stay on the robot until they are fetched."""
-    robot, kept = call.dog.robot, call.dog.files
+    robot, kept = call.context.robot, call.context.files
     robot[Camera], robot[Recorder]
     try:
         match command:

@@ -18,7 +18,7 @@ from roboglot.model.components.sensing.camera import Camera
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.app_link import AppLink
-from roboglot.protocols.cyberdog.table import Call, operations, push
+from roboglot.protocols.cyberdog.table import TABLE, Call, push
 from roboglot.wire.cyberdog.codes import Code
 from roboglot.wire.cyberdog.signalling import (
     Alignment,
@@ -218,12 +218,12 @@ class _Peer:
             await call.close()
 
 
-@operations.on(Code.VIDEO, right=Right.SEE, needs=(Camera, VideoStream))
+@TABLE.on(Code.VIDEO, right=Right.SEE, needs=(Camera, VideoStream))
 async def signal(call: Call) -> str:
     """Offers, candidates and stops of the app; the robot's own come as pushes of the same code."""
-    call.dog.robot[Camera], call.dog.robot[VideoStream]
+    call.context.robot[Camera], call.context.robot[VideoStream]
     try:
-        call.dog.video.take(read_signal(read_params(call.text)))
+        call.context.video.take(read_signal(read_params(call.text)))
     except BadSignal as bad:
         log.info("4001: %s", bad)  # robots take it without a word, and do nothing
     return ""

@@ -12,21 +12,21 @@ from roboglot.model.errors import RobotError
 from roboglot.model.map_loading import known_dock
 from roboglot.protocols.cyberdog.chapters.mapping.task_state import Task
 from roboglot.protocols.cyberdog.chapters.motion.gait import SOURCE
-from roboglot.protocols.cyberdog.context import Dog
+from roboglot.protocols.cyberdog.context import Context
 from roboglot.wire.cyberdog.codes import Feedback, TaskResult
 
 log = logging.getLogger(__name__)
 MOVED = 0.05  # m from where the stored map has the dock: from when on the map is stored anew
 
 
-async def dock(dog: Dog, task: Task) -> TaskResult:
+async def dock(context: Context, task: Task) -> TaskResult:
     """Drive onto the charging contacts; the text leaves the feedback open, robots in the field send these two.
 
     A dock whose place is unknown is looked for nearby. ``feedback_msg`` says why the robot does not charge.
     """
     task.feedback(Feedback.ACTIVATING)
     try:
-        action = task.action = dog.robot[Docking].dock(source=SOURCE)
+        action = task.action = context.robot[Docking].dock(source=SOURCE)
         task.feedback(Feedback.DOCKING)
         try:
             await action.succeeded()
@@ -35,18 +35,18 @@ async def dock(dog: Dog, task: Task) -> TaskResult:
             raise
     except RobotError as error:
         return task.fail(Feedback.DOCKING, error)
-    await keep_dock(dog)
+    await keep_dock(context)
     return TaskResult.SUCCESS
 
 
-async def keep_dock(dog: Dog) -> None:
+async def keep_dock(context: Context) -> None:
     """Store with the map in use where the robot learnt that its dock stands."""
-    robot = dog.robot
-    if not dog.stored_map or (home := known_dock(robot)) is None:
+    robot = context.robot
+    if not context.stored_map or (home := known_dock(robot)) is None:
         return
     try:
-        stored = await robot[MapLibrary].get(dog.stored_map)
+        stored = await robot[MapLibrary].get(context.stored_map)
         if stored.dock is None or stored.dock.distance_to(home) > MOVED:
             await robot[MapLibrary].put(replace(stored, dock=home))
     except (RobotError, OSError) as error:
-        log.warning("cannot store the dock of map %r: %s", dog.stored_map, error)
+        log.warning("cannot store the dock of map %r: %s", context.stored_map, error)

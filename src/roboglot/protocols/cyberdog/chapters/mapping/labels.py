@@ -13,9 +13,9 @@ from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Point
 from roboglot.operations import BadParameters, Right
-from roboglot.protocols.cyberdog.context import Dog
+from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.profile import Profile
-from roboglot.protocols.cyberdog.table import Call, operations
+from roboglot.protocols.cyberdog.table import TABLE, Call
 from roboglot.protocols.cyberdog.vocabulary import grid_of, label_of, no_grid
 from roboglot.wire.cyberdog.channel import MESSAGE_MAX
 from roboglot.wire.cyberdog.codes import Code
@@ -40,27 +40,29 @@ class WireLabel(msgspec.Struct):
         return named and math.isfinite(self.physicX) and math.isfinite(self.physicY)
 
 
-async def newest_map(dog: Dog, wanted: str = "", *, number: int = 0, outdoor: bool | None = None) -> StoredMap | None:
+async def newest_map(
+    context: Context, wanted: str = "", *, number: int = 0, outdoor: bool | None = None
+) -> StoredMap | None:
     """The stored map: the one of that ``number``, else ``wanted``, else the one in use, else the newest.
 
     Of ``wanted`` real robots take no notice while they have another one: they keep one map. In the text a name that
     was never given, or no longer, means no map. Only maps of one kind, if ``outdoor`` says which; None if there is
     none.
     """
-    if MapLibrary not in dog.robot:
+    if MapLibrary not in context.robot:
         return None
-    library = dog.robot[MapLibrary]
+    library = context.robot[MapLibrary]
     numbered = await library.names(outdoor=outdoor, number=number) if number else ()
     names = list(await library.names(outdoor=outdoor))
-    if dog.profile is Profile.SPEC and wanted:
+    if context.profile is Profile.SPEC and wanted:
         candidates: tuple[str, ...] = (*numbered, wanted)
     else:
-        candidates = (*numbered, dog.stored_map, wanted, *reversed(names))
+        candidates = (*numbered, context.stored_map, wanted, *reversed(names))
     found = next((name for name in candidates if name in names), None)
     return None if found is None else await library.get(found)
 
 
-@operations.on(Code.GET_LABELS, right=Right.SEE, needs=(Mapping,))
+@TABLE.on(Code.GET_LABELS, right=Right.SEE, needs=(Mapping,))
 async def get_labels(
     call: Call,
     *,
@@ -72,13 +74,13 @@ async def get_labels(
     A map found is pushed (6001), too.
     """
     _check_number(map_id)
-    dog = call.dog
-    stored = await newest_map(dog, mapName, number=map_id)
-    grid = stored.grid if stored else dog.robot[Mapping].grid
-    in_memory = not dog.map_deleted and (not mapName or dog.profile is Profile.ROBOT)
+    context = call.context
+    stored = await newest_map(context, mapName, number=map_id)
+    grid = stored.grid if stored else context.robot[Mapping].grid
+    in_memory = not context.map_deleted and (not mapName or context.profile is Profile.ROBOT)
     found = (stored is not None or in_memory) and 0 < grid.width * grid.height <= CELLS_MAX
     if found:
-        dog.reports.show_map(grid)
+        context.reports.show_map(grid)
     return {
         "mapName": stored.name if stored else "",
         "success": 0 if found else 1,
@@ -88,7 +90,7 @@ async def get_labels(
     }
 
 
-@operations.on(Code.SET_LABELS, right=Right.EDIT, needs=(MapLibrary,))
+@TABLE.on(Code.SET_LABELS, right=Right.EDIT, needs=(MapLibrary,))
 async def set_labels(
     call: Call,
     *,
@@ -102,8 +104,8 @@ async def set_labels(
     With labels the map takes the number ``map_id`` on, if one is given; without a name it is the map of that number.
     """
     _check_number(map_id)
-    dog = call.dog
-    library = dog.robot[MapLibrary]
+    context = call.context
+    library = context.robot[MapLibrary]
     try:
         labels = msgspec.convert(locationLabelInfo or [], list[WireLabel])
     except msgspec.ValidationError as error:
@@ -114,8 +116,8 @@ async def set_labels(
         stored = await library.get(mapName or await _numbered(library, map_id))
         if only_delete and not names:
             await library.remove(stored.name)
-            if dog.stored_map == stored.name or not await library.names():
-                dog.map_gone()
+            if context.stored_map == stored.name or not await library.names():
+                context.map_gone()
         elif only_delete:
             if missing := set(names) - {label.name for label in stored.labels}:
                 raise NotFound(f"no label {missing}")

@@ -11,35 +11,35 @@ from roboglot.model.map_loading import known_dock
 from roboglot.protocols.cyberdog.chapters.mapping.labels import NAME_MAX
 from roboglot.protocols.cyberdog.chapters.mapping.survey import Survey
 from roboglot.protocols.cyberdog.chapters.mapping.task_state import Task
-from roboglot.protocols.cyberdog.context import Dog
+from roboglot.protocols.cyberdog.context import Context
 from roboglot.wire.cyberdog.codes import Feedback, TaskResult
 
 log = logging.getLogger(__name__)
 FIX_PERIOD = 1.0  # s between two looks at the satellites
 
 
-async def build_map(dog: Dog, task: Task, *, outdoor: bool) -> TaskResult:
+async def build_map(context: Context, task: Task, *, outdoor: bool) -> TaskResult:
     """Begin an empty map where the robot stands and add what the lidar sees, until the task is stopped.
 
     Outdoors the satellites' fixes on the way are kept with it: they give its place on the globe.
     """
-    mapping = dog.robot[Mapping]
+    mapping = context.robot[Mapping]
     enabled = mapping.enabled
     mapping.clear()
     mapping.enable(True)
-    dog.stored_map, dog.survey = "", Survey(outdoor)
+    context.stored_map, context.survey = "", Survey(outdoor)
     task.feedback(Feedback.MAPPING_STARTED)
     try:
         while True:  # only 6009 ends it
-            dog.survey.look(dog.robot)
-            await dog.robot.clock.sleep(FIX_PERIOD)
+            context.survey.look(context.robot)
+            await context.robot.clock.sleep(FIX_PERIOD)
     finally:
         mapping.enable(enabled)
 
 
-async def keep_map(dog: Dog, name: str) -> bool:
+async def keep_map(context: Context, name: str) -> bool:
     """Save the map under ``name``, on disk when this returns; without a name throw it away. False if that failed."""
-    mapping = dog.robot[Mapping]
+    mapping = context.robot[Mapping]
     if not name:
         mapping.clear()
         return True
@@ -47,11 +47,11 @@ async def keep_map(dog: Dog, name: str) -> bool:
     if grid.width == 0 or len(name) > NAME_MAX:
         return False
     try:
-        library, survey = dog.robot[MapLibrary], dog.survey
-        dock, stamp = known_dock(dog.robot), dog.robot.clock.epoch()
+        library, survey = context.robot[MapLibrary], context.survey
+        dock, stamp = known_dock(context.robot), context.robot.clock.epoch()
         await library.put(StoredMap(name, grid, stamp, outdoor=survey.outdoor, anchor=survey.anchor, dock=dock))
     except (RobotError, OSError) as error:
         log.warning("map %r was not saved: %s", name, error)
         return False
-    dog.stored_map = name
+    context.stored_map = name
     return True

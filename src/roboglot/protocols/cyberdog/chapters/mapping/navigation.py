@@ -19,7 +19,7 @@ from roboglot.protocols.cyberdog.chapters.mapping.docking import keep_dock
 from roboglot.protocols.cyberdog.chapters.mapping.labels import newest_map
 from roboglot.protocols.cyberdog.chapters.mapping.task_state import Task
 from roboglot.protocols.cyberdog.chapters.motion.gait import SOURCE
-from roboglot.protocols.cyberdog.context import Dog
+from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.errors import codes_of
 from roboglot.wire.cyberdog.codes import Feedback, TaskResult
 
@@ -39,21 +39,21 @@ class Goal:
     theta: float | None
 
 
-async def relocalize(dog: Dog, task: Task, *, outdoor: bool) -> TaskResult:
+async def relocalize(context: Context, task: Task, *, outdoor: bool) -> TaskResult:
     """Find the robot in the stored map of that kind, or in the one in its head; localization goes on afterwards.
 
     A robot whose newest scan fits where it believes to be is not moved elsewhere; any other one is searched in the
     whole map, or, in an outdoor map while satellites are seen, around where they say it is.
     """
-    robot = dog.robot
+    robot = context.robot
     task.feedback(Feedback.LOCALIZATION_CHECKING_MAP)
-    stored = await newest_map(dog, outdoor=outdoor)
-    other = stored is not None and stored.name != dog.stored_map  # saved in an earlier life
+    stored = await newest_map(context, outdoor=outdoor)
+    other = stored is not None and stored.name != context.stored_map  # saved in an earlier life
     if stored is not None and other and stored.grid.width * stored.grid.height > 0:
         load_map(robot, stored, Pose())
-        dog.stored_map = stored.name
+        context.stored_map = stored.name
     # Without a stored one the map in memory will do, unless it is of the other kind, or was deleted.
-    if not has_map(robot) or (stored is None and (outdoor or dog.stored_map or dog.map_deleted)):
+    if not has_map(robot) or (stored is None and (outdoor or context.stored_map or context.map_deleted)):
         task.feedback(Feedback.LOCALIZATION_MAP_UNUSABLE)
         return TaskResult.FAILED
     task.feedback(Feedback.LOCALIZATION_MAP_GOOD)
@@ -66,7 +66,7 @@ async def relocalize(dog: Dog, task: Task, *, outdoor: bool) -> TaskResult:
     place = stored.anchor if stored else None
     if (other or not await _still_there(robot, task, place)) and not await _search(robot, task, place):
         return TaskResult.FAILED
-    await keep_dock(dog)
+    await keep_dock(context)
     task.feedback(Feedback.LOCALIZATION_DONE)
     return TaskResult.SUCCESS
 
@@ -119,9 +119,9 @@ async def _search(robot: Robot, task: Task, place: GlobeAnchor | None) -> bool:
     return False
 
 
-async def navigate(dog: Dog, task: Task, *, goal: Goal) -> TaskResult:
+async def navigate(context: Context, task: Task, *, goal: Goal) -> TaskResult:
     """Go to ``goal``; the app sees the path, and at the end an empty one."""
-    robot = dog.robot
+    robot = context.robot
     task.feedback(Feedback.CHECKING_MAP)
     if not has_map(robot):
         task.feedback(Feedback.NO_MAP)
@@ -134,17 +134,17 @@ async def navigate(dog: Dog, task: Task, *, goal: Goal) -> TaskResult:
     try:
         options = NavigationOptions(yaw=goal.theta)
         action = task.action = navigation.navigate_to([Point(goal.x, goal.y)], options, source=SOURCE)
-        return await _arrive(dog, task, action)
+        return await _arrive(context, task, action)
     except RobotError as error:
         return task.fail(codes_of(error).navigation, error)
     finally:
-        dog.reports.show_path(Path())
+        context.reports.show_path(Path())
 
 
-async def _arrive(dog: Dog, task: Task, action: Action) -> TaskResult:
+async def _arrive(context: Context, task: Task, action: Action) -> TaskResult:
     """Report the progress of ``action`` until it has ended; cancelled if the task is."""
     shown_at = -PATH_PERIOD
-    clock = dog.robot.clock
+    clock = context.robot.clock
 
     def watch(event: ActionChanged) -> None:
         nonlocal shown_at
@@ -154,9 +154,9 @@ async def _arrive(dog: Dog, task: Task, action: Action) -> TaskResult:
             task.feedback(Feedback.NAVIGATING)
         if clock.time() - shown_at >= PATH_PERIOD:
             shown_at = clock.time()
-            dog.reports.show_path(feedback.remaining)
+            context.reports.show_path(feedback.remaining)
 
-    end_watch = dog.robot.events.listen(ActionChanged, watch)
+    end_watch = context.robot.events.listen(ActionChanged, watch)
     try:
         status = await action.done()
     except asyncio.CancelledError:

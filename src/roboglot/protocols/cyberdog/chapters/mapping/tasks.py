@@ -31,10 +31,10 @@ from roboglot.protocols.cyberdog.chapters.people.following import (
     follow_thing,
     manner_of,
 )
-from roboglot.protocols.cyberdog.context import Dog
+from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.protocols.cyberdog.stream import follow
-from roboglot.protocols.cyberdog.table import Call, operations
+from roboglot.protocols.cyberdog.table import TABLE, Call
 from roboglot.wire.cyberdog.codes import (
     Accepted,
     Code,
@@ -67,9 +67,7 @@ _INDOORS = {TaskState.LOCALIZING, TaskState.LOCALIZED, TaskState.LOCALIZATION_FA
 NAVIGATION_STATES = _INDOORS | {OUTDOORS[state] for state in _INDOORS}
 
 
-@operations.on(
-    Code.START_TASK, right=Right.DRIVE, needs=(Docking, Following, Localization, MappingComponent, Navigation)
-)
+@TABLE.on(Code.START_TASK, right=Right.DRIVE, needs=(Docking, Following, Localization, MappingComponent, Navigation))
 async def start_task(
     call: Call,
     *,
@@ -83,50 +81,50 @@ async def start_task(
     keep_distance: float = 0.0,
 ) -> object:
     """Answers ``accepted``, feedback codes, ``result``; the task goes on if the stream breaks."""
-    dog = call.dog
+    context = call.context
     if type not in NEEDS:
         return {"accepted": int(Accepted.NO)}
     kind = TaskType(type)
     order = Order(kind, outdoor and kind in IN_A_MAP, object_tracking and kind is TaskType.VISION_FOLLOWING)
     for component in NEEDS_FOR_THINGS if order.thing else NEEDS[kind]:
-        dog.robot[component]
+        context.robot[component]
     if kind is TaskType.NAVIGATION and (goalX is None or goalY is None):
         raise InvalidGoal("a goal has goalX and goalY")
     manner = manner_of(relative_pos, keep_distance) if kind in FOLLOWS else manner_of(AUTOMATIC, 0.0)
-    if dog.tasks.state not in order.begins_in or dog.gaits.state is MachineState.LOW_POWER:
+    if context.tasks.state not in order.begins_in or context.gaits.state is MachineState.LOW_POWER:
         return {"accepted": int(Accepted.NO)}
-    run = _run(dog, order, Goal(goalX or 0.0, goalY or 0.0, theta), manner)
-    task = dog.tasks.start(order, run, then=LEAVES if kind is TaskType.LOCALIZATION else {})
+    run = _run(context, order, Goal(goalX or 0.0, goalY or 0.0, theta), manner)
+    task = context.tasks.start(order, run, then=LEAVES if kind is TaskType.LOCALIZATION else {})
     return await follow(call, task.stream, STREAM_MAX)
 
 
-def _run(dog: Dog, order: Order, goal: Goal, manner: Manner) -> Callable[[Task], Awaitable[TaskResult]]:
+def _run(context: Context, order: Order, goal: Goal, manner: Manner) -> Callable[[Task], Awaitable[TaskResult]]:
     """What does the work of a task."""
     match order.kind:
         case TaskType.NAVIGATION:
-            return partial(navigate, dog, goal=goal)
+            return partial(navigate, context, goal=goal)
         case TaskType.MAPPING:
-            return partial(build_map, dog, outdoor=order.outdoor)
+            return partial(build_map, context, outdoor=order.outdoor)
         case TaskType.LOCALIZATION:
-            return partial(relocalize, dog, outdoor=order.outdoor)
+            return partial(relocalize, context, outdoor=order.outdoor)
         case TaskType.UWB_FOLLOWING:
-            return partial(follow_tag, dog, manner=manner)
+            return partial(follow_tag, context, manner=manner)
         case TaskType.VISION_FOLLOWING:
-            return partial(follow_thing if order.thing else follow_person, dog, manner=manner)
+            return partial(follow_thing if order.thing else follow_person, context, manner=manner)
         case _:
-            return partial(dock, dog)
+            return partial(dock, context)
 
 
-@operations.on(Code.JOIN_TASK, right=Right.SEE)
+@TABLE.on(Code.JOIN_TASK, right=Right.SEE)
 async def join_task(call: Call, *, type: Int32) -> object:
     """Take the stream of a running task over, from its latest feedback on."""
-    task = call.dog.tasks.current
-    if task is None or task.kind != _kind_of(call.dog, type):
+    task = call.context.tasks.current
+    if task is None or task.kind != _kind_of(call.context, type):
         return {"accepted": int(Accepted.NOTHING_TO_JOIN)}
     return await follow(call, task.stream, STREAM_MAX)
 
 
-@operations.on(Code.STOP_TASK, right=Right.DRIVE, needs=(MapLibrary, MappingComponent))
+@TABLE.on(Code.STOP_TASK, right=Right.DRIVE, needs=(MapLibrary, MappingComponent))
 async def stop_task(call: Call, *, type: Int32, map_name: object = "") -> dict[str, Any]:
     """Stop the task of that type (nothing to do if it does not run); 0 stops every task, localisation too.
 
@@ -135,42 +133,42 @@ async def stop_task(call: Call, *, type: Int32, map_name: object = "") -> dict[s
     if not isinstance(map_name, str):
         raise BadParameters("map_name is a text")  # to take it as left out would throw the map away
     try:
-        result = await call.dog.robot.clock.wait_for(_stop(call.dog, type, map_name), STOP_MAX)
+        result = await call.context.robot.clock.wait_for(_stop(call.context, type, map_name), STOP_MAX)
     except TimeoutError:
         result = StopResult.NO_ANSWER
     return {"result": int(result)}
 
 
-async def _keep_map(dog: Dog, name: str) -> bool:
+async def _keep_map(context: Context, name: str) -> bool:
     """Save the map that is built, or throw it away without a name; whether that was done.
 
     A map that was saved is a success in the text (0); robots end the stream as one that was stopped (5).
     """
-    task = dog.tasks.current
-    if not await keep_map(dog, name):
+    task = context.tasks.current
+    if not await keep_map(context, name):
         return False
-    if task and name and dog.profile is Profile.SPEC:
+    if task and name and context.profile is Profile.SPEC:
         task.stopped_as = TaskResult.SUCCESS
     return True
 
 
-def _kind_of(dog: Dog, type: int) -> int:
+def _kind_of(context: Context, type: int) -> int:
     """Following a thing goes by the number of its state, too."""
-    following_a_thing = dog.tasks.state is TaskState.THING_FOLLOWING
+    following_a_thing = context.tasks.state is TaskState.THING_FOLLOWING
     return TaskType.VISION_FOLLOWING if following_a_thing and type == TaskState.THING_FOLLOWING else type
 
 
-async def _stop(dog: Dog, type: int, map_name: str) -> StopResult:
-    tasks = dog.tasks
-    running, type = tasks.current.kind if tasks.current else None, _kind_of(dog, type)
+async def _stop(context: Context, type: int, map_name: str) -> StopResult:
+    tasks = context.tasks
+    running, type = tasks.current.kind if tasks.current else None, _kind_of(context, type)
     match type:
         case TaskType.ALL:
-            if running == TaskType.MAPPING and map_name and not await _keep_map(dog, map_name):
+            if running == TaskType.MAPPING and map_name and not await _keep_map(context, map_name):
                 return StopResult.FAILED
             await tasks.stop()
             tasks.leave()
         case TaskType.MAPPING if running == type:
-            if not await _keep_map(dog, map_name):
+            if not await _keep_map(context, map_name):
                 return StopResult.FAILED
             await tasks.stop()
         case TaskType.LOCALIZATION if running is None and tasks.state in NAVIGATION_STATES:

@@ -10,7 +10,7 @@ from roboglot.operations import Right
 from roboglot.protocols.cyberdog.chapters.motion.gait import Executed, Wish
 from roboglot.protocols.cyberdog.chapters.motion.motion_table import POSES, SERVO_POSES, WALKS
 from roboglot.protocols.cyberdog.profile import Profile
-from roboglot.protocols.cyberdog.table import Call, operations, push
+from roboglot.protocols.cyberdog.table import TABLE, Call, push
 from roboglot.protocols.cyberdog.vocabulary import ALL_FEET, body_of, feet_of, lift_of, twist_of
 from roboglot.wire.cyberdog.codes import Code, InBandError
 from roboglot.wire.cyberdog.motions import CommandType, Motion, MotionCode
@@ -21,7 +21,7 @@ CALIBRATION = 4  # ``value`` of a frame
 ANSWER_MAX = 20.0  # s after which the answer is a time-out, whatever the motion still does
 
 
-@operations.on(Code.SERVO, right=Right.DRIVE, needs=(Driving,))
+@TABLE.on(Code.SERVO, right=Right.DRIVE, needs=(Driving,))
 async def servo(
     call: Call,
     *,
@@ -38,7 +38,7 @@ async def servo(
 
     ``value``: 0 feet toed in, 2 straight below the hips, 4 calibration: lie down and let the motors go.
     """
-    gaits = call.dog.gaits
+    gaits = call.context.gaits
     if cmd_type == CommandType.END:
         executed = gaits.end_servo()
     elif value == CALIBRATION:
@@ -57,11 +57,11 @@ async def servo(
         "status": int(executed.status),
         "order_process_bar": round(100 * executed.share),
     }
-    call.dog.app.push(SERVO_RESPONSE, response if cmd_id is None else {**response, "cmd_id": cmd_id})
+    call.context.app.push(SERVO_RESPONSE, response if cmd_id is None else {**response, "cmd_id": cmd_id})
     return ""
 
 
-@operations.on(Code.MOTION, right=Right.DRIVE)
+@TABLE.on(Code.MOTION, right=Right.DRIVE)
 async def motion(
     call: Call,
     *,
@@ -83,10 +83,10 @@ async def motion(
         feet_of(contact),
     )
     try:
-        code = await call.dog.robot.clock.wait_for(call.dog.gaits.carry_out(motion_id, wish), ANSWER_MAX)
+        code = await call.context.robot.clock.wait_for(call.context.gaits.carry_out(motion_id, wish), ANSWER_MAX)
     except TimeoutError:
         return {"error_code": int(InBandError.TIMEOUT)}
     motion = (
-        call.dog.gaits.motion if call.dog.profile is Profile.ROBOT else motion_id
+        call.context.gaits.motion if call.context.profile is Profile.ROBOT else motion_id
     )  # robots report what they do then
     return {"motion_id": int(motion), "result": code is MotionCode.DONE, "code": int(code)}

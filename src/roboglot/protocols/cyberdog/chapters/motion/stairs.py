@@ -15,7 +15,7 @@ from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.chapters.motion.gait import SOURCE
 from roboglot.protocols.cyberdog.chapters.motion.readiness import refusal_of
-from roboglot.protocols.cyberdog.table import Call, operations
+from roboglot.protocols.cyberdog.table import TABLE, Call
 from roboglot.wire.cyberdog.codes import Code, InBandError
 from roboglot.wire.cyberdog.motions import Motion
 
@@ -24,13 +24,13 @@ LOOK = 0.05  # s between two looks at how far it is
 BEGUN = (AlignmentStage.ALIGNING, AlignmentStage.ALIGNED)
 
 
-@operations.on(Code.ALIGN_WITH_STAIRS, right=Right.DRIVE, needs=(StairAlignment,))
+@TABLE.on(Code.ALIGN_WITH_STAIRS, right=Right.DRIVE, needs=(StairAlignment,))
 async def align_with_stairs(call: Call, *, data: bool) -> dict[str, object]:
     """``data``: true for a flight that leads up, false for one that leads down. Answered as soon as it moves.
 
     ``success`` is false where no step is seen, and while the robot's state or another motion does not let it walk.
     """
-    robot, gaits = call.dog.robot, call.dog.gaits
+    robot, gaits = call.context.robot, call.context.gaits
     alignment = robot[StairAlignment]
     if gaits.busy or refusal_of(robot, Motion.TROT_SLOW) is not None:
         return {"success": False}
@@ -46,11 +46,11 @@ async def align_with_stairs(call: Call, *, data: bool) -> dict[str, object]:
     return {"success": action.feedback in BEGUN}
 
 
-@operations.on(Code.END_STAIR_ALIGNMENT, right=Right.DRIVE, needs=(StairAlignment,))
+@TABLE.on(Code.END_STAIR_ALIGNMENT, right=Right.DRIVE, needs=(StairAlignment,))
 async def end_stair_alignment(call: Call) -> dict[str, bool]:
     """Stand still, no matter which client had it align; nothing to do if it does not. Answered when it stands."""
-    call.dog.robot[StairAlignment]
-    for action in call_off(call.dog.robot, "stopped by the app"):
+    call.context.robot[StairAlignment]
+    for action in call_off(call.context.robot, "stopped by the app"):
         await action.done()
     return {"success": True}
 

@@ -14,7 +14,7 @@ from roboglot.model.components.system.settings import Settings
 from roboglot.model.robot import Robot
 from roboglot.operations import BadParameters, Right
 from roboglot.protocols.cyberdog.chapters.system.stored_settings import ACCOUNT, VOICEPRINTS, kept
-from roboglot.protocols.cyberdog.table import Call, operations, push
+from roboglot.protocols.cyberdog.table import TABLE, Call, push
 from roboglot.wire.cyberdog.codes import Code
 
 TRAINED = push(Code.VOICE_TRAINED)
@@ -26,15 +26,15 @@ VOICEPRINTS_MAX = 65_536
 LASTS_MAX = 10 * 365 * 86_400  # s
 
 
-@operations.on(Code.AUDIO_IDENTITY, right=Right.SEE, needs=(Hearing,))
+@TABLE.on(Code.AUDIO_IDENTITY, right=Right.SEE, needs=(Hearing,))
 async def audio_identity(call: Call) -> dict[str, str]:
     """Which device asks for an account: its id (made from the serial number) and its serial number."""
-    call.dog.robot[Hearing]
-    serial = call.dog.robot.description.serial
+    call.context.robot[Hearing]
+    serial = call.context.robot.description.serial
     return {"did": str(uuid.uuid5(DEVICES, serial)), "sn": serial}
 
 
-@operations.on(Code.AUDIO_TOKEN, right=Right.ADMIN, needs=(Hearing, Settings))
+@TABLE.on(Code.AUDIO_TOKEN, right=Right.ADMIN, needs=(Hearing, Settings))
 async def audio_token(
     call: Call,
     *,
@@ -44,14 +44,14 @@ async def audio_token(
     token_expires_in: str | int = "",
 ) -> dict[str, bool]:
     """Activate the voice board for ``uid`` until the token expires (s from now); false for a token that cannot hold."""
-    call.dog.robot[Hearing]
+    call.context.robot[Hearing]
     lasts = _seconds(token_expires_in)
     account = str(uid)
     if not account or len(account) > ID_MAX or not token_access or lasts is None:
         return {"result": False}
     if max(len(token_access), len(token_fresh)) > TOKEN_MAX:
         return {"result": False}
-    await call.dog.robot[Settings].put(ACCOUNT, {"uid": account, "until": call.dog.robot.clock.epoch() + lasts})
+    await call.context.robot[Settings].put(ACCOUNT, {"uid": account, "until": call.context.robot.clock.epoch() + lasts})
     return {"result": True}
 
 
@@ -63,29 +63,29 @@ def activated(robot: Robot, uid: str | None = None) -> bool:
     return uid is None or account["uid"] == uid
 
 
-@operations.on(Code.TRAIN_VOICE, right=Right.EDIT, needs=(Members,))
+@TABLE.on(Code.TRAIN_VOICE, right=Right.EDIT, needs=(Members,))
 async def train_voice(call: Call, *, nick_name: str, voiceprint_id: str = "") -> dict[str, Any]:
     """Learn the next speaker's voice as that member's; push 3013 reports the outcome within 30 s."""
-    call.dog.robot[Hearing]
-    call.dog.voice.train(nick_name, voiceprint_id[:ID_MAX])
+    call.context.robot[Hearing]
+    call.context.voice.train(nick_name, voiceprint_id[:ID_MAX])
     return {}
 
 
-@operations.on(Code.CANCEL_VOICE, right=Right.EDIT, needs=(Hearing,))
+@TABLE.on(Code.CANCEL_VOICE, right=Right.EDIT, needs=(Hearing,))
 async def cancel_voice(call: Call) -> dict[str, Any]:
     """Stop learning a voice."""
-    call.dog.robot[Hearing]
-    call.dog.voice.stop_training()
+    call.context.robot[Hearing]
+    call.context.voice.stop_training()
     return {}
 
 
-@operations.on(Code.VOICEPRINTS, right=Right.EDIT, needs=(Hearing, Settings))
+@TABLE.on(Code.VOICEPRINTS, right=Right.EDIT, needs=(Hearing, Settings))
 async def voiceprints(call: Call, *, voiceprints_data: str = "") -> str:
     """The app's answer to push 3014: kept as it is. Robots know people by what they learned themselves."""
-    call.dog.robot[Hearing]
+    call.context.robot[Hearing]
     if len(voiceprints_data) > VOICEPRINTS_MAX:
         raise BadParameters(f"voiceprints_data has up to {VOICEPRINTS_MAX} characters")
-    await call.dog.robot[Settings].put(VOICEPRINTS, voiceprints_data)
+    await call.context.robot[Settings].put(VOICEPRINTS, voiceprints_data)
     return ""
 
 

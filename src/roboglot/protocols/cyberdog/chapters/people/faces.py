@@ -17,7 +17,7 @@ from roboglot.model.perception import Emotion, FaceSeen
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.app_link import AppLink
-from roboglot.protocols.cyberdog.table import Call, operations, push
+from roboglot.protocols.cyberdog.table import TABLE, Call, push
 from roboglot.wire.cyberdog.codes import Code
 from roboglot.wire.cyberdog.text import Int32
 
@@ -126,12 +126,12 @@ def _recognised(result: FaceResult, name: str, id: int, age: float, emotion: flo
     return {"username": name, "result": int(result), "id": id, "age": age, "emotion": emotion}
 
 
-@operations.on(Code.ENTER_FACE, right=Right.EDIT, needs=(Members, Vision))
+@TABLE.on(Code.ENTER_FACE, right=Right.EDIT, needs=(Members, Vision))
 async def enter_face(
     call: Call, *, command: Int32, username: str = "", oriname: str = "", ishost: bool = False
 ) -> dict[str, Any]:
     """0 enter, 1 cancel that, 2 confirm (the robot did already), 3 rename, 4 delete a face, 5 who has one."""
-    robot, faces = call.dog.robot, call.dog.faces
+    robot, faces = call.context.robot, call.context.faces
     robot[Vision], robot[Members]
     try:
         match command:
@@ -168,7 +168,7 @@ def _check_face(members: Members, name: str) -> None:
 
 
 async def _begin_entry(call: Call, name: str, host: bool) -> FaceResult:
-    faces, members = call.dog.faces, call.dog.robot[Members]
+    faces, members = call.context.faces, call.context.robot[Members]
     if faces.busy:
         return FaceResult.BUSY
     if name not in {member.name for member in members.all()}:
@@ -177,13 +177,13 @@ async def _begin_entry(call: Call, name: str, host: bool) -> FaceResult:
     return FaceResult.DONE
 
 
-@operations.on(Code.RECOGNISE_FACES, right=Right.DRIVE, needs=(Vision,))
+@TABLE.on(Code.RECOGNISE_FACES, right=Right.DRIVE, needs=(Vision,))
 async def recognise_faces(
     call: Call, *, command: Int32, username: str = "", id: Int32 = 0, timeout: Seconds = 60
 ) -> dict[str, int]:
     """0 everybody known, 1 ``username`` alone, 2 stop; for ``timeout`` s (1 to 300). Push 7004 tells who is seen."""
-    faces = call.dog.faces
-    call.dog.robot[Vision]
+    faces = call.context.faces
+    call.context.robot[Vision]
     if command == 2:
         if not faces.entering:
             faces.stop()

@@ -18,8 +18,8 @@ from roboglot.operations import BadParameters, Right
 from roboglot.protocols.cyberdog.chapters.mapping.task_state import Task
 from roboglot.protocols.cyberdog.chapters.motion.gait import SOURCE
 from roboglot.protocols.cyberdog.chapters.people.pursuit import Pursuit, ThingPursuit
-from roboglot.protocols.cyberdog.context import Dog
-from roboglot.protocols.cyberdog.table import Call, operations
+from roboglot.protocols.cyberdog.context import Context
+from roboglot.protocols.cyberdog.table import TABLE, Call
 from roboglot.wire.cyberdog.codes import Code, Feedback, TaskResult
 
 AUTOMATIC = 200  # ``relative_pos`` that leaves it to the robot
@@ -53,46 +53,48 @@ def manner_of(relative_pos: int, keep_distance: float) -> Manner:
     return Manner(SIDES[relative_pos], max(DISTANCE_MIN, min(DISTANCE_MAX, distance)))
 
 
-async def follow_person(dog: Dog, task: Task, manner: Manner) -> TaskResult:
+async def follow_person(context: Context, task: Task, manner: Manner) -> TaskResult:
     """Show whom the camera sees, wait for the app's choice, and follow until stopped or the person is lost."""
-    pursuit = Pursuit(dog.robot, dog.app)
-    follow = partial(dog.robot[Following].follow, side=manner.side, distance=manner.distance, source=SOURCE)
-    return await _pursue(dog, task, pursuit, follow)
+    pursuit = Pursuit(context.robot, context.app)
+    follow = partial(context.robot[Following].follow, side=manner.side, distance=manner.distance, source=SOURCE)
+    return await _pursue(context, task, pursuit, follow)
 
 
-async def follow_thing(dog: Dog, task: Task, manner: Manner) -> TaskResult:
+async def follow_thing(context: Context, task: Task, manner: Manner) -> TaskResult:
     """Wait until the app has chosen a region of the picture, and follow what the lidar sees there."""
-    pursuit = ThingPursuit(dog.robot, dog.app)
-    follow = partial(dog.robot[Following].follow_thing, side=manner.side, distance=manner.distance, source=SOURCE)
-    return await _pursue(dog, task, pursuit, follow)
+    pursuit = ThingPursuit(context.robot, context.app)
+    follow = partial(context.robot[Following].follow_thing, side=manner.side, distance=manner.distance, source=SOURCE)
+    return await _pursue(context, task, pursuit, follow)
 
 
-async def _pursue(dog: Dog, task: Task, pursuit: Pursuit | ThingPursuit, follow: Callable[[Any], Action]) -> TaskResult:
+async def _pursue(
+    context: Context, task: Task, pursuit: Pursuit | ThingPursuit, follow: Callable[[Any], Action]
+) -> TaskResult:
     task.feedback(Feedback.ACTIVATING)
     task.feedback(Feedback.FOLLOW_STARTING)
-    dog.pursuit = pursuit
+    context.pursuit = pursuit
     watching = asyncio.get_running_loop().create_task(pursuit.watch(), name="tracking boxes")
     try:
         task.feedback(Feedback.FOLLOW_WAITS_FOR_CHOICE)
         chosen = await pursuit.chosen
         task.feedback(Feedback.FOLLOW_CHOSEN)
         action = task.action = follow(chosen)
-        await _tell(dog, task, action, Feedback.FOLLOWING, Feedback.TARGET_SEARCHED)
+        await _tell(context, task, action, Feedback.FOLLOWING, Feedback.TARGET_SEARCHED)
     except NotFound:
         task.feedback(Feedback.TARGET_LOST if task.last is not Feedback.FOLLOW_CHOSEN else Feedback.TARGET_NOT_LOCKED)
     except RobotError:
         pass  # another client drives now
     finally:
-        dog.pursuit = None
+        context.pursuit = None
         watching.cancel()
     return TaskResult.FAILED
 
 
-async def follow_tag(dog: Dog, task: Task, manner: Manner) -> TaskResult:
+async def follow_tag(context: Context, task: Task, manner: Manner) -> TaskResult:
     """Follow the wearer of the connected bracelet until stopped or it is heard no more."""
     task.feedback(Feedback.ACTIVATING)
     try:
-        action = task.action = dog.robot[Following].follow_tag(
+        action = task.action = context.robot[Following].follow_tag(
             side=manner.side, distance=manner.distance, source=SOURCE
         )
     except RobotError:
@@ -100,7 +102,7 @@ async def follow_tag(dog: Dog, task: Task, manner: Manner) -> TaskResult:
         return TaskResult.FAILED
     task.feedback(Feedback.ACTIVATED)
     try:
-        await _tell(dog, task, action, Feedback.TAG_FOLLOWED, None)
+        await _tell(context, task, action, Feedback.TAG_FOLLOWED, None)
     except NotFound:
         task.feedback(Feedback.TAG_LOST if task.last is Feedback.TAG_FOLLOWED else Feedback.TAG_NOT_THERE)
     except RobotError:
@@ -108,7 +110,7 @@ async def follow_tag(dog: Dog, task: Task, manner: Manner) -> TaskResult:
     return TaskResult.FAILED
 
 
-async def _tell(dog: Dog, task: Task, action: Action, followed: Feedback, searched: Feedback | None) -> None:
+async def _tell(context: Context, task: Task, action: Action, followed: Feedback, searched: Feedback | None) -> None:
     """How ``action`` goes on until it has ended; cancelled if the task is."""
 
     def watch(event: ActionChanged) -> None:
@@ -119,7 +121,7 @@ async def _tell(dog: Dog, task: Task, action: Action, followed: Feedback, search
         elif searched and task.last is not Feedback.FOLLOW_CHOSEN:  # it takes a picture until anybody is followed
             task.feedback(searched)
 
-    end_watch = dog.robot.events.listen(ActionChanged, watch)
+    end_watch = context.robot.events.listen(ActionChanged, watch)
     try:
         await action.succeeded()
     except asyncio.CancelledError:
@@ -129,13 +131,13 @@ async def _tell(dog: Dog, task: Task, action: Action, followed: Feedback, search
         end_watch()
 
 
-@operations.on(Code.CHOOSE_TARGET, right=Right.DRIVE)
+@TABLE.on(Code.CHOOSE_TARGET, right=Right.DRIVE)
 async def choose_target(call: Call, *, roi: object) -> dict[str, bool]:
     """Follow who or what is in that region of the picture (push 6007); false before 501, or if nothing is there."""
     try:
         region = msgspec.convert(roi, Region)
     except msgspec.ValidationError as error:
         raise BadParameters(str(error)) from None
-    pursuit = call.dog.pursuit
+    pursuit = call.context.pursuit
     chosen = pursuit is not None and pursuit.choose(region.x_offset, region.y_offset, region.width, region.height)
     return {"success": chosen}

@@ -10,78 +10,78 @@ from typing import Any
 from roboglot.model.components.interaction.members import Member, Members
 from roboglot.model.errors import NotFound, RobotError
 from roboglot.operations import Right
-from roboglot.protocols.cyberdog.context import Dog
+from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.profile import Profile
-from roboglot.protocols.cyberdog.table import Call, operations
+from roboglot.protocols.cyberdog.table import TABLE, Call
 from roboglot.wire.cyberdog.codes import AccountCode, Code, PrintState
 
 
-@operations.on(Code.ADD_MEMBER, right=Right.ADMIN, needs=(Members,))
+@TABLE.on(Code.ADD_MEMBER, right=Right.ADMIN, needs=(Members,))
 async def add_member(call: Call, *, member: str) -> dict[str, int | bool]:
     """A member without face and voice yet; 122 if the name is taken or cannot be kept."""
-    members = call.dog.robot[Members]
+    members = call.context.robot[Members]
     try:
         await members.add(member)
     except RobotError:
-        return _done(call.dog, AccountCode.DATABASE)
-    return _done(call.dog, AccountCode.DONE)
+        return _done(call.context, AccountCode.DATABASE)
+    return _done(call.context, AccountCode.DONE)
 
 
-@operations.on(Code.FIND_MEMBERS, right=Right.SEE, needs=(Members,))
+@TABLE.on(Code.FIND_MEMBERS, right=Right.SEE, needs=(Members,))
 async def find_members(call: Call, *, account: str = "") -> dict[str, Any]:
     """All members, or the named one with ``code``: 0, or 121 and nothing else."""
-    members = call.dog.robot[Members]
+    members = call.context.robot[Members]
     if not account:
-        return {"code": int(AccountCode.DONE), "accounts": [_account(call.dog, member) for member in members.all()]}
+        return {"code": int(AccountCode.DONE), "accounts": [_account(call.context, member) for member in members.all()]}
     try:
         found = members.get(account)
     except NotFound:
         return {"code": int(AccountCode.UNKNOWN)}
-    return {"code": int(AccountCode.DONE), "accounts": [_account(call.dog, found)]}
+    return {"code": int(AccountCode.DONE), "accounts": [_account(call.context, found)]}
 
 
-@operations.on(Code.DELETE_MEMBER, right=Right.ADMIN, needs=(Members,))
+@TABLE.on(Code.DELETE_MEMBER, right=Right.ADMIN, needs=(Members,))
 async def delete_member(call: Call, *, member: str) -> dict[str, int | bool]:
     """With face and voice."""
-    members = call.dog.robot[Members]
+    members = call.context.robot[Members]
     try:
         await members.remove(member)
     except NotFound:
-        return _done(call.dog, AccountCode.DATABASE)
-    return _done(call.dog, AccountCode.DONE)
+        return _done(call.context, AccountCode.DATABASE)
+    return _done(call.context, AccountCode.DONE)
 
 
-@operations.on(Code.RENAME_MEMBER, right=Right.ADMIN, needs=(Members,))
+@TABLE.on(Code.RENAME_MEMBER, right=Right.ADMIN, needs=(Members,))
 async def rename_member(call: Call, *, pre_name: str, new_name: str) -> dict[str, int | bool]:
     """Face and voice stay with the member."""
-    members = call.dog.robot[Members]
+    members = call.context.robot[Members]
     try:
         await members.rename(pre_name, new_name)
     except NotFound:
-        return _done(call.dog, AccountCode.UNKNOWN)
+        return _done(call.context, AccountCode.UNKNOWN)
     except RobotError:
-        return _done(call.dog, AccountCode.DATABASE)
-    return _done(call.dog, AccountCode.DONE)
+        return _done(call.context, AccountCode.DATABASE)
+    return _done(call.context, AccountCode.DONE)
 
 
-@operations.on(Code.SYNCHRONISE_MEMBERS, right=Right.SEE, needs=(Members,))
+@TABLE.on(Code.SYNCHRONISE_MEMBERS, right=Right.SEE, needs=(Members,))
 async def synchronise_members(call: Call) -> dict[str, Any]:
     """The text has the number and nothing else: answered with all members, as 1021 does, for the app to copy."""
-    accounts = [_account(call.dog, member) for member in call.dog.robot[Members].all()]
+    accounts = [_account(call.context, member) for member in call.context.robot[Members].all()]
     return {"code": int(AccountCode.DONE), "accounts": accounts}
 
 
-def _done(dog: Dog, code: AccountCode) -> dict[str, int | bool]:
+def _done(context: Context, code: AccountCode) -> dict[str, int | bool]:
     """Whether it was done, in the words of the profile."""
-    return {"success": int(code) if dog.profile is Profile.ROBOT else code is AccountCode.DONE}
+    return {"success": int(code) if context.profile is Profile.ROBOT else code is AccountCode.DONE}
 
 
-def _account(dog: Dog, member: Member) -> dict[str, Any]:
+def _account(context: Context, member: Member) -> dict[str, Any]:
     return {
         "id": member.id,
         "name": member.name,
-        "face_state": _state(member.face, dog.faces.entering == member.name),
-        "voice_state": _state(member.voice, dog.voice.training == member.name),
+        "face_state": _state(member.face, context.faces.entering == member.name),
+        "voice_state": _state(member.voice, context.voice.training == member.name),
     }
 
 

@@ -20,7 +20,7 @@ from roboglot.model.errors import NotFound, Refused
 from roboglot.model.robot import Robot
 from roboglot.operations import BadParameters, Right
 from roboglot.protocols.cyberdog.chapters.motion.gait import SOURCE
-from roboglot.protocols.cyberdog.table import Call, operations
+from roboglot.protocols.cyberdog.table import TABLE, Call
 from roboglot.wire.cyberdog.codes import Code, InBandError
 
 CONNECT_MAX = 18.0  # s
@@ -36,20 +36,20 @@ class WireDevice(msgspec.Struct):
     name: str
 
 
-@operations.on(Code.SCAN_BLUETOOTH, right=Right.EDIT, needs=(Bluetooth,))
+@TABLE.on(Code.SCAN_BLUETOOTH, right=Right.EDIT, needs=(Bluetooth,))
 async def scan(call: Call, *, scan_seconds: float = 0.0) -> dict[str, Any]:
     """What is heard in ``scan_seconds`` and was not connected before; 0: what was connected once.
 
     While a device is connected nothing is scanned: the last scan's devices are returned.
     """
-    radio = call.dog.robot[Bluetooth]
+    radio = call.context.robot[Bluetooth]
     here = radio.connected.address if radio.connected else ""
     if scan_seconds <= 0.0:
         return _listed(device for device in radio.history if device.address != here)
     if not here:
-        scanning = _under_way(call.dog.robot) or radio.scan(min(scan_seconds, SCAN_SECONDS_MAX), source=SOURCE)
+        scanning = _under_way(call.context.robot) or radio.scan(min(scan_seconds, SCAN_SECONDS_MAX), source=SOURCE)
         try:
-            await call.dog.robot.clock.wait_for(scanning.succeeded(), max(6.0, 1.5 * scan_seconds))
+            await call.context.robot.clock.wait_for(scanning.succeeded(), max(6.0, 1.5 * scan_seconds))
         except TimeoutError:
             return {"error_code": int(InBandError.TIMEOUT)}
     known = {device.address for device in radio.history}
@@ -61,10 +61,10 @@ def _under_way(robot: Robot) -> Action | None:
     return next((action for action in robot.actions.running(BLUETOOTH) if isinstance(action.goal, float)), None)
 
 
-@operations.on(Code.CONNECT_BLUETOOTH, right=Right.EDIT, needs=(Bluetooth,))
+@TABLE.on(Code.CONNECT_BLUETOOTH, right=Right.EDIT, needs=(Bluetooth,))
 async def connect(call: Call, *, selected_device: object = None) -> dict[str, int]:
     """Connect the device (0, or 1: it does not answer); without one let go of the present one (0, or 3: none)."""
-    robot = call.dog.robot
+    robot = call.context.robot
     radio = robot[Bluetooth]
     if selected_device is None:
         try:
@@ -84,64 +84,64 @@ async def connect(call: Call, *, selected_device: object = None) -> dict[str, in
     return {"result": DONE if status is ActionStatus.SUCCEEDED else RADIO_FAILED}
 
 
-@operations.on(Code.BLUETOOTH_CONNECTED, right=Right.SEE, needs=(Bluetooth,))
+@TABLE.on(Code.BLUETOOTH_CONNECTED, right=Right.SEE, needs=(Bluetooth,))
 async def connected(call: Call) -> dict[str, Any]:
     """None or one."""
-    device = call.dog.robot[Bluetooth].connected
+    device = call.context.robot[Bluetooth].connected
     return _listed([device] if device else [])
 
 
-@operations.on(Code.BLUETOOTH_FIRMWARE, right=Right.SEE, needs=(Bluetooth,))
+@TABLE.on(Code.BLUETOOTH_FIRMWARE, right=Right.SEE, needs=(Bluetooth,))
 async def firmware_version(call: Call) -> dict[str, Any]:
     """Of the connected device."""
-    device = call.dog.robot[Bluetooth].connected
+    device = call.context.robot[Bluetooth].connected
     return {"success": device is not None, "message": device.firmware if device else ""}
 
 
-@operations.on(Code.BLUETOOTH_BATTERY, right=Right.SEE, needs=(Bluetooth,))
+@TABLE.on(Code.BLUETOOTH_BATTERY, right=Right.SEE, needs=(Bluetooth,))
 async def battery_level(call: Call) -> dict[str, Any]:
     """0 to 1; the key is spelt as in the text, the value a number as there."""
-    device = call.dog.robot[Bluetooth].connected
+    device = call.context.robot[Bluetooth].connected
     return {"connected": device is not None, "persentage": (device.battery or 0.0) if device else 0.0}
 
 
-@operations.on(Code.FORGET_BLUETOOTH, right=Right.EDIT, needs=(Bluetooth,))
+@TABLE.on(Code.FORGET_BLUETOOTH, right=Right.EDIT, needs=(Bluetooth,))
 async def forget(call: Call, *, mac: str = "") -> dict[str, bool]:
     """Strike a device from the history; without ``mac`` all but the connected one."""
     try:
-        await call.dog.robot[Bluetooth].forget(mac or None)
+        await call.context.robot[Bluetooth].forget(mac or None)
     except NotFound:
         return {"success": False}
     return {"success": True}
 
 
-@operations.on(Code.UPDATE_BLUETOOTH, right=Right.ADMIN, needs=(Bluetooth,))
+@TABLE.on(Code.UPDATE_BLUETOOTH, right=Right.ADMIN, needs=(Bluetooth,))
 async def update_device(call: Call) -> dict[str, Any]:
     """Begin to bring the newer firmware to the connected device; push 8010 reports the progress."""
-    radio = call.dog.robot[Bluetooth]
+    radio = call.context.robot[Bluetooth]
     if radio.connected is None:
         return {"success": False, "message": "no device is connected"}
     if not radio.update_available:
         return {"success": False, "message": "there is no newer firmware"}
-    if call.dog.bracelet.updating:
+    if call.context.bracelet.updating:
         return {"success": False, "message": "an update is under way"}
-    call.dog.bracelet.follow(radio.update_device(source=SOURCE))
+    call.context.bracelet.follow(radio.update_device(source=SOURCE))
     return {"success": True, "message": ""}
 
 
-@operations.on(Code.SET_GEAR, right=Right.EDIT, needs=(RemoteControl,))
+@TABLE.on(Code.SET_GEAR, right=Right.EDIT, needs=(RemoteControl,))
 async def set_gear(call: Call, *, data: int) -> str:
     """0 low, 1 middle, 2 high: how fast the remote control's stick drives. Nothing else is a gear."""
     if data not in list(Gear):
         raise BadParameters("a gear is 0, 1 or 2")
-    await call.dog.robot[RemoteControl].set_gear(Gear(data))
+    await call.context.robot[RemoteControl].set_gear(Gear(data))
     return ""
 
 
-@operations.on(Code.GEAR, right=Right.SEE, needs=(RemoteControl,))
+@TABLE.on(Code.GEAR, right=Right.SEE, needs=(RemoteControl,))
 async def gear(call: Call) -> dict[str, int]:
     """The present one."""
-    return {"data": int(call.dog.robot[RemoteControl].gear)}
+    return {"data": int(call.context.robot[RemoteControl].gear)}
 
 
 def _listed(devices: Iterable[BluetoothDevice]) -> dict[str, Any]:

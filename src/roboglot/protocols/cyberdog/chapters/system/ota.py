@@ -24,7 +24,7 @@ from roboglot.operations import BadParameters, Right
 from roboglot.protocols.cyberdog.app_link import AppLink
 from roboglot.protocols.cyberdog.chapters.motion.gait import SOURCE
 from roboglot.protocols.cyberdog.chapters.system.stored_settings import UPDATE, kept
-from roboglot.protocols.cyberdog.table import Call, operations, push
+from roboglot.protocols.cyberdog.table import TABLE, Call, push
 from roboglot.wire.cyberdog.codes import Code
 
 log = logging.getLogger(__name__)
@@ -202,53 +202,53 @@ def package_of(modules: object) -> tuple[FirmwarePackage, frozenset[str]]:
     return package, frozenset(file.md5.lower() for file in files)
 
 
-@operations.on(Code.UPDATE_STATUS, right=Right.SEE, needs=(Firmware,))
+@TABLE.on(Code.UPDATE_STATUS, right=Right.SEE, needs=(Firmware,))
 async def update_status(call: Call) -> dict[str, Any]:
     """Idle, download or update."""
-    state = call.dog.robot[Firmware].progress.state
+    state = call.context.robot[Firmware].progress.state
     return {"status": WORDS.get(state, "idle"), "code": FAILED if state is FirmwareState.FAILED else GOOD}
 
 
-@operations.on(Code.UPDATE_VERSION, right=Right.SEE, needs=(Firmware,))
+@TABLE.on(Code.UPDATE_VERSION, right=Right.SEE, needs=(Firmware,))
 async def update_version(call: Call) -> dict[str, Any]:
     """What runs now (not in the text)."""
-    return {"version": call.dog.robot[Firmware].version, "code": GOOD}
+    return {"version": call.context.robot[Firmware].version, "code": GOOD}
 
 
-@operations.on(Code.DOWNLOAD_UPDATE, right=Right.ADMIN, needs=(Firmware,))
+@TABLE.on(Code.DOWNLOAD_UPDATE, right=Right.ADMIN, needs=(Firmware,))
 async def download_update(call: Call, *, modules: object) -> dict[str, Any]:
     """Fetch the files of some modules; push 5005 reports the progress."""
-    firmware = call.dog.robot[Firmware]
+    firmware = call.context.robot[Firmware]
     try:
         package, digests = package_of(modules)
         if firmware.progress.state in UNDER_WAY:
             return {"response": False, "code": BUSY}
-        call.dog.updates.download(package, digests)
+        call.context.updates.download(package, digests)
     except InvalidGoal as error:
         log.info("5003: %s", error)
         return {"response": False, "code": ARGUMENTS}
     return {"response": True, "code": GOOD}
 
 
-@operations.on(Code.INSTALL_UPDATE, right=Right.ADMIN, needs=(Firmware,))
+@TABLE.on(Code.INSTALL_UPDATE, right=Right.ADMIN, needs=(Firmware,))
 async def install_update(call: Call, *, md5: str) -> dict[str, Any]:
     """Install what was downloaded and restart; the text spells the key "reponse", clients read either."""
-    call.dog.robot[Firmware]
-    code = call.dog.updates.obstacle(md5)
+    call.context.robot[Firmware]
+    code = call.context.updates.obstacle(md5)
     if code == GOOD:
-        call.dog.updates.install()
+        call.context.updates.install()
     return {"reponse": code == GOOD, "response": code == GOOD, "code": code}
 
 
-@operations.on(Code.UPDATE_PROGRESS, right=Right.SEE, needs=(Firmware,))
+@TABLE.on(Code.UPDATE_PROGRESS, right=Right.SEE, needs=(Firmware,))
 async def update_progress(call: Call) -> dict[str, int]:
     """Percent of download and installation; -1 failed, -2 too little room."""
-    call.dog.robot[Firmware]
-    return call.dog.updates.progress()
+    call.context.robot[Firmware]
+    return call.context.updates.progress()
 
 
-@operations.on(Code.UPDATE_TIME, right=Right.SEE, needs=(Firmware,))
+@TABLE.on(Code.UPDATE_TIME, right=Right.SEE, needs=(Firmware,))
 async def update_time(call: Call) -> dict[str, int]:
     """Seconds that the update under way will still take; -2 when there is none."""
-    remaining = call.dog.robot[Firmware].remaining
+    remaining = call.context.robot[Firmware].remaining
     return {"time": NO_TIME if remaining is None else round(remaining)}

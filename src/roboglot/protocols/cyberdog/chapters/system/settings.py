@@ -22,7 +22,7 @@ from roboglot.protocols.cyberdog.chapters.system.stored_settings import (
     VOICE_CONTROL,
     WAKE_WORD,
 )
-from roboglot.protocols.cyberdog.table import Call, operations
+from roboglot.protocols.cyberdog.table import TABLE, Call
 from roboglot.wire.cyberdog.codes import Code
 from roboglot.wire.cyberdog.text import Int32
 
@@ -32,56 +32,56 @@ BRIGHTEST = 100
 Name = Annotated[str, msgspec.Meta(min_length=1, max_length=NAME_MAX)]
 
 
-@operations.on(Code.SWITCH_NICKNAME, right=Right.EDIT, needs=(Settings,))
+@TABLE.on(Code.SWITCH_NICKNAME, right=Right.EDIT, needs=(Settings,))
 async def switch_nickname(call: Call, *, enable: bool) -> dict[str, bool]:
     """Go by the nickname, or by the name from the factory."""
-    await call.dog.robot[Settings].put(NICKNAME_ON, enable)
+    await call.context.robot[Settings].put(NICKNAME_ON, enable)
     return {"success": True}
 
 
-@operations.on(Code.SET_NICKNAME, right=Right.EDIT, needs=(Settings,))
+@TABLE.on(Code.SET_NICKNAME, right=Right.EDIT, needs=(Settings,))
 async def set_nickname(call: Call, *, nick_name: Name, wake_name: str = "") -> dict[str, bool]:
     """Another name and the word that wakes the robot; without that, a short name twice."""
     if len(wake_name) > NAME_MAX:
         return {"success": False}
-    settings = call.dog.robot[Settings]
+    settings = call.context.robot[Settings]
     await settings.put(NICKNAME, nick_name)
     await settings.put(WAKE_WORD, wake_name or (nick_name * 2 if len(nick_name) <= 3 else nick_name))
     await settings.put(NICKNAME_ON, True)
     return {"success": True}
 
 
-@operations.on(Code.SET_VOLUME, right=Right.EDIT, needs=(Speaker,))
+@TABLE.on(Code.SET_VOLUME, right=Right.EDIT, needs=(Speaker,))
 async def set_volume(call: Call, *, volume: Int32) -> dict[str, bool]:
     """0 silent to 100."""
     if not 0 <= volume <= 100:
         return {"success": False}
-    call.dog.robot[Speaker].set_volume(volume / 100.0)
+    call.context.robot[Speaker].set_volume(volume / 100.0)
     return {"success": True}
 
 
-@operations.on(Code.SET_MICROPHONE, right=Right.EDIT)
+@TABLE.on(Code.SET_MICROPHONE, right=Right.EDIT)
 async def set_microphone(call: Call, *, enable: bool) -> dict[str, bool]:
     """Whether the voice board hears anything: voice control and voiceprints need it."""
-    call.dog.robot[Hearing]
-    await call.dog.robot[Settings].put(MICROPHONE, enable)
-    call.dog.voice.adapt()
+    call.context.robot[Hearing]
+    await call.context.robot[Settings].put(MICROPHONE, enable)
+    call.context.voice.adapt()
     return {"success": True}
 
 
-@operations.on(Code.SET_VOICE_CONTROL, right=Right.EDIT)
+@TABLE.on(Code.SET_VOICE_CONTROL, right=Right.EDIT)
 async def set_voice_control(call: Call, *, enable: bool) -> dict[str, bool]:
     """Whether the robot answers to its wake word and does what is then said."""
-    call.dog.robot[Hearing]
-    await call.dog.robot[Settings].put(VOICE_CONTROL, enable)
-    call.dog.voice.adapt()
+    call.context.robot[Hearing]
+    await call.context.robot[Settings].put(VOICE_CONTROL, enable)
+    call.context.voice.adapt()
     return {"success": True}
 
 
-@operations.on(Code.SET_EYE_LIGHT, right=Right.EDIT, needs=(Light,))
+@TABLE.on(Code.SET_EYE_LIGHT, right=Right.EDIT, needs=(Light,))
 async def set_eye_light(call: Call, *, eyelight: Int32) -> dict[str, bool]:
     """Brightness of the eyes; the text gives no range: 0 dark to 100."""
-    light = call.dog.robot[Light]
+    light = call.context.robot[Light]
     if EYES not in light.zones:
         raise ComponentMissing(Light)
     if not 0 <= eyelight <= BRIGHTEST:
@@ -90,9 +90,9 @@ async def set_eye_light(call: Call, *, eyelight: Int32) -> dict[str, bool]:
     return {"success": True}
 
 
-@operations.on(Code.STOP_SOUND, right=Right.DRIVE, needs=(Speaker,))
+@TABLE.on(Code.STOP_SOUND, right=Right.DRIVE, needs=(Speaker,))
 async def stop_sound(call: Call) -> dict[str, bool]:
     """Be quiet, no matter which client let the robot speak."""
-    call.dog.robot[Speaker]
-    await call.dog.robot.actions.cancel(resource=SPEAKER, reason="silenced by the app")
+    call.context.robot[Speaker]
+    await call.context.robot.actions.cancel(resource=SPEAKER, reason="silenced by the app")
     return {}

@@ -8,7 +8,7 @@ from typing import Any
 from roboglot.model.components.interaction.skin import ElectronicSkin, Shade, SkinPattern
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.operations import Right
-from roboglot.protocols.cyberdog.table import Call, operations
+from roboglot.protocols.cyberdog.table import TABLE, Call
 from roboglot.wire.cyberdog.codes import Code, SkinMode
 from roboglot.wire.cyberdog.text import Int32
 
@@ -16,17 +16,17 @@ log = logging.getLogger(__name__)
 OVER_TIME = frozenset({SkinMode.REARWARD, SkinMode.FORWARD, SkinMode.FLASH, SkinMode.RANDOM})
 
 
-@operations.on(Code.ENABLE_SKIN, right=Right.DRIVE, needs=(ElectronicSkin,))
+@TABLE.on(Code.ENABLE_SKIN, right=Right.DRIVE, needs=(ElectronicSkin,))
 async def enable_skin(call: Call, *, data: bool) -> dict[str, Any]:
     """On or off; off, it is dark."""
-    call.dog.robot[ElectronicSkin].enable(data)
+    call.context.robot[ElectronicSkin].enable(data)
     return {"success": True, "message": ""}
 
 
-@operations.on(Code.SET_SKIN, right=Right.DRIVE, needs=(ElectronicSkin,))
+@TABLE.on(Code.SET_SKIN, right=Right.DRIVE, needs=(ElectronicSkin,))
 async def set_skin(call: Call, *, mode: Int32, wave_cycle_time: Int32) -> dict[str, bool]:
     """Modes 0 to 6; the time, in ms, counts for 2 to 5, and for 6 chooses the shade of the legs on the floor."""
-    skin = call.dog.robot[ElectronicSkin]
+    skin = call.context.robot[ElectronicSkin]
     if mode not in tuple(SkinMode):
         return {"success": False}
     pattern = SkinPattern[SkinMode(mode).name]

@@ -18,9 +18,9 @@ from roboglot.operations import Right
 from roboglot.protocols.cyberdog.chapters.people.audio import activated
 from roboglot.protocols.cyberdog.chapters.system.self_check import self_check
 from roboglot.protocols.cyberdog.chapters.system.stored_settings import DEFAULT_NAME, nickname
-from roboglot.protocols.cyberdog.context import Dog
+from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.profile import Profile
-from roboglot.protocols.cyberdog.table import Call, operations
+from roboglot.protocols.cyberdog.table import TABLE, Call
 from roboglot.protocols.cyberdog.vocabulary import percent, wifi_strength
 from roboglot.wire.cyberdog.codes import Code, SelfCheck
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
@@ -43,31 +43,31 @@ class Status:
     wireless_charging: bool
 
 
-def status_of(dog: Dog) -> Status:
+def status_of(context: Context) -> Status:
     """Now, from the model."""
-    check, errors = self_check(dog.robot)
-    battery = dog.robot[Battery].state if Battery in dog.robot else None
+    check, errors = self_check(context.robot)
+    battery = context.robot[Battery].state if Battery in context.robot else None
     return Status(
-        motion_id=int(dog.gaits.motion),
-        task_status=int(dog.tasks.state),
-        task_sub_status=dog.tasks.last_feedback,
+        motion_id=int(context.gaits.motion),
+        task_status=int(context.tasks.state),
+        task_sub_status=context.tasks.last_feedback,
         self_check=check,
         self_check_description=write(errors),
-        state=int(dog.gaits.state),
+        state=int(context.gaits.state),
         wired_charging=battery is not None and battery.wired_charging,
         wireless_charging=battery is not None and battery.dock_charging,
     )
 
 
-def ticks(dog: Dog, address: str) -> Any:
+def ticks(context: Context, address: str) -> Any:
     """One heartbeat; ``address`` is where the app finds the robot."""
-    status = status_of(dog)
+    status = status_of(context)
     return pb.Ticks(
         ip=address,
-        wifi_strength=_strength(dog.robot),
-        battery_power=percent(dog.robot[Battery].state.percentage) if Battery in dog.robot else 0,
-        internet=Network in dog.robot and dog.robot[Network].state.internet,
-        sn=dog.robot.description.serial,
+        wifi_strength=_strength(context.robot),
+        battery_power=percent(context.robot[Battery].state.percentage) if Battery in context.robot else 0,
+        internet=Network in context.robot and context.robot[Network].state.internet,
+        sn=context.robot.description.serial,
         motion_status=pb.MotionStatus(motion_id=status.motion_id),
         task_status=pb.TaskStatus(task_status=status.task_status, task_sub_status=status.task_sub_status),
         self_check_status=pb.SelfCheckStatus(code=int(status.self_check), description=status.self_check_description),
@@ -75,14 +75,14 @@ def ticks(dog: Dog, address: str) -> Any:
         charging_status=pb.ChargingStatus(
             wired_charging=status.wired_charging, wireless_charging=status.wireless_charging
         ),
-        audio=activated(dog.robot),
+        audio=activated(context.robot),
     )
 
 
-@operations.on(Code.STATUS, right=Right.SEE)
+@TABLE.on(Code.STATUS, right=Right.SEE)
 async def query_status(call: Call) -> dict[str, Any]:
     """The states of the heartbeat, on request."""
-    status = status_of(call.dog)
+    status = status_of(call.context)
     return {
         "motion_status": {"motion_id": status.motion_id},
         "task_status": {"task_status": status.task_status, "task_sub_status": status.task_sub_status},
@@ -95,10 +95,10 @@ async def query_status(call: Call) -> dict[str, Any]:
     }
 
 
-def _battery(dog: Dog) -> dict[str, Any]:
-    if Battery not in dog.robot:
+def _battery(context: Context) -> dict[str, Any]:
+    if Battery not in context.robot:
         return {}
-    state = dog.robot[Battery].state
+    state = context.robot[Battery].state
     return {
         "capacity": round(1000.0 * state.capacity),  # mAh
         "power": percent(state.percentage),
@@ -109,13 +109,13 @@ def _battery(dog: Dog) -> dict[str, Any]:
     }
 
 
-def _wifi(dog: Dog) -> dict[str, Any]:
+def _wifi(context: Context) -> dict[str, Any]:
     """Its network in the simulated world, but the address where clients reach it."""
-    if Network not in dog.robot:
-        return {"name": "", "ip": dog.address, "mac": "", "strength": 0}
-    network = dog.robot[Network]
+    if Network not in context.robot:
+        return {"name": "", "ip": context.address, "mac": "", "strength": 0}
+    network = context.robot[Network]
     state = network.state
-    return {"name": state.ssid, "ip": dog.address, "mac": state.mac, "strength": _strength(dog.robot)}
+    return {"name": state.ssid, "ip": context.address, "mac": state.mac, "strength": _strength(context.robot)}
 
 
 def _strength(robot: Robot) -> int:
@@ -123,9 +123,9 @@ def _strength(robot: Robot) -> int:
     return wifi_strength(robot[Network].signal) if Network in robot and robot[Network].connected else 0
 
 
-def _versions(dog: Dog) -> dict[str, Any]:
+def _versions(context: Context) -> dict[str, Any]:
     """The whole, and the single boards' as the firmware knows them ("board.module")."""
-    robot = dog.robot
+    robot = context.robot
     if Firmware not in robot:
         return {"new_version": robot.description.software_version}
     firmware = robot[Firmware]
@@ -137,13 +137,13 @@ def _versions(dog: Dog) -> dict[str, Any]:
     return answer
 
 
-def _motor_temperatures(dog: Dog) -> dict[str, Any]:
+def _motor_temperatures(context: Context) -> dict[str, Any]:
     """Celsius, four legs a joint. Robots send text with two decimals, and words of theirs where there are none."""
-    warm = dict(dog.robot[Motors].temperatures) if Motors in dog.robot else {}
+    warm = dict(context.robot[Motors].temperatures) if Motors in context.robot else {}
     legs = {joint: [warm.get(f"{leg} {name}") for leg in LEGS] for joint, name in JOINTS.items()}
-    if dog.profile is Profile.SPEC:
+    if context.profile is Profile.SPEC:
         return {joint: [None if celsius is None else round(celsius, 2) for celsius in legs[joint]] for joint in legs}
-    if Motors not in dog.robot:
+    if Motors not in context.robot:
         return dict.fromkeys(JOINTS, "unavalible")
     return {joint: ["unkown" if celsius is None else f"{celsius:.2f}" for celsius in legs[joint]] for joint in legs}
 
@@ -151,24 +151,24 @@ def _motor_temperatures(dog: Dog) -> dict[str, Any]:
 NX = "nx"
 LEGS = ("left front", "right front", "left rear", "right rear")
 JOINTS = {"hip": "hip", "thigh": "thigh", "crus": "knee"}
-INFORMATION: Mapping[str, Callable[[Dog, str], Any]] = {
-    "version": lambda dog, _: _versions(dog),
-    "sn": lambda dog, _: dog.robot.description.serial,
-    "nick_name": lambda dog, _: {"default_name": DEFAULT_NAME, "current_name": nickname(dog.robot)},
-    "volume": lambda dog, _: percent(dog.robot[Speaker].volume) if Speaker in dog.robot else NO_SERVICE,
-    "mic_state": lambda dog, _: dog.voice.microphone,
-    "voice_control": lambda dog, _: dog.voice.controlled,
-    "wifi": lambda dog, _: _wifi(dog),
-    "bat_info": lambda dog, _: _battery(dog),
-    "motor_temper": lambda dog, _: _motor_temperatures(dog),
-    "audio_state": lambda dog, uid: activated(dog.robot, uid or None),
-    "device_model": lambda dog, _: dog.robot.description.model,
-    "stand": lambda dog, _: dog.gaits.posture is Posture.STANDING,
-    "lowpower_control": lambda dog, _: Power in dog.robot and dog.robot[Power].automatic,
+INFORMATION: Mapping[str, Callable[[Context, str], Any]] = {
+    "version": lambda context, _: _versions(context),
+    "sn": lambda context, _: context.robot.description.serial,
+    "nick_name": lambda context, _: {"default_name": DEFAULT_NAME, "current_name": nickname(context.robot)},
+    "volume": lambda context, _: percent(context.robot[Speaker].volume) if Speaker in context.robot else NO_SERVICE,
+    "mic_state": lambda context, _: context.voice.microphone,
+    "voice_control": lambda context, _: context.voice.controlled,
+    "wifi": lambda context, _: _wifi(context),
+    "bat_info": lambda context, _: _battery(context),
+    "motor_temper": lambda context, _: _motor_temperatures(context),
+    "audio_state": lambda context, uid: activated(context.robot, uid or None),
+    "device_model": lambda context, _: context.robot.description.model,
+    "stand": lambda context, _: context.gaits.posture is Posture.STANDING,
+    "lowpower_control": lambda context, _: Power in context.robot and context.robot[Power].automatic,
 }
 
 
-@operations.on(Code.DEVICE_INFO, right=Right.SEE)
+@TABLE.on(Code.DEVICE_INFO, right=Right.SEE)
 async def device_information(
     call: Call,
     *,
@@ -204,13 +204,13 @@ async def device_information(
         is_lowpower_control,
     )
     answer = {
-        key: tell(call.dog, str(uid)) for (key, tell), yes in zip(INFORMATION.items(), wanted, strict=True) if yes
+        key: tell(call.context, str(uid)) for (key, tell), yes in zip(INFORMATION.items(), wanted, strict=True) if yes
     }
-    return {**answer, "non-standing": call.dog.gaits.posture is not Posture.STANDING}
+    return {**answer, "non-standing": call.context.gaits.posture is not Posture.STANDING}
 
 
-@operations.on(Code.DISCONNECT_APP, right=Right.DRIVE)
+@TABLE.on(Code.DISCONNECT_APP, right=Right.DRIVE)
 async def disconnect_app(call: Call) -> str:
     """Forget the app's address: heartbeats and pushes end until the next request comes."""
-    call.dog.app.forget()
+    call.context.app.forget()
     return ""

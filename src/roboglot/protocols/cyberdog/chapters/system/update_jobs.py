@@ -36,7 +36,7 @@ from roboglot.protocols.cyberdog.chapters.system.ota import (
     package_of,
 )
 from roboglot.protocols.cyberdog.stream import Stream, follow
-from roboglot.protocols.cyberdog.table import Call, operations
+from roboglot.protocols.cyberdog.table import TABLE, Call
 from roboglot.wire.cyberdog.codes import Accepted, Code
 
 log = logging.getLogger(__name__)
@@ -204,20 +204,20 @@ def _progress(progress: FirmwareProgress) -> dict[str, Any]:
     return {"state": progress.state, "progress": round(100 * progress.share)}
 
 
-@operations.on(Code.START_UPDATE, right=Right.ADMIN, needs=(Firmware,))
+@TABLE.on(Code.START_UPDATE, right=Right.ADMIN, needs=(Firmware,))
 async def start_update(call: Call, *, operate: str = "", id: Id = "", data: object = None) -> object:
     """Answers ``accepted``, feedback, result; the work goes on if the stream breaks."""
-    call.dog.robot[Firmware]
-    if operate not in OPERATIONS or call.dog.jobs.stream is not None:
+    call.context.robot[Firmware]
+    if operate not in OPERATIONS or call.context.jobs.stream is not None:
         return {"accepted": int(Accepted.NO)}
-    return await follow(call, call.dog.jobs.start(Goal(operate, id, data)), STREAM_MAX)
+    return await follow(call, call.context.jobs.start(Goal(operate, id, data)), STREAM_MAX)
 
 
-@operations.on(Code.JOIN_UPDATE, right=Right.SEE, needs=(Firmware,))
+@TABLE.on(Code.JOIN_UPDATE, right=Right.SEE, needs=(Firmware,))
 async def join_update(call: Call) -> object:
     """Take the stream of the goal under way over, from its latest feedback on."""
-    call.dog.robot[Firmware]
-    stream = call.dog.jobs.stream
+    call.context.robot[Firmware]
+    stream = call.context.jobs.stream
     if stream is None:
         return {"accepted": int(Accepted.NOTHING_TO_JOIN)}
     return await follow(call, stream, STREAM_MAX)

@@ -15,7 +15,7 @@ from roboglot.model.errors import InvalidGoal, NotFound, Refused, RobotError
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.chapters.motion.gait import SOURCE
 from roboglot.protocols.cyberdog.chapters.system.stored_settings import ENVIRONMENT
-from roboglot.protocols.cyberdog.table import Call, operations
+from roboglot.protocols.cyberdog.table import TABLE, Call
 from roboglot.wire.cyberdog.codes import Code, InBandError, MachineState, TaskState, UnlockResult
 
 WAKE_MAX = 13.0  # s that leaving low power may take
@@ -26,40 +26,40 @@ ENVIRONMENTS = ("pro", "test")
 LAST_WORDS = 1.0  # s between the answer and the robot's going away
 
 
-@operations.on(Code.LEAVE_LOW_POWER, right=Right.DRIVE, needs=(Power,))
+@TABLE.on(Code.LEAVE_LOW_POWER, right=Right.DRIVE, needs=(Power,))
 async def leave_low_power(call: Call) -> dict[str, Any]:
     """Answered when the robot is awake; an empty battery keeps it in low power."""
-    power, clock = call.dog.robot[Power], call.dog.robot.clock
+    power, clock = call.context.robot[Power], call.context.robot.clock
     waking = power.wake(source=SOURCE)
     try:
         await clock.wait_for(waking.done(), WAKE_MAX)
     except TimeoutError:
         return {"error_code": int(InBandError.TIMEOUT)}
-    return {"success": call.dog.gaits.state is not MachineState.LOW_POWER}
+    return {"success": call.context.gaits.state is not MachineState.LOW_POWER}
 
 
-@operations.on(Code.AUTOMATIC_LOW_POWER, right=Right.EDIT, needs=(Power,))
+@TABLE.on(Code.AUTOMATIC_LOW_POWER, right=Right.EDIT, needs=(Power,))
 async def switch_automatic_low_power(call: Call, *, data: bool) -> dict[str, bool]:
     """Whether a robot that lies for half a minute goes to low power."""
-    await call.dog.robot[Power].set_automatic(data)
+    await call.context.robot[Power].set_automatic(data)
     return {"success": True}
 
 
-@operations.on(Code.WORK_ENVIRONMENT, right=Right.ADMIN, needs=(Settings,))
+@TABLE.on(Code.WORK_ENVIRONMENT, right=Right.ADMIN, needs=(Settings,))
 async def set_work_environment(call: Call, *, data: str) -> dict[str, Any]:
     """Production ("pro") or "test": kept. Simulated robots have the same maker in both."""
     if data not in ENVIRONMENTS:
         return {"success": False, "message": f"the environment is {' or '.join(ENVIRONMENTS)}"}
-    await call.dog.robot[Settings].put(ENVIRONMENT, data)
+    await call.context.robot[Settings].put(ENVIRONMENT, data)
     return {"success": True, "message": ""}
 
 
-@operations.on(Code.UPLOAD_LOG, right=Right.ADMIN, needs=(SystemLog,))
+@TABLE.on(Code.UPLOAD_LOG, right=Right.ADMIN, needs=(SystemLog,))
 async def upload_log(call: Call) -> dict[str, Any]:
     """Hand the system's log to the maker; false when the internet is not reached."""
-    action = call.dog.robot[SystemLog].upload(source=SOURCE)
+    action = call.context.robot[SystemLog].upload(source=SOURCE)
     try:
-        await call.dog.robot.clock.wait_for(action.succeeded(), UPLOAD_MAX)
+        await call.context.robot.clock.wait_for(action.succeeded(), UPLOAD_MAX)
     except TimeoutError:
         action.cancel("it took too long")
         return {"error_code": int(InBandError.TIMEOUT)}
@@ -68,35 +68,35 @@ async def upload_log(call: Call) -> dict[str, Any]:
     return {"success": True}
 
 
-@operations.on(Code.UPLOAD_MOTION_LOG, right=Right.ADMIN, needs=(SystemLog,))
+@TABLE.on(Code.UPLOAD_MOTION_LOG, right=Right.ADMIN, needs=(SystemLog,))
 async def upload_motion_log(call: Call) -> dict[str, Any]:
     """The same for the log of the motion board (not in the text), which here is one with the system's."""
     answer = await upload_log(call)
     return answer if "error_code" in answer else {**answer, "message": ""}
 
 
-@operations.on(Code.SWITCH_POINT_CLOUD, right=Right.EDIT, needs=(DepthCamera,))
+@TABLE.on(Code.SWITCH_POINT_CLOUD, right=Right.EDIT, needs=(DepthCamera,))
 async def switch_point_cloud(call: Call, *, data: bool) -> dict[str, Any]:
     """The depth camera, whose points are what is gone around (not in the text); not while a bracelet is followed."""
-    camera = call.dog.robot[DepthCamera]
-    if call.dog.tasks.state is TaskState.TAG_FOLLOWING:
+    camera = call.context.robot[DepthCamera]
+    if call.context.tasks.state is TaskState.TAG_FOLLOWING:
         return {"success": False, "message": "the robot follows a bracelet"}
     camera.enable(data)
     return {"success": True, "message": ""}
 
 
-@operations.on(Code.POINT_CLOUD, right=Right.SEE, needs=(DepthCamera,))
+@TABLE.on(Code.POINT_CLOUD, right=Right.SEE, needs=(DepthCamera,))
 async def point_cloud(call: Call) -> dict[str, Any]:
     """Whether it is on (not in the text)."""
-    return {"success": call.dog.robot[DepthCamera].enabled, "message": ""}
+    return {"success": call.context.robot[DepthCamera].enabled, "message": ""}
 
 
-@operations.on(Code.UNLOCK, right=Right.ADMIN, needs=(Developer,))
+@TABLE.on(Code.UNLOCK, right=Right.ADMIN, needs=(Developer,))
 async def unlock(call: Call, *, httplink: str = "") -> dict[str, int]:
     """Open developers' access with the key at that link. ``result`` in the text, ``unlock_result`` on robots."""
     result = UnlockResult.DONE
     try:
-        await call.dog.robot.clock.wait_for(call.dog.robot[Developer].unlock(httplink), UNLOCK_MAX)
+        await call.context.robot.clock.wait_for(call.context.robot[Developer].unlock(httplink), UNLOCK_MAX)
     except InvalidGoal:
         result = UnlockResult.ARGUMENTS
     except NotFound:
@@ -106,24 +106,24 @@ async def unlock(call: Call, *, httplink: str = "") -> dict[str, int]:
     return {"result": int(result), "unlock_result": int(result)}
 
 
-@operations.on(Code.REBOOT, right=Right.ADMIN, needs=(Firmware,))
+@TABLE.on(Code.REBOOT, right=Right.ADMIN, needs=(Firmware,))
 async def reboot(call: Call) -> dict[str, int]:
     """``result`` in the text, ``reboot_result`` on real robots: 0. The connection ends soon after the answer."""
-    call.dog.robot[Firmware].reboot(after=LAST_WORDS, source=SOURCE)
+    call.context.robot[Firmware].reboot(after=LAST_WORDS, source=SOURCE)
     return {"result": 0, "reboot_result": 0}
 
 
-@operations.on(Code.POWER_OFF, right=Right.ADMIN, needs=(Power,))
+@TABLE.on(Code.POWER_OFF, right=Right.ADMIN, needs=(Power,))
 async def power_off(call: Call) -> dict[str, bool]:
     """Switch off soon after the answer; on again only by hand."""
-    call.dog.robot[Power].shut_down(after=LAST_WORDS, source=SOURCE)
+    call.context.robot[Power].shut_down(after=LAST_WORDS, source=SOURCE)
     return {"success": True}
 
 
-@operations.on(Code.CALIBRATE_LEGS, right=Right.ADMIN, needs=(Legs,))
+@TABLE.on(Code.CALIBRATE_LEGS, right=Right.ADMIN, needs=(Legs,))
 async def calibrate_legs(call: Call, *, data: bool) -> dict[str, Any]:
     """False: lie down and let the motors go; true: give them power again and stand."""
-    legs, clock = call.dog.robot[Legs], call.dog.robot.clock
+    legs, clock = call.context.robot[Legs], call.context.robot.clock
     if not data and legs.posture is Posture.LIMP:
         return {"success": True, "message": ""}
     action = legs.stand(source=SOURCE) if data else legs.lie_down(source=SOURCE)

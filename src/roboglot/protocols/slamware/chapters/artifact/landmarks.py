@@ -14,7 +14,7 @@ from roboglot.model.errors import NotFound
 from roboglot.model.maps import PointOfInterest
 from roboglot.operations import Right
 from roboglot.protocols.slamware.context import Context
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.table import TABLE
 from roboglot.protocols.slamware.vocabulary import entry_of, pose_of
 from roboglot.wire.slamware.artifact import Identifier, PoseEntry, metadata_text
 from roboglot.wire.slamware.slam import Switch
@@ -22,13 +22,13 @@ from roboglot.wire.slamware.slam import Switch
 API = "/api/core/artifact/v1/laser-landmarks"
 
 
-@OPERATIONS.on(f"GET {API}", right=Right.SEE, needs=(MapAnnotations,))
+@TABLE.on(f"GET {API}", right=Right.SEE, needs=(MapAnnotations,))
 async def get_laser_landmarks(context: Context) -> list[PoseEntry]:
     """Those that the lidar found and those that were set."""
     return [entry_of(mark) for mark in context.robot[MapAnnotations].current.landmarks]
 
 
-@OPERATIONS.on(f"PUT {API}", right=Right.EDIT, needs=(Localization, MapAnnotations))
+@TABLE.on(f"PUT {API}", right=Right.EDIT, needs=(Localization, MapAnnotations))
 async def put_laser_landmarks(
     context: Context, body: Annotated[list[PoseEntry], msgspec.Meta(max_length=2000)]
 ) -> bool:
@@ -39,27 +39,27 @@ async def put_laser_landmarks(
     return True
 
 
-@OPERATIONS.on(f"GET {API}/:update", right=Right.SEE, needs=(LaserLandmarks,))
+@TABLE.on(f"GET {API}/:update", right=Right.SEE, needs=(LaserLandmarks,))
 async def get_laser_landmark_update(context: Context) -> bool:
     """Whether the robot adds what its lidar finds."""
     return context.robot[LaserLandmarks].updating
 
 
-@OPERATIONS.on(f"PUT {API}/:update", right=Right.EDIT, needs=(LaserLandmarks,))
+@TABLE.on(f"PUT {API}/:update", right=Right.EDIT, needs=(LaserLandmarks,))
 async def set_laser_landmark_update(context: Context, body: Switch) -> bool:
     """Let it, or not."""
     await context.robot[LaserLandmarks].set_updating(body.enable)
     return True
 
 
-@OPERATIONS.on(f"DELETE {API}", right=Right.EDIT, needs=(MapAnnotations,))
+@TABLE.on(f"DELETE {API}", right=Right.EDIT, needs=(MapAnnotations,))
 async def delete_laser_landmarks(context: Context) -> bool:
     """Remove all."""
     await context.robot[MapAnnotations].change(lambda now: replace(now, landmarks=()))
     return True
 
 
-@OPERATIONS.on(f"POST {API}/:remove", right=Right.EDIT, needs=(MapAnnotations,))
+@TABLE.on(f"POST {API}/:remove", right=Right.EDIT, needs=(MapAnnotations,))
 async def remove_laser_landmarks(
     context: Context, body: Annotated[list[Identifier | int], msgspec.Meta(max_length=2000)]
 ) -> bool:

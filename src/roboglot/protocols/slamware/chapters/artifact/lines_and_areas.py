@@ -16,7 +16,7 @@ from roboglot.protocols.slamware.chapters.artifact.drawing import (
     wire_line,
 )
 from roboglot.protocols.slamware.context import Context
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.table import TABLE
 from roboglot.wire.slamware import artifact as wire
 from roboglot.wire.slamware.artifact import AreaChange, AreaRequest, AreaUsage, Lines, LineUsage, RectangleArea
 
@@ -24,13 +24,13 @@ API = "/api/core/artifact/v1"
 LINES, AREAS = f"{API}/lines/{{usage}}", f"{API}/rectangle-areas/{{usage}}"
 
 
-@OPERATIONS.on(f"GET {LINES}", right=Right.SEE, needs=(MapAnnotations,))
+@TABLE.on(f"GET {LINES}", right=Right.SEE, needs=(MapAnnotations,))
 async def get_lines(context: Context, usage: LineUsage) -> list[wire.Line]:
     """All of one kind, oldest first."""
     return [wire_line(line) for line in context.robot[MapAnnotations].current.lines_of(LINE_KINDS[usage])]
 
 
-@OPERATIONS.on(f"POST {LINES}", right=Right.EDIT, needs=(MapAnnotations,))
+@TABLE.on(f"POST {LINES}", right=Right.EDIT, needs=(MapAnnotations,))
 async def add_lines(context: Context, usage: LineUsage, body: Lines) -> bool:
     """Add some; the ids in the body do not count."""
     lines = [line_of(LINE_KINDS[usage], line) for line in body]
@@ -38,7 +38,7 @@ async def add_lines(context: Context, usage: LineUsage, body: Lines) -> bool:
     return True
 
 
-@OPERATIONS.on(f"PUT {LINES}", right=Right.EDIT, needs=(MapAnnotations,))
+@TABLE.on(f"PUT {LINES}", right=Right.EDIT, needs=(MapAnnotations,))
 async def modify_lines(context: Context, usage: LineUsage, body: Lines) -> bool:
     """Change those with these ids; 404, and nothing happens, if one of them does not exist."""
     changed = {line.id: line_of(LINE_KINDS[usage], line) for line in body}
@@ -53,7 +53,7 @@ async def modify_lines(context: Context, usage: LineUsage, body: Lines) -> bool:
     return True
 
 
-@OPERATIONS.on(f"DELETE {LINES}", right=Right.EDIT, needs=(MapAnnotations,))
+@TABLE.on(f"DELETE {LINES}", right=Right.EDIT, needs=(MapAnnotations,))
 async def clear_lines(context: Context, usage: LineUsage) -> bool:
     """Remove all of one kind."""
     kind = LINE_KINDS[usage]
@@ -63,7 +63,7 @@ async def clear_lines(context: Context, usage: LineUsage) -> bool:
     return True
 
 
-@OPERATIONS.on(f"DELETE {LINES}/{{id}}", right=Right.EDIT, needs=(MapAnnotations,))
+@TABLE.on(f"DELETE {LINES}/{{id}}", right=Right.EDIT, needs=(MapAnnotations,))
 async def remove_line_by_id(context: Context, usage: LineUsage, id: int) -> bool:
     """Remove one, or 404."""
     kind = LINE_KINDS[usage]
@@ -78,13 +78,13 @@ async def remove_line_by_id(context: Context, usage: LineUsage, id: int) -> bool
     return True
 
 
-@OPERATIONS.on(f"GET {AREAS}", right=Right.SEE, needs=(MapAnnotations,))
+@TABLE.on(f"GET {AREAS}", right=Right.SEE, needs=(MapAnnotations,))
 async def get_rectangle_areas(context: Context, usage: AreaUsage) -> list[RectangleArea]:
     """All of one kind, oldest first."""
     return [wire_area(area) for area in context.robot[MapAnnotations].current.areas_of(AREA_KINDS[usage])]
 
 
-@OPERATIONS.on(f"POST {AREAS}", right=Right.EDIT, needs=(MapAnnotations,))
+@TABLE.on(f"POST {AREAS}", right=Right.EDIT, needs=(MapAnnotations,))
 async def add_rectangle_area(context: Context, usage: AreaUsage, body: AreaRequest) -> bool:
     """Add one; what its metadata ask for must make sense."""
     area = area_of(usage, body.area, wire.metadata_text(body.metadata))
@@ -92,7 +92,7 @@ async def add_rectangle_area(context: Context, usage: AreaUsage, body: AreaReque
     return True
 
 
-@OPERATIONS.on(f"DELETE {AREAS}", right=Right.EDIT, needs=(MapAnnotations,))
+@TABLE.on(f"DELETE {AREAS}", right=Right.EDIT, needs=(MapAnnotations,))
 async def clear_rectangle_areas(context: Context, usage: AreaUsage) -> bool:
     """Remove all of one kind."""
     kind = AREA_KINDS[usage]
@@ -102,7 +102,7 @@ async def clear_rectangle_areas(context: Context, usage: AreaUsage) -> bool:
     return True
 
 
-@OPERATIONS.on(f"PUT {AREAS}/{{id}}", right=Right.EDIT, needs=(MapAnnotations,))
+@TABLE.on(f"PUT {AREAS}/{{id}}", right=Right.EDIT, needs=(MapAnnotations,))
 async def edit_rectangle_area(context: Context, usage: AreaUsage, id: int, body: AreaChange) -> bool:
     """Change place, metadata or both; 404 if there is none."""
 
@@ -119,7 +119,7 @@ async def edit_rectangle_area(context: Context, usage: AreaUsage, id: int, body:
     return True
 
 
-@OPERATIONS.on(f"DELETE {AREAS}/{{id}}", right=Right.EDIT, needs=(MapAnnotations,))
+@TABLE.on(f"DELETE {AREAS}/{{id}}", right=Right.EDIT, needs=(MapAnnotations,))
 async def remove_rectangle_area_by_id(context: Context, usage: AreaUsage, id: int) -> bool:
     """Remove one, or 404."""
     kind = AREA_KINDS[usage]

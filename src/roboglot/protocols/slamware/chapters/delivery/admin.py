@@ -19,7 +19,7 @@ from roboglot.protocols.slamware.chapters.delivery.cargo import all_cargos
 from roboglot.protocols.slamware.chapters.delivery.voice import LANGUAGE, language_of
 from roboglot.protocols.slamware.chapters.system.system import device_id, software_version
 from roboglot.protocols.slamware.context import Context
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.table import TABLE
 from roboglot.wire.slamware.delivery import (
     AdminPassword,
     BatteryLevels,
@@ -51,13 +51,13 @@ async def _set(context: Context, policy: Policy) -> OperationReply:
     return DONE
 
 
-@OPERATIONS.on(f"GET {API}/admin/password", right=Right.ADMIN, needs=(Settings,))
+@TABLE.on(f"GET {API}/admin/password", right=Right.ADMIN, needs=(Settings,))
 async def get_password(context: Context) -> AdminPassword:
     """What the robot's screen asks for before it shows its settings; it never expires."""
     return AdminPassword(msgspec.convert(context.robot[Settings].get(PASSWORD, {"enable": False}), Password))
 
 
-@OPERATIONS.on(f"PUT {API}/admin/password", right=Right.ADMIN, needs=(Settings,))
+@TABLE.on(f"PUT {API}/admin/password", right=Right.ADMIN, needs=(Settings,))
 async def set_password(context: Context, body: Password | None = None) -> OperationReply:
     """Ask for this password, or for none. It guards the screen: the API itself is open."""
     new = body or Password(enable=False)
@@ -67,25 +67,25 @@ async def set_password(context: Context, body: Password | None = None) -> Operat
     return DONE
 
 
-@OPERATIONS.on(f"GET {API}/admin/mode", right=Right.SEE, needs=(Delivery,))
+@TABLE.on(f"GET {API}/admin/mode", right=Right.SEE, needs=(Delivery,))
 async def get_work_mode(context: Context) -> WorkModeEntry:
     """Which tasks may be created at the robot."""
     return WorkModeEntry(context.robot[Delivery].policy.work_mode.value.upper())  # type: ignore[arg-type]
 
 
-@OPERATIONS.on(f"PUT {API}/admin/mode", right=Right.EDIT, needs=(Delivery,))
+@TABLE.on(f"PUT {API}/admin/mode", right=Right.EDIT, needs=(Delivery,))
 async def set_work_mode(context: Context, body: WorkModeEntry) -> OperationReply:
     """DISPATCH: none, RECYCLE: only collecting dishes, MANUAL: any."""
     return await _set(context, replace(context.robot[Delivery].policy, work_mode=WorkMode(body.work_mode.lower())))
 
 
-@OPERATIONS.on(f"GET {API}/admin/language", right=Right.SEE, needs=(Settings,))
+@TABLE.on(f"GET {API}/admin/language", right=Right.SEE, needs=(Settings,))
 async def get_language(context: Context) -> Language:
     """As it was set; at first Chinese."""
     return Language(language_of(context.robot))
 
 
-@OPERATIONS.on(f"PUT {API}/admin/language", right=Right.EDIT, needs=(Settings,))
+@TABLE.on(f"PUT {API}/admin/language", right=Right.EDIT, needs=(Settings,))
 async def set_language(context: Context, body: Language) -> OperationReply:
     """What the robot says aloud is Chinese or English from now on."""
     await context.robot[Settings].put(LANGUAGE, body.language)
@@ -94,14 +94,14 @@ async def set_language(context: Context, body: Language) -> OperationReply:
     return DONE
 
 
-@OPERATIONS.on(f"GET {API}/admin/working_time", right=Right.SEE, needs=(Delivery,))
+@TABLE.on(f"GET {API}/admin/working_time", right=Right.SEE, needs=(Delivery,))
 async def get_working_time(context: Context) -> WorkingTime:
     """UTC; no hours: always."""
     policy = context.robot[Delivery].policy
     return WorkingTime([Hours(_clock(a), _clock(b)) for a, b in policy.hours], list(policy.rest_days))
 
 
-@OPERATIONS.on(f"PUT {API}/admin/working_time", right=Right.EDIT, needs=(Delivery,))
+@TABLE.on(f"PUT {API}/admin/working_time", right=Right.EDIT, needs=(Delivery,))
 async def set_working_time(context: Context, body: WorkingTime) -> OperationReply:
     """Outside these hours (UTC) the robot rests on its dock and tasks wait."""
     hours = tuple((_seconds(entry.start_time), _seconds(entry.end_time)) for entry in body.hours)
@@ -118,13 +118,13 @@ def _clock(seconds: int) -> str:
     return f"{seconds // 3600:02}:{seconds // 60 % 60:02}:{seconds % 60:02}"
 
 
-@OPERATIONS.on(f"GET {API}/admin/move_options", right=Right.SEE, needs=(Delivery,))
+@TABLE.on(f"GET {API}/admin/move_options", right=Right.SEE, needs=(Delivery,))
 async def get_move_options(context: Context) -> MoveOptions:
     """How the robot drives for tasks, as it was set."""
     return _effective(msgspec.convert(dict(context.robot[Delivery].policy.words), MoveOptions))
 
 
-@OPERATIONS.on(f"PUT {API}/admin/move_options", right=Right.EDIT, needs=(Delivery,))
+@TABLE.on(f"PUT {API}/admin/move_options", right=Right.EDIT, needs=(Delivery,))
 async def set_move_options(context: Context, body: dict[str, object] | None = None) -> OperationReply:
     """Change what is sent; an empty body goes back to the default. The next drive has it."""
     policy = context.robot[Delivery].policy
@@ -160,7 +160,7 @@ def _effective(how: MoveOptions) -> MoveOptions:
     )
 
 
-@OPERATIONS.on(f"GET {API}/admin/line_speed", right=Right.SEE, needs=(Base, Delivery))
+@TABLE.on(f"GET {API}/admin/line_speed", right=Right.SEE, needs=(Base, Delivery))
 async def get_line_speed(context: Context) -> LineSpeed:
     """m/s on the way to people and back; what was never set is as fast as the robot may drive."""
     policy, most = context.robot[Delivery].policy, context.robot[Base].limits.twist.x
@@ -168,7 +168,7 @@ async def get_line_speed(context: Context) -> LineSpeed:
     return LineSpeed(there, most if policy.return_speed is None else policy.return_speed)
 
 
-@OPERATIONS.on(f"PUT {API}/admin/line_speed", right=Right.EDIT, needs=(Delivery,))
+@TABLE.on(f"PUT {API}/admin/line_speed", right=Right.EDIT, needs=(Delivery,))
 async def set_line_speed(context: Context, body: LineSpeed) -> None:
     """The next drive has it; never faster than the robot may drive."""
     policy = context.robot[Delivery].policy
@@ -177,7 +177,7 @@ async def set_line_speed(context: Context, body: LineSpeed) -> None:
     await _set(context, replace(policy, delivery_speed=there, return_speed=back))
 
 
-@OPERATIONS.on(f"GET {API}/configurations", right=Right.SEE, needs=(Settings,))
+@TABLE.on(f"GET {API}/configurations", right=Right.SEE, needs=(Settings,))
 async def get_configurations(context: Context) -> Configuration:
     """The machine; it does not search its place anew when parked."""
     plate = context.robot.description
@@ -185,7 +185,7 @@ async def get_configurations(context: Context) -> Configuration:
     return Configuration(device_id(plate.serial), software_version(context.robot), context.cloud.managed, False, cargos)
 
 
-@OPERATIONS.on(f"GET {API}/settings", right=Right.SEE, needs=(Delivery,))
+@TABLE.on(f"GET {API}/settings", right=Right.SEE, needs=(Delivery,))
 async def get_delivery_settings(context: Context) -> WrappedSettings:
     """Battery levels (percent) and time-outs (s)."""
     policy = context.robot[Delivery].policy
@@ -200,13 +200,13 @@ async def get_delivery_settings(context: Context) -> WrappedSettings:
     return WrappedSettings(DeliverySettings(levels, timeouts))
 
 
-@OPERATIONS.on(f"PUT {API}/settings/timeout", right=Right.EDIT, needs=(Delivery,))
+@TABLE.on(f"PUT {API}/settings/timeout", right=Right.EDIT, needs=(Delivery,))
 async def set_timeout_settings(context: Context, body: TimeoutChange) -> None:
     """How long the robot waits for a guest to take the food."""
     await _set(context, replace(context.robot[Delivery].policy, food_seconds=float(body.food_pickup_timeout)))
 
 
-@OPERATIONS.on(f"GET {API}/voice_resources", right=Right.SEE, needs=(Settings,))
+@TABLE.on(f"GET {API}/voice_resources", right=Right.SEE, needs=(Settings,))
 async def get_voice_resources(context: Context) -> VoicePackages:
     """The cloud's voice packages; ``result`` false without a cloud, or when it cannot be reached."""
     if not context.cloud.reached:

@@ -22,7 +22,7 @@ from roboglot.protocols.slamware.chapters.delivery.vocabulary import (
 from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import HttpError
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.table import TABLE
 from roboglot.wire.slamware.delivery import AssignedCargo, Box, Cargo, OperationResult
 
 CARGOS = "/api/delivery/v1/cargos"
@@ -40,26 +40,26 @@ def all_cargos(robot: Robot) -> list[Cargo]:
     return found
 
 
-@OPERATIONS.on(f"GET {CARGOS}", right=Right.SEE, needs=(CargoComponent,))
+@TABLE.on(f"GET {CARGOS}", right=Right.SEE, needs=(CargoComponent,))
 async def get_cargos(context: Context) -> list[Cargo]:
     """All groups of boxes with the state of each box."""
     return all_cargos(context.robot)
 
 
-@OPERATIONS.on(f"GET {BOXES}", right=Right.SEE, needs=(CargoComponent,))
+@TABLE.on(f"GET {BOXES}", right=Right.SEE, needs=(CargoComponent,))
 async def get_cargo_boxes(context: Context, cargo_id: str) -> list[Box]:
     """The boxes of one cargo; 404 if there is none."""
     cargo = context.robot[CargoComponent]
     return [box_of(cargo.box(id)) for id in _compartment(context, cargo_id).boxes]
 
 
-@OPERATIONS.on(f"GET {BOXES}/{{box_id}}", right=Right.SEE, needs=(CargoComponent,))
+@TABLE.on(f"GET {BOXES}/{{box_id}}", right=Right.SEE, needs=(CargoComponent,))
 async def get_cargo_box(context: Context, cargo_id: str, box_id: int) -> Box:
     """One box; 404 if the cargo has none of that number."""
     return box_of(context.robot[CargoComponent].box(_box_id(context, cargo_id, box_id)))
 
 
-@OPERATIONS.on(f"PUT {BOXES}/{{box_id}}/{{op}}", right=Right.DRIVE, needs=(CargoComponent,))
+@TABLE.on(f"PUT {BOXES}/{{box_id}}/{{op}}", right=Right.DRIVE, needs=(CargoComponent,))
 async def operate_box(context: Context, cargo_id: str, box_id: int, op: Literal[":open", ":close"]) -> None:
     """Begin to open or close; the door moves in its own time, ``operation_result`` has the outcome."""
     cargo, id = context.robot[CargoComponent], _box_id(context, cargo_id, box_id)
@@ -69,7 +69,7 @@ async def operate_box(context: Context, cargo_id: str, box_id: int, op: Literal[
         cargo.close_box(id, source=SOURCE)
 
 
-@OPERATIONS.on(f"GET {BOXES}/{{box_id}}/operation_result", right=Right.SEE, needs=(CargoComponent,))
+@TABLE.on(f"GET {BOXES}/{{box_id}}/operation_result", right=Right.SEE, needs=(CargoComponent,))
 async def get_operation_result(context: Context, cargo_id: str, box_id: int) -> OperationResult:
     """The last opening or closing of the box; 404 while there was none."""
     id = _box_id(context, cargo_id, box_id)
@@ -88,7 +88,7 @@ async def get_operation_result(context: Context, cargo_id: str, box_id: int) -> 
     return OperationResult(kind, "FAILED", reason, cargo_id, box)  # type: ignore[arg-type]
 
 
-@OPERATIONS.on(f"GET {CARGOS}/assigned", right=Right.SEE, needs=(Delivery, Places))
+@TABLE.on(f"GET {CARGOS}/assigned", right=Right.SEE, needs=(Delivery, Places))
 async def get_assigned_cargos(context: Context) -> list[AssignedCargo]:
     """Which boxes belong to takeouts that have not ended."""
     return [

@@ -22,13 +22,13 @@ from roboglot.protocols.slamware.chapters.delivery.vocabulary import (
 )
 from roboglot.protocols.slamware.chapters.system.health import record_of
 from roboglot.protocols.slamware.context import Context
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.table import TABLE
 from roboglot.wire.slamware.delivery import DeviceError, Pickup, StageInfo, TaskStage
 
 LANDING = {None: "INITIALIZING", "approaching": "GOING_TO_LANDING_POINT"}  # by the feedback of docking
 
 
-@OPERATIONS.on("GET /api/delivery/v1/stage", right=Right.SEE, needs=(Delivery, Places))
+@TABLE.on("GET /api/delivery/v1/stage", right=Right.SEE, needs=(Delivery, Places))
 async def get_stage(context: Context) -> TaskStage:
     """A fault that keeps the robot from moving before the task before the way to rest."""
     delivery, floor = context.robot[Delivery], context.maps.current.floor

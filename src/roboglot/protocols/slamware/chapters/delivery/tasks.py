@@ -23,7 +23,7 @@ from roboglot.protocols.slamware.chapters.delivery.vocabulary import (
     task_of,
 )
 from roboglot.protocols.slamware.context import Context
-from roboglot.protocols.slamware.table import NO_CONTENT, OPERATIONS, NoContent
+from roboglot.protocols.slamware.table import NO_CONTENT, TABLE, NoContent
 from roboglot.wire.slamware.delivery import (
     DeliveryTask,
     TaskCreated,
@@ -39,7 +39,7 @@ KindFilter = Literal["takeout", "retail", "collect", "refill", "food_delivery", 
 StatusFilter = Literal["ready", "running", "succeeded", "failed", "all"]
 
 
-@OPERATIONS.on(f"GET {TASKS}", right=Right.SEE, needs=(Delivery, Places))
+@TABLE.on(f"GET {TASKS}", right=Right.SEE, needs=(Delivery, Places))
 async def get_tasks(
     context: Context, type: KindFilter | None = None, status: StatusFilter | None = None
 ) -> list[DeliveryTask]:
@@ -66,14 +66,14 @@ def is_asked(status: OrderStatus, asked: StatusFilter | None) -> bool:
             return status.value == asked
 
 
-@OPERATIONS.on(f"POST {TASKS}", right=Right.DRIVE, needs=(Delivery,))
+@TABLE.on(f"POST {TASKS}", right=Right.DRIVE, needs=(Delivery,))
 async def create_task(context: Context, body: TaskRequest) -> TaskCreated:
     """Queue a task; a refusal is an answer with ``result`` false."""
     orders, errors = await _accept(context, [request_of(body)])
     return TaskCreated(bool(orders), orders[0].number if orders else "", errors)
 
 
-@OPERATIONS.on(f"POST {TASKS}/:batch", right=Right.DRIVE, needs=(Delivery,))
+@TABLE.on(f"POST {TASKS}/:batch", right=Right.DRIVE, needs=(Delivery,))
 async def create_tasks(
     context: Context, body: Annotated[list[TaskRequest], msgspec.Meta(min_length=1, max_length=BATCH_MAX)]
 ) -> TasksCreated:
@@ -91,25 +91,25 @@ async def _accept(context: Context, requests: list[OrderRequest]) -> tuple[Seque
         return (), [TaskError(str(error))]
 
 
-@OPERATIONS.on(f"DELETE {TASKS}", right=Right.DRIVE, needs=(Delivery,))
+@TABLE.on(f"DELETE {TASKS}", right=Right.DRIVE, needs=(Delivery,))
 async def cancel_all_tasks(context: Context) -> None:
     """All end as canceled; the robot brakes and goes to rest."""
     await context.robot[Delivery].cancel()
 
 
-@OPERATIONS.on(f"DELETE {TASKS}/{{task_id}}", right=Right.DRIVE, needs=(Delivery,))
+@TABLE.on(f"DELETE {TASKS}/{{task_id}}", right=Right.DRIVE, needs=(Delivery,))
 async def cancel_task_by_task_id(context: Context, task_id: str) -> None:
     """One ends as canceled; 404 if there is none."""
     await context.robot[Delivery].cancel(task_id)
 
 
-@OPERATIONS.on(f"DELETE {TASKS}/orders/{{order_id}}", right=Right.DRIVE, needs=(Delivery,))
+@TABLE.on(f"DELETE {TASKS}/orders/{{order_id}}", right=Right.DRIVE, needs=(Delivery,))
 async def cancel_task_by_order_id(context: Context, order_id: str) -> None:
     """The same by the number that creating it answered."""
     await context.robot[Delivery].cancel(order_id)
 
 
-@OPERATIONS.on(f"PUT {TASKS}/:task_execution", right=Right.DRIVE, needs=(Delivery,))
+@TABLE.on(f"PUT {TASKS}/:task_execution", right=Right.DRIVE, needs=(Delivery,))
 async def set_task_execution(context: Context, body: TaskExecution | None = None) -> TaskExecution:
     """False: the robot stands still while people use its screen. True: it goes on, or to rest if there is no task.
 
@@ -121,28 +121,28 @@ async def set_task_execution(context: Context, body: TaskExecution | None = None
     return TaskExecution(delivery.executing)
 
 
-@OPERATIONS.on(f"PUT {TASKS}/:task_finish", right=Right.DRIVE, needs=(Delivery,))
+@TABLE.on(f"PUT {TASKS}/:task_finish", right=Right.DRIVE, needs=(Delivery,))
 async def end_task(context: Context) -> NoContent:
     """All end as succeeded."""
     await context.robot[Delivery].finish()
     return NO_CONTENT
 
 
-@OPERATIONS.on(f"PUT {TASKS}/:start_pickup", right=Right.DRIVE, needs=(Delivery,))
+@TABLE.on(f"PUT {TASKS}/:start_pickup", right=Right.DRIVE, needs=(Delivery,))
 async def start_pickup(context: Context) -> NoContent:
     """Begin to take goods out; 403 unless the robot stands at the target."""
     await context.robot[Delivery].start_pickup()
     return NO_CONTENT
 
 
-@OPERATIONS.on(f"PUT {TASKS}/:end_pickup", right=Right.DRIVE, needs=(Delivery,))
+@TABLE.on(f"PUT {TASKS}/:end_pickup", right=Right.DRIVE, needs=(Delivery,))
 async def end_pickup(context: Context) -> NoContent:
     """This box is done: its door shuts, and the next one opens. 403 unless goods are being taken out."""
     await context.robot[Delivery].end_pickup()
     return NO_CONTENT
 
 
-@OPERATIONS.on(f"PUT {TASKS}/:end_operation", right=Right.DRIVE, needs=(Delivery,))
+@TABLE.on(f"PUT {TASKS}/:end_operation", right=Right.DRIVE, needs=(Delivery,))
 async def end_operation(context: Context) -> NoContent:
     """The task may leave this point; 403 unless the robot stands at one."""
     await context.robot[Delivery].end_operation()

@@ -14,7 +14,7 @@ from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.motion.action_factories import FACTORIES, create
 from roboglot.protocols.slamware.chapters.motion.errands import part_of
 from roboglot.protocols.slamware.context import Context
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.table import TABLE
 from roboglot.wire.slamware.motion import (
     ActionFactory,
     ActionGravestone,
@@ -29,7 +29,7 @@ API = "/api/core/motion/v1"
 SEARCH_SECONDS = 10.0  # the longest search when the client sets no limit
 
 
-@OPERATIONS.on(f"GET {API}/action-factories", right=Right.SEE)
+@TABLE.on(f"GET {API}/action-factories", right=Right.SEE)
 async def get_action_factories(context: Context) -> list[ActionFactory]:
     """The kinds of action that this robot can do."""
     return [
@@ -39,45 +39,45 @@ async def get_action_factories(context: Context) -> list[ActionFactory]:
     ]
 
 
-@OPERATIONS.on(f"POST {API}/actions", right=Right.DRIVE)
+@TABLE.on(f"POST {API}/actions", right=Right.DRIVE)
 async def create_action(context: Context, body: ActionRequest) -> ActionInfo:
     """Start an action in place of the one under way; 400 for what this robot cannot do or does not understand."""
     return context.actions.enter(body.action_name, create(context, body))
 
 
-@OPERATIONS.on(f"GET {API}/actions/:current", right=Right.SEE)
+@TABLE.on(f"GET {API}/actions/:current", right=Right.SEE)
 async def get_current_action(context: Context) -> ActionInfo:
     """What the robot does; 404 when it does nothing."""
     return context.actions.current_info()
 
 
-@OPERATIONS.on(f"DELETE {API}/actions/:current", right=Right.DRIVE)
+@TABLE.on(f"DELETE {API}/actions/:current", right=Right.DRIVE)
 async def abort_current_action(context: Context) -> None:
     """Stop, no matter who asked for the motion; fine when nothing moves."""
     context.actions.abort()
 
 
-@OPERATIONS.on(f"GET {API}/actions/{{action_id}}", right=Right.SEE)
+@TABLE.on(f"GET {API}/actions/{{action_id}}", right=Right.SEE)
 async def get_action_result(context: Context, action_id: int) -> ActionInfo | ActionGravestone:
     """One under way, or what is left of one of the last 20; 404 otherwise."""
     return context.actions.look_up(action_id)
 
 
-@OPERATIONS.on(f"GET {API}/path", right=Right.SEE)
+@TABLE.on(f"GET {API}/path", right=Right.SEE)
 async def get_remaining_path(context: Context) -> PathPoints:
     """What is left to drive; empty when the robot goes nowhere."""
     feedback = _navigation(context)
     return _path_points(feedback.remaining.points if feedback else ())
 
 
-@OPERATIONS.on(f"GET {API}/milestones", right=Right.SEE)
+@TABLE.on(f"GET {API}/milestones", right=Right.SEE)
 async def get_remaining_milestones(context: Context) -> PathPoints:
     """The goals still to reach."""
     feedback = _navigation(context)
     return _path_points(feedback.milestones if feedback else ())
 
 
-@OPERATIONS.on(f"GET {API}/speed", right=Right.SEE, needs=(Odometry,))
+@TABLE.on(f"GET {API}/speed", right=Right.SEE, needs=(Odometry,))
 async def get_current_speed(context: Context) -> Speed:
     """How the robot moves, by its odometry."""
     require_heard(context.robot)
@@ -85,14 +85,14 @@ async def get_current_speed(context: Context) -> Speed:
     return Speed(twist.x, twist.y, twist.yaw)
 
 
-@OPERATIONS.on(f"GET {API}/time", right=Right.SEE)
+@TABLE.on(f"GET {API}/time", right=Right.SEE)
 async def get_remaining_time(context: Context) -> float:
     """Seconds to the goal; 0 when the robot goes nowhere."""
     feedback = _navigation(context)
     return feedback.time_to_goal if feedback else 0.0
 
 
-@OPERATIONS.on(f"POST {API}/:search_path", right=Right.SEE, needs=(Localization, Navigation))
+@TABLE.on(f"POST {API}/:search_path", right=Right.SEE, needs=(Localization, Navigation))
 async def search_path(context: Context, body: PathQuery) -> PathPoints:
     """The path that the robot would take to a target, without going; empty if there is none."""
     robot = context.robot

@@ -8,7 +8,7 @@ from roboglot.model.errors import InvalidGoal
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.protocols.slamware.context import Context
-from roboglot.protocols.slamware.table import OPERATIONS, Text
+from roboglot.protocols.slamware.table import TABLE, Text
 from roboglot.wire.slamware.motion import Strategy
 
 API = "/api/core/motion/v1/strategies"
@@ -25,21 +25,21 @@ def _current(robot: Robot) -> str:
     return str(robot[Settings].get(CURRENT, "default")) if Settings in robot else "default"
 
 
-@OPERATIONS.on(f"GET {API}", right=Right.SEE, needs=(Navigation,))
+@TABLE.on(f"GET {API}", right=Right.SEE, needs=(Navigation,))
 async def get_motion_strategies(context: Context) -> list[str]:
     """All that there are."""
     _ = context.robot[Navigation]
     return list(SHARES)
 
 
-@OPERATIONS.on(f"GET {API}/:current", right=Right.SEE, needs=(Navigation,))
+@TABLE.on(f"GET {API}/:current", right=Right.SEE, needs=(Navigation,))
 async def get_current_strategy(context: Context) -> Text:
     """The one in use."""
     _ = context.robot[Navigation]
     return Text(_current(context.robot))
 
 
-@OPERATIONS.on(f"PUT {API}/:current", right=Right.EDIT, needs=(Navigation, Settings))
+@TABLE.on(f"PUT {API}/:current", right=Right.EDIT, needs=(Navigation, Settings))
 async def set_current_strategy(context: Context, body: Strategy) -> bool:
     """Use another one for whatever is started from now on, also after a restart; 400 if there is none of that name."""
     if body.strategy not in SHARES:

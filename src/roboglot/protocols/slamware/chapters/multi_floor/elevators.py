@@ -23,7 +23,7 @@ from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import HttpError
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.table import TABLE
 from roboglot.protocols.slamware.vocabulary import pose3d
 from roboglot.wire.slamware.artifact import Identifier, MetadataError, number
 from roboglot.wire.slamware.geometry import Pose3D
@@ -142,19 +142,19 @@ def elevator_called(robot: Robot, id: str) -> Elevator:
     raise HttpError(400, "Unknown Elevator ID", f"the map has no elevator {id}")
 
 
-@OPERATIONS.on(f"GET {API}", right=Right.SEE, needs=(MapAnnotations,))
+@TABLE.on(f"GET {API}", right=Right.SEE, needs=(MapAnnotations,))
 async def get_elevators(context: Context) -> list[ElevatorInfo]:
     """The elevators of this floor and where to wait for them."""
     return [elevator.info for elevator in elevators_here(context.robot)]
 
 
-@OPERATIONS.on(f"GET {API}/{{elevator_id}}", right=Right.SEE, needs=(MapAnnotations,))
+@TABLE.on(f"GET {API}/{{elevator_id}}", right=Right.SEE, needs=(MapAnnotations,))
 async def get_elevators_by_id(context: Context, elevator_id: Identifier) -> ElevatorInfo:
     """One, or 400."""
     return elevator_called(context.robot, elevator_id).info
 
 
-@OPERATIONS.on(f"GET {API}/{{elevator_id}}/pose_relation", right=Right.SEE, needs=(Localization, MapAnnotations))
+@TABLE.on(f"GET {API}/{{elevator_id}}/pose_relation", right=Right.SEE, needs=(Localization, MapAnnotations))
 async def get_pose_relation_to_elevator(context: Context, elevator_id: Identifier) -> PoseRelation:
     """Whether the robot is in it, over its sill or outside; 400 if there is none."""
     return elevator_called(context.robot, elevator_id).relation(context.robot)

@@ -24,7 +24,7 @@ from roboglot.protocols.slamware.chapters.motion.home_docks import (
 from roboglot.protocols.slamware.chapters.multi_floor.elevators import elevator_around
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, FloorName
 from roboglot.protocols.slamware.context import Context
-from roboglot.protocols.slamware.table import NO_CONTENT, OPERATIONS, NoContent
+from roboglot.protocols.slamware.table import NO_CONTENT, TABLE, NoContent
 from roboglot.protocols.slamware.vocabulary import pose2d, pose_of
 from roboglot.wire.slamware.geometry import Point
 from roboglot.wire.slamware.multi_floor import (
@@ -46,7 +46,7 @@ from roboglot.wire.slamware.multi_floor import (
 MAP, LOCALIZATION = "/api/multi-floor/map/v1", "/api/multi-floor/localization/v1"
 
 
-@OPERATIONS.on("GET /api/multi-floor/status", right=Right.SEE, needs=(Mapping, Settings))
+@TABLE.on("GET /api/multi-floor/status", right=Right.SEE, needs=(Mapping, Settings))
 async def get_status(context: Context) -> MultiFloorStatus:
     """What became of the map on disk."""
     return MultiFloorStatus(
@@ -54,20 +54,20 @@ async def get_status(context: Context) -> MultiFloorStatus:
     )
 
 
-@OPERATIONS.on(f"POST {MAP}/stcm", right=Right.EDIT, needs=(FileStore,))
+@TABLE.on(f"POST {MAP}/stcm", right=Right.EDIT, needs=(FileStore,))
 async def upload_map(context: Context, body: bytes) -> None:
     """Keep this composite map on disk; it is used from the next reload on. 400 if it is none."""
     await context.maps.upload(body)
 
 
-@OPERATIONS.on(f"DELETE {MAP}/stcm", right=Right.EDIT, needs=(FileStore,))
+@TABLE.on(f"DELETE {MAP}/stcm", right=Right.EDIT, needs=(FileStore,))
 async def delete_map(context: Context) -> NoContent:
     """Forget the map on disk; the one in memory stays."""
     await context.maps.delete()
     return NO_CONTENT
 
 
-@OPERATIONS.on(
+@TABLE.on(
     f"POST {MAP}/stcm/:save", right=Right.EDIT, needs=(Docking, MapAnnotations, MapMemory, Mapping, Places, Settings)
 )
 async def save_stcm(context: Context) -> None:
@@ -75,7 +75,7 @@ async def save_stcm(context: Context) -> None:
     await context.maps.save()
 
 
-@OPERATIONS.on(
+@TABLE.on(
     f"POST {MAP}/stcm/:reload",
     right=Right.EDIT,
     needs=(FileStore, Localization, MapAnnotations, MapMemory, Mapping, Settings),
@@ -86,7 +86,7 @@ async def reload_stcm(context: Context, body: Reload | None = None) -> None:
     await context.maps.reload(pose_of(body.pose) if body and body.pose else None)
 
 
-@OPERATIONS.on(
+@TABLE.on(
     f"POST {MAP}/stcm/:sync",
     right=Right.EDIT,
     needs=(Docking, FileStore, MapAnnotations, MapMemory, Mapping, Places, Settings),
@@ -96,7 +96,7 @@ async def sync_stcm(context: Context) -> None:
     await context.maps.sync()
 
 
-@OPERATIONS.on(f"POST {MAP}/scene/unbind", right=Right.ADMIN, needs=(FileStore, Settings))
+@TABLE.on(f"POST {MAP}/scene/unbind", right=Right.ADMIN, needs=(FileStore, Settings))
 async def unbind_scene(context: Context, body: Unbinding | None = None) -> None:
     """The robot leaves its cloud, if it has one; the map on disk is deleted unless it is to be kept."""
     await context.cloud.leave()
@@ -104,21 +104,21 @@ async def unbind_scene(context: Context, body: Unbinding | None = None) -> None:
         await context.maps.delete()
 
 
-@OPERATIONS.on(f"GET {MAP}/floors", right=Right.SEE)
+@TABLE.on(f"GET {MAP}/floors", right=Right.SEE)
 async def get_floors(context: Context) -> list[FloorInfo]:
     """The floors of the loaded map; none while nothing was loaded."""
     names = (floor.name for floor in context.maps.floors)
     return [FloorInfo(name.building, name.floor, name.order, name.default) for name in names]
 
 
-@OPERATIONS.on(f"GET {MAP}/floors/:current", right=Right.SEE, needs=(Localization, MapAnnotations))
+@TABLE.on(f"GET {MAP}/floors/:current", right=Right.SEE, needs=(Localization, MapAnnotations))
 async def get_current_floor(context: Context) -> CurrentFloorInfo:
     """The floor whose map is in memory, and the elevator that the robot is in."""
     name = context.maps.current
     return CurrentFloorInfo(name.building, name.floor, elevator_around(context.robot), name.map_id)
 
 
-@OPERATIONS.on(f"PUT {MAP}/floors/:current", right=Right.DRIVE)
+@TABLE.on(f"PUT {MAP}/floors/:current", right=Right.DRIVE)
 async def set_current_floor(context: Context, body: FloorChoice) -> None:
     """Use the map of the floor to which the robot was carried. 404 if it is not loaded."""
     context.actions.abort()
@@ -147,13 +147,13 @@ def _dock(name: FloorName, dock: PointOfInterest) -> DockInfo:
     return DockInfo(dock.id, dock.metadata.get(NAME, dock.id), name.floor, name.building, pose2d(dock.pose))
 
 
-@OPERATIONS.on(f"GET {MAP}/pois", right=Right.SEE)
+@TABLE.on(f"GET {MAP}/pois", right=Right.SEE)
 async def get_all_pois(context: Context, floor: FloorText = "", building: FloorText = "") -> list[PoiInfo]:
     """The places of the loaded map, of one floor or of all; new ones are here after a sync."""
     return [_poi(f.name, place) for f in _asked(context, floor, building) for place in f.places]
 
 
-@OPERATIONS.on(f"GET {MAP}/homedocks", right=Right.SEE)
+@TABLE.on(f"GET {MAP}/homedocks", right=Right.SEE)
 async def get_multi_floor_home_docks(
     context: Context, floor: FloorText = "", building: FloorText = ""
 ) -> list[DockInfo]:
@@ -161,7 +161,7 @@ async def get_multi_floor_home_docks(
     return [_dock(f.name, dock) for f in _asked(context, floor, building) for dock in f.annotations.docks]
 
 
-@OPERATIONS.on(f"POST {MAP}/pois/:search_nearby", right=Right.SEE, needs=(Localization, MapAnnotations))
+@TABLE.on(f"POST {MAP}/pois/:search_nearby", right=Right.SEE, needs=(Localization, MapAnnotations))
 async def search_nearby_poi(context: Context) -> NearbyPoi:
     """The nearest place on this floor as seen from the robot; ON_DOCK, IN_ELEVATOR, or UNKNOWN if there is none."""
     if DockContact in context.robot and context.robot[DockContact].docked:
@@ -177,7 +177,7 @@ async def search_nearby_poi(context: Context) -> NearbyPoi:
     return NearbyPoi(nearest.metadata.get(NAME, nearest.id), nearest.id, Point(seen.x, seen.y))
 
 
-@OPERATIONS.on(f"POST {MAP}/homedocks/:search_nearby", right=Right.SEE, needs=(Localization,))
+@TABLE.on(f"POST {MAP}/homedocks/:search_nearby", right=Right.SEE, needs=(Localization,))
 async def search_nearby_home_dock(context: Context) -> DockInfo:
     """The nearest dock on this floor, in a straight line; 404 if there is none."""
     here = context.robot[Localization].pose
@@ -193,7 +193,7 @@ def _here(context: Context) -> list[FloorMap]:
     return [floor for floor in context.maps.floors if floor.name == context.maps.current]
 
 
-@OPERATIONS.on(f"GET {MAP}/homedocks/:current", right=Right.SEE, needs=(Settings,))
+@TABLE.on(f"GET {MAP}/homedocks/:current", right=Right.SEE, needs=(Settings,))
 async def get_current_home_dock(context: Context) -> BoundDock:
     """The dock that the robot is bound to."""
     bound = context.robot[Settings].get(BOUND)
@@ -203,7 +203,7 @@ async def get_current_home_dock(context: Context) -> BoundDock:
     return BoundDock(result=True, msg="", data=_dock(found[0].name, found[1]))
 
 
-@OPERATIONS.on(f"PUT {MAP}/homedocks/:current", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
+@TABLE.on(f"PUT {MAP}/homedocks/:current", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
 async def set_current_home_dock(context: Context, body: DockChoice) -> None:
     """Go home to this dock from now on. If it is on another floor, the robot stands on it: its map is used."""
     found = _find_dock(context, body.dock_id)
@@ -217,7 +217,7 @@ async def set_current_home_dock(context: Context, body: DockChoice) -> None:
     settle_home(context.robot)
 
 
-@OPERATIONS.on(f"PUT {LOCALIZATION}/pose", right=Right.DRIVE, needs=(Localization,))
+@TABLE.on(f"PUT {LOCALIZATION}/pose", right=Right.DRIVE, needs=(Localization,))
 async def set_pose_by_poi(context: Context, body: PoiChoice) -> bool:
     """The robot is at this place of the floor, by its name or id; 404 if there is none."""
     for place in (place for floor in _here(context) for place in floor.places):
@@ -227,9 +227,7 @@ async def set_pose_by_poi(context: Context, body: PoiChoice) -> bool:
     raise NotFound(f"no place {body.poi_name} on this floor of the loaded map")
 
 
-@OPERATIONS.on(
-    f"PUT {LOCALIZATION}/homedock", right=Right.DRIVE, needs=(Docking, Localization, MapAnnotations, Settings)
-)
+@TABLE.on(f"PUT {LOCALIZATION}/homedock", right=Right.DRIVE, needs=(Docking, Localization, MapAnnotations, Settings))
 async def set_pose_by_homedock(context: Context, body: DockChoice | None = None) -> None:
     """The robot is in front of this dock, or of its own; 404 if there is none."""
     if body is None:

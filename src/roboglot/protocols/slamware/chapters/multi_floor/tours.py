@@ -11,13 +11,13 @@ from roboglot.model.errors import NotFound
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.motion.home_docks import NAME
 from roboglot.protocols.slamware.context import Context
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.table import TABLE
 
 STOPS_MAX = 500
 StopName = Annotated[str, msgspec.Meta(min_length=1, max_length=4096)]
 
 
-@OPERATIONS.on("POST /api/multi-floor/map/v1/pois/:dispatch", right=Right.SEE, needs=(Navigation,))
+@TABLE.on("POST /api/multi-floor/map/v1/pois/:dispatch", right=Right.SEE, needs=(Navigation,))
 async def dispatch_by_pois(
     context: Context, body: Annotated[list[StopName], msgspec.Meta(max_length=STOPS_MAX)]
 ) -> list[str]:

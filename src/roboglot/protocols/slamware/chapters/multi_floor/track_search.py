@@ -9,12 +9,12 @@ from roboglot.model.geometry import Point
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.multi_floor.track_graph import way_along
 from roboglot.protocols.slamware.context import Context
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.table import TABLE
 from roboglot.wire.slamware.motion import PathPoints
 from roboglot.wire.slamware.multi_floor import TrackQuery
 
 
-@OPERATIONS.on("POST /api/multi-floor/map/v1/search_path_points", right=Right.SEE, needs=(Localization, MapAnnotations))
+@TABLE.on("POST /api/multi-floor/map/v1/search_path_points", right=Right.SEE, needs=(Localization, MapAnnotations))
 async def search_path_points_in_graph(context: Context, body: TrackQuery) -> PathPoints:
     """The shortest way along the tracks, which go from their start to their end only if ``with_direction``.
 

@@ -24,7 +24,7 @@ from roboglot.protocols.slamware.chapters.motion.home_docks import (
     known_docks,
 )
 from roboglot.protocols.slamware.context import Context
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.table import TABLE
 from roboglot.protocols.slamware.vocabulary import entry_of, pose3d, pose_of
 from roboglot.wire.slamware.artifact import Identifier, PoseChange, PoseEntry, metadata_text
 from roboglot.wire.slamware.geometry import Pose3D
@@ -40,7 +40,7 @@ def _entered(robot: Robot, entry: PoseEntry) -> PointOfInterest:
     return PointOfInterest(entry.id, pose_of(entry.pose) if entry.pose else robot[Localization].pose, metadata)
 
 
-@OPERATIONS.on(f"GET {API}/homepose", right=Right.SEE, needs=(Docking,))
+@TABLE.on(f"GET {API}/homepose", right=Right.SEE, needs=(Docking,))
 async def get_home_pose(context: Context) -> Pose3D:
     """Where the robot stands when docked; 404 if it knows no dock."""
     if (home := context.robot[Docking].home) is None:
@@ -48,7 +48,7 @@ async def get_home_pose(context: Context) -> Pose3D:
     return pose3d(home)
 
 
-@OPERATIONS.on(f"PUT {API}/homepose", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
+@TABLE.on(f"PUT {API}/homepose", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
 async def set_home_pose(context: Context, body: Pose3D) -> bool:
     """The dock is there: the robot's pose when docked. Moves the dock that it goes home to."""
     robot = context.robot
@@ -61,13 +61,13 @@ async def set_home_pose(context: Context, body: Pose3D) -> bool:
     return True
 
 
-@OPERATIONS.on(f"GET {API}/homedocks", right=Right.SEE, needs=(Docking, MapAnnotations, Settings))
+@TABLE.on(f"GET {API}/homedocks", right=Right.SEE, needs=(Docking, MapAnnotations, Settings))
 async def get_home_docks(context: Context) -> list[PoseEntry]:
     """The docks on the map."""
     return [entry_of(dock) for dock in known_docks(context.robot)]
 
 
-@OPERATIONS.on(f"PUT {API}/homedocks", right=Right.EDIT, needs=(Docking, Localization, MapAnnotations, Settings))
+@TABLE.on(f"PUT {API}/homedocks", right=Right.EDIT, needs=(Docking, Localization, MapAnnotations, Settings))
 async def set_home_docks(context: Context, body: Annotated[list[PoseEntry], msgspec.Meta(max_length=1000)]) -> bool:
     """These, and no others; each needs a name."""
     docks = {entry.id: _entered(context.robot, entry) for entry in body}
@@ -75,7 +75,7 @@ async def set_home_docks(context: Context, body: Annotated[list[PoseEntry], msgs
     return True
 
 
-@OPERATIONS.on(f"POST {API}/homedocks", right=Right.EDIT, needs=(Docking, Localization, MapAnnotations, Settings))
+@TABLE.on(f"POST {API}/homedocks", right=Right.EDIT, needs=(Docking, Localization, MapAnnotations, Settings))
 async def add_home_dock(context: Context, body: PoseEntry) -> bool:
     """Add one with a name, or replace the one with its id."""
     dock = _entered(context.robot, body)
@@ -83,7 +83,7 @@ async def add_home_dock(context: Context, body: PoseEntry) -> bool:
     return True
 
 
-@OPERATIONS.on(f"DELETE {API}/homedocks", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
+@TABLE.on(f"DELETE {API}/homedocks", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
 async def clear_home_docks(context: Context) -> PoseEntry | None:
     """Remove all; answers the one that was home, as the manual has a dock here, or null."""
     home = home_dock(context.robot)
@@ -91,9 +91,7 @@ async def clear_home_docks(context: Context) -> PoseEntry | None:
     return entry_of(home) if home else None
 
 
-@OPERATIONS.on(
-    f"POST {API}/homedocks/:register", right=Right.EDIT, needs=(Docking, Localization, MapAnnotations, Settings)
-)
+@TABLE.on(f"POST {API}/homedocks/:register", right=Right.EDIT, needs=(Docking, Localization, MapAnnotations, Settings))
 async def register_home_dock(context: Context, body: Registration) -> PoseEntry:
     """There is a dock where the robot stands now."""
     robot = context.robot
@@ -110,7 +108,7 @@ def _one(docks: Docks, id: str) -> PointOfInterest:
     return found
 
 
-@OPERATIONS.on(f"PUT {API}/homedocks/{{dock_id}}", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
+@TABLE.on(f"PUT {API}/homedocks/{{dock_id}}", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
 async def edit_home_dock(context: Context, dock_id: Identifier, body: PoseChange) -> bool:
     """Change pose, metadata or both; 404 if there is none."""
 
@@ -124,7 +122,7 @@ async def edit_home_dock(context: Context, dock_id: Identifier, body: PoseChange
     return True
 
 
-@OPERATIONS.on(f"DELETE {API}/homedocks/{{dock_id}}", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
+@TABLE.on(f"DELETE {API}/homedocks/{{dock_id}}", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
 async def erase_home_dock(context: Context, dock_id: Identifier) -> bool:
     """Remove one, or 404."""
 

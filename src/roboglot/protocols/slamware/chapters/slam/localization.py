@@ -18,7 +18,7 @@ from roboglot.model.sensing import ImuReading, RawImu
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.system.raw_imu import in_units
 from roboglot.protocols.slamware.context import Context
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.table import TABLE
 from roboglot.protocols.slamware.vocabulary import pose3d, pose_of
 from roboglot.wire.slamware.geometry import COORDINATE_MAX, Location, Pose3D, Quaternion, Rectangle
 from roboglot.wire.slamware.slam import (
@@ -36,47 +36,47 @@ LOST = "not localized"  # the fault
 Bound = Annotated[float, msgspec.Meta(ge=-COORDINATE_MAX, le=COORDINATE_MAX)]
 
 
-@OPERATIONS.on(f"GET {API}/localization/pose", right=Right.SEE, needs=(Localization,))
+@TABLE.on(f"GET {API}/localization/pose", right=Right.SEE, needs=(Localization,))
 async def get_pose(context: Context) -> Pose3D:
     """Where the robot is in the map."""
     require_heard(context.robot)
     return pose3d(context.robot[Localization].pose)
 
 
-@OPERATIONS.on(f"PUT {API}/localization/pose", right=Right.DRIVE, needs=(Localization,))
+@TABLE.on(f"PUT {API}/localization/pose", right=Right.DRIVE, needs=(Localization,))
 async def set_pose(context: Context, body: Pose3D) -> None:
     """Set the robot's pose in the map."""
     context.robot[Localization].set_pose(pose_of(body))
 
 
-@OPERATIONS.on(f"GET {API}/localization/odopose", right=Right.SEE, needs=(Odometry,))
+@TABLE.on(f"GET {API}/localization/odopose", right=Right.SEE, needs=(Odometry,))
 async def get_odo_pose(context: Context) -> Pose3D:
     """Where its wheels think that it is, from where it started."""
     require_heard(context.robot)
     return pose3d(context.robot[Odometry].reading.pose)
 
 
-@OPERATIONS.on(f"GET {API}/localization/quality", right=Right.SEE, needs=(Localization,))
+@TABLE.on(f"GET {API}/localization/quality", right=Right.SEE, needs=(Localization,))
 async def get_localization_quality(context: Context) -> int:
     """How well the lidar fits the map, 0..100."""
     require_heard(context.robot)
     return round(context.robot[Localization].quality * 100)
 
 
-@OPERATIONS.on(f"GET {API}/localization/:enable", right=Right.SEE, needs=(Localization,))
+@TABLE.on(f"GET {API}/localization/:enable", right=Right.SEE, needs=(Localization,))
 async def get_map_localization(context: Context) -> bool:
     """Whether the lidar corrects the pose."""
     return context.robot[Localization].enabled
 
 
-@OPERATIONS.on(f"PUT {API}/localization/:enable", right=Right.EDIT, needs=(Localization,))
+@TABLE.on(f"PUT {API}/localization/:enable", right=Right.EDIT, needs=(Localization,))
 async def set_map_localization(context: Context, body: Switch) -> bool:
     """Let the lidar correct the pose, or follow the wheels alone."""
     context.robot[Localization].enable(body.enable)
     return True
 
 
-@OPERATIONS.on(f"POST {API}/localization/status/:reset", right=Right.DRIVE, needs=(Localization,))
+@TABLE.on(f"POST {API}/localization/status/:reset", right=Right.DRIVE, needs=(Localization,))
 async def reset_localization_status(context: Context) -> bool:
     """Begin anew from the present pose: doubts are forgotten, and the lidar looks for the place in a wide circle."""
     robot = context.robot
@@ -88,33 +88,33 @@ async def reset_localization_status(context: Context) -> bool:
     return True
 
 
-@OPERATIONS.on(f"GET {API}/mapping/:enable", right=Right.SEE, needs=(Mapping,))
+@TABLE.on(f"GET {API}/mapping/:enable", right=Right.SEE, needs=(Mapping,))
 async def get_map_update(context: Context) -> bool:
     """Whether the map grows."""
     return context.robot[Mapping].enabled
 
 
-@OPERATIONS.on(f"PUT {API}/mapping/:enable", right=Right.EDIT, needs=(Mapping,))
+@TABLE.on(f"PUT {API}/mapping/:enable", right=Right.EDIT, needs=(Mapping,))
 async def set_map_update(context: Context, body: Switch) -> bool:
     """Let the map grow, or leave it as it is."""
     context.robot[Mapping].enable(body.enable)
     return True
 
 
-@OPERATIONS.on(f"GET {API}/loopclosure/:enable", right=Right.SEE, needs=(Mapping,))
+@TABLE.on(f"GET {API}/loopclosure/:enable", right=Right.SEE, needs=(Mapping,))
 async def get_loop_closure(context: Context) -> bool:
     """Whether a place known again straightens the map."""
     return context.robot[Mapping].closes_loops
 
 
-@OPERATIONS.on(f"PUT {API}/loopclosure/:enable", right=Right.EDIT, needs=(Mapping,))
+@TABLE.on(f"PUT {API}/loopclosure/:enable", right=Right.EDIT, needs=(Mapping,))
 async def set_loop_closure(context: Context, body: Switch) -> bool:
     """Let it, or not."""
     context.robot[Mapping].close_loops(body.enable)
     return True
 
 
-@OPERATIONS.on(f"GET {API}/imu", right=Right.SEE, needs=(Imu,))
+@TABLE.on(f"GET {API}/imu", right=Right.SEE, needs=(Imu,))
 async def get_imu(context: Context) -> ImuData:
     """Attitude (rad), acceleration (m/s2) and turning rates (rad/s) in the robot's frame."""
     require_heard(context.robot)
@@ -126,7 +126,7 @@ async def get_imu(context: Context) -> ImuData:
     return imu_data(imu.reading, raw)
 
 
-@OPERATIONS.on(f"GET {API}/knownarea", right=Right.SEE, needs=(Mapping,))
+@TABLE.on(f"GET {API}/knownarea", right=Right.SEE, needs=(Mapping,))
 async def get_known_area(context: Context) -> Rectangle:
     """The extent of the map, m."""
     grid = context.robot[Mapping].grid

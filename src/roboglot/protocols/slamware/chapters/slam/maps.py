@@ -22,7 +22,7 @@ from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.motion.home_docks import known_docks
 from roboglot.protocols.slamware.chapters.slam.composite import explore_map
 from roboglot.protocols.slamware.context import Context
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.table import TABLE
 from roboglot.wire.slamware.explore_map import encode_explore_map
 from roboglot.wire.slamware.geometry import COORDINATE_MAX
 from roboglot.wire.slamware.platform import GeneralEvent
@@ -33,7 +33,7 @@ REACH_MAX = 0.99 * COORDINATE_MAX  # m from an origin; the robot may drive about
 Bound = Annotated[float, msgspec.Meta(ge=-COORDINATE_MAX, le=COORDINATE_MAX)]
 
 
-@OPERATIONS.on(f"GET {API}/maps/explore", right=Right.SEE, needs=(Mapping,))
+@TABLE.on(f"GET {API}/maps/explore", right=Right.SEE, needs=(Mapping,))
 async def get_explore_map(
     context: Context,
     min_x: Bound | None = None,
@@ -53,15 +53,13 @@ async def get_explore_map(
     return encode_explore_map(explore_map(grid))
 
 
-@OPERATIONS.on(f"GET {API}/maps/stcm", right=Right.SEE, needs=(Docking, MapAnnotations, Mapping, Places, Settings))
+@TABLE.on(f"GET {API}/maps/stcm", right=Right.SEE, needs=(Docking, MapAnnotations, Mapping, Places, Settings))
 async def get_composite_map(context: Context) -> bytes:
     """The map with all that is drawn on it as a composite map; 403 while one is being loaded."""
     return context.maps.export()
 
 
-@OPERATIONS.on(
-    f"PUT {API}/maps/stcm", right=Right.EDIT, needs=(Localization, MapAnnotations, MapMemory, Mapping, Settings)
-)
+@TABLE.on(f"PUT {API}/maps/stcm", right=Right.EDIT, needs=(Localization, MapAnnotations, MapMemory, Mapping, Settings))
 async def set_composite_map(context: Context, body: bytes) -> None:
     """Use this map and what is drawn on it, in memory only; the robot's pose becomes the origin."""
     context.actions.abort()
@@ -69,7 +67,7 @@ async def set_composite_map(context: Context, body: bytes) -> None:
     context.events.note(GeneralEvent.SET_MAP_DONE)
 
 
-@OPERATIONS.on(f"DELETE {API}/maps", right=Right.EDIT, needs=(FileStore, Localization, MapMemory, Mapping, Settings))
+@TABLE.on(f"DELETE {API}/maps", right=Right.EDIT, needs=(FileStore, Localization, MapMemory, Mapping, Settings))
 async def clear_map(context: Context) -> None:
     """Forget the map and begin a new one here. The docks stay where they are; they get new coordinates.
 
@@ -82,7 +80,7 @@ async def clear_map(context: Context) -> None:
     await context.maps.begin_anew(origin)
 
 
-@OPERATIONS.on(f"PUT {API}/maps/origin", right=Right.EDIT, needs=(MapAnnotations, MapMemory, Mapping, Places, Settings))
+@TABLE.on(f"PUT {API}/maps/origin", right=Right.EDIT, needs=(MapAnnotations, MapMemory, Mapping, Places, Settings))
 async def move_origin_point(context: Context, body: NewOrigin) -> None:
     """Make this place, to the nearest 5 cm, the map's origin; all that is drawn on the map moves with it."""
     robot = context.robot

@@ -18,7 +18,7 @@ from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.motion.speed_limits import CONFIGURED
 from roboglot.protocols.slamware.chapters.system.devices import MASKED, restore_masks
 from roboglot.protocols.slamware.context import Context
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.table import TABLE
 
 ID_MAX, IDS_MAX = 10_000, 1000
 Speed = Annotated[float, msgspec.Meta(gt=0, le=10)]
@@ -34,7 +34,7 @@ class CubeConfig(msgspec.Struct, forbid_unknown_fields=True):
     ] = []
 
 
-@OPERATIONS.on(
+@TABLE.on(
     "PUT /api/core/system/v1/cube/config",
     partial="the format that the vendor's tool exports is not public and refused; a JSON object of our own configures",
     right=Right.EDIT,

@@ -17,7 +17,7 @@ from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
 from roboglot.protocols.slamware.context import Context
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.table import TABLE
 from roboglot.wire.slamware.devices import DisabledSensor, SensorSwitch
 from roboglot.wire.slamware.slam import Switch
 
@@ -54,13 +54,13 @@ class JackStatus(msgspec.Struct):
     stage: int
 
 
-@OPERATIONS.on(f"POST {SYSTEM}/aeb/control", right=Right.EDIT, needs=(EmergencyBraking,))
+@TABLE.on(f"POST {SYSTEM}/aeb/control", right=Right.EDIT, needs=(EmergencyBraking,))
 async def set_aeb_control(context: Context, body: OnOff) -> None:
     """Switch automatic emergency braking."""
     context.robot[EmergencyBraking].enable(body is OnOff.ON)
 
 
-@OPERATIONS.on(f"POST {SYSTEM}/jack/status", right=Right.DRIVE, needs=(Jack,))
+@TABLE.on(f"POST {SYSTEM}/jack/status", right=Right.DRIVE, needs=(Jack,))
 async def set_jack_req(context: Context, body: JackCommand) -> None:
     """Lift (Up, On), set down (Down, Off), stop, or acknowledge the alarm."""
     jack = context.robot[Jack]
@@ -76,7 +76,7 @@ async def set_jack_req(context: Context, body: JackCommand) -> None:
             jack.clear_alarm()
 
 
-@OPERATIONS.on(f"GET {SYSTEM}/jack/status", right=Right.SEE, needs=(Jack,))
+@TABLE.on(f"GET {SYSTEM}/jack/status", right=Right.SEE, needs=(Jack,))
 async def get_jack_status(context: Context) -> JackStatus:
     """Where the platform is."""
     jack = context.robot[Jack]
@@ -84,19 +84,19 @@ async def get_jack_status(context: Context) -> JackStatus:
     return JackStatus(counts, int(bool(jack.alarm)), int(jack.stage is JackStage.MOVING), STAGES[jack.stage])
 
 
-@OPERATIONS.on(f"PUT {SENSORS}/depth/:enable", right=Right.EDIT, needs=(DepthCamera,))
+@TABLE.on(f"PUT {SENSORS}/depth/:enable", right=Right.EDIT, needs=(DepthCamera,))
 async def set_depth_sensor_state(context: Context, body: Switch) -> None:
     """Switch the depth camera."""
     context.robot[DepthCamera].enable(body.enable)
 
 
-@OPERATIONS.on(f"GET {SENSORS}/masks", right=Right.SEE, needs=(SensorMasks,))
+@TABLE.on(f"GET {SENSORS}/masks", right=Right.SEE, needs=(SensorMasks,))
 async def get_disabled_sensors_mask_data(context: Context) -> list[DisabledSensor]:
     """The sensors that are switched off."""
     return [DisabledSensor(id, always) for id, always in sorted(context.robot[SensorMasks].masked.items())]
 
 
-@OPERATIONS.on(f"PUT {SENSORS}/masks", right=Right.EDIT, needs=(SensorMasks, Settings))
+@TABLE.on(f"PUT {SENSORS}/masks", right=Right.EDIT, needs=(SensorMasks, Settings))
 async def set_sensor_mask(context: Context, body: Annotated[list[SensorSwitch], msgspec.Meta(max_length=1000)]) -> bool:
     """Switch sensors off and on, all or none; 404 if one does not exist."""
     masks = context.robot[SensorMasks]

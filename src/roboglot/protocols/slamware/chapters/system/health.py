@@ -11,7 +11,7 @@ from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import HttpError
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.table import TABLE
 from roboglot.wire.slamware.system import BaseError, BaseHealthInfo, Level, Part, health_record
 
 API = "/api/core/system/v1/robot/health"
@@ -54,7 +54,7 @@ def record_of(fault: Fault) -> BaseError:
     return health_record(LEVELS[fault.level], part, code, code & 0xFF, fault.message)
 
 
-@OPERATIONS.on(f"GET {API}", right=Right.SEE)
+@TABLE.on(f"GET {API}", right=Right.SEE)
 async def get_robot_health(context: Context) -> BaseHealthInfo:
     """What is wrong now."""
     robot = context.robot
@@ -91,7 +91,7 @@ def _stopped(robot: Robot) -> bool:
     return engaged or (Legs in robot and robot[Legs].posture is Posture.LIMP)
 
 
-@OPERATIONS.on(f"DELETE {API}/{{error_code}}", right=Right.DRIVE)
+@TABLE.on(f"DELETE {API}/{{error_code}}", right=Right.DRIVE)
 async def clear_robot_health(context: Context, error_code: int) -> None:
     """Dismiss a record; it comes back while its cause persists. 400 for a code that is not there.
 

@@ -9,7 +9,7 @@ from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import HttpError
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.table import TABLE
 from roboglot.wire.slamware.devices import Channel, Half, LightColour, LightControl, Mode
 
 STEP_MIN = 0.02  # s; faster makes no visible difference
@@ -23,7 +23,7 @@ ZONES = {
 }
 
 
-@OPERATIONS.on("POST /api/core/system/v1/light/control", right=Right.DRIVE, needs=(Light,))
+@TABLE.on("POST /api/core/system/v1/light/control", right=Right.DRIVE, needs=(Light,))
 async def set_light_control(context: Context, body: LightControl) -> None:
     """Show this on one half of a channel from now on; 501 if the robot has no such strip."""
     light, zone = context.robot[Light], ZONES[body.channel, body.control_part]

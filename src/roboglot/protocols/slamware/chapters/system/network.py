@@ -7,7 +7,7 @@ from roboglot.model.errors import ComponentMissing, InvalidGoal
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
 from roboglot.protocols.slamware.context import Context
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.table import TABLE
 from roboglot.wire.slamware.network import (
     ApnStatus,
     NetworkRequest,
@@ -23,7 +23,7 @@ PRIORITIES = {Uplink.WIFI: "wifi", Uplink.MOBILE: "4g"}
 BEST, WORST = -50.0, -100.0  # dBm that count as 100 and as 0
 
 
-@OPERATIONS.on(f"GET {API}/status", right=Right.SEE, needs=(Network,))
+@TABLE.on(f"GET {API}/status", right=Right.SEE, needs=(Network,))
 async def get_network_status(context: Context) -> WrappedStatus:
     """How the Wi-Fi card is linked now; switched off it is a station without a network."""
     network = context.robot[Network]
@@ -34,7 +34,7 @@ async def get_network_status(context: Context) -> WrappedStatus:
     return WrappedStatus(NetworkStatus(state.wired, state.address, state.mac, mode, quality, state.ssid))
 
 
-@OPERATIONS.on(f"PUT {API}/status", right=Right.ADMIN, needs=(Network,))
+@TABLE.on(f"PUT {API}/status", right=Right.ADMIN, needs=(Network,))
 async def set_network_status(context: Context, body: NetworkRequest) -> bool:
     """Be a network, join one (which takes seconds, and where it fails changes nothing), or switch something."""
     network = context.robot[Network]
@@ -53,19 +53,19 @@ async def set_network_status(context: Context, body: NetworkRequest) -> bool:
     return True
 
 
-@OPERATIONS.on(f"GET {API}/route", right=Right.SEE, needs=(Network,))
+@TABLE.on(f"GET {API}/route", right=Right.SEE, needs=(Network,))
 async def get_network_route(context: Context) -> RouteStatus:
     """Which way to the internet comes first."""
     return RouteStatus(PRIORITIES[context.robot[Network].priority])  # type: ignore[arg-type]
 
 
-@OPERATIONS.on(f"PUT {API}/route", right=Right.ADMIN, needs=(Network,))
+@TABLE.on(f"PUT {API}/route", right=Right.ADMIN, needs=(Network,))
 async def set_network_route(context: Context, body: RouteStatus) -> None:
     """Choose it."""
     await context.robot[Network].set_priority(Uplink.WIFI if body.priority == "wifi" else Uplink.MOBILE)
 
 
-@OPERATIONS.on(f"GET {API}/apn", right=Right.SEE, needs=(Network,))
+@TABLE.on(f"GET {API}/apn", right=Right.SEE, needs=(Network,))
 async def get_cmlink_apn(context: Context) -> ApnStatus:
     """With which access point name the modem asks the operator to let it in."""
     if (mobile := context.robot[Network].mobile) is None:
@@ -73,7 +73,7 @@ async def get_cmlink_apn(context: Context) -> ApnStatus:
     return ApnStatus(mobile.apn)
 
 
-@OPERATIONS.on(f"PUT {API}/apn", right=Right.ADMIN, needs=(Network,))
+@TABLE.on(f"PUT {API}/apn", right=Right.ADMIN, needs=(Network,))
 async def set_cmlink_apn(context: Context, body: ApnStatus) -> None:
     """Another one: a wrong name is let in nowhere."""
     await context.robot[Network].set_apn(body.apn)

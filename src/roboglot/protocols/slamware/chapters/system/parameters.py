@@ -12,14 +12,14 @@ from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.errors import InvalidGoal
 from roboglot.operations import Right
 from roboglot.protocols.slamware.context import Context
-from roboglot.protocols.slamware.table import OPERATIONS, Text
+from roboglot.protocols.slamware.table import TABLE, Text
 from roboglot.wire.slamware.devices import Parameter
 
 PARAMETER = "/api/core/system/v1/parameter"
 SWITCH = {"on": True, "off": False}
 
 
-@OPERATIONS.on(f"GET {PARAMETER}", right=Right.SEE, needs=(Base, Docking))
+@TABLE.on(f"GET {PARAMETER}", right=Right.SEE, needs=(Base, Docking))
 async def get_system_parameter(context: Context, param: Annotated[str, msgspec.Meta(min_length=1)]) -> Text:
     """Top speeds in m/s and rad/s, as text with six decimals; when the robot registers a dock that it touches."""
     match param:
@@ -34,7 +34,7 @@ async def get_system_parameter(context: Context, param: Annotated[str, msgspec.M
             raise InvalidGoal(f"no parameter {param[:64]}")
 
 
-@OPERATIONS.on(f"PUT {PARAMETER}", right=Right.DRIVE, needs=(Base, EmergencyStop))
+@TABLE.on(f"PUT {PARAMETER}", right=Right.DRIVE, needs=(Base, EmergencyStop))
 async def set_system_parameter(context: Context, body: Parameter) -> bool:
     """Speed limits, emergency stop, brake release."""
     match body.param:

@@ -7,7 +7,7 @@ from roboglot.model.components.system.firmware import Firmware, Module
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
 from roboglot.protocols.slamware.context import Context
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.table import TABLE
 from roboglot.wire.slamware.devices import Restart, RestartMode, Shutdown
 
 API = "/api/core/system/v1/power"
@@ -16,7 +16,7 @@ API = "/api/core/system/v1/power"
 MODULES = {RestartMode.SOFT: Module.SOFTWARE, RestartMode.BASE: Module.BASE}
 
 
-@OPERATIONS.on(f"POST {API}/:shutdown", right=Right.ADMIN, needs=(Power,))
+@TABLE.on(f"POST {API}/:shutdown", right=Right.ADMIN, needs=(Power,))
 async def shutdown(context: Context, body: Shutdown) -> bool:
     """Switch off, at once or later, and perhaps on again. While it is off there are no answers."""
     restart = body.restart_time_interval * 60.0 or None
@@ -24,19 +24,19 @@ async def shutdown(context: Context, body: Shutdown) -> bool:
     return True
 
 
-@OPERATIONS.on(f"POST {API}/:hibernate", right=Right.ADMIN, needs=(Power,))
+@TABLE.on(f"POST {API}/:hibernate", right=Right.ADMIN, needs=(Power,))
 async def hibernate(context: Context) -> None:
     """Sleep: the lidar rests and nothing moves until it is woken up."""
     context.robot[Power].sleep(source=SOURCE)
 
 
-@OPERATIONS.on(f"POST {API}/:wakeup", right=Right.ADMIN, needs=(Power,))
+@TABLE.on(f"POST {API}/:wakeup", right=Right.ADMIN, needs=(Power,))
 async def wakeup(context: Context) -> None:
     """Wake up, which takes some seconds."""
     context.robot[Power].wake(source=SOURCE)
 
 
-@OPERATIONS.on(f"POST {API}/:restartmodule", right=Right.ADMIN, needs=(Firmware,))
+@TABLE.on(f"POST {API}/:restartmodule", right=Right.ADMIN, needs=(Firmware,))
 async def restart_module(context: Context, body: Restart) -> bool:
     """Restart all (without answers meanwhile), the software, or the base; 403 during an update."""
     context.actions.abort()

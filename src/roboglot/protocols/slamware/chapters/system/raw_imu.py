@@ -6,20 +6,20 @@ from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.sensing import RawImu
 from roboglot.operations import Right
 from roboglot.protocols.slamware.context import Context
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.table import TABLE
 from roboglot.wire.slamware.system import ImuCounts, ImuValues
 
 API = "/api/core/system/v1"
 
 
-@OPERATIONS.on(f"GET {API}/rawadcimu", right=Right.SEE, needs=(Imu,))
+@TABLE.on(f"GET {API}/rawadcimu", right=Right.SEE, needs=(Imu,))
 async def get_imu_raw_adc_data(context: Context) -> ImuCounts:
     """Counts of accelerometer, gyro and compass."""
     raw = context.robot[Imu].raw
     return ImuCounts(*raw.acceleration, *raw.rate, *raw.field, _milliseconds(raw))
 
 
-@OPERATIONS.on(f"GET {API}/rawimu", right=Right.SEE, needs=(Imu,))
+@TABLE.on(f"GET {API}/rawimu", right=Right.SEE, needs=(Imu,))
 async def get_imu_raw_data(context: Context) -> ImuValues:
     """The same in m/s2, rad/s and microtesla, not yet freed from the sensors' errors."""
     raw = context.robot[Imu].raw

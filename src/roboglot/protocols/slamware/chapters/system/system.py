@@ -19,7 +19,7 @@ from roboglot.model.robot import Robot
 from roboglot.model.sensing import Supply
 from roboglot.operations import Right
 from roboglot.protocols.slamware.context import Context
-from roboglot.protocols.slamware.table import OPERATIONS
+from roboglot.protocols.slamware.table import TABLE
 from roboglot.protocols.slamware.vocabulary import pose3d
 from roboglot.wire.slamware.system import (
     BatteryPack,
@@ -41,7 +41,7 @@ SLEEP_MODES = {
 }
 
 
-@OPERATIONS.on(f"GET {API}/capabilities", right=Right.SEE)
+@TABLE.on(f"GET {API}/capabilities", right=Right.SEE)
 async def get_capabilities(context: Context) -> list[Capability]:
     """What this robot can do; ``core`` is enabled as soon as it can drive somewhere and its lidar turns.
 
@@ -58,7 +58,7 @@ async def get_capabilities(context: Context) -> list[Capability]:
     ]
 
 
-@OPERATIONS.on(f"GET {API}/power/status", right=Right.SEE, needs=(Battery,))
+@TABLE.on(f"GET {API}/power/status", right=Right.SEE, needs=(Battery,))
 async def get_power_status(context: Context) -> PowerStatus:
     """Battery, dock and how awake the robot is."""
     require_heard(context.robot)
@@ -76,7 +76,7 @@ async def get_power_status(context: Context) -> PowerStatus:
     )
 
 
-@OPERATIONS.on(f"GET {API}/battery/pack", right=Right.SEE, needs=(Battery,))
+@TABLE.on(f"GET {API}/battery/pack", right=Right.SEE, needs=(Battery,))
 async def get_battery_pack(context: Context) -> BatteryPack:
     """Current (mA, positive: charging) and temperature (0.1 degrees Celsius)."""
     require_heard(context.robot)
@@ -84,7 +84,7 @@ async def get_battery_pack(context: Context) -> BatteryPack:
     return BatteryPack(round(state.current * 1000, 1), 1, [round(state.temperature * 10)])
 
 
-@OPERATIONS.on(f"GET {API}/robot/info", right=Right.SEE)
+@TABLE.on(f"GET {API}/robot/info", right=Right.SEE)
 async def get_robot_info(context: Context) -> DeviceInfo:
     """The name plate. Numbers that only the vendor hands out are made from the names, the same at every start."""
     plate = context.robot.description
@@ -110,7 +110,7 @@ def device_id(serial: str) -> str:
     return (bare if re.fullmatch("[0-9a-fA-F]{32}", bare) else uuid.uuid5(uuid.NAMESPACE_OID, serial).hex).upper()
 
 
-@OPERATIONS.on(f"GET {API}/laserscan", right=Right.SEE, needs=(Lidar, Localization, Odometry))
+@TABLE.on(f"GET {API}/laserscan", right=Right.SEE, needs=(Lidar, Localization, Odometry))
 async def get_laser_scan(context: Context) -> LaserScan:
     """The last turn of the lidar (rad from straight ahead, m) and the robot's pose then."""
     _ = context.robot[Lidar]

@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 class Part(Protocol):
     """What a chapter keeps between its commands."""
 
-    def __init__(self, session: Session) -> None: ...
+    def __init__(self, context: Context) -> None: ...
 
     def reset(self) -> None:
         """As before the session."""
@@ -59,7 +59,7 @@ class Outlets(Protocol):
         """An event for everybody on the event port."""
 
 
-class Session:
+class Context:
     """What the commands of all connections share."""
 
     robot: Robot

@@ -64,7 +64,7 @@ from roboglot.protocols.slamware.errors import HttpError, bad_request, from_robo
 from roboglot.protocols.slamware.http_connection import REASON
 from roboglot.protocols.slamware.pages import Pages
 from roboglot.protocols.slamware.routes import BEYOND, SHORTHANDS, Match, Routes
-from roboglot.protocols.slamware.table import NO_CONTENT, OPERATIONS, Text
+from roboglot.protocols.slamware.table import NO_CONTENT, TABLE, Text
 from roboglot.wire.contracts import Row, contract
 
 log = logging.getLogger(__name__)
@@ -200,7 +200,7 @@ class Application:
 
     async def _carry_out(self, row: Row, match: Match, scope: Scope, receive: Receive) -> tuple[int, Headers, bytes]:
         scope["operation"] = row.key
-        operation, stand_in = OPERATIONS.get(row.key), self._context.robot.stand_in
+        operation, stand_in = TABLE.get(row.key), self._context.robot.stand_in
         if operation is None and stand_in is None:
             raise HttpError(501, f"{row.name} is not implemented", row.key)
         self._check_right(row.key, operation.right if operation else Right.ADMIN)

@@ -1,0 +1,38 @@
+"""The frames' words for programs: fields of a frame and rows of a list (0.2.1.1 and 0.2.1.2 of the manual)."""
+
+from __future__ import annotations
+
+from roboglot.programs.stores import ListedProgram, StoredProgram
+from roboglot.wire.visual.requests import Kind, Request
+
+
+def key_of(request: Request) -> str:
+    """The contract's key of a frame's wish."""
+    return f"{request.kind} {request.operate if request.kind in (Kind.TASK, Kind.MODULE) else request.mode}"
+
+
+def program(request: Request) -> StoredProgram:
+    """What a frame wants saved."""
+    return StoredProgram(
+        id=request.targets[0],
+        describe=request.describe,
+        style=request.style,
+        mode=request.mode,
+        condition=request.condition,
+        body=request.body,
+        state="null",
+    )
+
+
+def item(listed: ListedProgram) -> dict[str, object]:
+    """One row of a list (0.2.1.2.2.3 and .4); "operate" is the manual's name for the state."""
+    return {
+        "id": listed.id,
+        "describe": listed.describe,
+        "style": listed.style,
+        "operate": listed.state,
+        "mode": listed.mode,
+        "condition": listed.condition,
+        "dependent": listed.uses,
+        "be_depended": listed.used_by,
+    }
