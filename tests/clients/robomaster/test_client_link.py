@@ -215,4 +215,4 @@ async def test_closing_stops_what_it_commanded(client, run, robot, forward, door
     await asyncio.sleep(0.02)
     await forward(seconds=0.5)
     assert robot[Base].velocity.speed < 0.02
-    assert not door.session.active
+    assert not door.context.active
