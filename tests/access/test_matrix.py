@@ -13,6 +13,7 @@ import httpx
 import pytest
 
 from roboglot.console.verbs import VERBS
+from roboglot.console.wire_log import rows
 from roboglot.console.world_verbs import WORLD_VERBS
 from roboglot.model.admission import Forbidden
 from roboglot.model.client_context import ask_for
@@ -40,6 +41,20 @@ from tests.access.matrix import (
 )
 
 REFUSED = (401, 403)
+COLUMNS = [
+    "number",
+    "stamp",
+    "door",
+    "connection",
+    "client",
+    "direction",
+    "operation",
+    "status",
+    "refusal",
+    "ms",
+    "bytes",
+    "excerpt",
+]
 TARGETS = {"debug": "debug"}  # by what a frame wants; all others may be any
 
 
@@ -193,6 +208,45 @@ async def test_programs_do_what_the_right_allows(runtime: Runtime) -> None:
         for frame, (_, words) in zip(frames, states, strict=True):
             right = Right.SEE if frame["operate"] == "inquiry" else Right.PROGRAM
             assert ("has no right" in words) == (right not in caller.rights), (caller.name, frame)
+
+
+async def test_the_wire_view_shows_every_row_that_goes_over_a_wire(
+    runtime: Runtime, reached: set[object], data: Path
+) -> None:
+    """Asks every door everything, as one who may do all and as one who may only see, and reads the console's feed."""
+    assert runtime.console is not None
+    wire = runtime.console._desk.views["a"].wire
+    for name, caller in ((Right.ADMIN, CALLERS[5]), (Right.SEE, CALLERS[1])):
+        wire.open()
+        await ask_everything(runtime, caller, data)
+        shown = [dict(zip(COLUMNS, row, strict=True)) for row in rows(wire.after(0, 10**6))]
+        wire.close()
+        wire.end()
+        for door, table, key_of in (("slamware", REST, str), ("robomaster", TEXT, str), ("cyberdog", DOG, int)):
+            keys = {row.key for row in contract(door) if not row.key.startswith(">")}  # pushes are not asked
+            asked = [row["operation"] for row in shown if row["door"] == door and row["direction"] == "request"]
+            assert sorted(asked) == sorted(keys), door
+            answers = [row for row in shown if row["door"] == door and row["direction"] == "reply"]
+            forbidden = {row["operation"] for row in answers if "has no right to" in row["refusal"]}
+            may_not = {key for key in keys if table.get(key_of(key)) and not may(caller, table, key_of(key))}
+            assert forbidden == may_not, (name, door)
+            assert all(row["excerpt"] for row in answers if row["operation"] in forbidden)
+
+
+async def ask_everything(runtime: Runtime, caller: Caller, data: Path) -> None:
+    """Every row of the three catalogues whose operations go over a wire one by one."""
+    transport = httpx.AsyncHTTPTransport(local_address=caller.address)
+    async with httpx.AsyncClient(base_url=f"http://{ADDRESS}:1448", transport=transport) as client:
+        for row in contract("slamware"):
+            await rest_status(client, row.key)
+    session = runtime_session(runtime)
+    session.begin()
+    text = await TextCaller.open(caller.address)
+    for row in (row for row in contract("robomaster") if not row.key.startswith(">")):
+        await text.ask(row.key)
+        session.active = True
+    text.close()
+    await dog_answers(data / "cyberdog", caller.name, [int(row.key) for row in contract("cyberdog")])
 
 
 def runtime_session(runtime: Runtime) -> Any:
