@@ -14,7 +14,7 @@ from roboglot.model.clock import LockstepClock
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.motion.legs import Legs, Posture
 from roboglot.model.robot import Robot
-from roboglot.protocols.cyberdog.app_link import AppLink, AppRoute, host_of
+from roboglot.protocols.cyberdog.app_link import AppLink, AppRoute, early_share, host_of
 from roboglot.protocols.cyberdog.chapters.programming import TO_APP
 from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.outbox import Outbox
@@ -300,3 +300,11 @@ def test_who_called(peer: str, host: str) -> None:
 def test_a_push_is_declared_once() -> None:
     with pytest.raises(ValueError, match="twice"):
         push(6005, depth=1)
+
+
+def test_heartbeats_of_a_hundred_dogs_do_not_come_at_once():
+    instants = sorted(early_share(f"127.0.1.{number}") for number in range(1, 101))
+    assert all(0.0 <= instant <= 0.75 for instant in instants)
+    for tenth in range(10):
+        within = [i for i in instants if 0.075 * tenth <= i < 0.075 * (tenth + 1)]
+        assert 3 <= len(within) <= 20
