@@ -8,6 +8,7 @@ much the machine's speed changes meanwhile: by a half where another thread uses 
 from __future__ import annotations
 
 import asyncio
+import gc
 import os
 import statistics
 import time
@@ -53,6 +54,7 @@ async def measure(count: int, body: str, seconds: float, *, driving: bool) -> tu
     await world.prepare(wait=True)
     world.start()
     await clock.advance(0.5)
+    gc.freeze()  # as the runtime does
     for twist in (AHEAD, CIRCLE) if driving else ():
         for robot in robots:
             robot[Base].set_velocity(twist)

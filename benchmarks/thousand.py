@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import gc
 import os
 import time
 
@@ -49,6 +50,7 @@ async def shard(number: int, count: int, seconds: float, ready: int, go: int) ->
     await world.prepare(wait=True)
     world.start()
     await clock.advance(0.5)
+    gc.freeze()  # as the runtime does
     for twist in (AHEAD, CIRCLE):
         for robot in robots:
             robot[Base].set_velocity(twist)

@@ -109,3 +109,18 @@ def test_the_compiled_noise_is_the_same_to_the_bit():
     exact, noise = chance.uniform(0.0, 14.0, 5000), chance.standard_normal(5000, dtype=np.float32)
     exact[chance.integers(0, 5000, 400)] = np.inf
     assert (blur(exact, noise, 0.013, 0.2, 11.0) == compiled_blur(exact, noise, 0.013, 0.2, 11.0)).all()
+
+
+def test_a_crowd_behind_walls_and_behind_each_other_is_swept_alike() -> None:
+    """The compiled kernel leaves circles out that something hides; plain numpy looks at all of them."""
+    random = np.random.default_rng(5)
+    for _ in range(300):
+        count, rays = int(random.integers(1, 120)), int(random.choice([120, 360, 1600]))
+        places, radii = random.uniform(-10.0, 10.0, (count, 2)), random.uniform(0.03, 0.6, count)
+        circles = np.column_stack((places, radii, np.zeros(count)))
+        ends = random.uniform(-8.0, 8.0, (int(random.integers(0, 12)), 4))
+        x, y, yaw = random.uniform(-1.0, 1.0, 3).tolist()
+        ways = directions(rays).view(np.float64).reshape(rays, 2)
+        quick = compiled(ends, circles, ways, x, y, 9.0 * yaw, 12.0)
+        plain = sweep(ends.view(np.complex128), circles.view(np.complex128), x, y, 9.0 * yaw, rays, 12.0)
+        assert np.allclose(quick, plain, atol=1e-9)
