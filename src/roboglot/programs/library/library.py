@@ -9,6 +9,7 @@ import asyncio
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, replace
 
+from roboglot.conditions import BadCondition, parse_interface
 from roboglot.programs.errors import (
     CannotExecute,
     InvalidCondition,
@@ -27,7 +28,6 @@ from roboglot.programs.library.modules import (
 )
 from roboglot.programs.stores import ListedProgram, ProgramStore, StoredProgram
 from roboglot.programs.tasks.states import TaskOperation
-from roboglot.wire.visual.conditions import BadCondition, parse_interface
 
 MODULES_MAX = 1000
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import calendar
 from datetime import date, datetime, time, timedelta, tzinfo
 
-from roboglot.wire.visual.conditions import Cycle, Moment, parse_cycle, parse_moment
+from roboglot.conditions import Cycle, Moment, parse_cycle, parse_moment
 
 DAYS_AHEAD = 9 * 366
 """A day of any month and week day comes within this many days, or never (29 February, around the year 2100)."""

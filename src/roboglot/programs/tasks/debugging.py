@@ -11,10 +11,10 @@ import msgspec
 from roboglot.programs.engine.events import Stops
 from roboglot.programs.errors import NotAllowed, ProgramError
 from roboglot.programs.tasks.service import ProgramService
-from roboglot.wire.visual.requests import ID_MAX
 
 STOPS_MAX = 1000  # lines, and as many blocks, of one task
 NAME_MAX = 256  # characters of a module's or a block's name
+ID_MAX = 128  # characters of a task's id
 
 Name = Annotated[str, msgspec.Meta(max_length=NAME_MAX)]
 Line = Annotated[int, msgspec.Meta(ge=1, le=1_000_000)]

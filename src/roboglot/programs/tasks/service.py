@@ -12,6 +12,7 @@ from collections.abc import Collection
 from dataclasses import replace
 from datetime import UTC, tzinfo
 
+from roboglot.conditions import BadCondition
 from roboglot.model.client_context import identity
 from roboglot.model.components.system.disk import Disk
 from roboglot.model.robot import Robot
@@ -42,7 +43,6 @@ from roboglot.programs.tasks.states import (
     next_state,
     state_after,
 )
-from roboglot.wire.visual.conditions import BadCondition
 
 log = logging.getLogger(__name__)
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, NoReturn
 
+from roboglot.conditions import BadCondition, parse_cycle, parse_interface, parse_moment
 from roboglot.wire.visual.codes import FeedbackState
-from roboglot.wire.visual.conditions import BadCondition, parse_cycle, parse_interface, parse_moment
 
 FRAME_MAX = 4_000_000  # characters
 ID_MAX = 128

@@ -6,7 +6,7 @@ from datetime import date, time
 
 import pytest
 
-from roboglot.wire.visual.conditions import (
+from roboglot.conditions import (
     BadCondition,
     Cycle,
     Interface,

@@ -1,6 +1,6 @@
-"""The grammar of ``condition``: when a task runs (0.2.1.1.2.2.1) and how a module is called (0.2.1.1.2.2.2).
+"""The grammar of a program's condition: when a task runs ("now", "08:30", cron's five fields), how a module is called.
 
-Says what a text means; computes no times and knows no clock.
+Says what a text means, for programs and for the frames that carry it; computes no times and knows no clock.
 """
 
 from __future__ import annotations
