@@ -15,7 +15,7 @@ from foxglove_schemas_protobuf.LaserScan_pb2 import LaserScan
 from mcap.reader import make_reader
 
 from roboglot import runtime
-from roboglot.cli.record import _exchange
+from roboglot.cli.recordings.record import _exchange
 from roboglot.config import Config, ConsoleConfig, RecordConfig, RobotConfig, load_config
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.system.health import FaultLevel, Health

@@ -22,6 +22,7 @@ COMMANDS = {
     "stop": "stop a robot, or all of them",
     "reset": "put a simulated robot back where it started, charged and whole",
     "record": "record everything that robots say, hear and do; show and mend recordings",
+    "rerun": "run the world of a lockstep recording again with the same inputs, to the last byte",
     "replay": "send the requests of a recording to a robot again and compare its answers",
     "compare": "two recordings, value by value, and how much of them agrees",
     "test": "play test scenarios (YAML) on simulated robots, with a JUnit report",
@@ -34,6 +35,8 @@ COMMANDS = {
     "certs": "the certificates that CyberDog clients need",
     "doctor": "what is missing on this machine, and how to get it",
 }
+# Commands whose files have a folder of their own.
+FOLDERS = dict.fromkeys(("compare", "record", "replay", "rerun"), "recordings")
 # The extra to install for a command whose modules are missing; else the one that brings the module.
 EXTRAS = {"demo": "demo", "mcp": "mcp"} | dict.fromkeys(
     ("up", "coverage", "capabilities", "doctor", "cloud", "map", "test"), "up"
@@ -85,7 +88,8 @@ def _print_usage() -> None:
 def _run(name: str) -> None:
     import typer
 
-    module = importlib.import_module(f"roboglot.cli.{name}")
+    folder = f".{FOLDERS[name]}" if name in FOLDERS else ""
+    module = importlib.import_module(f"roboglot.cli{folder}.{name}")
     sys.argv[:2] = [f"roboglot {name}"]
     app = getattr(module, "app", None)  # of commands with commands of their own
     if app is None:

@@ -241,9 +241,12 @@ class LockstepClock(Clock):
 
     async def advance(self, seconds: float) -> None:
         """Let ``seconds`` pass: every due callback runs, and all that follows from it, before the next instant."""
-        if seconds < 0:
+        await self.advance_to(self._now + seconds)
+
+    async def advance_to(self, end: float) -> None:
+        """Let time pass until exactly ``end``."""
+        if end < self._now:
             raise ValueError("time does not go back")
-        end = self._now + seconds
         await asyncio.sleep(0)
         await self._settle()
         yielded = self._now

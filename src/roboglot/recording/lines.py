@@ -97,6 +97,11 @@ class TextLine(Line):
             raise LinkLost(f"no answer to {payload[:60]!r}: {error}") from None
         return [(reply, status_of("robomaster", reply))]
 
+    async def drain(self) -> None:
+        """Read what comes, and forget it, until the robot hangs up."""
+        while await self._reader.read(LINE_MAX):
+            pass
+
     async def close(self) -> None:
         self._writer.close()
 
@@ -164,6 +169,11 @@ class FrameLine(Line):
             else:
                 self.pushed("robot block" if b'"block"' in frame else "robot feedback", frame)
         return found
+
+    async def drain(self) -> None:
+        """Read what comes, and forget it, until the robot hangs up."""
+        async for _ in self._socket:
+            pass
 
     async def close(self) -> None:
         await self._socket.close()
