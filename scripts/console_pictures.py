@@ -30,6 +30,7 @@ VIEWS = {
     "wire": (),
     "world": ("people", "faults", "drawn", "clock"),
     "robots": (),
+    "class": (),
 }
 COLOURS = 256  # of the PNG in the docs
 

@@ -21,6 +21,7 @@ from roboglot.clients.visual.cloud import CloudLink
 from roboglot.config import Config, RobotConfig, refuse_unguarded
 from roboglot.console.desk import Desk
 from roboglot.console.desk import World as ConsoleWorld
+from roboglot.console.recordings import Recordings
 from roboglot.console.server import Console
 from roboglot.console.studio.lessons import FOLDER
 from roboglot.console.studio.programs import Programs, Studio
@@ -238,6 +239,7 @@ class Runtime:
             return 0 if self._engine is None else self._engine.running
 
         desk = Desk(world, self.fleet.robots, self.fleet.world.hands, listed, studio, running)
+        desk.recordings = Recordings(self.config.data, lambda: self.recorder)
         return Console(desk, self.config.console, self._tls)
 
     def _scene_of(self, name: str) -> Scene:

@@ -14,6 +14,7 @@ from roboglot.model.components.mapping.map_library import MapLibrary
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.components.system.lease import Lease
+from roboglot.recording.reader import read_recording
 from tests.browser.served import ADDRESS, Served
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
@@ -24,6 +25,8 @@ AXE = (Path(__file__).parent / "vendor" / "axe.min.js").read_text(encoding="utf-
 VIEWS = {
     "live": ("state", "drive", "actions"),
     "world": ("people", "faults", "drawn", "clock"),
+    "robots": (),
+    "class": (),
 }
 SHOWS_PICTURES = """() => document.querySelector('.screen video')?.videoWidth > 0
     || document.querySelector('.screen img')?.naturalWidth > 0"""
@@ -133,6 +136,38 @@ async def test_escape_stops_and_letting_go_does(served: Served, open_console: Op
     assert served.robot.actions.running() == []
 
 
+async def test_a_gamepad_drives_and_stops(served: Served, open_console: Open) -> None:
+    page = await open_console()
+    await page.evaluate("""() => { window.stick = [0, 0, 0, 0];
+        navigator.getGamepads = () => [null, { axes: window.stick }]; }""")
+    await page.click("#tab-drive")
+    await page.wait_for_selector(".pad")
+    await page.evaluate("window.stick = [0, -1, 0, 0]")  # forward
+    await until(lambda: any(action.name == "drive" for action in served.robot.actions.running()))
+    for _ in range(10):
+        await asyncio.sleep(0.09)  # so that the page sends again before the robot's time goes on
+        await served.clock.advance(0.08)
+    assert served.robot[Base].velocity.x > 0.1
+    await page.evaluate("window.stick = [0.05, -0.05, 0, 0]")  # a stick never rests at zero
+    await until(lambda: not [a for a in served.robot.actions.running() if a.status.name == "EXECUTING"])
+    await served.clock.advance(0.5)
+    assert speed_of(served) < 0.02
+
+
+async def test_a_recording_is_begun_marked_and_ended(served: Served, open_console: Open) -> None:
+    page = await open_console()
+    page.on("dialog", lambda dialog: asyncio.ensure_future(dialog.accept("it bumped")))
+    await page.click("#tab-actions")
+    await page.click("button:has-text('Record')")
+    await page.wait_for_selector("header >> text=REC")
+    await page.click("button:has-text('Mark')")
+    await served.clock.advance(1.0)
+    await page.click("text=End the recording")
+    await page.wait_for_selector("text=of the data.")
+    (file,) = (served.runtime.config.data / "recordings").glob("*.mcap")
+    assert read_recording(file).topics["/marks"] == 1
+
+
 async def test_two_browsers_contend_for_control(served: Served, open_console: Open) -> None:
     anna, ben = await open_console("anna"), await open_console("ben")
     await anna.click("text=Take control")
@@ -188,7 +223,7 @@ async def test_languages_and_themes_change_while_it_runs(served: Served, open_co
     assert await page.evaluate("localStorage.language") == "zh"
 
 
-@pytest.mark.parametrize("view", ["live", "wire", "world", "robots"])
+@pytest.mark.parametrize("view", ["live", "wire", "world", "robots", "class"])
 async def test_a_phone_shows_all_of_it_and_can_touch_it(served: Served, open_console: Open, view: str) -> None:
     page = await open_console(view=view, viewport={"width": 360, "height": 740}, has_touch=True, is_mobile=True)
     await page.wait_for_selector("main > :not(.empty)")
@@ -230,6 +265,13 @@ async def test_the_camera_shows_pictures_and_what_is_in_them(served: Served, ope
         while not await page.evaluate(SHOWS_PICTURES):
             await served.clock.advance(0.1)
             await asyncio.sleep(0.05)
+    await page.click("text=Film")
+    await asyncio.sleep(0.5)  # of the machine's time: the browser films what it shows
+    async with page.expect_download() as saved:
+        await page.click("text=End the film")
+    film = await asyncio.to_thread(Path(await (await saved.value).path()).read_bytes)
+    assert film.startswith(b"\x1a\x45\xdf\xa3")  # a WebM file
+    assert len(film) > 1000
     await page.click("text=Close the camera")
     await page.wait_for_selector(".screen", state="detached")
 
@@ -241,8 +283,10 @@ async def test_axe_finds_nothing_serious(theme: str, served: Served, open_consol
     await page.evaluate(AXE)
     for view, tabs in VIEWS.items():
         await page.click(f"nav a[href='#/{view}']")
-        for tab in tabs:
-            await page.click(f"#tab-{tab}")
+        for tab in tabs or ("",):
+            if tab:
+                await page.click(f"#tab-{tab}")
+            await page.wait_for_selector("main > :not(.empty)")
             found = await page.evaluate("axe.run(document, { resultTypes: ['violations'] })")
             serious = [
                 (violation["id"], [node["html"][:120] for node in violation["nodes"][:3]])

@@ -6,6 +6,7 @@ import asyncio
 import json
 from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -40,6 +41,7 @@ BUTTONS = {
     "draw": ("world", "#tab-drawn", "button:has-text('Save the map')"),
     "break": ("world", "#tab-faults", "button:has-text('Break it')"),
 }
+AXE = (Path(__file__).parent / "vendor" / "axe.min.js").read_text(encoding="utf-8")
 TRY = "(body) => fetch('/api/sign_in', {method: 'POST', body}).then((reply) => reply.status)"
 Page = Any
 Open = Callable[[], Awaitable[Page]]
@@ -162,6 +164,9 @@ async def test_buttons_are_on_for_those_who_may(guarded: Guarded, open_page: Ope
 async def test_signing_out_ends_the_session(guarded: Guarded, open_page: Open) -> None:
     guarded.add("anna", "drive")
     page = await open_page()
+    await page.wait_for_selector(".sign")
+    await page.evaluate(AXE)
+    assert await page.evaluate("axe.run(document).then((found) => found.violations.map((v) => v.id))") == []
     await sign_in(page, "anna")
     await page.wait_for_selector("text=Scan fits map")
     (cookie,) = await page.context.cookies()
@@ -256,6 +261,8 @@ async def test_pupils_join_by_a_code_and_the_teacher_leads(guarded: Guarded, ope
     shown = [await page.locator("header option").all_inner_texts() for page in pupils]
     assert sorted(shown) == [["Robot a"], ["Robot b"]]
     assert await pupils[0].evaluate("fetch('/api/class').then((r) => r.status)") == 403
+    record = "fetch('/api/recording', {method: 'POST', body: '{\"do\": \"start\"}'}).then((r) => r.status)"
+    assert await pupils[0].evaluate(record) == 403
     emils = shown[0][0][-1]
     await teacher.wait_for_selector(".tile:has-text('Frida'):has-text('is here')")
 

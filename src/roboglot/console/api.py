@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Mapping as Values
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 
@@ -16,6 +16,7 @@ from roboglot.console.http import Problem, Receive, Scope, Send, answer, answer_
 from roboglot.console.map_verbs import map_archive
 from roboglot.console.openapi import document
 from roboglot.console.people.classes import Classes, Wish
+from roboglot.console.recordings import RecordingWish
 from roboglot.console.resend import resend
 from roboglot.console.studio import blocks, lessons
 from roboglot.console.studio.plans import rehearse
@@ -40,6 +41,7 @@ from roboglot.operations import BadParameters
 from roboglot.programs.errors import ProgramError
 from roboglot.protocols.door import Endpoint
 
+T = TypeVar("T")
 STATUSES: list[tuple[type[Exception], int]] = [
     (BadParameters, 400),
     (InvalidGoal, 400),
@@ -85,7 +87,9 @@ class Api:
             case "GET", ["class"]:
                 await answer_json(send, self._classes.look())
             case "POST", ["class"]:
-                await answer_json(send, await self._classes.do(_wish(await read_json(receive))))
+                await answer_json(send, await self._classes.do(_wish(await read_json(receive), Wish)))
+            case "GET" | "POST", ["recording"]:
+                await answer_json(send, await self._serve_recording(method, receive))
             case _, ["robots", *_]:
                 await self._route_robot(method, parts, receive, send, client)
             case _, ["world" | "world.toml", *_]:
@@ -121,6 +125,15 @@ class Api:
                 await answer_json(send, {"result": await self._desk.command(name, verb, values, client)})
             case _:
                 raise _nothing_here()
+
+    async def _serve_recording(self, method: str, receive: Receive) -> dict[str, Any]:
+        if (recordings := self._desk.recordings) is None:
+            raise NotFound("nothing is recorded here")
+        for name in self._desk.views:
+            self._desk.view(name, "look at the recording")
+        if method == "GET":
+            return recordings.look()
+        return await recordings.do(self._desk, _wish(await read_json(receive), RecordingWish))
 
     async def _serve_program(self, method: str, name: str, what: str, receive: Receive, send: Send) -> None:
         if method == "GET" and what == "program":
@@ -200,9 +213,9 @@ class Api:
         return endpoint
 
 
-def _wish(values: Values[str, object]) -> Wish:
+def _wish(values: Values[str, object], kind: type[T]) -> T:
     try:
-        return msgspec.convert(values, Wish)
+        return msgspec.convert(values, kind)
     except msgspec.ValidationError as error:
         raise BadParameters(str(error)) from None
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from roboglot.console import drawings, map_verbs
 from roboglot.console.clock_verbs import CLOCK_VERBS
@@ -20,6 +20,9 @@ from roboglot.model.errors import Forbidden, NotFound, Refused
 from roboglot.model.robot import Robot
 from roboglot.model.stage import Stage
 from roboglot.protocols.door import Endpoint
+
+if TYPE_CHECKING:
+    from roboglot.console.recordings import Recordings
 
 CLIENT = "console"
 TAKE = "take_control"  # a verb of its own: it is about who asks
@@ -55,6 +58,7 @@ class Desk:
     doors: Callable[[], Mapping[str, Sequence[Endpoint]]]
     studio: Studio = field(default_factory=Studio)
     running: Callable[[], int] = lambda: 0
+    recordings: Recordings | None = None
     views: dict[str, RobotView] = field(init=False)
     pupils: set[str] = field(default_factory=set)  # of the class that is open, by their identities
     locked: set[str] = field(default_factory=set)  # robots that only a teacher moves
@@ -123,7 +127,7 @@ class Desk:
         """Return the right that each verb needs; "all": to admin on all robots."""
         own = {operation.key: str(operation.right or Right.ADMIN) for operation in VERBS}
         of_all = {operation.key: "all" for operation in (*WORLD_VERBS, *CLOCK_VERBS)}
-        return own | of_all | {TAKE: Right.DRIVE, "resend": Right.ADMIN}
+        return own | of_all | {TAKE: Right.DRIVE, "resend": Right.ADMIN, "record": "all"}
 
     @staticmethod
     def _rights(robot: Robot) -> list[str]:

@@ -121,6 +121,7 @@ class Page:
         moment: dict[str, Any] = {"type": "moment", "now": milliseconds(), "time": self._desk.world.clock.time()}
         moment["pace"] = self._desk.world.pace
         moment["poses"] = motion
+        moment["recording"] = self._desk.recordings is not None and self._desk.recordings.on
         whole = len(visible) == len(self._desk.views)  # the world shows all of them
         if self._watch.truth and whole and (truth := drawings.truth_of(self._desk.stage)) != self._truth:
             self._truth = moment["truth"] = truth

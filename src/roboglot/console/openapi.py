@@ -20,6 +20,7 @@ NUMBER = NAME | {"name": "number"}
 READS = {
     "/api/me": "Who asks, and whether names are asked for here",
     "/api/class": "The class that is open, for its teacher; POST {do: open, lock, unlock, reset, give_back, close}",
+    "/api/recording": "How the recording of all robots goes; POST {do: start, stop, mark}",
     "/api/blocks": "Every function of robot programs for an editor: names, types, ranges, choices",
     "/api/lessons": "The missions of the studio",
     "/api/robots": "All robots with their poses",

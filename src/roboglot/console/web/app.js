@@ -3,7 +3,7 @@ import { render } from "preact";
 import { useEffect, useState } from "preact/hooks";
 import { signal } from "@preact/signals";
 import { Button, Icon, html, lacks, language, loadWords, notice, robotWord, t, theme } from "./base.js";
-import { age, changeWorld, choose, command, connect, current, hello, me, pace, signOut, state, status, want } from "./link.js";
+import { age, changeWorld, choose, command, connect, current, hello, me, pace, recording, signOut, state, status, want } from "./link.js";
 import { Live } from "./views/live.js";
 import { Robots } from "./views/robots.js";
 import { Wire } from "./views/wire.js";
@@ -58,7 +58,7 @@ function Header() {
       <select value=${current.value} onChange=${(e) => choose(e.target.value)}>
         ${robots.map((r) => html`<option value=${r.name}>${t("robot.named", { name: r.name })}</option>`)}
       </select></label>
-    <${Link} /><${Charge} /><${Pace} />
+    <${Link} /><${Charge} /><${Pace} />${recording.value && html`<span class="chip bad" title=${t("record")}>● REC</span>`}
     <span class="grow"></span><${Person} />
     <button type="button" class="button plain" lang=${language.value === "zh" ? "en" : "zh-CN"}
       onClick=${() => { language.value = language.value === "zh" ? "en" : "zh"; }}>${language.value === "zh" ? "EN" : "中文"}</button>

@@ -18,6 +18,7 @@ export const exchanges = signal(/** @type {any[][]} */ ([]));
 export const seen = signal(/** @type {any[][]} */ ([])); // what the camera makes out
 export const pace = signal({ paused: false, speed: 1, lockstep: false });
 export const missed = signal(0);
+export const recording = signal(false);
 export const padRefused = signal("");
 
 export const chosen = kept("robot", "");
@@ -147,7 +148,7 @@ function receive(message) {
     case "you": you.value = message.client; break;
     case "pong": age.value = performance.now() - message.at; break;
     case "moment":
-      batch(() => { clock.value = message.time; poses.value = message.poses; if (message.truth) truth.value = message.truth; steer(message.pace); });
+      batch(() => { clock.value = message.time; poses.value = message.poses; recording.value = message.recording; if (message.truth) truth.value = message.truth; steer(message.pace); });
       break;
     case "state":
       states.value = { ...states.value, [message.robot]: { ...states.value[message.robot], ...message.state } };

@@ -4,6 +4,9 @@ import { signal, useSignal } from "@preact/signals";
 import { Button, html, robotWord, t } from "../base.js";
 import { current, seen, want } from "../link.js";
 
+const FILM_RATE = 15; // pictures a second
+const FILM_MAX = 600_000; // ms
+const filming = signal(/** @type {(() => void) | null} */ (null));
 const CONNECT_MAX = 5000; // ms until motion JPEG takes the place of the call
 const shown = signal(false);
 const boxes = signal(true);
@@ -64,10 +67,36 @@ function Picture({ robot }) {
     let peer = null, gone = false;
     call(video.current, robot).then((made) => { if (gone) made.close(); else peer = made; }, () => { if (!gone) plain.value = true; });
     want({ seen: true });
-    return () => { gone = true; peer?.close(); want({ seen: false }); };
+    return () => { filming.value?.(); gone = true; peer?.close(); want({ seen: false }); };
   }, [robot]);
   return html`<div class="screen">${plain.value ? html`<img src=${`/api/robots/${robot}/camera.mjpeg`} alt=${t("camera.alt")} />`
     : html`<video ref=${video} autoplay playsinline muted aria-label=${t("camera.alt")}></video>`}<${Boxes} /></div>`;
+}
+
+/** Film what is on the screen until it is called again; then the file is saved. @param {Element} screen @param {string} robot */
+function film(screen, robot) {
+  const canvas = document.createElement("canvas"), context = canvas.getContext("2d");
+  const draw = () => {
+    const picture = /** @type {any} */ (screen.querySelector("video, img"));
+    const [width, height] = [picture?.videoWidth || picture?.naturalWidth, picture?.videoHeight || picture?.naturalHeight];
+    if (!width) return;
+    if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+    context?.drawImage(picture, 0, 0);
+  };
+  draw();
+  const recorder = new MediaRecorder(canvas.captureStream(FILM_RATE)), parts = /** @type {Blob[]} */ ([]);
+  const timer = setInterval(draw, 1000 / FILM_RATE);
+  const late = setTimeout(() => { if (filming.value) filming.value(); }, FILM_MAX);
+  recorder.ondataavailable = ({ data }) => parts.push(data);
+  recorder.onstop = () => {
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(new Blob(parts, { type: recorder.mimeType }));
+    link.download = `${robot}.${recorder.mimeType.includes("mp4") ? "mp4" : "webm"}`;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+  };
+  recorder.start(1000);
+  filming.value = () => { clearInterval(timer); clearTimeout(late); filming.value = null; recorder.stop(); };
 }
 
 export function Camera() {
@@ -75,5 +104,6 @@ export function Camera() {
   return html`<div class="card"><h3>${t("camera")}</h3><figure class="film">${shown.value ? html`<${Picture} key=${robot} robot=${robot} />` : html`<p class="muted">${t("camera.off")}</p>`}
     <figcaption class="buttons"><${Button} label=${t(shown.value ? "camera.close" : "camera.open")} onClick=${() => { shown.value = !shown.value; }} />
     ${shown.value && html`<${Button} label=${t("camera.boxes")} on=${boxes.value} onClick=${() => { boxes.value = !boxes.value; }} />`}
+    ${shown.value && html`<${Button} kind=${filming.value ? "danger" : ""} label=${t(filming.value ? "film.stop" : "film.start")} onClick=${(e) => { if (filming.value) filming.value(); else film(e.currentTarget.closest("figure"), robot); }} />`}
     <a class="button" href=${`/api/robots/${robot}/camera.jpg`} download=${`${robot}.jpg`}>${t("photo")}</a></figcaption></figure></div>`;
 }

@@ -4,6 +4,7 @@ import { Button, Icon, duration, html, person, robotWord, say, t } from "../base
 import { MapView } from "../map.js";
 import { command, current, introduce, poses, simulated, state, wanted, you } from "../link.js";
 import { Drive } from "./drive.js";
+import { Recording } from "./recording.js";
 
 const tool = signal("go");
 const drag = signal(/** @type {any} */ (null));
@@ -113,7 +114,7 @@ function Actions() {
       ${refused && html`<p class="warned">${t("actions.refused", { who: refused.client, doing: robotWord(refused.doing), why: refused.reason })}</p>`}</div>
     <div class="card"><h3>${t("actions.before")}</h3>
       ${history.length ? html`<ol class="actions">${history.map((a) => html`<li key=${a.id}><b>${robotWord(a.name)}</b><span class=${`badge ${a.status.toLowerCase()}`}>${robotWord(a.status)}</span>
-        <small>${a.client || t("itself")} · ${duration(a.seconds)}</small>${a.reason && html`<em>${a.reason}</em>`}</li>`)}</ol>` : html`<p class="muted">${t("actions.nothing")}</p>`}</div>`;
+        <small>${a.client || t("itself")} · ${duration(a.seconds)}</small>${a.reason && html`<em>${a.reason}</em>`}</li>`)}</ol>` : html`<p class="muted">${t("actions.nothing")}</p>`}</div><${Recording} />`;
 }
 
 const TABS = { state: State, drive: Drive, actions: Actions };
