@@ -1,7 +1,8 @@
 """Claim: two laps through the office with drifting odometry (>= 2 m) and people: ATE median <= 5 cm, worst <= 15 cm.
 
-Three levels of noise, five seeds each; <= 2 ms of processor time a scan. The truth is the world's, the map frame's
-origin is where the robot woke up, so nothing is aligned afterwards. ``--quick``: one seed a level.
+The body's own noise (median <= 2 cm) and three levels of it, five seeds each; <= 2 ms of processor time a scan. The
+truth is the world's, the map frame's origin is where the robot woke up, so nothing is aligned afterwards. ``--quick``:
+one seed a level.
 """
 
 from __future__ import annotations
@@ -32,7 +33,9 @@ from roboglot.storage.database import Database
 
 MEDIAN_MAX, WORST_MAX, MILLISECONDS_MAX, DRIFT_MIN = 0.05, 0.15, 2.0, 2.0
 SEEDS = (1, 2, 3, 4, 5)
-LEVELS = {  # what replaces the universal body's figures
+USUAL_MAX = 0.02
+LEVELS: dict[str, dict[str, float]] = {  # what replaces the universal body's figures
+    "usual": {},
     "low": {"scale_error": 0.12, "gyro_bias": 0.008, "range_max": 12.0},
     "middle": {"scale_error": 0.09, "gyro_bias": 0.007, "gyro_scale": 0.01, "range_max": 8.0, "lidar": 0.02},
     "high": {"scale_error": 0.12, "gyro_bias": 0.008, "gyro_scale": 0.015, "range_max": 6.0, "lidar": 0.03},
@@ -113,12 +116,13 @@ def runs() -> Iterator[tuple[str, int]]:
 
 
 def main() -> None:
-    ates, scans, drifts, failed = [], [], [], 0
+    usual, ates, scans, drifts, failed = list[float](), [], [], [], 0
     with tempfile.TemporaryDirectory() as folder:
         for level, seed in runs():
             lap = asyncio.run(run(noisy_body(Path(folder), LEVELS[level]), seed))
-            ates.append(lap.ate)
-            drifts.append(lap.drift)
+            (ates if level != "usual" else usual).append(lap.ate)
+            if level != "usual":
+                drifts.append(lap.drift)
             failed += bool(lap.failed)
             scans.append(statistics.fmean(lap.scan_seconds) * 1000)
             print(f"{level:7} seed {seed}  ATE {lap.ate * 100:5.1f} cm, at most {max(lap.errors) * 100:5.1f} cm, "
@@ -126,6 +130,7 @@ def main() -> None:
                   flush=True)  # fmt: skip
     median, worst, slowest = statistics.median(ates), max(ates), max(scans)
     claims = Claims()
+    claims.at_most("ATE with the body's own noise, median", 100.0 * statistics.median(usual), 100.0 * USUAL_MAX, "cm")
     claims.at_most("ATE, median", 100.0 * median, 100.0 * MEDIAN_MAX, "cm")
     claims.at_most("ATE, worst", 100.0 * worst, 100.0 * WORST_MAX, "cm")
     claims.at_most("a scan, on average, slowest run", slowest, MILLISECONDS_MAX, "ms")

@@ -10,14 +10,17 @@ from msgspec import Struct, defstruct
 
 from roboglot.simulation.bodies.body import Body, HullSection
 from roboglot.simulation.bodies.part import parts
+from roboglot.simulation.bodies.realism import PRESETS, USUAL, with_realism
 from roboglot.simulation.world.declarations import BadFile, read_toml
 
 BODIES = Path(__file__).parent
 
 
 def load_body(name: str) -> Body:
-    """Return a shipped body by its name, or one's own by the path of its TOML file. Raises BadFile."""
-    path = body_source(name)
+    """Return a shipped body by its name, or one's own by the path of its TOML file; ``@hard`` or ``@clean`` behind it
+    chooses how good its sensors are. Raises BadFile.
+    """
+    path, (name, preset) = body_source(name), split_realism(name)
     if not name.endswith(".toml") and (not name.isidentifier() or not path.is_file()):
         known = ", ".join(sorted(file.stem for file in BODIES.glob("*.toml")))
         raise BadFile(f"no body is named {name!r}; there are: {known}; or give the path of a .toml file")
@@ -27,13 +30,22 @@ def load_body(name: str) -> Body:
         for needed in part.needs if sections.get(part.name) else ():
             if not sections[needed]:
                 raise BadFile(f"{path}: [{part.name}] works with a [{needed}], which is missing")
-    given = {type(section): section for section in sections.values() if section is not None}
+    if preset not in PRESETS:
+        raise BadFile(f"{name}@{preset}: no preset is named {preset!r}; there are: {', '.join(PRESETS)}")
+    given = with_realism({type(section): section for section in sections.values() if section is not None}, preset)
     return Body(content.maker, content.model, content.hardware_version, content.hull, given)
 
 
 def body_source(name: str) -> Path:
     """Return the file of a body by its name or path; it may not exist."""
+    name, _ = split_realism(name)
     return Path(name) if name.endswith(".toml") else BODIES / f"{name}.toml"
+
+
+def split_realism(name: str) -> tuple[str, str]:
+    """Return name or path of a body, and the preset behind it."""
+    body, at, preset = name.rpartition("@")
+    return (body, preset) if at and "/" not in preset else (name, USUAL)
 
 
 @cache

@@ -10,11 +10,12 @@ from typing import Annotated
 
 import numpy as np
 from msgspec import Meta, Struct
+from numpy.typing import NDArray
 
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.events import EventStream, ScanTaken
-from roboglot.model.geometry import ORIGIN
+from roboglot.model.geometry import ORIGIN, Pose
 from roboglot.model.sensing import LaserScan
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
@@ -24,12 +25,16 @@ from roboglot.simulation.world.sight import Sight
 
 CLIMBED = 0.01  # m above its floor at which a robot's standing higher counts
 
-
 RAYS_MAX = 2000
+PACKETS = 12  # of a turn
 
 
 class LidarSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """A full turn of ``rays``; ``above_belly`` is the height of its plane above the belly."""
+    """A full turn of ``rays``; ``above_belly`` is the height of its plane above the belly.
+
+    ``dropouts``: share of rays that measure nothing (NaN); every ``sector_every`` s on average a packet of a twelfth of
+    a turn is lost (0: never); ``jitter``: standard deviation (s) of the stamp, which odometry is looked up by.
+    """
 
     rays: Annotated[int, Meta(ge=4, le=RAYS_MAX)]
     rate: Annotated[float, Meta(gt=0, le=50)]
@@ -37,6 +42,9 @@ class LidarSection(Struct, frozen=True, forbid_unknown_fields=True):
     range_max: Positive
     noise: NotNegative
     above_belly: NotNegative
+    dropouts: Annotated[float, Meta(ge=0, lt=1)] = 0.0
+    sector_every: NotNegative = 0.0
+    jitter: Annotated[float, Meta(ge=0, le=0.1)] = 0.0
 
 
 class SimulatedLidar(Lidar):
@@ -76,12 +84,33 @@ class SimulatedLidar(Lidar):
         exact = self._sight.turn(hull, height, section.rays, section.range_max)
         noise = self._random.standard_normal(section.rays, dtype=np.float32)
         ranges = self._sight.blur(exact, noise, section.noise, section.range_min, section.range_max)
+        if section.dropouts or section.sector_every:
+            self._drop(ranges)
         ranges.setflags(write=False)
+        late = abs(self._random.normal(0.0, section.jitter)) if section.jitter else 0.0
         self._scan = LaserScan(
-            stamp, ranges, -math.pi, self._increment, section.range_min, section.range_max, mount=ORIGIN
+            max(0.0, stamp - late),
+            ranges,
+            -math.pi,
+            self._increment,
+            section.range_min,
+            section.range_max,
+            mount=ORIGIN,
         )
         pose = self._odometry.reading.pose if self._odometry else ORIGIN
+        if late and self._odometry:  # the driver takes odometry of a moment before
+            twist = self._odometry.reading.twist
+            pose = pose.compose(Pose(-late * twist.x, -late * twist.y, -late * twist.yaw))
         self._events.publish(ScanTaken(stamp=stamp, scan=self._scan, odometry=pose))
+
+    def _drop(self, ranges: NDArray[np.float32]) -> None:
+        """Lose single rays (black, glossy, too flat), now and then a packet."""
+        section, random = self._section, self._random
+        if section.dropouts:
+            ranges[random.random(len(ranges)) < section.dropouts] = np.nan
+        if section.sector_every and random.random() < 1.0 / (self.rate * section.sector_every):
+            first = int(random.integers(len(ranges)))
+            ranges[(first + np.arange(len(ranges) // PACKETS)) % len(ranges)] = np.nan
 
 
 def _fit(fit: Fitting) -> SimulatedLidar:

@@ -31,12 +31,19 @@ class DescribedNoise(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class OdometrySection(Struct, frozen=True, forbid_unknown_fields=True):
-    """Standard deviations of the wheels' scale error and of the noise per way travelled; ``described``: as believed."""
+    """Standard deviations of the wheels' scale error and of the noise per way travelled; ``described``: as believed.
+
+    ``turn_slip``: m/s that wheels slide ahead per rad/s of turning; an encoder jumps by ``jump`` m every ``jump_every``
+    s on average while it drives (0: never).
+    """
 
     scale_error: NotNegative
     noise: NotNegative
     still_rate: NotNegative
     described: DescribedNoise = DescribedNoise()
+    turn_slip: NotNegative = 0.0
+    jump: NotNegative = 0.0
+    jump_every: NotNegative = 0.0
 
 
 class SimulatedOdometry(Odometry):
@@ -58,6 +65,15 @@ class SimulatedOdometry(Odometry):
             self._reading = OdometryReading(stamp, Pose(x, y, yaw), Twist(vx, vy, rate), way)
         return self._reading
 
+    def _disturbed(self, x: float, y: float, yaw: float, seconds: float) -> tuple[float, float]:
+        """What slip and a jump of an encoder add to the way."""
+        section, off = self._section, 0.0
+        if section.turn_slip:
+            off += section.turn_slip * abs(self._imu.rate) * math.copysign(seconds, self._base.velocity.x)
+        if section.jump_every and self._random.random() < seconds / section.jump_every:
+            off += math.copysign(section.jump, self._random.standard_normal())
+        return x + off * math.cos(yaw), y + off * math.sin(yaw)
+
     @property
     def noise(self) -> OdometryNoise:
         return OdometryNoise(**structs.asdict(self._section.described))
@@ -75,6 +91,7 @@ class SimulatedOdometry(Odometry):
                 self._noises = self._random.standard_normal(2 * DRAWN)[::-1].tolist()
             vx = wheels.x * (self._scale_x + self._section.noise * self._noises.pop())
             vy = wheels.y * (self._scale_y + self._section.noise * self._noises.pop())
+            x, y = self._disturbed(x, y, yaw, seconds)
             middle = yaw + rate * seconds / 2
             c, s = math.cos(middle), math.sin(middle)
             x += (c * vx - s * vy) * seconds

@@ -1,0 +1,83 @@
+"""Presets of how good sensors are: clean, usual, hard; judged by what the robot reports against the truth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from roboglot.config import RobotConfig
+from roboglot.fleet import build_fleet
+from roboglot.model.actions import ActionStatus
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.events import ScanTaken
+from roboglot.model.geometry import Pose, Twist
+from roboglot.simulation.world.declarations import BadFile
+from roboglot.storage.database import Database
+
+
+async def circled(body: str) -> tuple[float, float, list[tuple[float, float]]]:
+    """How far odometry was off after a bent drive (m), the share of rays that said nothing, and where scans were."""
+    clock, database = LockstepClock(), Database(":memory:")
+    fleet = build_fleet("empty", [RobotConfig(body=body)], clock=clock, seed=4, database=database)
+    fleet.world.hands.place("a", Pose(5.0, 3.0))
+    await fleet.start(wait=True)
+    robot, start, unknown, trace = fleet.robots["a"], fleet.world.truth.pose_of("a"), [], []
+
+    def look(event: ScanTaken) -> None:
+        unknown.append(float(np.isnan(event.scan.ranges).mean()))
+        trace.append((event.stamp, event.odometry.x))
+
+    robot.events.listen(ScanTaken, look)
+    robot[Driving].drive(Twist(0.4, 0.0, 0.3), lifetime=12.0)
+    await clock.advance(14.0)
+    assert robot[Lidar].scan is not None
+    off = start.compose(robot[Odometry].reading.pose).distance_to(fleet.world.truth.pose_of("a"))
+    await fleet.close()
+    database.close()
+    return off, float(np.mean(unknown)), trace
+
+
+async def test_the_presets_differ_as_they_should() -> None:
+    clean, usual, hard = [await circled(f"hermes{preset}") for preset in ("@clean", "@usual", "@hard")]
+    assert clean[0] < 0.03
+    assert usual[0] < 0.15
+    assert hard[0] > 2.0 * usual[0]
+    assert clean[1] == usual[1] == 0.0
+    assert 0.02 < hard[1] < 0.15
+
+
+async def test_usual_is_what_is_without_a_word_and_each_seed_gives_one_trace() -> None:
+    assert (await circled("hermes"))[2] == (await circled("hermes@usual"))[2]
+    assert (await circled("hermes@hard"))[2] == (await circled("hermes@hard"))[2]
+
+
+def test_an_unknown_preset_is_refused_in_words() -> None:
+    with pytest.raises(BadFile, match="clean, usual, hard"):
+        build_fleet(
+            "empty", [RobotConfig(body="hermes@worse")], clock=LockstepClock(), seed=1, database=Database(":memory:")
+        )
+
+
+@pytest.mark.parametrize("body", ["universal@hard", "hermes@hard"])
+async def test_on_a_hard_day_goals_are_reached_within_twice_the_tolerance(body: str) -> None:
+    clock, database = LockstepClock(), Database(":memory:")
+    fleet = build_fleet("office", [RobotConfig(body=body)], clock=clock, seed=2, database=database)
+    await fleet.start(wait=True)
+    robot, start = fleet.robots["a"], fleet.world.truth.pose_of("a")
+    await clock.advance(1.0)
+    for spot in ((25.5, 10.0), (26.0, 7.0), (19.0, 9.8)):
+        goal = Pose(*spot).relative_to(start).point
+        action = robot[Navigation].navigate_to([goal], NavigationOptions(retries=2))
+        while not action.status.ended:
+            await clock.advance(0.5)
+        assert action.status is ActionStatus.SUCCEEDED, action.reason
+        truth = fleet.world.truth.pose_of("a")
+        assert truth.distance_to(Pose(*spot)) < 0.2
+        assert start.compose(robot[Localization].pose).distance_to(truth) < 0.2
+    await fleet.close()
+    database.close()
