@@ -53,7 +53,6 @@ from roboglot.simulation.components.motion.base import SimulatedBase
 LOOK = 0.02  # s between looks at whether a motion has ended
 TURN_RATE = 1.2  # rad/s at which the body straightens on its way between postures
 OWN_GAIT_AFTER = 1.0  # s of standing still until the robot walks its own way again
-LANDED = 0.02  # m above the floor
 
 
 class SimulatedLegs(Legs):
@@ -63,8 +62,7 @@ class SimulatedLegs(Legs):
         self._section, self._hull, self._base, self._robot = section, hull, base, robot
         self._clock = robot.clock
         self.limits = section.limits
-        self._posture = Posture.STANDING
-        self._straight = Body(section.standing)
+        self._posture, self._straight = Posture.STANDING, Body(section.standing)
         self._body = self._taken = self._straight
         self._stance = Stance(
             self._straight, min(section.lying, section.lowest), max(section.standing, section.highest), tick
@@ -118,7 +116,7 @@ class SimulatedLegs(Legs):
             if self._posture is not Posture.STANDING or self._body != self._straight:
                 await self._move(action, Posture.STANDING, self._section.standing, self._section.stand_time)
 
-        there = self._posture is Posture.STANDING and self._body == self._straight and self._track is None
+        there = self._posture is Posture.STANDING and self._body == self._straight and not self._track
         return self._start("stand up", run, there, Posture.STANDING, source)
 
     def lie_down(self, *, source: str = "") -> Action:
@@ -163,8 +161,7 @@ class SimulatedLegs(Legs):
         try:
             await followed(track, action, self._clock, LOOK)
         finally:
-            if self._track is track:
-                self._track = None
+            self._track = None if self._track is track else self._track
 
     async def _brake(self) -> None:
         """Return when the wheels stand still; who cancels meanwhile finds the robot standing as before."""
@@ -269,8 +266,8 @@ class SimulatedLegs(Legs):
         self._body = held_body(self._hull)
         self._become(Posture.CHANGING)
         begin = self._hull.pose
-        performance = self._performance = Performance(make())
-        self._performing = motion
+        performance, self._performing = Performance(make()), motion
+        self._performance = performance
         self.duty.begin()
         try:
             await self._until_over(performance)
@@ -368,9 +365,9 @@ class SimulatedLegs(Legs):
                 self._base.set_velocity(led(self._hull.leash, self._hull.turned))
         if not (velocity.x or velocity.y or velocity.yaw):
             self._still += 0.0 if on_a_leash else seconds
+            self._hull.effort = 0.0
             if self._still >= OWN_GAIT_AFTER:
                 self.walk(None)
-            self._hull.effort = 0.0
         elif gait is not None:
             spec, self._still = GAITS[gait], 0.0
             self._strides += spec.steps * seconds
