@@ -19,6 +19,24 @@ MOVED = {
     "SECURITY.md": "project/SECURITY.md",
     "CHANGELOG.md": "project/CHANGELOG.md",
 }
+# What programs of users import, and who it is for; mkdocstrings makes a page of each from the docstrings.
+INTERFACES = {
+    "roboglot.testing": "For tests in Python of whatever drives robots.",
+    "roboglot.clients.slamware": "For programs that drive a Slamtec base.",
+    "roboglot.clients.robomaster.client": "For programs that drive a RoboMaster.",
+    "roboglot.clients.cyberdog": "For programs that drive a CyberDog 2.",
+    "roboglot.clients.visual": "For programs that send block programs to a robot.",
+    "roboglot.clients.errors": "For all who use the clients: what goes wrong, and why.",
+    "roboglot.model.robot": "For who writes components, doors and drivers: what a robot is.",
+    "roboglot.model.actions": "For who writes components, doors and drivers: what takes time.",
+    "roboglot.model.clock": "For who writes components, doors and drivers: robot time.",
+    "roboglot.model.geometry": "For who computes with points, poses and twists.",
+    "roboglot.model.stage": "For who places robots, people and things, and breaks them.",
+    "roboglot.model.components.motion.navigation": "For who has robots go somewhere.",
+    "roboglot.model.components.motion.driving": "For who has robots move.",
+    "roboglot.model.components.mapping.localization": "For who asks where a robot is.",
+    "roboglot.protocols.door": "For who adds a door.",
+}
 LINK = re.compile(r"(?<!!)\[([^\]]+)\]\(([^)\s]+)\)|(!)\[([^\]]*)\]\(([^)\s]+)\)")
 
 
@@ -65,7 +83,11 @@ def gather() -> int:
             new.write_text(rewritten((ROOT / source).read_text("utf-8"), source), "utf-8")
         else:
             shutil.copy(ROOT / source, new)
-    return len(sources)
+    for module, reader in INTERFACES.items():
+        new = PAGES / f"reference/api/{module}.md"
+        new.parent.mkdir(parents=True, exist_ok=True)
+        new.write_text(f"# {module}\n\n{reader}\n\n::: {module}\n", "utf-8")
+    return len(sources) + len(INTERFACES)
 
 
 if __name__ == "__main__":

@@ -99,3 +99,8 @@ def test_examples_run_in_a_users_project(tmp_path: Path) -> None:
     ]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=200, cwd=tmp_path)
     assert ended.returncode == 0, ended.stdout + ended.stderr
+
+
+@pytest.mark.parametrize("page", sorted(ROOT.glob("docs/**/*.md")), ids=lambda page: page.name)
+def test_every_page_says_who_it_is_for(page: Path) -> None:
+    assert re.search(r"^(For |写给)", "\n".join(page.read_text().splitlines()[:9]), re.MULTILINE)

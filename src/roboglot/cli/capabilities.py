@@ -95,6 +95,8 @@ def page(tell: Callable[[int, str], None] = lambda _done, _name: None) -> str:
     lines = [
         "# Capabilities",
         "",
+        "For who chooses a robot and a protocol: what each can do with which.",
+        "",
         "Made by `roboglot capabilities --write` from the code; do not edit. Columns are simulated bodies and drivers",
         "of real robots, rows the chapters of a protocol. A cell counts the requests that such a robot has the parts",
         "for, as its handlers declare them: `12/14` is twelve of fourteen, `(5≈)` five of the twelve by a part",

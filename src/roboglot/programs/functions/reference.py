@@ -13,6 +13,8 @@ from roboglot.programs.functions.table import ABILITIES
 
 _HEAD = """# Functions of robot programs
 
+For who writes block programs and looks a function up.
+
 Made from the declarations by `python -m roboglot.programs.functions.reference docs/reference/programs.md`.
 How the language looks is in [programs](../programs.md), what the functions do with the robot in
 [visual programming](../protocols/visual.md).
