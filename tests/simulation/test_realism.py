@@ -43,7 +43,7 @@ async def circled(body: str) -> tuple[float, float, list[tuple[float, float]]]:
 
 
 async def test_the_presets_differ_as_they_should() -> None:
-    clean, usual, hard = [await circled(f"hermes{preset}") for preset in ("@clean", "@usual", "@hard")]
+    clean, usual, hard = [await circled(f"hermes{preset}") for preset in ("+clean", "+usual", "+hard")]
     assert clean[0] < 0.03
     assert usual[0] < 0.15
     assert hard[0] > 2.0 * usual[0]
@@ -52,18 +52,18 @@ async def test_the_presets_differ_as_they_should() -> None:
 
 
 async def test_usual_is_what_is_without_a_word_and_each_seed_gives_one_trace() -> None:
-    assert (await circled("hermes"))[2] == (await circled("hermes@usual"))[2]
-    assert (await circled("hermes@hard"))[2] == (await circled("hermes@hard"))[2]
+    assert (await circled("hermes"))[2] == (await circled("hermes+usual"))[2]
+    assert (await circled("hermes+hard"))[2] == (await circled("hermes+hard"))[2]
 
 
 def test_an_unknown_preset_is_refused_in_words() -> None:
     with pytest.raises(BadFile, match="clean, usual, hard"):
         build_fleet(
-            "empty", [RobotConfig(body="hermes@worse")], clock=LockstepClock(), seed=1, database=Database(":memory:")
+            "empty", [RobotConfig(body="hermes+worse")], clock=LockstepClock(), seed=1, database=Database(":memory:")
         )
 
 
-@pytest.mark.parametrize("body", ["universal@hard", "hermes@hard"])
+@pytest.mark.parametrize("body", ["universal+hard", "hermes+hard"])
 async def test_on_a_hard_day_goals_are_reached_within_twice_the_tolerance(body: str) -> None:
     clock, database = LockstepClock(), Database(":memory:")
     fleet = build_fleet("office", [RobotConfig(body=body)], clock=clock, seed=2, database=database)

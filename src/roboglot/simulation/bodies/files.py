@@ -17,7 +17,7 @@ BODIES = Path(__file__).parent
 
 
 def load_body(name: str) -> Body:
-    """Return a shipped body by its name, or one's own by the path of its TOML file; ``@hard`` or ``@clean`` behind it
+    """Return a shipped body by its name, or one's own by the path of its TOML file; ``+hard`` or ``+clean`` behind it
     chooses how good its sensors are. Raises BadFile.
     """
     path, (name, preset) = body_source(name), split_realism(name)
@@ -31,7 +31,7 @@ def load_body(name: str) -> Body:
             if not sections[needed]:
                 raise BadFile(f"{path}: [{part.name}] works with a [{needed}], which is missing")
     if preset not in PRESETS:
-        raise BadFile(f"{name}@{preset}: no preset is named {preset!r}; there are: {', '.join(PRESETS)}")
+        raise BadFile(f"{name}+{preset}: no preset is named {preset!r}; there are: {', '.join(PRESETS)}")
     given = with_realism({type(section): section for section in sections.values() if section is not None}, preset)
     return Body(content.maker, content.model, content.hardware_version, content.hull, given)
 
@@ -44,8 +44,8 @@ def body_source(name: str) -> Path:
 
 def split_realism(name: str) -> tuple[str, str]:
     """Return name or path of a body, and the preset behind it."""
-    body, at, preset = name.rpartition("@")
-    return (body, preset) if at and "/" not in preset else (name, USUAL)
+    body, plus, preset = name.rpartition("+")
+    return (body, preset) if plus and preset.isalpha() else (name, USUAL)
 
 
 @cache

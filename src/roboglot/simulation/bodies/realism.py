@@ -1,6 +1,6 @@
 """How honest a body's sensors are: ``clean`` knows no noise, ``usual`` is as its file says, ``hard`` a bad day.
 
-Chosen behind the body's name: ``hermes@hard``.
+Chosen behind the body's name: ``hermes+hard``.
 """
 
 from __future__ import annotations
