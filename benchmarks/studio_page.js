@@ -42,8 +42,21 @@ window.bench = (() => {
     },
     loop() {
       const wait = { type: "wait", inputs: { SECONDS: { shadow: { type: "math_number", fields: { NUM: 0.2 } } } } };
+      const twice = { ...wait, next: { block: wait } }; // so that the light moves
       studio.runner.lights.count = 0;
-      studio.editor.load({ blocks: { languageVersion: 0, blocks: [{ type: "forever", x: 20, y: 20, inputs: { DO: { block: wait } } }] } });
+      studio.editor.load({ blocks: { languageVersion: 0, blocks: [{ type: "forever", x: 20, y: 20, inputs: { DO: { block: twice } } }] } });
+    },
+    choose(name) {
+      const list = document.querySelector("header .robot select");
+      list.value = name;
+      list.dispatchEvent(new Event("change", { bubbles: true }));
+    },
+    seen: [],
+    watch() {
+      new MutationObserver((news) => {
+        for (const { target } of news) if (target.classList.contains("lit") && target.dataset.id !== this.last) bench.seen.push([this.last = target.dataset.id, performance.timeOrigin + performance.now()]);
+        if (!document.querySelector(".lit")) this.last = "";
+      }).observe(document.querySelector(".blocklySvg"), { subtree: true, attributes: true, attributeFilter: ["class"] });
     },
     async stop() {
       const began = performance.now();

@@ -125,6 +125,16 @@ async def test_a_class_is_joined_seen_and_handed_in(shown: Shown) -> None:
         assert (row["name"], row["lit"], row["stars"], row["robot"]) == ("Anna", "turn", 4, "a")
         await teacher.say(type="class", do="look", id=9, name="Anna")
         assert (await teacher.kind("looked"))["style"] == '{"body": "x = 1"}'
+        await anna.say(type="check", id=1, body="x = 1\n")  # who works on a program stays in the class
+        await anna.kind("checked")
+        await teacher.say(type="class", do="look", id=10, name="Anna")
+        await teacher.kind("looked")
+        assert [m["pupils"][0]["here"] for m in teacher.heard if m["type"] == "grid" and m["pupils"]][-1]
+    async with page(shown) as teacher, page(shown) as anna:
+        await teacher.say(type="class", do="open", code=code)
+        await teacher.kind("grid")
+        await anna.say(type="class", do="join", code=code, name="Anna")  # her first page is closed
+        assert (await anna.kind("joined"))["name"] == "Anna"
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"type": "run"}', "[" * 100_000, '{"type": "check", "id": "x"}', "\x00"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import re
 from pathlib import Path
 
@@ -65,10 +66,25 @@ def test_pages_load_nothing_from_elsewhere() -> None:
 def test_the_page_is_small_enough() -> None:
     sent = {
         path: asset
-        for path, asset in Assets()._files.items()
+        for path, asset in Assets().all()
         if path not in ("/index.html", "/words/en.json") and not path.startswith("/studio")  # one language is loaded
     }
     assert sum(len(asset.packed) for asset in sent.values()) < 60 * 1024
+
+
+def test_the_studio_asks_for_all_its_modules_at_once() -> None:
+    text = (FOLDER / "studio" / "index.html").read_text("utf-8")
+    asked = set(re.findall(r'rel="modulepreload" href="/([^"]+)"', text))
+    packages = set(re.findall(r'":"/([^"]+)"', text))
+    wanted, new = packages, {Path("studio/main.js")}
+    while new:
+        path = new.pop()
+        for name in re.findall(r'^import [^;]*?"([./][^"]+)"', (FOLDER / path).read_text("utf-8"), re.MULTILINE):
+            found = Path(os.path.normpath(path.parent / name)) if name.startswith(".") else Path(name[1:])
+            if str(found) not in wanted:
+                wanted.add(str(found))
+                new |= {found} if "vendor" not in found.parts else set()
+    assert asked == wanted
 
 
 def test_no_own_file_is_long() -> None:

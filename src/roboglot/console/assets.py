@@ -6,8 +6,9 @@ import base64
 import gzip
 import hashlib
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 
 FOLDER = Path(__file__).parent / "web"
@@ -36,31 +37,40 @@ class Asset:
     tag: str
 
 
-class Assets:
-    """All files below ``web``, by path ("/app.js"); "/" is the page itself."""
+@cache
+def _paths() -> dict[str, Path]:
+    found = {
+        "/" + path.relative_to(FOLDER).as_posix(): path for path in sorted(FOLDER.rglob("*")) if path.suffix in TYPES
+    }
+    for folder in ("/", "/studio/"):
+        found[folder] = found[f"{folder}index.html"]
+    found["/studio"] = found["/studio/"]
+    return found
 
-    @cached_property
-    def _files(self) -> dict[str, Asset]:
-        found = {}
-        for path in sorted(FOLDER.rglob("*")):
-            if path.suffix in TYPES:
-                plain = path.read_bytes()
-                tag = f'"{hashlib.sha256(plain).hexdigest()[:24]}"'
-                asset = Asset(TYPES[path.suffix], plain, gzip.compress(plain, 9, mtime=0), tag)
-                found["/" + path.relative_to(FOLDER).as_posix()] = asset
-        for folder in ("/", "/studio/"):
-            found[folder] = found[f"{folder}index.html"]
-        found["/studio"] = found["/studio/"]
-        return found
+
+@cache
+def _read(path: Path) -> Asset:
+    plain = path.read_bytes()
+    tag = f'"{hashlib.sha256(plain).hexdigest()[:24]}"'
+    return Asset(TYPES[path.suffix], plain, gzip.compress(plain, 9, mtime=0), tag)
+
+
+class Assets:
+    """All files below ``web``, by path ("/app.js"); "/" is the page itself. Each is read when it is first asked for."""
 
     def find(self, path: str) -> Asset | None:
         """The file at ``path``."""
-        return self._files.get(path)
+        found = _paths().get(path)
+        return None if found is None else _read(found)
+
+    def all(self) -> Iterator[tuple[str, Asset]]:
+        """Every path and its file."""
+        return ((path, _read(file)) for path, file in _paths().items())
 
     @cached_property
     def policy(self) -> bytes:
         """The Content-Security-Policy: nothing from elsewhere, no inline script but the import map, by its hash."""
-        inline = _INLINE.search(self._files["/"].plain)
+        inline = _INLINE.search(_read(_paths()["/"]).plain)
         digest = base64.b64encode(hashlib.sha256(inline[1] if inline else b"").digest()).decode()
         return (
             f"default-src 'none'; script-src 'self' 'sha256-{digest}'; style-src 'self'; img-src 'self' blob: data:; "

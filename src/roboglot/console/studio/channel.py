@@ -218,7 +218,6 @@ class Session:
                 await self._trial.take(message, self._desk.studio, programs)
             case TrialEnd():
                 self._trial.close()
-        self._seat.leave()
 
     async def _fetch(self, programs: Programs, wish: Fetch) -> None:
         service = programs.service
@@ -253,6 +252,7 @@ class Session:
         """The page is gone; what it began on the robot goes on."""
         self._leave()
         self._trial.close()
+        self._seat.leave()
 
 
 def _plain(problem: Problem) -> dict[str, Any]:

@@ -1,0 +1,75 @@
+"""A class in real pages: join by code, the teacher's grid, a pupil's screen shown, handed in, stopped, exported."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import pytest
+
+from tests.browser.served import until
+from tests.browser.test_studio import FOREVER, Open, loaded, phase, studio
+
+__all__ = ["studio"]  # the fixture
+pytestmark = pytest.mark.asyncio(loop_scope="session")
+WRONG = {
+    "blocks": {
+        "languageVersion": 0,
+        "blocks": [
+            {
+                "type": "text_print",
+                "id": "bad",
+                "x": 30,
+                "y": 30,
+                "inputs": {"TEXT": {"block": {"type": "lists_getIndex", "fields": {"MODE": "GET", "WHERE": "FIRST"}}}},
+            }
+        ],
+    }
+}
+
+
+async def test_a_class_from_its_code_to_its_results(studio: Open) -> None:
+    teacher, anna = await studio(), await studio()
+    await teacher.click("#tab-group")
+    await teacher.fill("form:nth-of-type(2) input[name=name]", "7b")
+    await teacher.click("form:nth-of-type(2) button")
+    await until(teacher, "document.querySelector('.code')")
+    code = await teacher.inner_text(".code")
+
+    await anna.click("#tab-group")
+    await anna.fill("input[name=code]", code.lower())
+    await anna.fill("form:nth-of-type(1) input[name=name]", "Anna")
+    await anna.click("form:nth-of-type(1) button")
+    await until(anna, f"document.querySelector('#panel').textContent.includes('{code}')")
+    row = "document.querySelector('.pupils li')?.textContent"
+    await until(teacher, f"{row}?.includes('Anna')")
+
+    await loaded(anna, FOREVER)
+    await anna.keyboard.press("F5")
+    await phase(anna, "running")
+    await until(anna, "studio.runner.lit.value === 'count'")
+    words = await anna.evaluate("studio.editor.workspace.getBlockById('count').toString(60)")
+    await until(teacher, f"{row}.includes({words!r})")  # the block that is lit at the pupil's
+    await teacher.click(".pupils button")  # her screen on the projector
+    await until(teacher, "studio.editor.workspace.getAllBlocks(false).length === 3")
+    assert "Anna" in await teacher.evaluate("studio.program.value.name")
+    await teacher.click("#panel .button.danger")  # stop all
+    await phase(anna, "idle")
+
+    await loaded(anna, WRONG)
+    await anna.keyboard.press("F5")
+    await until(anna, "studio.runner.failure.value")
+    failure = await anna.evaluate("studio.runner.failureWords.value")
+    await until(teacher, f"document.querySelector('.pupils li.bad')?.textContent.includes({failure!r})")
+    await anna.click("#panel .button.main")
+    await until(teacher, f"{row}.includes('handed in')")
+    async with teacher.expect_download() as saved:
+        await teacher.click("text=Results as a table")
+    text = await asyncio.to_thread(Path(await (await saved.value).path()).read_text, "utf-8-sig")
+    assert text.splitlines()[0].startswith('"name","robot","stars"')
+    assert text.splitlines()[1].startswith('"Anna","a","0","yes"')
+    await anna.reload()  # still in the class
+    await until(anna, f"document.querySelector('#panel')?.textContent.includes('{code}')")
+    await anna.context.close()
+    await until(teacher, f"{row}.includes('away')")
+    assert teacher.errors == []
