@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
 from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -165,6 +166,8 @@ async def test_signing_out_ends_the_session(guarded: Guarded, open_page: Open) -
     guarded.add("anna", "drive")
     page = await open_page()
     await page.wait_for_selector(".sign")
+    if folder := os.environ.get("ROBOGLOT_PICTURES"):
+        await page.screenshot(path=f"{folder}/sign.png")
     await page.evaluate(AXE)
     assert await page.evaluate("axe.run(document).then((found) => found.violations.map((v) => v.id))") == []
     await sign_in(page, "anna")
@@ -174,6 +177,19 @@ async def test_signing_out_ends_the_session(guarded: Guarded, open_page: Open) -
     await page.wait_for_selector("input[name=password]")
     await page.context.add_cookies([cookie])  # a kept copy is worth nothing
     assert await page.evaluate("fetch('/api/robots').then((r) => r.status)") == 401
+
+
+async def test_the_header_of_a_phone_has_room_for_a_name(guarded: Guarded, open_page: Open) -> None:
+    guarded.add("a-person-with-a-long-name", "drive")
+    page = await open_page()
+    await page.set_viewport_size({"width": 360, "height": 740})
+    await sign_in(page, "a-person-with-a-long-name")
+    await page.wait_for_selector("text=Scan fits map")
+    boxes = [await item.bounding_box() for item in await page.locator("header > *:visible").all()]
+    assert all(box["x"] >= 0 and box["x"] + box["width"] <= 360 for box in boxes)
+    assert await page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    if folder := os.environ.get("ROBOGLOT_PICTURES"):
+        await page.screenshot(path=f"{folder}/phone.png")
 
 
 async def test_a_token_signs_in_and_its_rotation_signs_out(guarded: Guarded, open_page: Open) -> None:
@@ -265,6 +281,8 @@ async def test_pupils_join_by_a_code_and_the_teacher_leads(guarded: Guarded, ope
     assert await pupils[0].evaluate(record) == 403
     emils = shown[0][0][-1]
     await teacher.wait_for_selector(".tile:has-text('Frida'):has-text('is here')")
+    if folder := os.environ.get("ROBOGLOT_PICTURES"):
+        await teacher.screenshot(path=f"{folder}/class.png")
 
     await teacher.click(".tile:has-text('Emil') >> text=Lock")
     await until(lambda: guarded.runtime.fleet.robots[emils][Lease].taken_by == "console teacher")

@@ -54,17 +54,17 @@ function Header() {
   const robots = hello.value?.robots ?? [];
   return html`<header>
     <a class="brand" href="#/live"><img src="/icon.svg" alt="" width="28" height="28" /><b>roboglot</b></a>
-    <label class="robot"><span class="unseen">${t("robot")}</span>
+    ${robots.length > 0 && html`<label class="robot"><span class="unseen">${t("robot")}</span>
       <select value=${current.value} onChange=${(e) => choose(e.target.value)}>
         ${robots.map((r) => html`<option value=${r.name}>${t("robot.named", { name: r.name })}</option>`)}
-      </select></label>
+      </select></label>`}
     <${Link} /><${Charge} /><${Pace} />${recording.value && html`<span class="chip bad" title=${t("record")}>● REC</span>`}
     <span class="grow"></span><${Person} />
     <button type="button" class="button plain" lang=${language.value === "zh" ? "en" : "zh-CN"}
       onClick=${() => { language.value = language.value === "zh" ? "en" : "zh"; }}>${language.value === "zh" ? "EN" : "中文"}</button>
     <${Button} compact kind="plain" icon=${theme.value === "dark" ? "sun" : "moon"} label=${t("theme")}
       onClick=${() => { theme.value = theme.value === "dark" ? "light" : "dark"; }} />
-    <${Stop} />
+    ${robots.length > 0 && html`<${Stop} />`}
   </header>`;
 }
 
