@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 from roboglot.operations import Operation
-from roboglot.protocols.slamware.chapters.motion.action_factories import FACTORIES
+from roboglot.protocols.slamware.chapters.motion.actions import FACTORIES
 from roboglot.protocols.slamware.chapters.uploads import Upload
 from roboglot.protocols.slamware.routes import ALIASES, BEYOND, SHORTHANDS
 from roboglot.protocols.slamware.table import TABLE, NoContent, Text

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import chain
 
 from roboglot.model.actions import Action
 from roboglot.model.clock import Clock
@@ -12,7 +13,7 @@ from roboglot.model.components.motion.legs import FootLift, Posture
 from roboglot.model.errors import Refused
 from roboglot.model.geometry import Orientation, Twist
 from roboglot.simulation.bodies.hull import Hull
-from roboglot.simulation.bodies.performing import Body, Frame, Stance, Track, fall
+from roboglot.simulation.bodies.performing import Body, Frame, Performance, Stance, Track, fall, straighten
 from roboglot.simulation.bodies.support import GRAVITY
 
 
@@ -68,3 +69,11 @@ def check_posture(posture: Posture, before: frozenset[Posture], off: str) -> Non
         raise Refused(f"the robot is {posture}; this begins {' or '.join(sorted(before))}")
     if off:
         raise Refused(off)
+
+
+def given_up(performance: Performance, hull: Hull, body: Body, straight: Body, stance: Stance) -> Iterator[Frame]:
+    """The frames that end a performance before its end: land if need be, then straighten."""
+    if performance.frame and performance.frame.airborne:
+        hull.stop()
+        return chain(landing(hull, body, stance), straighten(straight, stance))
+    return straighten(body, stance)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from itertools import chain
 
 from roboglot.model.actions import Action, ActionStatus, OnBusy
 from roboglot.model.components.motion.driving import BASE
@@ -33,7 +32,6 @@ from roboglot.simulation.bodies.performing import (
     Track,
     dance_frames,
     motion_frames,
-    straighten,
     strayed,
 )
 from roboglot.simulation.bodies.posture_limits import STEP_SECONDS_MAX, added, check_lift, check_pose, check_steps, led
@@ -42,8 +40,8 @@ from roboglot.simulation.bodies.schedule import Duty
 from roboglot.simulation.bodies.walking_body import (
     check_posture,
     followed,
+    given_up,
     held_body,
-    landing,
     no_floor_under,
     swayed,
     walking_effort,
@@ -273,7 +271,7 @@ class SimulatedLegs(Legs):
             await self._until_over(performance)
         except asyncio.CancelledError:
             if action.status is ActionStatus.CANCELING:  # otherwise the loop is closing and its clock may stand still
-                self._give_up(performance)
+                performance.frames = given_up(performance, self._hull, self._body, self._straight, self._stance)
                 await self._until_over(performance)
             raise
         finally:
@@ -289,15 +287,6 @@ class SimulatedLegs(Legs):
     async def _until_over(self, performance: Performance) -> None:
         while not performance.over and self._performance is performance:
             await self._clock.sleep(LOOK)
-
-    def _give_up(self, performance: Performance) -> None:
-        """Land if need be, then straighten."""
-        if performance.frame and performance.frame.airborne:
-            self._hull.stop()
-            coming_down = landing(self._hull, self._body, self._stance)
-            performance.frames = chain(coming_down, straighten(self._straight, self._stance))
-        else:
-            performance.frames = straighten(self._body, self._stance)
 
     # -- every tick --------------------------------------------------------------------------------------------------
 
@@ -338,7 +327,7 @@ class SimulatedLegs(Legs):
         frame = performance.frame
         if frame and not performance.hit and in_the_way(self._hull, frame.twist):
             performance.hit = True
-            self._give_up(performance)
+            performance.frames = given_up(performance, self._hull, self._body, self._straight, self._stance)
         performance.frame = frame = next(performance.frames, None)
         if frame is None:
             performance.over = True
