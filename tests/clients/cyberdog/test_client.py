@@ -175,14 +175,14 @@ EXAMPLES: dict[int, values.Value] = {
 async def test_every_push_arrives_as_its_value(client: CyberDogClient, door: CyberDogDoor) -> None:
     assert {int(code) for code in pushes} - {int(Code.VIDEO)} == EXAMPLES.keys()
     await client.found()
-    await _until(lambda: door._dog.app.connected)
+    await _until(lambda: door._context.app.connected)
     for code, value in EXAMPLES.items():
         with client.watch(type(value)) as told:
-            door._dog.app.push(pushes[code], msgspec.to_builtins(value))
+            door._context.app.push(pushes[code], msgspec.to_builtins(value))
             async with asyncio.timeout(5):
                 assert await anext(told) == value
     with client.signals.subscribe() as signals:
-        door._dog.app.push(pushes[Code.VIDEO], {"is_closed": True, "uid": "x"})
+        door._context.app.push(pushes[Code.VIDEO], {"is_closed": True, "uid": "x"})
         async with asyncio.timeout(5):
             assert await anext(signals) == End("x", done=True)
 
@@ -238,12 +238,12 @@ async def test_files_come_whole_with_their_share(client: CyberDogClient, door) -
 
 async def test_pictures_move(client: CyberDogClient, door, world) -> None:
     await client.found()
-    await _until(lambda: door._dog.app.connected)
+    await _until(lambda: door._context.app.connected)
     async with asyncio.timeout(30), client.video() as pictures:
         first = await pictures.next()
         await pictures.next()
     assert (first.width, first.height) == (1280, 720)
-    await _until(lambda: door._dog.video.viewers == 0)
+    await _until(lambda: door._context.video.viewers == 0)
 
 
 async def test_a_dead_link_is_told_at_once_and_mends(client: CyberDogClient, door: CyberDogDoor) -> None:
