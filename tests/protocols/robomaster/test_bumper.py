@@ -52,3 +52,22 @@ async def test_a_blow_is_an_impact_although_the_bumper_brakes(speed: float, clie
     await forward(seconds=0.1)
     assert (await client.ask("chassis status ?;")).rstrip(";").split()[6:8] == ["1", "0"]
     assert "1" not in [along for along, _ in flags[:-1]]
+
+
+@pytest.mark.world("empty", body="hermes")
+async def test_emergency_braking_fails_what_drives_on(client, world, forward) -> None:
+    world.hands.place("a", Pose(3.0, 5.0, 0.0))
+    world.hands.add_obstacle(Pose(4.5, 5.0), (0.3, 1.0, 1.0))
+    await forward(seconds=0.5)
+    answers = []
+    for _ in range(8):
+        answers.append(await client.ask("chassis speed x 0.5;"))
+        await forward(seconds=3)
+    where = world.truth.pose_of("a").x
+    assert (answers[0], answers[-1]) == (OK, FAIL)
+    assert await client.ask("chassis wheel w1 100 w2 100 w3 100 w4 100;") == FAIL
+    await forward(seconds=1)
+    assert world.truth.pose_of("a").x == pytest.approx(where, abs=0.01)
+    assert await client.ask("chassis speed x -0.3;") == OK
+    await forward(seconds=1)
+    assert world.truth.pose_of("a").x < where - 0.1

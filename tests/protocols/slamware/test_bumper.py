@@ -61,3 +61,30 @@ async def test_a_robot_in_plain_view_is_not_shoved(client: httpx.AsyncClient, wo
         await push(client, FORWARD)
     assert (await state(client, reply))["result"] == -1
     assert world.truth.pose_of("a").x == pytest.approx(4.0 - 0.15 - 0.25, abs=0.01)
+
+
+@pytest.mark.world("empty", body="hermes")
+async def test_emergency_braking_ends_the_move_with_its_reason(
+    client: httpx.AsyncClient, world: World, forward: Forward
+) -> None:
+    world.hands.place("a", Pose(3.0, 5.0, 0.0))
+    world.hands.add_obstacle(Pose(5.0, 5.0), (0.3, 1.0, 1.0))
+    await forward(seconds=1)
+    for _ in range(20):
+        reply = await push(client, FORWARD)
+        if reply.status_code != 200:
+            break
+        await forward(seconds=3.0)
+        ended = await state(client, reply)
+        assert ended["status"] == 4
+        if ended["result"] == -1:
+            assert ended["reason"] == "PATH_OCCUPIED"
+    refused = await push(client, FORWARD)
+    assert refused.status_code == 400
+    assert "emergency braking" in refused.text
+    assert await triggered(client) == 0  # it touches nothing
+    where = world.truth.pose_of("a")
+    assert where.x < 5.0 - 0.15 - 0.25
+    assert (await push(client, BACKWARD)).status_code == 200
+    await forward(seconds=1)
+    assert world.truth.pose_of("a").x < where.x - 0.2

@@ -161,6 +161,8 @@ class OdometryDriving(Driving):
         if (refusal := self._robot[Base].refusal) is not None:
             raise type(refusal)(*refusal.args)
         self._robot[Base].check_free(command)
+        if (hindrance := self._robot[Base].hindrance(command)) is not None:
+            raise hindrance
 
     def _apply(self, velocity: Twist | WheelSpeeds) -> None:
         if isinstance(velocity, Twist):
@@ -179,6 +181,8 @@ class OdometryDriving(Driving):
                 await self._hold_at_most(action, left)
                 continue
             self._apply(command.velocity)
+            if (hindrance := self._robot[Base].hindrance(command.velocity)) is not None:
+                raise hindrance
             await clock.sleep(min(PERIOD, left))
         if self._command is command:
             self._action = None  # it brakes from now on: what comes meanwhile begins anew

@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from roboglot.model.errors import (
+    Blocked,
     Busy,
-    Collided,
     ComponentMissing,
     DockNotFound,
     Expired,
@@ -48,7 +48,7 @@ STATUSES: dict[type[RobotError], tuple[int, str]] = {
     Busy: (403, "operation fail"),
     NotReady: (503, "Service Unavailable"),
     Refused: (403, "operation fail"),
-    Collided: (403, "operation fail"),
+    Blocked: (403, "operation fail"),
     Expired: (504, "Gateway Timeout"),
     Unreachable: (400, "Bad Request"),
     RobotError: (500, "Internal Server Error"),

@@ -6,7 +6,7 @@ from abc import abstractmethod
 from dataclasses import dataclass
 
 from roboglot.model.components.component import Component
-from roboglot.model.errors import Refused
+from roboglot.model.errors import Blocked, Refused
 from roboglot.model.geometry import Twist
 
 
@@ -51,6 +51,13 @@ class Base(Component):
     def check_free(self, command: Twist | WheelSpeeds) -> None:
         """Raise at once what driving so would abort with: Collided where the hull touches something on that side."""
         return
+
+    def hindrance(self, command: Twist | WheelSpeeds) -> Blocked | None:
+        """Return what keeps it from driving so without touching it (emergency braking, a cliff); None if nothing does.
+
+        The base turns as commanded and stands otherwise; who plans a way around may go on.
+        """
+        return None
 
     @abstractmethod
     def set_velocity(self, twist: Twist) -> None:

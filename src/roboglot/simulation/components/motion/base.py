@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from roboglot.model.components.motion.base import Base, BaseLimits, WheelSpeeds
 from roboglot.model.components.motion.legs import LEGS
-from roboglot.model.errors import Collided, InvalidGoal, Refused
+from roboglot.model.errors import Blocked, Collided, InvalidGoal, Refused
 from roboglot.model.geometry import STILL, Twist
 from roboglot.simulation.bodies.body import BaseSection
 from roboglot.simulation.bodies.hull import Hull
@@ -42,7 +42,7 @@ class SimulatedBase(Base):
         self._twist = STILL
         self._wheels = NO_WHEELS
         self._locks: dict[str, Refused] = {}
-        self._bars: dict[str, tuple[bool, bool]] = {}
+        self._bars: dict[str, tuple[bool, bool, str]] = {}
         self._touching: tuple[tuple[float, float], ...] = ()
         self.pace = math.inf  # m/s that what stands ahead allows
         self._carried = False
@@ -108,10 +108,10 @@ class SimulatedBase(Base):
         """``who`` has no objection any more; does nothing if it had none."""
         self._locks.pop(who, None)
 
-    def bar(self, who: str, *, ahead: bool = False, behind: bool = False) -> None:
+    def bar(self, who: str, *, ahead: bool = False, behind: bool = False, reason: str = "") -> None:
         """Do not drive forwards or backwards, whatever is asked, until ``who`` bars it no more."""
         if ahead or behind:
-            self._bars[who] = ahead, behind
+            self._bars[who] = ahead, behind, reason
         else:
             self._bars.pop(who, None)
 
@@ -140,6 +140,15 @@ class SimulatedBase(Base):
     def check_free(self, command: Twist | WheelSpeeds) -> None:
         if self._touching and self._presses(command if isinstance(command, Twist) else self._body_of(command)):
             raise Collided("the bumper is pressed: the robot moves only away from what it touches")
+
+    def hindrance(self, command: Twist | WheelSpeeds) -> Blocked | None:
+        if not self._bars:
+            return None
+        way = (command if isinstance(command, Twist) else self._body_of(command)).x
+        for who, (ahead, behind, reason) in self._bars.items():
+            if (ahead and way > 0.0) or (behind and way < 0.0):
+                return Blocked(f"{who} stopped the robot: {reason}")
+        return None
 
     @property
     def dead_wheels(self) -> frozenset[str]:
@@ -199,7 +208,7 @@ class SimulatedBase(Base):
     def _respect_bars(self) -> None:
         """Block at once what is barred; a turn on the spot stays possible."""
         target = self._target if isinstance(self._target, Twist) else self._body_of(self._target)
-        for ahead, behind in self._bars.values():
+        for ahead, behind, _ in self._bars.values():
             if (ahead and target.x > 0.0) or (behind and target.x < 0.0):
                 self._target = target = Twist(0.0, 0.0, target.yaw)
             if (ahead and self._twist.x > 0.0) or (behind and self._twist.x < 0.0):

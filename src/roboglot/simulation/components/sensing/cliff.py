@@ -15,7 +15,7 @@ from roboglot.simulation.bodies.schedule import Duty
 from roboglot.simulation.building.floor_edges import Footing
 from roboglot.simulation.components.motion.base import SimulatedBase
 
-WHO = "cliff"
+WHO = "the cliff sensor"
 PLACES = {  # direction in base_link, of the hull's radius
     "front": (1.0, 0.0),
     "front left": (0.78, 0.63),
@@ -71,7 +71,9 @@ class SimulatedCliff(Cliff):
         before, self._detected = self._detected, seen
         if seen == before:
             return
-        self._base.bar(WHO, ahead=any("front" in zone for zone in seen), behind="rear" in seen)
+        ahead, behind = any("front" in zone for zone in seen), "rear" in seen
+        reason = f"the floor ends {'ahead' if ahead else 'behind'}"
+        self._base.bar(WHO, ahead=ahead, behind=behind, reason=reason)
         for zone in self.zones:
             if zone in seen and zone not in before:
                 self._events.publish(CliffDetected(stamp=stamp, zone=zone))
