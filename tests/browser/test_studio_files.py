@@ -1,0 +1,58 @@
+"""What opens: examples and the language guide's programs as text, unchanged; files and the app's style as blocks."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.browser.served import until
+from tests.browser.test_studio import COUNTING, Open, loaded, studio
+from tests.programs.test_language_guide import shown
+
+__all__ = ["studio"]  # the fixture
+pytestmark = pytest.mark.asyncio(loop_scope="session")
+EXAMPLES = Path(__file__).parents[2] / "examples" / "programs"
+FILE = {"name": "f.py", "mimeType": "text/x-python"}
+
+
+async def test_examples_and_the_guides_programs_open_as_text_unchanged(studio: Open) -> None:
+    page = await studio()
+    files = await asyncio.to_thread(lambda: {path.name: path.read_text("utf-8") for path in EXAMPLES.glob("*.py")})
+    guide = {f"guide{n}.py": text for n, (kind, text, _) in enumerate(shown("language.md")) if kind == "python"}
+    assert len(files) >= 20
+    assert len(guide) >= 10
+    for name, text in (files | guide).items():
+        await page.click("text=Programs")
+        await page.set_input_files("input[type=file]", {**FILE, "name": name, "buffer": text.encode()})
+        await until(page, f"studio.program.value.name === {name[:-3]!r} && !document.querySelector('dialog')")
+        assert await page.evaluate("studio.program.value.kind") == "text"
+        assert await page.inner_text(".notice") != ""  # it says so
+        held = await page.evaluate("JSON.parse(localStorage['studio.program.' + studio.program.value.id]).body")
+        assert held == text, name
+    assert page.errors == []
+
+
+@pytest.mark.parametrize("wanted", ["For the app (style)", "Program"])
+async def test_a_program_of_blocks_comes_back_from_its_file(studio: Open, wanted: str) -> None:
+    page = await loaded(await studio(), COUNTING)
+    await until(page, "studio.editor.code.value.includes('print')")
+    code, state = await page.evaluate("[studio.editor.code.value, JSON.stringify(studio.editor.save())]")
+    await page.click("text=Programs")
+    async with page.expect_download() as saved:
+        await page.get_by_role("button", name=wanted, exact=True).click()
+    text = await asyncio.to_thread(Path(await (await saved.value).path()).read_text, "utf-8")
+    assert "blocks" in text
+    await page.set_input_files("input[type=file]", {"name": "g.json", "mimeType": "", "buffer": text.encode()})
+    await until(page, "!document.querySelector('dialog')")
+    assert await page.evaluate("[studio.editor.code.value, JSON.stringify(studio.editor.save())]") == [code, state]
+    assert await page.evaluate("studio.program.value.kind") == "blocks"
+    style = json.dumps(json.loads(state))  # as frames carry it: text in a field
+    frame = json.dumps({"describe": "from a frame", "style": style, "body": code}).encode()
+    await page.click("text=Programs")
+    await page.set_input_files("input[type=file]", {"name": "h.json", "mimeType": "", "buffer": frame})
+    await until(page, "studio.program.value.name === 'from a frame'")
+    assert await page.evaluate("[studio.editor.code.value, JSON.stringify(studio.editor.save())]") == [code, state]
+    assert page.errors == []
