@@ -333,7 +333,7 @@ def set_up(stage: Stage, scene: Scene) -> None:
 
 
 def act(stage: Stage, given: Act) -> None:
-    """Have something happen in the world. Raises ValueError for what nobody can do."""
+    """Have something happen in the world. Raises ValueError for what no one can do."""
     match given.kind, given.who:
         case "touch", _:
             stage.touch(ROBOT, TouchKind[given.text.upper() or "SINGLE"])

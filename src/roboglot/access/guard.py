@@ -161,7 +161,7 @@ class Guard:
         return self._handshakes.take(host) and self._handshakes_together.take("")
 
     def _by_token(self, proof: Proof) -> str | None:
-        """Who shows this certificate or token. Nobody guesses one, so it counts whoever else was wrong before."""
+        """Who shows this certificate or token. No one guesses one, so it counts anyone else who was wrong before."""
         if proof.kind is not HTTP:
             return self._certified(proof)
         scheme, _, rest = proof.value.partition(" ")

@@ -120,7 +120,7 @@ class Tools:
         return await self._act(robot, "drive", values, seconds + 5.0)
 
     async def stop(self, robot: Robot = DEFAULT) -> str:
-        """Stop everything that moves the robot, whoever began it."""
+        """Stop everything that moves the robot, no matter who began it."""
         await _asked(self._console.post("robots", robot, "stop", values={}))
         return "it stands"
 
@@ -175,8 +175,8 @@ class Tools:
             if seen["status"] in ("SUCCEEDED", "CANCELED", "ABORTED"):
                 break
         pose = (await _asked(self._console.get("robots", robot)))["pose"]
-        told = {key: seen[key] for key in ("id", "status", "reason") if key in seen}
-        return told | {"pose": [round(value, 3) if math.isfinite(value) else None for value in pose]}
+        known = {key: seen[key] for key in ("id", "status", "reason") if key in seen}
+        return known | {"pose": [round(value, 3) if math.isfinite(value) else None for value in pose]}
 
 
 async def _beats(seconds: float) -> Any:

@@ -1,4 +1,4 @@
-"""``roboglot doctor --security``: what listens where, who may reach it, rights nobody uses, weak spots in words."""
+"""``roboglot doctor --security``: what listens where, who may reach it, rights no one uses, weak spots in words."""
 
 from __future__ import annotations
 

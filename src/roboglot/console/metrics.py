@@ -1,6 +1,6 @@
 """``/metrics``: what robots and their doors do, in Prometheus's text format (docs/metrics.md lists every name).
 
-Requests are counted from the first scrape on: until somebody scrapes, the tap costs nothing. Labels come from robots,
+Requests are counted from the first scrape on: until someone scrapes, the tap costs nothing. Labels come from robots,
 doors and contracts, never from what a client sends.
 """
 
@@ -100,7 +100,7 @@ class Metrics:
 
 
 class _Now(Collector):
-    """What is the case when somebody scrapes."""
+    """What is the case when someone scrapes."""
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk

@@ -11,7 +11,7 @@ from roboglot.model.geometry import Point, Pose, Twist
 
 @dataclass(frozen=True, slots=True)
 class Act:
-    """What happens ``at`` so many seconds: ``who`` does ``kind`` (say, gesture, walk; touch and box need nobody)."""
+    """What happens ``at`` so many seconds: ``who`` does ``kind`` (say, gesture, walk; touch and box need no one)."""
 
     at: float
     kind: str

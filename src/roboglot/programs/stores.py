@@ -22,7 +22,7 @@ class StoredProgram:
 
     ``style`` is the editor's own text, ``state`` a word of the state table. ``due``: when a scheduled task runs, in
     seconds since 1970; None: no time is set. ``owner``: who wrote or ran a task last, and so what it may do; empty:
-    nobody was asked.
+    no one was asked.
     """
 
     id: str

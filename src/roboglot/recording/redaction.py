@@ -49,7 +49,7 @@ class Redaction:
         self._in_query = re.compile(rb"([?&; ](?:" + names + rb")=)[^&;\s\"]*", re.IGNORECASE)
 
     def __call__(self, payload: bytes) -> bytes:
-        """Return ``payload`` without what must not be told."""
+        """Return ``payload`` without what must stay secret."""
         if self._some is None or not self._some.search(payload):
             return payload
         payload = self._in_json.sub(rb"\1\2\1\3\1" + REDACTED + rb"\1", payload)

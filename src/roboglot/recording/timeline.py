@@ -20,7 +20,7 @@ EARLIER = 0.25  # s: so long an answer waits for pushes that were recorded befor
 class _Item:
     due: float
     number: int
-    send: Callable[[], bool] = field(compare=False)  # whether somebody else goes on from here
+    send: Callable[[], bool] = field(compare=False)  # whether someone else goes on from here
 
 
 class Timeline:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from roboglot.storage.database import connect
 
-OF_OTHERS = frozenset({"cloud_record"})  # tables that name a robot and belong to somebody else
+OF_OTHERS = frozenset({"cloud_record"})  # tables that name a robot and belong to someone else
 
 
 def copy_robot(robot: str, source: Path, target: Path) -> int:

@@ -17,7 +17,7 @@ def give_back(addresses: Iterable[str]) -> None:
 
 
 def free_addresses(count: int) -> str:
-    """Return the first of so many loopback addresses in a row that nobody on this machine uses for robots."""
+    """Return the first of so many loopback addresses in a row that no one on this machine uses for robots."""
     worker = int("".join(filter(str.isdigit, os.environ.get("PYTEST_XDIST_WORKER", ""))) or 0) % 250
     for attempt in range(FREE_TRIES):
         block = (os.getpid() + 7 * attempt) % 120

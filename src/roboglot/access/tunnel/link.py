@@ -9,7 +9,7 @@ from typing import cast
 
 from roboglot.access.tunnel.frames import HEAD, BadFrame, Frame, Kind, encode
 
-EARLY_MAX = 16  # frames before somebody takes them
+EARLY_MAX = 16  # frames before someone takes them
 
 Take = Callable[[Kind, int, bytes], None]
 _KINDS = {int(kind): kind for kind in Kind}
@@ -66,7 +66,7 @@ class Link(asyncio.Protocol):
         return self._early.popleft()
 
     def follow(self, take: Take, crowded: Callable[[bool], None]) -> None:
-        """Hand on every frame from now on; ``crowded`` is told when much waits to be sent, and when no more."""
+        """Hand on every frame from now on; ``crowded`` is called when much waits to be sent, and when no more."""
         self._take, self._crowded = take, crowded
         try:
             while self._early:

@@ -1,6 +1,6 @@
 """Where the dock is on the map, and what its contacts say of where the robot is. Moves nothing.
 
-A dock whose place is known says where a robot is that has lost its place on it; a pose that somebody gives says nothing
+A dock whose place is known says where a robot is that has lost its place on it; a pose that someone gives says nothing
 of where the dock is until the map confirms it.
 """
 

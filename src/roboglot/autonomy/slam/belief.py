@@ -14,7 +14,7 @@ from roboglot.model.events import LostReason
 from roboglot.model.geometry import ORIGIN, Pose
 
 SURE = (0.003**2, 0.003**2, 0.002**2)  # m2, m2, rad2: the smallest variances ever believed
-TOLD = (0.15**2, 0.15**2, 0.1**2)  # variances of a pose that a client gave
+SET_BY_CLIENT = (0.15**2, 0.15**2, 0.1**2)  # variances of a pose that a client gave
 
 
 def _sure() -> NDArray[np.float64]:
@@ -59,7 +59,7 @@ class Belief:
     def take_pose(self, pose: Pose) -> None:
         """Use a pose that a client gave."""
         self.move_to(pose, self.odometry.reading.pose)
-        self.covariance = np.diag(TOLD)
+        self.covariance = np.diag(SET_BY_CLIENT)
         self.search = True
 
     def take_map(self, grid: EvidenceGrid, pose: Pose) -> None:

@@ -69,7 +69,7 @@ class Sighting:
 
 
 class LoopCloser:
-    """Told every scan that is added to the map."""
+    """Gets every scan that is added to the map."""
 
     def __init__(self, belief: Belief) -> None:
         self._belief = belief

@@ -147,7 +147,7 @@ class Slam:
         return self._trajectory.points(self._loops.keyframes)
 
     def _jumped(self, event: PoseJumped) -> None:
-        """The next scans show whether a pose that somebody gave is right."""
+        """The next scans show whether a pose that someone gave is right."""
         self._displacement.forget(event.stamp)
         if event.given:
             self.whereabouts.be_given(event.stamp)

@@ -25,7 +25,7 @@ INTERVAL_GAIN = 0.1
 
 
 class Whereabouts:
-    """Told what the map says of every matched scan; keeps ``belief.lost``."""
+    """Hears what the map says of every matched scan; keeps ``belief.lost``."""
 
     def __init__(self, belief: Belief, events: EventStream) -> None:
         self._belief, self._events = belief, events

@@ -1,6 +1,6 @@
 """A program tried on a copy of the world before the robot does it, or in a mission's world to be judged.
 
-One page tries one program at a time. What happens there is told as it happens, ten times as fast as life.
+One page tries one program at a time. What happens there is sent as it happens, ten times as fast as life.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ class ScanTaken(Event):
 class PoseJumped(Event):
     """The robot's pose was set, or found to be elsewhere: the pose in the map changed without driving.
 
-    ``given``: it was set by somebody; ``PoseConfirmed`` or ``LocalizationLost`` says what the map makes of it.
+    ``given``: it was set by someone; ``PoseConfirmed`` or ``LocalizationLost`` says what the map makes of it.
     """
 
     pose: Pose
@@ -35,7 +35,7 @@ class PoseJumped(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PoseConfirmed(Event):
-    """The scans fit the map at a pose that somebody gave, or that was found after ``RobotDisplaced``."""
+    """The scans fit the map at a pose that someone gave, or that was found after ``RobotDisplaced``."""
 
     pose: Pose
 

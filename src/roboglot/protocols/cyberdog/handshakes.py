@@ -23,7 +23,7 @@ LATER = 1.0  # s, outside time, until a handshake is over
 QUIET = 10.0  # s between two lines about one host
 LOOK_PERIOD = 0.1  # s between two looks at the table
 TABLE_MAX = 128 * 1024  # bytes of it that are read
-WATCHED_MAX = 256  # connections whose handshake is under way, and hosts that were told about
+WATCHED_MAX = 256  # connections whose handshake is under way, and hosts that were logged
 ASKED_MAX = 2048  # connections that are remembered for having asked for something
 
 

@@ -98,7 +98,7 @@ def compare(
 
 
 def answers_only(exchanges: Sequence[Exchange]) -> list[Exchange]:
-    """Leave out pushes: for sessions whose requests are sent again, where nobody listens for them as before."""
+    """Leave out pushes: for sessions whose requests are sent again, where no one listens for them as before."""
     return [exchange for exchange in exchanges if exchange.direction is not Direction.PUSH]
 
 

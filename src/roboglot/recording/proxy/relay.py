@@ -254,7 +254,7 @@ class _Pushes(asyncio.DatagramProtocol):
 
 
 class _Events(Sniffer):
-    """The EP's event port: the robot speaks, and nobody asks."""
+    """The EP's event port: the robot speaks, and no one asks."""
 
     _rest = b""
 

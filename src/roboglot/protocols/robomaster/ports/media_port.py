@@ -1,6 +1,6 @@
 """The video and audio ports: bytes for everybody connected while the stream is on (manual 3.2.17, 3.2.18; chapter 6).
 
-Who connects before ``stream on`` waits; who connects in the middle begins with a key picture. While nobody is
+Who connects before ``stream on`` waits; who connects in the middle begins with a key picture. While no one is
 connected nothing is subscribed to, so nothing is drawn or encoded.
 """
 

@@ -175,7 +175,7 @@ async def camera(call: Call, *, command: Int32) -> dict[str, int]:
 
 
 def _told(error: Exception) -> FileError:
-    return next((told for kind, told in ERRORS if isinstance(error, kind)), FileError.NOT_THERE)
+    return next((code for kind, code in ERRORS if isinstance(error, kind)), FileError.NOT_THERE)
 
 
 def _reading(path: Path, start: int) -> Callable[[], bytes]:
