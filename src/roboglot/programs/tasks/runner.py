@@ -204,8 +204,9 @@ class Runner:
         if step:
             step()
         await self._store.set_state(run.task.id, run.state)
-        await run.resume()
+        # First: a program that goes on may begin a block, and halt there, before this one is asked again.
         self.reports.publish(done(TaskOperation.RECOVER, run.task.id, run.state))
+        await run.resume()
 
     async def _supervise(self, run: TaskRun) -> None:
         """Follow a run from start to stop, unless it is ended in between."""
