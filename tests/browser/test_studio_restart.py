@@ -96,6 +96,7 @@ async def test_a_killed_server_gives_the_program_back(server: tuple[str, Life], 
     await first.wait()
     await until(page, "document.querySelector('.banner.bad')")
     await start()
+    await until(page, "!document.querySelector('.banner.bad')")  # what it shows meanwhile is from before
     await until(page, f"{HELD} === 'say'")
     second = await context.new_page()  # another tab sees the same
     await second.goto(f"{url}/studio/")
