@@ -20,7 +20,7 @@ TRANSCRIPT = re.compile(r"^```text\n(> .*?)^```$", re.MULTILINE | re.DOTALL)
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?![\d.])")
 CAUSES = {  # the comments of both pages
     "a hand taps the rear plate": "hand", "有人拍后装甲板": "hand",
-    "somebody claps twice": "claps", "有人鼓掌两次": "claps",
+    "someone claps twice": "claps", "有人鼓掌两次": "claps",
     "2.5 V at port 2 of adapter 3": "volts", "3 号转接板 2 号端口接上 2.5 V": "volts",
     "the pilot holds W and the left button": "keys", "操作手按住 W 与鼠标左键": "keys",
     "it stands before a marker": "place", "它站在视觉标签前": "place",
