@@ -168,3 +168,18 @@ async def test_the_broker_says_when_the_robot_is_gone(yard: Opened) -> None:
     ].keys()
     await one.close()
     await one.until(lambda: one.control.heard["connection"][-1]["connectionState"] == "OFFLINE", 0)
+
+
+async def test_a_message_that_breaks_the_door_ends_nothing(yard: Opened, monkeypatch: pytest.MonkeyPatch) -> None:
+    one = await yard()
+    (door,) = one.runtime.doors["a"]._doors
+
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError("a defect")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(door._session, "check", broken)
+        one.control.send("order", order("one", [(0, 0), (0.5, 0)]))
+        await one.until(lambda: any("broke" in e["errorDescription"] for e in one.control.state["errors"]))
+    one.control.send("order", order("two", [(0, 0), (0.5, 0)]))
+    await one.until(lambda: one.control.state["lastNodeId"] == "n1")

@@ -25,7 +25,7 @@ from roboglot.protocols.vda5050.session import Error, Session
 from roboglot.protocols.vda5050.table import TABLE
 from roboglot.transport.seldom import Seldom
 from roboglot.wire.vda5050.orders import MESSAGE_MAX
-from roboglot.wire.vda5050.versions import VERSIONS
+from roboglot.wire.vda5050.versions import VERSIONS, ErrorKind
 
 log = logging.getLogger(__name__)
 RETRY = 2.0  # s between two tries to reach the broker
@@ -164,6 +164,11 @@ class Vda5050Door:
         except Rejected as rejected:
             status, why = self._version.error(rejected.kind), str(rejected)
             self._session.refuse(rejected)
+        except Exception as error:  # one message must not end the link to fleet control
+            log.exception("robot %s: %s broke", self._robot.id, name)
+            broken = Rejected(ErrorKind.NOT_AVAILABLE, f"{name} broke: {error}")
+            status, why = self._version.error(broken.kind), str(broken)
+            self._session.refuse(broken)
         if tap.watched:
             tap.reply(self.name, name, b"", status, why, began)
 
