@@ -137,3 +137,15 @@ async def test_a_goal_on_the_way_that_is_walled_in_fails(tour: Tour) -> None:
     track = [tour.truth]
     await tour.end_of(action)
     assert isinstance(action.error, Blocked), (action.reason, track)
+
+
+@pytest.mark.world("office", body="hermes")
+async def test_a_middle_goal_at_the_dock_itself(tour: Tour) -> None:
+    wanted = [Point(1.0, 0.0), Point(0.0, 0.0), Point(1.0, 0.3)]
+    action = tour.robot[Navigation].navigate_to(wanted, NavigationOptions(tolerance=TOLERANCE))
+    track = [tour.truth.relative_to(tour.start)]
+    while not action.status.ended:
+        await tour.clock.advance(0.1)
+        track.append(tour.truth.relative_to(tour.start))
+    assert action.status is ActionStatus.SUCCEEDED, action.reason
+    assert passed_in_order(track, wanted, TOLERANCE + LOCALIZATION) == len(wanted)

@@ -25,7 +25,7 @@ from weakref import WeakKeyDictionary
 
 from roboglot.kernels import MODULES
 
-WORKERS_MAX = 4  # compilers at once; each takes up to 250 MB
+WORKERS_MAX = 4  # compilers at once; each takes up to 350 MB
 HERE = Path(__file__).parent
 _turns: WeakKeyDictionary[asyncio.AbstractEventLoop, asyncio.Lock] = WeakKeyDictionary()
 Report = Callable[[str, int, int], None]  # the kernel that is ready, how many are, of how many

@@ -80,6 +80,10 @@ class Follower:
             self._passed += 1
         self.along, self.beside = self.route.advance(pose, self._passed)
 
+    def pass_goal(self) -> None:
+        """Count the next goal as reached: the robot cannot come nearer than it is."""
+        self._passed += not self.last
+
     def carrot(self) -> tuple[Point, float]:
         """The point to aim for, no farther than the next goal; and how far along it lies."""
         goal_along = self.route.goals_along[self._passed]

@@ -133,7 +133,7 @@ class Pilot:
     async def _is_over(self, follower: Follower) -> bool:
         """True where it should brake. Raises Blocked or NotLocalized where it gives up."""
         await self._hold(follower)
-        pose, patience = self._belief.pose, self._patience
+        pose, patience, tuning = self._belief.pose, self._patience, self._tuning
         follower.locate(pose)
         self._journey.far += follower.speed * PERIOD
         self._count(follower, pose)
@@ -146,8 +146,17 @@ class Pilot:
         if patience.spent:
             where = f"{follower.left:.1f} m before the goal{self._lookout.squeeze}"
             raise Blocked(f"the way was blocked for {patience.seconds:g} s, {where}")
-        near = follower.last and pose.distance_to(self._goal.points[-1]) <= self._goal.options.tolerance
-        return near and stood > self._tuning.good_enough_seconds  # something stands in the goal itself
+        if stood <= tuning.good_enough_seconds or not self._is_near(follower, pose):
+            return False
+        if follower.last:
+            return True
+        follower.pass_goal()
+        return False
+
+    def _is_near(self, follower: Follower, pose: Pose) -> bool:
+        """True within the tolerance of the next goal: near enough where something stands in the goal itself."""
+        goal = self._goal.points[self._replanner.passed(follower)]
+        return pose.distance_to(goal) <= self._goal.options.tolerance
 
     async def _turn(self, follower: Follower) -> State:
         """To the final yaw, keeping the place."""

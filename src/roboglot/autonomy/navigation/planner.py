@@ -78,6 +78,8 @@ class Task:
         start = self.start
         for number, goal in enumerate(self.goals, start=1):
             leg = self._leg(cost, start, goal, f"goal {number} at ({goal.x:.2f}, {goal.y:.2f})")
+            if not legs:
+                self._open_way_out(cost, leg)
             legs.append(leg if not legs else leg[1:])
             start = goal
         route = Route(legs, self.goals, self.tolerance)
@@ -153,11 +155,22 @@ class Task:
             NEAR_COST,
             UNKNOWN_COST,
         )
-        reach = (self.radius - SQUEEZE) / RESOLUTION
-        reopen(cost, self.evidence, self.seen, self.since, self.trodden, reach, 1.0 + NEAR_COST + UNKNOWN_COST)
+        self._reopen(cost)
         if rules and rules.extra is not None:
             cost += rules.extra
         return cost
+
+    def _reopen(self, cost: NDArray[np.float32]) -> None:
+        """Open what the robot has trodden as far as the hull fits."""
+        reach = (self.radius - SQUEEZE) / RESOLUTION
+        reopen(cost, self.evidence, self.seen, self.since, self.trodden, reach, 1.0 + NEAR_COST + UNKNOWN_COST)
+
+    def _open_way_out(self, cost: NDArray[np.float32], leg: NDArray[np.float64]) -> None:
+        """Let later legs come back by the way on which the first one leaves a narrow place, such as a dock."""
+        here, there = Point(*leg[0].tolist()), Point(*leg[min(1, len(leg) - 1)].tolist())
+        if here.distance_to(there) <= ESCAPE_MAX:
+            _mark_line(self.trodden, self.corner, here, there)
+            self._reopen(cost)
 
     def _leg(self, cost: NDArray[np.float32], start: Point, goal: Point, name: str) -> NDArray[np.float64]:
         """Vertices from ``start`` to ``goal`` in map."""
@@ -283,15 +296,9 @@ class Planner:
         if self.radius > self._trodden_radius:  # it carries more than what got through there
             self._trodden[:] = 0
         self._trodden_radius = self.radius
-        if last is None or (length := last.distance_to(pose)) > TREAD_MAX:
-            last, length = pose, 0.0
-        corner, count = self._belief.map.corner, math.ceil(length / RESOLUTION) + 1
-        x = np.linspace(last.x - corner.x, pose.x - corner.x, count) / RESOLUTION
-        y = np.linspace(last.y - corner.y, pose.y - corner.y, count) / RESOLUTION
-        for column, row in zip(
-            np.floor(x - 0.5).astype(int).tolist(), np.floor(y - 0.5).astype(int).tolist(), strict=True
-        ):
-            self._trodden[max(0, row) : max(0, row + 2), max(0, column) : max(0, column + 2)] = 1
+        if last is None or last.distance_to(pose) > TREAD_MAX:
+            last = pose
+        _mark_line(self._trodden, self._belief.map.corner, last.point, pose.point)
 
     def free_way(self, path: NDArray[np.float64], points: NDArray[np.float64], pose: Pose, margin: float) -> float:
         """Metres along ``path`` that the hull can go before one of ``points`` is within ``margin`` m; inf: all."""
@@ -369,3 +376,13 @@ def _without(evidence: NDArray[np.int16], corner: Point, gone: NDArray[np.float6
         part = kept[max(0, row - reach) : max(0, row + reach + 1), max(0, column - reach) : max(0, column + reach + 1)]
         part[part > 0] = -1
     return kept
+
+
+def _mark_line(trodden: NDArray[np.uint8], corner: Point, start: Point, end: Point) -> None:
+    """Set the cells of ``trodden`` under a straight way, two cells wide."""
+    count = math.ceil(start.distance_to(end) / RESOLUTION) + 1
+    x = np.linspace(start.x - corner.x, end.x - corner.x, count) / RESOLUTION
+    y = np.linspace(start.y - corner.y, end.y - corner.y, count) / RESOLUTION
+    columns, rows = np.floor(x - 0.5).astype(int).tolist(), np.floor(y - 0.5).astype(int).tolist()
+    for column, row in zip(columns, rows, strict=True):
+        trodden[max(0, row) : max(0, row + 2), max(0, column) : max(0, column + 2)] = 1
