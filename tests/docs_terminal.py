@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from roboglot.config import Config, RobotConfig
+from roboglot.config import Config, ConsoleConfig, RobotConfig
 from roboglot.model.clock import LockstepClock
 from roboglot.model.events import BumperPressed
 from roboglot.model.geometry import Pose
@@ -178,7 +178,9 @@ async def terminal(folder: Path, address: str, body: str = "universal") -> Async
     (folder / "examples").symlink_to(ROOT / "examples")
     dog = CyberDogConfig(app_port=free_port())
     robots = (RobotConfig("a", body, address),)
-    runtime = Runtime(Config(robots=robots, lockstep=True, data=folder / "data", doors={"cyberdog": dog}))
+    console = ConsoleConfig(address=address)
+    config = Config(robots=robots, lockstep=True, data=folder / "data", doors={"cyberdog": dog}, console=console)
+    runtime = Runtime(config)
     try:
         await runtime.start()
         opened = Terminal(runtime, address, folder, runtime.fleet.world.truth.pose_of("a"), dog.app_port)

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from roboglot.model.components.energy.battery import Battery
 from roboglot.model.geometry import Point, Pose
 from roboglot.testing import assert_pose, passed_in_order
-from tests.docs_terminal import ROOT, terminal
+from tests.docs_terminal import ROOT, commands, terminal
 from tests.test_docs import blocks
 
 README, DOCS = ROOT / "README.md", ROOT / "docs/protocols"
@@ -80,6 +81,54 @@ async def test_the_dogs_chinese_page_goes_there_too(tmp_path: Path) -> None:
         ended = await user.type(f"{line} --app-port {user.app_port}")
         assert ended.status == 0, ended
         assert_pose(user.moved, x=1.5, y=0.2, within=GOAL)
+
+
+async def test_the_consoles_page_drives_and_drains(tmp_path: Path) -> None:
+    async with terminal(tmp_path, "127.0.0.79", body="hermes") as user:
+        said = await user.type_block(block_with(DOCS.parent / "console.md", "go_to"))
+        assert '"a"' in said[0].said
+        await user.stand()
+        assert_pose(user.moved, x=2.0, y=0.0, deg=90, within=GOAL)
+        assert user.robot[Battery].state.percentage < 20
+
+
+async def test_the_page_of_programs_runs_and_keeps_them(tmp_path: Path) -> None:
+    async with terminal(tmp_path, "127.0.0.80", body="cyberdog2") as user:
+        (tmp_path / "my_program.py").write_text("cyberdog.motion.go_straight(0.5, 0.5)\nprint('there')\n")
+        (tmp_path / "greet.py").write_text("def greet(name):\n    print('hello', name)\n")
+        said = {}
+        for line in commands(block_with(DOCS / "visual.md", "program check my_program.py")):
+            if not re.search("--cycle|--break|--own|suspend", line):  # these wait for someone, or start a robot
+                said[line.split()[2]] = ended = await user.type(line)
+                assert ended.status == 0, ended
+        assert "my_program" in said["list"].said
+        assert "save" in said
+        await user.stand()
+        assert_pose(user.moved, x=0.5, y=0.0)
+
+
+async def test_the_drivers_page_takes_and_releases_control(tmp_path: Path) -> None:
+    block = block_with(DOCS.parent / "drivers.md", "lease b --take").replace("lease b", "lease a")
+    async with terminal(tmp_path, "127.0.0.81", body="hermes") as user:
+        looked, taken, given, released = [ended.said for ended in await user.type_block(block)]
+        assert "a" in looked
+        assert len({looked, taken, given}) == 3
+        assert released == looked
+
+
+async def test_the_dogs_page_photographs_and_films(tmp_path: Path) -> None:
+    async with terminal(tmp_path, "127.0.0.82", body="cyberdog2") as user:
+        block = block_with(DOCS / "cyberdog.md", "cyberdog photo")
+        await user.type_block(block.replace("cyberdog ", f"cyberdog --app-port {user.app_port} "))
+        assert (tmp_path / "door.jpg").read_bytes()[:2] == b"\xff\xd8"
+        assert (tmp_path / "walk.mp4").stat().st_size > 10_000
+
+
+async def test_the_page_of_recordings_records_what_runs(tmp_path: Path) -> None:
+    async with terminal(tmp_path, "127.0.0.83", body="hermes") as user:
+        await user.type_block(block_with(DOCS.parent / "recording.md", "record mark", "bash"))
+        ended = await user.type(".venv/bin/roboglot record info today.mcap")
+        assert ended.status == 0, ended
 
 
 async def test_the_text_client_drives_and_listens(tmp_path: Path, vendor_ports: None) -> None:

@@ -5,8 +5,12 @@ from __future__ import annotations
 import importlib
 import io
 import sys
+from typing import TYPE_CHECKING
 
 from roboglot.extras import explained
+
+if TYPE_CHECKING:
+    import typer
 
 COMMANDS = {
     "up": "start the robots with all their doors",
@@ -86,13 +90,19 @@ def _print_usage() -> None:
 
 
 def _run(name: str) -> None:
+    app = loaded(name)
+    sys.argv[:2] = [f"roboglot {name}"]
+    app()
+
+
+def loaded(name: str) -> typer.Typer:
+    """Return the application of one of COMMANDS, and import what it needs."""
     import typer
 
     folder = f".{FOLDERS[name]}" if name in FOLDERS else ""
     module = importlib.import_module(f"roboglot.cli{folder}.{name}")
-    sys.argv[:2] = [f"roboglot {name}"]
-    app = getattr(module, "app", None)  # of commands with commands of their own
+    app: typer.Typer | None = getattr(module, "app", None)  # of commands with commands of their own
     if app is None:
         app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
         app.command(context_settings=getattr(module, "SETTINGS", None))(module.command)
-    app()
+    return app
