@@ -31,6 +31,7 @@ def test_defaults() -> None:
         "cyberdog": [50052],
         "visual": [50053],
         "vda5050": [],
+        "foxglove": [8765],
     }
 
 

@@ -19,6 +19,8 @@ TOTALS = {
     "visual_frames": 203,
     "vda5050": 34,
     "vda5050_messages": 27,
+    "foxglove": 14,
+    "foxglove_messages": 15,
 }
 
 

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from roboglot.model.tap import Exchange
 from roboglot.recording import foxglove, messages
+from roboglot.recording.redaction import Redaction
 
 SCAN_BYTES = 1500  # about what a value of unknown size holds while it waits
 NANO = 1_000_000_000
@@ -65,3 +66,12 @@ KINDS = {
     "scene": Kind("foxglove.SceneUpdate", foxglove.encode_scene),
     "video": Kind("foxglove.CompressedVideo", foxglove.encode_video),
 }
+
+
+def encoded(entry: Entry, redaction: Redaction) -> bytes:
+    """Return an entry as a message, without what must stay secret."""
+    kind, value = KINDS[entry.kind], entry.value
+    if entry.kind == "exchange":
+        value = value._replace(payload=redaction(value.payload))
+    data = kind.encode(entry.at, value)
+    return data if kind.is_protobuf or entry.kind == "exchange" else redaction(data)

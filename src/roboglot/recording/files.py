@@ -11,7 +11,7 @@ from typing import IO, Any
 
 from mcap.writer import CompressionType, Writer
 
-from roboglot.recording.entries import KINDS, NANO, Entry
+from roboglot.recording.entries import KINDS, NANO, Entry, encoded
 from roboglot.recording.redaction import Redaction
 
 log = logging.getLogger(__name__)
@@ -69,15 +69,8 @@ class PartWriter:
         """Add one."""
         channel = self._channels.get((entry.topic, entry.kind)) or self._channel(entry)
         self._sequence += 1
-        data = self._redact(entry)
+        data = encoded(entry, self._redaction)
         self._writer.add_message(channel, entry.at, data, entry.wall, self._sequence)
-
-    def _redact(self, entry: Entry) -> bytes:
-        kind, value = KINDS[entry.kind], entry.value
-        if entry.kind == "exchange":
-            value = value._replace(payload=self._redaction(value.payload))
-        data = kind.encode(entry.at, value)
-        return data if kind.is_protobuf or entry.kind == "exchange" else self._redaction(data)
 
     def _channel(self, entry: Entry) -> int:
         kind = KINDS[entry.kind]

@@ -58,14 +58,22 @@ class Sampler:
             robot.tap.listen(self._note_exchange),
             robot.events.listen(Event, self._note_event),
         ]
-        self._filming = asyncio.get_running_loop().create_task(self._film(), name="film") if video else None
+        self._filming: asyncio.Task[None] | None = None
+        self.film(video)
 
     def close(self) -> None:
         """Look away."""
         for leave in self._leave:
             leave()
-        if self._filming is not None:
+        self.film(False)
+
+    def film(self, on: bool) -> None:
+        """Look through the camera from now on, or no more; nothing changes if it is so already."""
+        if on and self._filming is None:
+            self._filming = asyncio.get_running_loop().create_task(self._film(), name="film")
+        elif not on and self._filming is not None:
             self._filming.cancel()
+            self._filming = None
 
     def beat(self, number: int) -> None:
         """Look at what moves; now and then at the rest."""

@@ -15,10 +15,10 @@ from roboglot.clients.visual import TextLink
 from roboglot.model.robot import Robot
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.tasks.service import ProgramService
-from roboglot.protocols.visual import websocket
+from roboglot.protocols import websocket
 from roboglot.protocols.visual.config import VisualConfig
 from roboglot.protocols.visual.server import VisualDoor
-from roboglot.protocols.visual.websocket import CONNECTIONS_MAX, MESSAGE_MAX, OPENING_MAX, UNSENT_MAX
+from roboglot.protocols.websocket import CONNECTIONS_MAX, MESSAGE_MAX, OPENING_MAX, UNSENT_MAX
 from roboglot.storage.database import Database
 from roboglot.storage.programs import program_stores
 

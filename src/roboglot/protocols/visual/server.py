@@ -12,17 +12,19 @@ import logging
 from collections.abc import Callable, Sequence
 
 from roboglot.model.admission import Right
+from roboglot.programs.stores import LogEntry
 from roboglot.programs.tasks import debugging
 from roboglot.programs.tasks.reports import TaskReport
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols.browsers import Browsers
+from roboglot.protocols.channels import Channel, Room, Send, texts
 from roboglot.protocols.door import Endpoint
 from roboglot.protocols.visual.config import VisualConfig
 from roboglot.protocols.visual.dispatch import Dispatch
 from roboglot.protocols.visual.errors import state_of_report
 from roboglot.protocols.visual.front_ends import FrontEnds, Plain
 from roboglot.protocols.visual.mirror import CloudMirror
-from roboglot.protocols.visual.websocket import Channel, Room, Send, WebSocketServer, log_line
+from roboglot.protocols.websocket import WebSocketServer
 from roboglot.transport.tls import Tls
 from roboglot.wire.visual.relay import FrontEnd
 from roboglot.wire.visual.replies import feedback
@@ -123,11 +125,11 @@ class VisualDoor:
             return lambda: None
 
         return {
-            "/programs": Channel(follow_frames, lambda text, _: self._dispatch.receive(text)),
-            "/log": Channel(self._follow_log, self._send_log),
-            "/where": Channel(follow_nothing, self._send_position),
-            "/runs": Channel(follow_nothing, self._send_runs),
-            "/debug": Channel(follow_nothing, self._debug, Right.PROGRAM),
+            "/programs": texts(follow_frames, lambda text, _: self._dispatch.receive(text)),
+            "/log": texts(self._follow_log, self._send_log),
+            "/where": texts(follow_nothing, self._send_position),
+            "/runs": texts(follow_nothing, self._send_runs),
+            "/debug": texts(follow_nothing, self._debug, Right.PROGRAM),
         }
 
     def _follow_log(self, send: Send, room: Room) -> Callable[[], None]:
@@ -189,3 +191,9 @@ class VisualDoor:
             task = asyncio.create_task(self._cloud.send(text), name="record for the cloud")
             self._recording.add(task)
             task.add_done_callback(self._recording.discard)
+
+
+def log_line(task: str, entry: LogEntry) -> str:
+    """Return one entry of a task's log as ``/log`` sends it."""
+    fields = {"target_id": task, "at": entry.at, "level": entry.level, "text": entry.text}
+    return json.dumps(fields, ensure_ascii=False)

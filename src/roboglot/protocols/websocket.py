@@ -1,24 +1,22 @@
-"""The WebSocket that carries the frames at ``/programs``, and four paths of ours beside it.
+"""WebSockets for doors: connections, limits and admission; each path leads to a session that the door makes.
 
-Connections, limits and admission; bytes are the `websockets` library's business, the meaning of a text the door's.
+Bytes are the `websockets` library's business, the meaning of a message the door's.
 """
 
 from __future__ import annotations
 
 import asyncio
 import importlib
-import json
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable
 from contextvars import copy_context
-from dataclasses import dataclass
 from http import HTTPStatus
 from typing import TYPE_CHECKING, cast
 
 from roboglot.model.admission import NO_PROOF, Admission, Forbidden, Proof, ProofKind, Right, Unknown
 from roboglot.model.client_context import ask_for
-from roboglot.programs.stores import LogEntry
 from roboglot.protocols.browsers import Browsers, of_texts
+from roboglot.protocols.channels import Channel, Session
 from roboglot.protocols.gate import Gate
 from roboglot.transport.tls import Tls
 
@@ -42,21 +40,6 @@ BACKLOG = 64
 HEAD_END = b"\r\n\r\n"
 REASON_BYTES_MAX = 123  # of a close frame
 GOING_AWAY, UNSUPPORTED, NOT_UTF8, POLICY, TRY_LATER = 1001, 1003, 1007, 1008, 1013  # close codes of RFC 6455
-Send = Callable[[str], None]
-Room = Callable[[], Awaitable[None]]
-
-
-@dataclass(frozen=True, slots=True)
-class Channel:
-    """What a path of the WebSocket leads to; ``right`` is needed to open it.
-
-    ``subscribe`` gets what sends a text, and what waits until the client has caught up; it returns what ends it.
-    ``receive`` answers a text.
-    """
-
-    subscribe: Callable[[Send, Room], Callable[[], None]]
-    receive: Callable[[str, Send], Awaitable[None]]
-    right: Right = Right.SEE
 
 
 class WebSocketServer:
@@ -73,14 +56,16 @@ class WebSocketServer:
         browsers: Browsers | None = None,
         admission: Admission | None = None,
         tls: Tls | None = None,
+        door: str = "visual",
     ) -> None:
+        self.door = door
         self.admission = admission or Admission()
         self.scheme = "wss" if tls else "ws"
         self._gate = Gate(self.admission, tls)
         self.channels = channels
         self.address = address
         self.port = port
-        self.browsers = browsers or Browsers("[visual]")
+        self.browsers = browsers or Browsers(f"[{door}]")
         self.connections: set[Connection] = set()
         self._server: asyncio.Server | None = None
         self._loading: asyncio.Future[object] | None = None
@@ -90,7 +75,7 @@ class WebSocketServer:
         self.browsers.warn_if_open()
         self._leave = self.admission.on_lost(self._disconnect)
         loop = asyncio.get_running_loop()
-        gated = self._gate.before(lambda: Connection(self), "visual WebSocket", most=CONNECTIONS_MAX)
+        gated = self._gate.before(lambda: Connection(self), f"{self.door} WebSocket", most=CONNECTIONS_MAX)
         self._server = await loop.create_server(gated, self.address, self.port, backlog=BACKLOG)
         self.port = self._server.sockets[0].getsockname()[1]
         self._loading = loop.run_in_executor(None, importlib.import_module, LIBRARY)
@@ -130,7 +115,8 @@ class Connection(asyncio.Protocol):
         self._open = False
         self._pieces = bytearray()
         self._channel: Channel | None = None
-        self._unsubscribe: Callable[[], None] = lambda: None
+        self._session: Session | None = None
+        self._binary = False  # the message that comes in pieces
         self._pending: set[asyncio.Future[None]] = set()
         self._has_room = asyncio.Event()
         self._has_room.set()
@@ -165,7 +151,9 @@ class Connection(asyncio.Protocol):
         self._opening_timer.cancel()
         self._transport = None
         self._server.connections.discard(self)
-        self._unsubscribe()
+        session, self._session = self._session, None
+        if session is not None:
+            session.close()
         self.resume_writing()
 
     def pause_writing(self) -> None:
@@ -184,15 +172,33 @@ class Connection(asyncio.Protocol):
         """Wait until the client has caught up."""
         await self._has_room.wait()
 
-    def send(self, text: str) -> None:
-        """Send one text; disconnect a client that does not read."""
+    @property
+    def name(self) -> str:
+        """The other end's address with its port."""
+        return self._name
+
+    @property
+    def who(self) -> str:
+        """The client in words, as control has it."""
+        return f"{self._server.door} {self.identity or self._host}"
+
+    @property
+    def unsent(self) -> int:
+        """Bytes that wait for the client to read."""
+        return 0 if self._transport is None else self._transport.get_write_buffer_size()
+
+    def send(self, message: str | bytes) -> None:
+        """Send one message, a text or bytes; disconnect a client that does not read."""
         if self._transport is None or self._transport.is_closing() or not self._open:
             return
         if self._transport.get_write_buffer_size() > UNSENT_MAX:
             self._give_up()
             return
         assert self._protocol is not None
-        self._protocol.send_text(text.encode("utf-8", "replace"))
+        if isinstance(message, str):
+            self._protocol.send_text(message.encode("utf-8", "replace"))
+        else:
+            self._protocol.send_binary(message)
         self._flush()
 
     def _watch_reading(self, taken_before: int = -1) -> None:
@@ -254,12 +260,15 @@ class Connection(asyncio.Protocol):
             self._transport.close()
 
     def _check_request(self, request: Request) -> None:
+        from websockets.typing import Subprotocol
+
         path = request.path.partition("?")[0]
         self._channel = self._server.channels.get(path)
         if self._channel is None:
             self._refuse(HTTPStatus.NOT_FOUND, f"there are {' and '.join(self._server.channels)}")
             return
         assert self._protocol is not None
+        self._protocol.available_subprotocols = [Subprotocol(name) for name in self._channel.subprotocols] or None
         response = self._protocol.accept(request)
         headers = {name.lower(): value for name, value in request.headers.raw_items()}
         if response.status_code != HTTPStatus.SWITCHING_PROTOCOLS:
@@ -303,8 +312,8 @@ class Connection(asyncio.Protocol):
 
     def _check_right(self, operation: str, right: Right) -> None:
         """Raise Forbidden if the client lacks ``right``."""
-        ask_for(f"visual {self.identity or self._host}", self._name, self.identity)
-        self._server.admission.check("visual", operation, right)
+        ask_for(self.who, self._name, self.identity)
+        self._server.admission.check(self._server.door, operation, right)
 
     def _accept(self, request: Request) -> None:
         if self._transport is None:
@@ -315,13 +324,17 @@ class Connection(asyncio.Protocol):
         self._flush()
         self._open = True
         try:
-            self._unsubscribe = self._channel.subscribe(self.send, self.room)
+            self._session = copy_context().run(self._open_session, self._channel)
         except RuntimeError as full:
             self.leave(TRY_LATER, str(full))
             return
         early, self._early = self._early, b""
         if early:
             self._read(early)
+
+    def _open_session(self, channel: Channel) -> Session:
+        ask_for(self.who, self._name, self.identity)
+        return channel.open(self)
 
     def _refuse(self, status: HTTPStatus, reason: str, headers: dict[str, str] | None = None) -> None:
         if self._transport is None:
@@ -341,29 +354,32 @@ class Connection(asyncio.Protocol):
         for frame in self._protocol.events_received():
             if not isinstance(frame, Frame) or frame.opcode.value >= Opcode.CLOSE.value:
                 continue
-            if frame.opcode is Opcode.BINARY:
+            if frame.opcode is not Opcode.CONT:
+                self._binary = frame.opcode is Opcode.BINARY
+            if self._binary and not (self._channel is not None and self._channel.binary):
                 self.leave(UNSUPPORTED, "frames are texts")
                 return
             self._pieces += frame.data
             if frame.fin:
                 message, self._pieces = bytes(self._pieces), bytearray()
                 try:
-                    self._answer(message.decode())
+                    self._answer(message if self._binary else message.decode())
                 except UnicodeDecodeError:
                     self.leave(NOT_UTF8, "not UTF-8")
                     return
         self._flush()
 
-    def _answer(self, text: str) -> None:
+    def _answer(self, message: str | bytes) -> None:
         """Answer in the background: that may take as long as a program takes to start."""
-        assert self._channel is not None
-        self._in_background(self._receive(self._channel, text))
+        if self._session is None:
+            return
+        self._in_background(self._receive(self._session, message))
         if len(self._pending) >= PENDING_MAX and self._transport is not None:
             self._transport.pause_reading()
 
-    async def _receive(self, channel: Channel, text: str) -> None:
-        ask_for(f"visual {self.identity or self._host}", self._name, self.identity)
-        await channel.receive(text, self.send)
+    async def _receive(self, session: Session, message: str | bytes) -> None:
+        ask_for(self.who, self._name, self.identity)
+        await session.receive(message)
 
     def _in_background(self, work: Awaitable[None]) -> None:
         task = asyncio.ensure_future(work)
@@ -380,9 +396,3 @@ class Connection(asyncio.Protocol):
     def _abort(self) -> None:
         if self._transport is not None:
             self._transport.abort()
-
-
-def log_line(task: str, entry: LogEntry) -> str:
-    """Return one entry of a task's log as ``/log`` sends it."""
-    fields = {"target_id": task, "at": entry.at, "level": entry.level, "text": entry.text}
-    return json.dumps(fields, ensure_ascii=False)

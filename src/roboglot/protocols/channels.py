@@ -1,0 +1,87 @@
+"""What the paths of a door's WebSocket lead to: a session for each client. Knows no socket."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from roboglot.operations import Right
+
+Send = Callable[[str], None]
+Room = Callable[[], Awaitable[None]]
+
+
+class Carrier(Protocol):
+    """The connection of one client, as its session sees it."""
+
+    @property
+    def name(self) -> str:
+        """The other end's address with its port."""
+
+    @property
+    def who(self) -> str:
+        """The client in words, as control has it."""
+
+    @property
+    def unsent(self) -> int:
+        """Bytes that wait for the client to read."""
+
+    def send(self, message: str | bytes) -> None:
+        """Send one message, a text or bytes; disconnect a client that does not read."""
+
+    async def room(self) -> None:
+        """Wait until the client has caught up."""
+
+
+class Session(Protocol):
+    """One client at one path, from its opening to its end."""
+
+    async def receive(self, message: str | bytes) -> None:
+        """Answer one message; calls come in the order of the messages, and run beside each other where they wait."""
+
+    def close(self) -> None:
+        """The client is gone."""
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """What a path of the WebSocket leads to; ``right`` is needed to open it.
+
+    ``open`` makes the session of a client; it may send at once. Raises RuntimeError where there are too many.
+    ``subprotocols``: one of them must be offered, the first that is counts; none: it does not matter.
+    """
+
+    open: Callable[[Carrier], Session]
+    right: Right = Right.SEE
+    subprotocols: tuple[str, ...] = ()
+    binary: bool = False
+
+
+class TextSession:
+    """A session by two functions: ``subscribe`` gets what sends a text and what waits until the client has caught up.
+
+    It returns what ends it; ``receive`` answers a text.
+    """
+
+    def __init__(
+        self,
+        connection: Carrier,
+        subscribe: Callable[[Send, Room], Callable[[], None]],
+        receive: Callable[[str, Send], Awaitable[None]],
+    ) -> None:
+        self._send, self._receive = connection.send, receive
+        self.close = subscribe(connection.send, connection.room)
+
+    async def receive(self, message: str | bytes) -> None:
+        """Hand it on."""
+        await self._receive(str(message), self._send)
+
+
+def texts(
+    subscribe: Callable[[Send, Room], Callable[[], None]],
+    receive: Callable[[str, Send], Awaitable[None]],
+    right: Right = Right.SEE,
+) -> Channel:
+    """Return a channel for texts; see ``TextSession``."""
+    return Channel(lambda connection: TextSession(connection, subscribe, receive), right)

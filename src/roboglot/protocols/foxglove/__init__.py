@@ -1,0 +1,48 @@
+"""Foxglove and Lichtblick in front of a robot: its topics live, driving by their panels, parameters."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from roboglot.operations import OperationTable
+from roboglot.protocols.door import Contract, Door, DoorType, Implementation, PortSetting, Site
+from roboglot.protocols.foxglove.config import FoxgloveConfig
+from roboglot.wire.contracts import contract
+
+
+def _open(config: FoxgloveConfig, site: Site) -> Door:
+    from roboglot.protocols.foxglove.server import FoxgloveDoor
+
+    return FoxgloveDoor(site.robot, site.address, config, site.tls)
+
+
+def _implementation() -> Implementation:
+    from roboglot.protocols.foxglove import dispatch, table  # noqa: F401 - the chapters fill the table
+
+    return table
+
+
+def _messages() -> Implementation:
+    from roboglot.protocols.foxglove.table import Messages
+
+    return Messages()
+
+
+def _table() -> OperationTable[Any]:
+    from roboglot.protocols.foxglove import dispatch, table  # noqa: F401 - the chapters fill the table
+
+    return table.TABLE
+
+
+DOOR = DoorType(
+    name="foxglove",
+    title="Foxglove",
+    config=FoxgloveConfig,
+    contracts=(
+        Contract("foxglove", lambda: contract("foxglove"), _implementation),
+        Contract("foxglove_messages", lambda: contract("foxglove_messages"), _messages),
+    ),
+    table=_table,
+    ports=(PortSetting("Foxglove", "port"),),
+    open=_open,
+)

@@ -1,0 +1,101 @@
+"""What panels publish: velocities, goals and poses in ROS's messages, as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import msgspec
+
+from roboglot.model.clock import RealClock
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
+from roboglot.model.errors import InvalidGoal, NotFound
+from roboglot.operations import Right
+from roboglot.protocols.foxglove.context import Context, Published
+from roboglot.protocols.foxglove.table import TABLE
+from roboglot.protocols.foxglove.vocabulary import (
+    PoseStamped,
+    PoseWithCovarianceStamped,
+    RosTwist,
+    pose_in_map,
+    twist,
+)
+
+PUBLISHED_MAX = 100
+MESSAGE_MAX = 65536  # bytes
+
+
+@TABLE.on("advertise", right=Right.DRIVE)
+async def advertise(context: Context, *, channels: list[Published]) -> None:
+    """Begin to publish: ``cmd_vel``, ``goal_pose``, ``move_base_simple/goal`` and ``initialpose``, as JSON."""
+    for channel in channels:
+        if channel.encoding != "json":
+            raise InvalidGoal(f"{channel.topic[:80]} comes as {channel.encoding[:20]}; JSON is understood")
+        if _name(context, channel.topic) not in TOPICS:
+            raise NotFound(f"the robot listens to {', '.join(TOPICS)}, not to {channel.topic[:80]}")
+        if channel.id in context.published or len(context.published) >= PUBLISHED_MAX:
+            raise InvalidGoal(f"channel {channel.id} is published already, or there are more than {PUBLISHED_MAX}")
+        context.published[channel.id] = channel
+
+
+@TABLE.on("unadvertise", right=Right.DRIVE)
+async def unadvertise(context: Context, *, channel_ids: list[int]) -> None:
+    """Publish them no more."""
+    missing = [number for number in channel_ids if context.published.pop(number, None) is None]
+    if missing:
+        raise NotFound(f"there is no published channel {missing[0]}")
+
+
+@TABLE.on("messageData", right=Right.DRIVE)
+async def publish(context: Context, *, channel: int, data: bytes) -> None:
+    """Do what a published message wants."""
+    published = context.published.get(channel)
+    if published is None:
+        raise NotFound(f"channel {channel} is not advertised")
+    if len(data) > MESSAGE_MAX:
+        raise InvalidGoal(f"a message has at most {MESSAGE_MAX} bytes")
+    try:
+        TOPICS[_name(context, published.topic)](context, data)
+    except (msgspec.DecodeError, RecursionError) as error:  # a ValidationError is one, too
+        raise InvalidGoal(f"{published.topic}: {error}") from None
+
+
+def _name(context: Context, topic: str) -> str:
+    """Return the topic without the robot's name."""
+    return topic.removeprefix("/").removeprefix(f"{context.robot.id}/")
+
+
+def _drive(context: Context, data: bytes) -> None:
+    """geometry_msgs/Twist: drive so until the next one, or for as long as the dead-man's time."""
+    robot = context.robot
+    wish = twist(msgspec.json.decode(data, type=RosTwist))
+    limits = robot[Base].limits
+    if not limits.holonomic:
+        wish = type(wish)(wish.x, 0.0, wish.yaw)
+    pace = robot.clock.speed if isinstance(robot.clock, RealClock) else 1.0
+    seconds = context.config.dead_man * pace
+    robot[Driving].drive(wish.clamped(limits.twist), lifetime=seconds, source=context.source)
+
+
+def _go(context: Context, data: bytes) -> None:
+    """geometry_msgs/PoseStamped: go there; a status reports if that fails."""
+    robot, goal = context.robot, msgspec.json.decode(data, type=PoseStamped)
+    pose = pose_in_map(robot, goal.header.frame_id, goal.pose)
+    options = NavigationOptions(yaw=pose.yaw)
+    context.follow(robot[Navigation].navigate_to([pose.point], options, source=context.source))
+
+
+def _place(context: Context, data: bytes) -> None:
+    """geometry_msgs/PoseWithCovarianceStamped: the robot is there."""
+    robot, place = context.robot, msgspec.json.decode(data, type=PoseWithCovarianceStamped)
+    robot[Localization].set_pose(pose_in_map(robot, place.header.frame_id, place.pose.pose))
+
+
+TOPICS: Mapping[str, Callable[[Context, bytes], None]] = {
+    "cmd_vel": _drive,
+    "goal_pose": _go,
+    "move_base_simple/goal": _go,
+    "initialpose": _place,
+}

@@ -1,0 +1,54 @@
+"""Following topics."""
+
+from __future__ import annotations
+
+import msgspec
+
+from roboglot.model.errors import InvalidGoal, NotFound
+from roboglot.operations import Right
+from roboglot.protocols.foxglove.context import Context
+from roboglot.protocols.foxglove.table import TABLE
+
+SUBSCRIPTIONS_MAX = 500
+NUMBER_MAX = (1 << 32) - 1
+
+
+class Subscription(msgspec.Struct, rename="camel"):
+    """The client's number for messages of a channel."""
+
+    id: int
+    channel_id: int
+
+
+@TABLE.on("subscribe", right=Right.SEE)
+async def subscribe(context: Context, *, subscriptions: list[Subscription]) -> None:
+    """Follow topics from now on; of those that hold a state, the last one comes at once."""
+    topics = context.topics
+    known = {channel.id for channel in topics.channels} if topics is not None else set()
+    for wish in subscriptions:
+        if wish.channel_id not in known or topics is None:
+            raise NotFound(f"there is no channel {wish.channel_id}")
+        if not 0 <= wish.id <= NUMBER_MAX or wish.id in context.subscriptions.values():
+            raise InvalidGoal(f"a subscription cannot be {wish.id}, or is already")
+        if wish.channel_id in context.subscriptions:
+            raise InvalidGoal(f"channel {wish.channel_id} is subscribed to already")
+        if len(context.subscriptions) >= SUBSCRIPTIONS_MAX:
+            raise InvalidGoal(f"more than {SUBSCRIPTIONS_MAX} subscriptions")
+        context.subscriptions[wish.channel_id] = wish.id
+        topics.show_last(context, wish.channel_id, wish.id)
+    if topics is not None:
+        topics.look_at_camera()
+
+
+@TABLE.on("unsubscribe", right=Right.SEE)
+async def unsubscribe(context: Context, *, subscription_ids: list[int]) -> None:
+    """Follow them no more."""
+    gone = set(subscription_ids)
+    kept = {channel: number for channel, number in context.subscriptions.items() if number not in gone}
+    missing = gone - set(context.subscriptions.values())
+    context.subscriptions.clear()
+    context.subscriptions.update(kept)
+    if context.topics is not None:
+        context.topics.look_at_camera()
+    if missing:
+        raise NotFound(f"there is no subscription {min(missing)}")

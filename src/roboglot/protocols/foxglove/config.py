@@ -1,0 +1,27 @@
+"""Settings of the Foxglove door."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from roboglot.config import Port
+
+APP = "https://app.foxglove.dev"  # the vendor's web app
+
+
+@dataclass(frozen=True, slots=True)
+class FoxgloveConfig:
+    """The WebSocket's ``port``. ``origins`` and ``hosts`` are as in [slamware]; the vendor's web app may come in.
+
+    ``dead_man``: so long (s) a velocity counts; the Teleop panel sends one a second unless it is set otherwise.
+    """
+
+    enabled: bool = True
+    port: Port = 8765
+    origins: tuple[str, ...] = (APP,)
+    hosts: tuple[str, ...] = ()
+    dead_man: float = 1.5
+
+    def __post_init__(self) -> None:
+        if not 0.05 <= self.dead_man <= 60:
+            raise ValueError("foxglove.dead_man is 0.05 to 60 s")

@@ -1,0 +1,131 @@
+"""One client: what it has subscribed to and publishes, and what it has the robot do. Given to every handler."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from roboglot.model.actions import Action, ActionStatus
+from roboglot.model.client_context import ask_for
+from roboglot.model.robot import Robot
+from roboglot.protocols.channels import Carrier
+from roboglot.protocols.foxglove.config import FoxgloveConfig
+from roboglot.protocols.foxglove.vocabulary import DOOR, parameters
+from roboglot.wire.foxglove.messages import Level, message, message_data, time_message
+
+if TYPE_CHECKING:
+    from roboglot.protocols.foxglove.topics import Channel, Topics
+
+log = logging.getLogger(__name__)
+CAPABILITIES = ("clientPublish", "parameters", "parametersSubscribe", "time")
+UNSENT_MAX = 1 << 20  # bytes that wait for a slow client; what comes then is dropped
+DROPS_PERIOD = 10.0  # s between two words about it
+
+
+class Published(msgspec.Struct, rename="camel"):
+    """A topic that the client publishes."""
+
+    id: int
+    topic: str
+    encoding: str
+    schema_name: str = ""
+
+
+class Context:
+    """From the client's opening to its end."""
+
+    def __init__(self, robot: Robot, carrier: Carrier, config: FoxgloveConfig, topics: Topics | None = None) -> None:
+        self.robot, self.config, self.topics = robot, config, topics
+        self.subscriptions: dict[int, int] = {}  # the client's number by the channel's
+        self.published: dict[int, Published] = {}
+        self.watched: dict[str, object] = {}  # parameters whose changes it wants, as it knows them
+        self.source = f"{DOOR} {carrier.name}"  # of the actions that it starts
+        self._carrier = carrier
+        self._dropped = 0
+        self._warned_at = -DROPS_PERIOD
+        self._following: set[asyncio.Task[None]] = set()
+        session = f"{robot.id}-{int(robot.clock.epoch() * 1e3)}"
+        model = robot.description.model
+        self.send(
+            message(
+                "serverInfo",
+                name=f"roboglot: {robot.id}",
+                capabilities=CAPABILITIES,
+                supportedEncodings=["json"],
+                metadata={"robot": robot.id, "model": model},
+                sessionId=session,
+            )
+        )
+
+    def close(self) -> None:
+        """The client is gone: what it had the robot do ends."""
+        if self.topics is not None:
+            self.topics.leave(self)
+        for action in self.robot.actions.running():
+            if action.source == self.source:
+                action.cancel("its client is gone")
+        for task in tuple(self._following):
+            task.cancel()
+
+    def send(self, data: str | bytes) -> None:
+        """Send one message."""
+        self._carrier.send(data)
+
+    def status(self, level: Level, text: str) -> None:
+        """Say something in words."""
+        self.send(message("status", level=int(level), message=text))
+
+    def follow(self, action: Action) -> None:
+        """Report how an action that the client started ends, unless all is well."""
+
+        async def report() -> None:
+            ask_for("")  # no client asked for the end
+            if await action.done() is not ActionStatus.SUCCEEDED:
+                end = action.status.name.lower()
+                self.status(Level.WARNING, f"{action.name} {end}: {action.reason or 'another command came'}")
+
+        task = asyncio.get_running_loop().create_task(report(), name="foxglove goal")
+        self._following.add(task)
+        task.add_done_callback(self._following.discard)
+
+    # -- what topics call ----------------------------------------------------------------------------------------------
+
+    def advertise(self, channels: list[Channel]) -> None:
+        """There are these topics, too."""
+        if channels:
+            self.send(message("advertise", channels=[channel.row for channel in channels]))
+
+    def wants(self, channel: int) -> int | None:
+        """Its number for what it subscribed to."""
+        return self.subscriptions.get(channel)
+
+    def deliver(self, subscription: int, at: int, data: bytes) -> None:
+        """Send a message of a topic, or drop it where the client does not keep up."""
+        if self._carrier.unsent > UNSENT_MAX:
+            self._dropped += 1
+        else:
+            self.send(message_data(subscription, at, data))
+
+    def beat(self, at: int, *, seldom: bool) -> None:
+        """Send the time; seldom also parameters that changed, and what was dropped."""
+        if self._carrier.unsent <= UNSENT_MAX:
+            self.send(time_message(at))
+        if not seldom:
+            return
+        now = self.robot.clock.time()
+        if self._dropped and now - self._warned_at >= DROPS_PERIOD:
+            self._warned_at, dropped, self._dropped = now, self._dropped, 0
+            self.status(Level.WARNING, f"{dropped} messages were dropped: this client reads too slowly")
+        if self.watched:
+            self.report_parameters()
+
+    def report_parameters(self) -> None:
+        """Send what changed of the parameters that the client follows."""
+        found = parameters(self.robot, list(self.watched))
+        changed = [row for row in found if self.watched[row["name"]] != row["value"]]
+        if changed:
+            self.watched |= {row["name"]: row["value"] for row in changed}
+            self.send(message("parameterValues", parameters=changed))

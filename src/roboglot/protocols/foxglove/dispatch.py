@@ -1,0 +1,62 @@
+"""From one message to what is done: reads, finds the handler, checks the right, reports errors. Never raises."""
+
+from __future__ import annotations
+
+import logging
+import re
+
+from roboglot.model.errors import RobotError
+from roboglot.operations import BadParameters, Right
+from roboglot.protocols.foxglove.chapters import parameters, publishing, topics  # noqa: F401 - they fill the table
+from roboglot.protocols.foxglove.context import Context
+from roboglot.protocols.foxglove.errors import level_of, refusal
+from roboglot.protocols.foxglove.table import TABLE
+from roboglot.protocols.foxglove.vocabulary import DOOR
+from roboglot.wire.contracts import contract
+from roboglot.wire.foxglove.messages import Level, Malformed, Request, read_request
+
+log = logging.getLogger(__name__)
+_HUMP = re.compile(r"(?<=[a-z])[A-Z]")
+
+
+async def answer(context: Context, message: str | bytes) -> None:
+    """Do what one message asks for."""
+    tap, began = context.robot.tap, None
+    try:
+        request = read_request(message)
+    except Malformed as malformed:
+        if tap.watched:
+            tap.reply(DOOR, "", b"", "error", str(malformed), tap.request(DOOR, "", message))
+        context.status(Level.ERROR, str(malformed))
+        return
+    key = request.key if any(row.key == request.key for row in contract(DOOR)) else ""
+    if tap.watched:
+        began = tap.request(DOOR, key, message)
+    level, why = await _do(context, request)
+    reply = refusal(request, why, level) if why else ""
+    if why:
+        context.send(reply)
+    if tap.watched:
+        tap.reply(DOOR, key, reply, level.name.lower() if why else "ok", why, began)
+
+
+async def _do(context: Context, request: Request) -> tuple[Level, str]:
+    """Carry it out; returns why not, empty if it was done."""
+    operation = TABLE.get(request.key)
+    if operation is None:
+        return Level.ERROR, "this robot does not have that"
+    try:
+        context.robot.admission.check(DOOR, request.key, operation.right or Right.ADMIN)
+        await operation.call(context, {_snake(name): value for name, value in request.values.items()})
+    except BadParameters as bad:
+        return Level.ERROR, str(bad)
+    except RobotError as error:
+        return level_of(error), str(error)
+    except Exception as error:  # one message must not end the link to a client
+        log.exception("robot %s: %s broke", context.robot.id, request.key)
+        return Level.ERROR, f"the robot could not do it: {error}"
+    return Level.INFO, ""
+
+
+def _snake(name: str) -> str:
+    return _HUMP.sub(lambda match: f"_{match[0].lower()}", name)

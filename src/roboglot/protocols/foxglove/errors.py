@@ -1,0 +1,33 @@
+"""The one place where the model's errors become the protocol's: a status, or what the message has of its own."""
+
+from __future__ import annotations
+
+from roboglot.model.errors import Busy, Refused, RobotError
+from roboglot.wire.foxglove.messages import Level, Request, asset_failure, message
+
+LEVELS: dict[type[RobotError], Level] = {
+    Busy: Level.WARNING,
+    Refused: Level.WARNING,
+    RobotError: Level.ERROR,
+}
+
+
+def level_of(error: RobotError) -> Level:
+    """Return how bad ``error``, or its nearest ancestor in the table, is."""
+    return next(LEVELS[kind] for kind in type(error).__mro__ if kind in LEVELS)
+
+
+def refusal(request: Request, why: str, level: Level = Level.ERROR) -> str | bytes:
+    """Return what a client gets whose request is not done."""
+    values = request.values
+    match request.key:
+        case "serviceCallRequest":
+            return message("serviceCallFailure", serviceId=values["service"], callId=values["call"], message=why)
+        case "fetchAsset" if _is_number(values.get("requestId")):
+            return asset_failure(values["requestId"], why)
+        case _:
+            return message("status", level=int(level), message=f"{request.key}: {why}")
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 1 << 32

@@ -1,0 +1,119 @@
+"""The door: a WebSocket at which Foxglove, Lichtblick and their kin see the robot's topics, and drive it."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Sequence
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from roboglot.extras import explained
+from roboglot.model.robot import Robot
+from roboglot.operations import Right
+from roboglot.protocols.browsers import Browsers
+from roboglot.protocols.channels import Carrier, Channel
+from roboglot.protocols.door import Endpoint
+from roboglot.protocols.foxglove.config import FoxgloveConfig
+from roboglot.protocols.foxglove.context import Context
+from roboglot.protocols.foxglove.dispatch import answer
+from roboglot.protocols.foxglove.vocabulary import DOOR
+from roboglot.protocols.websocket import WebSocketServer
+from roboglot.transport.tls import Tls
+from roboglot.wire.foxglove.messages import SUBPROTOCOLS, Level
+
+if TYPE_CHECKING:
+    from roboglot.protocols.foxglove.topics import Topics
+
+log = logging.getLogger(__name__)
+CLIENTS_MAX = 16
+TOPICS = "roboglot.protocols.foxglove.topics"  # with libraries of an extra, loaded for the first client
+
+
+class Session:
+    """One client's messages, in their order."""
+
+    def __init__(self, door: FoxgloveDoor, carrier: Carrier) -> None:
+        self._door = door
+        self.context = Context(door.robot, carrier, door.config)
+        self._joining = asyncio.get_running_loop().create_task(self._join(), name="foxglove client")
+        self._turn = asyncio.Lock()
+
+    async def receive(self, message: str | bytes) -> None:
+        """Answer one message."""
+        async with self._turn:
+            await answer(self.context, message)
+
+    def close(self) -> None:
+        """The client is gone."""
+        self._joining.cancel()
+        self._door.forget(self)
+        self.context.close()
+
+    async def _join(self) -> None:
+        """Show the client all topics; what they need is loaded in a thread the first time."""
+        try:
+            topics = await self._door.topics()
+        except ImportError as error:
+            self.context.status(Level.ERROR, explained(error, "the robot's topics") or str(error))
+            return
+        self.context.topics = topics
+        topics.join(self.context)
+
+
+class FoxgloveDoor:
+    """One robot's."""
+
+    name = DOOR
+
+    def __init__(self, robot: Robot, address: str, config: FoxgloveConfig, tls: Tls | None = None) -> None:
+        self.robot, self.config = robot, config
+        self._topics: Topics | None = None
+        self._sessions: set[Session] = set()
+        self._socket: WebSocketServer | None = None
+        if config.enabled:
+            browsers = Browsers(f"[{DOOR}]", config.origins, config.hosts)
+            channel = Channel(self._open, Right.SEE, SUBPROTOCOLS, binary=True)
+            self._socket = WebSocketServer(
+                {"/": channel}, address, config.port, browsers, robot.admission, tls, door=DOOR
+            )
+
+    async def start(self) -> None:
+        """Listen. Raises OSError naming an address that is taken."""
+        if self._socket is not None:
+            await self._socket.start()
+
+    async def close(self) -> None:
+        """Hang up; what clients had the robot do ends."""
+        if self._socket is not None:
+            await self._socket.close()
+        for session in tuple(self._sessions):
+            session.close()
+        if self._topics is not None:
+            self._topics.close()
+
+    @property
+    def endpoints(self) -> Sequence[Endpoint]:
+        """The WebSocket's address."""
+        if self._socket is None:
+            return ()
+        return [Endpoint("Foxglove", f"{self._socket.scheme}://{self._socket.address}:{self._socket.port}")]
+
+    async def topics(self) -> Topics:
+        """Return the robot's topics. Raises ImportError where the extra is not installed."""
+        if self._topics is None:
+            module = await asyncio.get_running_loop().run_in_executor(None, import_module, TOPICS)
+            self._topics = self._topics or module.Topics(self.robot)
+        assert self._topics is not None
+        return self._topics
+
+    def forget(self, session: Session) -> None:
+        """A client is gone."""
+        self._sessions.discard(session)
+
+    def _open(self, carrier: Carrier) -> Session:
+        if len(self._sessions) >= CLIENTS_MAX:
+            raise RuntimeError(f"more than {CLIENTS_MAX} clients")
+        session = Session(self, carrier)
+        self._sessions.add(session)
+        return session

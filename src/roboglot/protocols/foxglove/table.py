@@ -1,0 +1,33 @@
+"""What clients may ask for, by the contract's keys, and which of the server's messages are sent. Chapters fill it."""
+
+from __future__ import annotations
+
+from roboglot.operations import OperationTable
+
+TABLE: OperationTable[str] = OperationTable("foxglove")
+SENT = frozenset({"serverInfo", "status", "advertise", "messageData", "time", "parameterValues"})
+REFUSALS = frozenset({"serviceCallFailure"})  # sent, and whole: there is no other service
+
+
+def implemented() -> set[str]:
+    """Keys of the operations that are there."""
+    return {operation.key for operation in TABLE if not operation.partial}
+
+
+def partly() -> dict[str, str]:
+    """Keys of those that are there in part, with what is missing."""
+    return {operation.key: operation.partial for operation in TABLE if operation.partial}
+
+
+class Messages:
+    """What the robot sends."""
+
+    @staticmethod
+    def implemented() -> set[str]:
+        """Keys of ``foxglove_messages``."""
+        return {*SENT, *REFUSALS}
+
+    @staticmethod
+    def partly() -> dict[str, str]:
+        """What is sent in part."""
+        return {"fetchAssetResponse": "refusals only: there are no files to fetch"}

@@ -1,0 +1,151 @@
+"""One robot's topics for all clients: what a recording would have, as long as someone is there to look.
+
+Values become bytes only for topics that someone has subscribed to, once for all of them.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from roboglot.media.video import VideoStream
+from roboglot.model.robot import Robot
+from roboglot.recording.entries import KINDS, Entry, encoded
+from roboglot.recording.redaction import Redaction
+from roboglot.recording.sampler import POSE_PERIOD, STATE_BEATS, Sampler, Stamps
+
+CHANNELS_MAX = 200
+CAMERA = "camera"
+KEPT = frozenset({"battery", "state", "grid", "scene", "pose", "transforms", "scan"})  # newcomers get the last one
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """A topic as clients know it."""
+
+    id: int
+    topic: str
+    kind: str
+
+    @property
+    def row(self) -> dict[str, Any]:
+        """What ``advertise`` says about it."""
+        kind = KINDS[self.kind]
+        protobuf = kind.is_protobuf
+        schema = base64.b64encode(kind.schema_data) if protobuf else kind.schema_data
+        return {
+            "id": self.id,
+            "topic": self.topic,
+            "encoding": "protobuf" if protobuf else "json",
+            "schemaName": kind.schema,
+            "schemaEncoding": "protobuf" if protobuf else "jsonschema",
+            "schema": schema.decode(),
+        }
+
+
+class Listener(Protocol):
+    """A client."""
+
+    def advertise(self, channels: list[Channel]) -> None:
+        """There are these topics, too."""
+
+    def wants(self, channel: int) -> int | None:
+        """Its number for what it subscribed to; None: it has not."""
+
+    def deliver(self, subscription: int, at: int, data: bytes) -> None:
+        """Send a message; ``at``: ns since 1970."""
+
+    def beat(self, at: int, *, seldom: bool) -> None:
+        """Robot time goes on; ``seldom``: about once a second."""
+
+
+class Topics:
+    """Looks at the robot while there are listeners."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._redaction = Redaction()
+        self._stamps = Stamps(robot)
+        self._channels: dict[tuple[str, str], Channel] = {}
+        self._last: dict[int, Entry] = {}
+        self._listeners: list[Listener] = []
+        self._sampler: Sampler | None = None
+        self._task: asyncio.Task[None] | None = None
+
+    @property
+    def channels(self) -> list[Channel]:
+        """Those that are known."""
+        return list(self._channels.values())
+
+    def join(self, listener: Listener) -> None:
+        """Let a client in: it gets all topics that are known, and those to come."""
+        if self._sampler is None:
+            self._sampler = Sampler(self._robot, self._put)
+            if VideoStream in self._robot:
+                self._channel(f"/{self._robot.id}/{CAMERA}", "video")
+            self._sampler.beat(0)
+            self._task = asyncio.get_running_loop().create_task(self._sample(), name="foxglove topics")
+        self._listeners.append(listener)
+        listener.advertise(self.channels)
+
+    def leave(self, listener: Listener) -> None:
+        """Forget a client; the last one ends the looking."""
+        if listener in self._listeners:
+            self._listeners.remove(listener)
+        self.look_at_camera()
+        if not self._listeners:
+            self.close()
+
+    def close(self) -> None:
+        """Look no more."""
+        if self._sampler is not None:
+            self._sampler.close()
+            self._sampler = None
+        if self._task is not None:
+            self._task.cancel()
+            self._task = None
+        self._last.clear()
+
+    def show_last(self, listener: Listener, channel: int, subscription: int) -> None:
+        """Send a newcomer what was said last, so that it need not wait for a change."""
+        if (entry := self._last.get(channel)) is not None:
+            listener.deliver(subscription, entry.at, encoded(entry, self._redaction))
+
+    def look_at_camera(self) -> None:
+        """Film if someone has subscribed to the camera; else do not."""
+        if self._sampler is not None:
+            camera = next((channel.id for channel in self.channels if channel.kind == "video"), -1)
+            self._sampler.film(any(listener.wants(camera) is not None for listener in self._listeners))
+
+    async def _sample(self) -> None:
+        number = 0
+        async for _ in self._robot.clock.every(POSE_PERIOD):
+            number += 1
+            if self._sampler is not None:
+                self._sampler.beat(number)
+            at, _wall = self._stamps.now()
+            for listener in tuple(self._listeners):
+                listener.beat(at, seldom=number % STATE_BEATS == 0)
+
+    def _put(self, entry: Entry) -> None:
+        channel = self._channel(entry.topic, entry.kind)
+        if channel is None:
+            return
+        if entry.kind in KEPT:
+            self._last[channel.id] = entry
+        data: bytes | None = None
+        for listener in tuple(self._listeners):
+            if (subscription := listener.wants(channel.id)) is not None:
+                if data is None:
+                    data = encoded(entry, self._redaction)
+                listener.deliver(subscription, entry.at, data)
+
+    def _channel(self, topic: str, kind: str) -> Channel | None:
+        known = self._channels.get((topic, kind))
+        if known is None and len(self._channels) < CHANNELS_MAX:
+            known = self._channels[topic, kind] = Channel(len(self._channels) + 1, topic, kind)
+            for listener in self._listeners:
+                listener.advertise([known])
+        return known

@@ -1,0 +1,165 @@
+"""The protocol's words for robots: what is published to them, in ROS's messages as JSON, and parameters by name."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+
+from roboglot.model.components.interaction.speaker import Speaker
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping as Mapper
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.errors import InvalidGoal
+from roboglot.model.geometry import Pose, Twist
+from roboglot.model.robot import Robot
+from roboglot.operations import Right
+
+DOOR = "foxglove"
+FAR = 1e6  # m, m/s: what is beyond is a mistake
+
+
+class Vector(msgspec.Struct):
+    """geometry_msgs/Vector3 and Point."""
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+
+
+class Quaternion(msgspec.Struct):
+    """geometry_msgs/Quaternion."""
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    w: float = 1.0
+
+    @property
+    def yaw(self) -> float:
+        """The heading, rad. Raises InvalidGoal for what turns nothing."""
+        if not all(map(math.isfinite, (self.x, self.y, self.z, self.w))) or not any((self.x, self.y, self.z, self.w)):
+            raise InvalidGoal("the orientation is no quaternion")
+        return math.atan2(2 * (self.w * self.z + self.x * self.y), 1 - 2 * (self.y**2 + self.z**2))
+
+
+class RosPose(msgspec.Struct):
+    """geometry_msgs/Pose."""
+
+    position: Vector = msgspec.field(default_factory=Vector)
+    orientation: Quaternion = msgspec.field(default_factory=Quaternion)
+
+
+class Header(msgspec.Struct):
+    """std_msgs/Header."""
+
+    frame_id: str = ""
+
+
+class PoseStamped(msgspec.Struct):
+    """geometry_msgs/PoseStamped."""
+
+    pose: RosPose
+    header: Header = msgspec.field(default_factory=Header)
+
+
+class WithCovariance(msgspec.Struct):
+    """geometry_msgs/PoseWithCovariance; the covariance is not used."""
+
+    pose: RosPose
+
+
+class PoseWithCovarianceStamped(msgspec.Struct):
+    """geometry_msgs/PoseWithCovarianceStamped."""
+
+    pose: WithCovariance
+    header: Header = msgspec.field(default_factory=Header)
+
+
+class RosTwist(msgspec.Struct):
+    """geometry_msgs/Twist."""
+
+    linear: Vector
+    angular: Vector
+
+
+def twist(message: RosTwist) -> Twist:
+    """Return the velocity. Raises InvalidGoal."""
+    found = Twist(message.linear.x, message.linear.y, message.angular.z)
+    if not all(abs(value) < FAR for value in (found.x, found.y, found.yaw)):
+        raise InvalidGoal("a velocity is not finite")
+    return found
+
+
+def pose_in_map(robot: Robot, frame: str, message: RosPose) -> Pose:
+    """Return the pose in the robot's map. Raises InvalidGoal, ComponentMissing."""
+    pose = Pose(message.position.x, message.position.y, message.orientation.yaw)
+    if not (abs(pose.x) < FAR and abs(pose.y) < FAR):
+        raise InvalidGoal("the position is not finite")
+    match frame.removeprefix("/").removeprefix(f"{robot.id}/"):
+        case "" | "map":
+            return pose
+        case "base_link":
+            return robot[Localization].pose.compose(pose)
+        case "odom":
+            here = robot[Localization].pose
+            return here.compose(robot[Odometry].reading.pose.inverse()).compose(pose)
+        case other:
+            raise InvalidGoal(f"there is no frame {other[:80]!r}: the frames are map, odom and base_link")
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A value of the robot; ``write`` and ``right`` where clients may set it."""
+
+    read: Callable[[Robot], Any]
+    needs: type | None = None
+    kind: type = str
+    write: Callable[[Robot, Any], None] | None = None
+    right: Right = Right.EDIT
+
+
+PARAMETERS: Mapping[str, Parameter] = {
+    "robot.name": Parameter(lambda robot: robot.id),
+    "robot.maker": Parameter(lambda robot: robot.description.maker),
+    "robot.model": Parameter(lambda robot: robot.description.model),
+    "robot.serial": Parameter(lambda robot: robot.description.serial),
+    "robot.radius": Parameter(lambda robot: robot.description.radius, kind=float),
+    "robot.height": Parameter(lambda robot: robot.description.height, kind=float),
+    "base.max_speed": Parameter(lambda robot: robot[Base].limits.twist.x, Base, float),
+    "base.max_yaw_speed": Parameter(lambda robot: robot[Base].limits.twist.yaw, Base, float),
+    "localization.enabled": Parameter(
+        lambda robot: robot[Localization].enabled,
+        Localization,
+        bool,
+        lambda robot, value: robot[Localization].enable(value),
+    ),
+    "mapping.enabled": Parameter(
+        lambda robot: robot[Mapper].enabled, Mapper, bool, lambda robot, value: robot[Mapper].enable(value)
+    ),
+    "mapping.closes_loops": Parameter(
+        lambda robot: robot[Mapper].closes_loops, Mapper, bool, lambda robot, value: robot[Mapper].close_loops(value)
+    ),
+    "speaker.volume": Parameter(
+        lambda robot: robot[Speaker].volume,
+        Speaker,
+        float,
+        lambda robot, value: robot[Speaker].set_volume(value),
+        Right.DRIVE,
+    ),
+}
+
+
+def parameters(robot: Robot, names: list[str] | None = None) -> list[dict[str, Any]]:
+    """Return those of these names (None or none: all) that this robot has."""
+    found = []
+    for name in names or PARAMETERS:
+        parameter = PARAMETERS.get(name)
+        if parameter is not None and (parameter.needs is None or parameter.needs in robot):
+            value: dict[str, Any] = {"name": name, "value": parameter.read(robot)}
+            found.append(value | ({"type": "float64"} if parameter.kind is float else {}))
+    return found

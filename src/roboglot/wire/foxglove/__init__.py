@@ -1,0 +1,1 @@
+"""The Foxglove WebSocket protocol's messages, for both ends. Knows no robot and no socket."""

@@ -1,0 +1,159 @@
+"""Messages of the protocol: JSON objects with ``op``, and binary ones with a number in their first byte.
+
+The subprotocols ``foxglove.sdk.v1`` and ``foxglove.websocket.v1`` have the same messages; the first also has playback.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+import msgspec
+
+SUBPROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
+ENCODING_MAX = 64  # bytes of the name of an encoding
+REQUEST_ID_MAX = 256  # bytes of the id of a playback request
+_DATA = struct.Struct("<BIQ")
+_TIME = struct.Struct("<BQ")
+_PUBLISHED = struct.Struct("<BI")
+_CALL = struct.Struct("<BIII")
+_PLAYBACK = struct.Struct("<BBfBQI")
+_STATE = struct.Struct("<BBQfI")
+_ASSET = struct.Struct("<BIBI")
+
+
+class Level(IntEnum):
+    """How bad a status is."""
+
+    INFO = 0
+    WARNING = 1
+    ERROR = 2
+
+
+class ServerOpcode(IntEnum):
+    """The first byte of what the server sends."""
+
+    MESSAGE_DATA = 1
+    TIME = 2
+    SERVICE_CALL_RESPONSE = 3
+    FETCH_ASSET_RESPONSE = 4
+    PLAYBACK_STATE = 5
+
+
+class ClientOpcode(IntEnum):
+    """The first byte of what a client sends."""
+
+    MESSAGE_DATA = 1
+    SERVICE_CALL_REQUEST = 2
+    PLAYBACK_CONTROL_REQUEST = 3
+
+
+class Malformed(ValueError):
+    """A message is none of the protocol's; the text says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What a client sends: the contract's key and the fields."""
+
+    key: str
+    values: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Playback:
+    """How a server plays; ``status``: 0 playing, 1 paused, 2 buffering, 3 ended; time in ns, speed, whom it answers."""
+
+    status: int
+    time: int
+    speed: float
+    request: str = ""
+
+
+def read_request(message: str | bytes) -> Request:
+    """Read what a client sent. Raises Malformed."""
+    return _read_text(message) if isinstance(message, str) else _read_bytes(message)
+
+
+def _read_text(text: str) -> Request:
+    try:
+        value = msgspec.json.decode(text)
+    except (msgspec.DecodeError, RecursionError) as error:
+        raise Malformed(f"no JSON: {error}") from None
+    if not isinstance(value, dict) or not isinstance(value.get("op"), str):
+        raise Malformed("a message is a JSON object with op")
+    return Request(value.pop("op"), value)
+
+
+def _read_bytes(data: bytes) -> Request:
+    try:
+        opcode = ClientOpcode(data[0])
+    except (IndexError, ValueError):
+        raise Malformed(f"no binary message of a client begins with {data[:1].hex() or 'nothing'}") from None
+    try:
+        match opcode:
+            case ClientOpcode.MESSAGE_DATA:
+                _, channel = _PUBLISHED.unpack_from(data)
+                return Request("messageData", {"channel": channel, "data": data[_PUBLISHED.size :]})
+            case ClientOpcode.SERVICE_CALL_REQUEST:
+                return _read_call(data)
+            case ClientOpcode.PLAYBACK_CONTROL_REQUEST:
+                return _read_playback(data)
+    except struct.error:
+        raise Malformed(f"{opcode.name.lower()} is cut off") from None
+
+
+def _read_call(data: bytes) -> Request:
+    _, service, call, length = _CALL.unpack_from(data)
+    encoding, end = _text(data, _CALL.size, length, ENCODING_MAX)
+    values = {"service": service, "call": call, "encoding": encoding, "data": data[end:]}
+    return Request("serviceCallRequest", values)
+
+
+def _read_playback(data: bytes) -> Request:
+    """``seek``: ns, or None; early versions of the message have no request id."""
+    padded = data if len(data) >= _PLAYBACK.size else data + bytes(4)
+    _, command, speed, sought, seek, length = _PLAYBACK.unpack_from(padded)
+    request, _ = _text(padded, _PLAYBACK.size, length, REQUEST_ID_MAX)
+    values = {"command": command, "speed": speed, "seek": seek if sought else None, "request": request}
+    return Request("playbackControlRequest", values)
+
+
+def _text(data: bytes, start: int, length: int, most: int) -> tuple[str, int]:
+    end = start + length
+    if length > most or end > len(data):
+        raise Malformed("a text in a binary message is too long")
+    try:
+        return data[start:end].decode(), end
+    except UnicodeDecodeError:
+        raise Malformed("a text in a binary message is not UTF-8") from None
+
+
+def message(op: str, **values: Any) -> str:
+    """Return a JSON message; what is None is left out."""
+    return msgspec.json.encode({"op": op} | {key: item for key, item in values.items() if item is not None}).decode()
+
+
+def message_data(subscription: int, at: int, data: bytes) -> bytes:
+    """Return a message of a topic; ``at``: ns since 1970."""
+    return _DATA.pack(ServerOpcode.MESSAGE_DATA, subscription, at) + data
+
+
+def time_message(at: int) -> bytes:
+    """Return the server's time, ns since 1970."""
+    return _TIME.pack(ServerOpcode.TIME, at)
+
+
+def playback_state(state: Playback) -> bytes:
+    """Return how the server plays."""
+    name = state.request.encode()
+    return _STATE.pack(ServerOpcode.PLAYBACK_STATE, state.status, state.time, state.speed, len(name)) + name
+
+
+def asset_failure(request: int, why: str) -> bytes:
+    """Return that a file cannot be had."""
+    text = why.encode()
+    return _ASSET.pack(ServerOpcode.FETCH_ASSET_RESPONSE, request, 1, len(text)) + text
