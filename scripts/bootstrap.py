@@ -27,6 +27,8 @@ except ImportError as missing:
         f"roboglot: this Python ({sys.executable}) lacks its standard library ({missing.name}). Install it whole:\n"
         "    sudo apt-get install python3"
     )
+except KeyboardInterrupt:
+    sys.exit(130)
 
 ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / ".venv"
