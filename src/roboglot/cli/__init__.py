@@ -28,7 +28,8 @@ COMMANDS = {
     "record": "record everything that robots say, hear and do; show and mend recordings",
     "rerun": "run the world of a lockstep recording again with the same inputs, to the last byte",
     "replay": "send the requests of a recording to a robot again and compare its answers",
-    "compare": "two recordings, value by value, and how much of them agrees",
+    "compare": "two recordings or robots, and how much of them agrees",
+    "fidelity": "how much the doors agree with what was published of real robots",
     "test": "play test scenarios (YAML) on simulated robots, with a JUnit report",
     "mirror": "live state of any robot in the terminal",
     "map": "ROS maps to a robot, its map to a ROS map, and maps from recorded drives",
@@ -40,10 +41,10 @@ COMMANDS = {
     "doctor": "what is missing on this machine, and how to get it",
 }
 # Commands whose files have a folder of their own.
-FOLDERS = dict.fromkeys(("compare", "record", "replay", "rerun"), "recordings")
+FOLDERS = dict.fromkeys(("compare", "fidelity", "record", "replay", "rerun"), "recordings")
 # The extra to install for a command whose modules are missing; else the one that brings the module.
 EXTRAS = {"demo": "demo", "mcp": "mcp"} | dict.fromkeys(
-    ("up", "coverage", "capabilities", "doctor", "cloud", "map", "test"), "up"
+    ("up", "coverage", "capabilities", "fidelity", "doctor", "cloud", "map", "test"), "up"
 )
 
 

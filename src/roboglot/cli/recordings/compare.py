@@ -1,40 +1,107 @@
-"""``roboglot compare``: two recordings, value by value, and how much of them agrees."""
+"""``roboglot compare``: two recordings or robots, and how much of them agrees."""
 
 from __future__ import annotations
 
+import asyncio
 import sys
+from collections.abc import Sequence
+from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+if TYPE_CHECKING:
+    from roboglot.model.tap import Exchange
+    from roboglot.recording.comparing.comparison import Comparison
+    from roboglot.recording.comparing.masks import Mask
+
+
+class By(StrEnum):
+    """What is compared."""
+
+    VALUES = "values"
+    BEHAVIOUR = "behaviour"
+
 
 def command(
-    one: Annotated[Path, typer.Argument(help="A recording.")],
-    other: Annotated[Path, typer.Argument(help="Another one.")],
+    one: Annotated[str, typer.Argument(help="A recording, or a robot's URL.")],
+    other: Annotated[str, typer.Argument(help="Another one.")],
+    by: Annotated[
+        By | None, typer.Option(help="Each value of each answer, or fields, units, rates and times; URLs: behaviour.")
+    ] = None,
     robot: Annotated[str, typer.Option(help="Only this robot; needed where there are several.")] = "",
     door: Annotated[str, typer.Option(help="Only this protocol.")] = "",
+    commands: Annotated[
+        bool, typer.Option("--commands", help="Send a robot also what moves or changes it, as recorded.")
+    ] = False,
     mask: Annotated[Path | None, typer.Option(help="TOML: how which fields are compared.")] = None,
     strict: Annotated[bool, typer.Option("--strict", help="Every number and time exactly.")] = False,
     html: Annotated[Path | None, typer.Option(help="Write a page.")] = None,
     junit: Annotated[Path | None, typer.Option(help="Write JUnit's XML.")] = None,
     at_least: Annotated[float, typer.Option(min=0, max=100, help="Fail below so many percent.")] = 100.0,
 ) -> None:
-    """Compare two recordings: status, values and times of answers; pushes; order. Exit status 1: they differ."""
+    """Compare two recordings or robots. A robot is asked what the recording has, or all that changes nothing."""
+    from roboglot.clients.errors import ClientError
     from roboglot.recording.comparing import reports
-    from roboglot.recording.comparing.comparison import compare
     from roboglot.recording.comparing.masks import STRICT, Mask, read_mask
-    from roboglot.recording.reader import read_recording
 
     try:
         used = STRICT if strict else read_mask(mask) if mask else Mask()
-        sessions = [read_recording(path).session(robot, door) for path in (one, other)]
-        comparison = compare(sessions[0], sessions[1], used)
+        comparison = asyncio.run(compared((one, other), by, robot, door, used, commands=commands))
         if html:
-            html.write_text(reports.page(comparison, (str(one), str(other))), encoding="utf-8")
+            html.write_text(reports.page(comparison, (one, other)), encoding="utf-8")
         if junit:
             junit.write_bytes(reports.junit(comparison))
-    except (OSError, ValueError) as error:
-        sys.exit(f"roboglot compare: {error}")
+    except (OSError, ValueError, ClientError) as error:
+        print(f"roboglot compare: {error}", file=sys.stderr)
+        raise typer.Exit(2) from None
     print(reports.table(comparison))
     sys.exit(comparison.fidelity * 100 < at_least)
+
+
+async def compared(
+    names: tuple[str, str], by: By | None, robot: str, door: str, mask: Mask, *, commands: bool
+) -> Comparison:
+    """Compare what two names stand for. Raises ClientError, ValueError, OSError."""
+    from roboglot.recording.comparing.behaviour import compare_behaviour
+    from roboglot.recording.comparing.comparison import answers_only, compare
+
+    live = ["://" in name for name in names]
+    one, other = await _sessions(names, live, robot, door, commands=commands)
+    if any(live):
+        one, other = answers_only(one), answers_only(other)
+    if (by or (By.BEHAVIOUR if any(live) else By.VALUES)) is By.BEHAVIOUR:
+        return compare_behaviour(one, other, mask)
+    return compare(one, other, mask, order=not any(live))
+
+
+async def _sessions(
+    names: tuple[str, str], live: Sequence[bool], robot: str, door: str, *, commands: bool
+) -> Sequence[Sequence[Exchange]]:
+    """Return both sessions; robots are asked one after the other. Raises ClientError, ValueError, OSError."""
+    from roboglot.cli.recordings.reads import askable, reads
+    from roboglot.model.clock import RealClock
+    from roboglot.recording.lines import Target
+    from roboglot.recording.probing import asked_again, probe, reads_only
+    from roboglot.recording.reader import read_recording
+
+    targets = {name: Target(name) for name, is_live in zip(names, live, strict=True) if is_live}
+    door = door or next((target.door for target in targets.values()), "")
+    if any(target.door != door for target in targets.values()):
+        raise ValueError("both robots must be asked in one protocol")
+    recorded: dict[str, Sequence[Exchange]] = {
+        name: read_recording(Path(name)).session(robot, door) for name in names if name not in targets
+    }
+    if targets and not commands:
+        recorded = {name: reads_only(session, reads(door)) for name, session in recorded.items()}
+    clock = RealClock()
+
+    async def session(name: str) -> Sequence[Exchange]:
+        if name in recorded:
+            return recorded[name]
+        for questions in recorded.values():
+            return await asked_again(questions, targets[name], clock)
+        return await probe(targets[name], askable(door), clock)
+
+    return [await session(name) for name in names]

@@ -93,7 +93,7 @@ def compare(
     _compare_answers(rows, asked_one, asked_other, mask)
     _compare_pushes(rows, [e for _, e in pushed_one], [e for _, e in pushed_other], starts, mask)
     if order:
-        _compare_order(rows, one, other)
+        compare_order(rows, one, other)
     return Comparison(sorted(rows.values(), key=lambda row: (row.door, row.operation)))
 
 
@@ -180,7 +180,7 @@ def _by_operation(pushes: Sequence[Exchange]) -> dict[tuple[str, str], list[Exch
     return found
 
 
-def _compare_order(rows: dict[tuple[str, str], Row], one: Sequence[Exchange], other: Sequence[Exchange]) -> None:
+def compare_order(rows: dict[tuple[str, str], Row], one: Sequence[Exchange], other: Sequence[Exchange]) -> None:
     """Of operations: which came first, for those that both sessions have."""
     firsts = [_first_places(one), _first_places(other)]
     shared = sorted(firsts[0].keys() & firsts[1].keys(), key=lambda key: firsts[0][key])

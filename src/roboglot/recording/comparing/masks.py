@@ -59,12 +59,20 @@ class Mask(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def agree(self, operation: str, path: str, one: Any, other: Any) -> bool:
         """Return whether two values are as good as the same."""
-        for rule in self.rule:
-            if fnmatchcase(operation, rule.operation) and fnmatchcase(path, rule.field):
-                return _agree(rule.compare, one, other, rule.tolerance, rule.share)
-        if _is_volatile(one) and _is_volatile(other):
+        if (rule := self._rule(operation, path)) is not None:
+            return _agree(rule.compare, one, other, rule.tolerance, rule.share)
+        if is_volatile(one) and is_volatile(other):
             return True
         return _agree(How.NUMBER, one, other, self.tolerance, self.share)
+
+    def how(self, operation: str, path: str) -> How | None:
+        """Return how a rule wants the field compared; None: no rule fits."""
+        rule = self._rule(operation, path)
+        return None if rule is None else rule.compare
+
+    def _rule(self, operation: str, path: str) -> Rule | None:
+        fits = (r for r in self.rule if fnmatchcase(operation, r.operation) and fnmatchcase(path, r.field))
+        return next(fits, None)
 
     def in_time(self, one: float, other: float) -> bool:
         """Return whether two durations (s) are as good as the same."""
@@ -97,7 +105,8 @@ def _agree(how: How, one: Any, other: Any, tolerance: float, share: float) -> bo
     return bool(one == other)
 
 
-def _is_volatile(value: Any) -> bool:
+def is_volatile(value: Any) -> bool:
+    """Return whether a value is one that no two sessions share: an id, a date, a Unix time."""
     if isinstance(value, bool):
         return False
     if isinstance(value, int | float):

@@ -1,0 +1,245 @@
+"""``roboglot fidelity``: how much our doors agree with what was published of real robots, and with themselves."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+import sys
+import tempfile
+import tomllib
+from collections import defaultdict
+from collections.abc import Sequence
+from pathlib import Path
+from textwrap import wrap
+from typing import Annotated, Any
+
+import msgspec
+import typer
+
+from roboglot.cli.recordings.reads import askable
+from roboglot.config import load_config
+from roboglot.model.clock import LockstepClock, RealClock
+from roboglot.model.tap import Exchange
+from roboglot.protocols import sections
+from roboglot.protocols.cyberdog.certificates import export_client
+from roboglot.protocols.cyberdog.server import FOLDER
+from roboglot.recording.comparing.behaviour import compare_behaviour
+from roboglot.recording.comparing.reports import percent
+from roboglot.recording.comparing.trees import kind_of, leaves, tree
+from roboglot.recording.lines import Target
+from roboglot.recording.probing import probe
+from roboglot.runtime import Runtime
+
+PAGE = Path("docs/fidelity.md")
+PUBLISHED = Path(__file__).with_name("published.toml")
+ADDRESSES = "127.0.211"  # of robots: .1 and so on
+BODY = {"robomaster": "robomaster_ep", "cyberdog": "cyberdog2", "slamware": "universal", "visual": "universal"}
+SEEDS = 1, 2
+WIDTH = 110
+
+
+class Asked(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One request, and what is known of its answer."""
+
+    request: str
+    status: str = ""
+    pattern: str = ""
+    fields: dict[str, str] = {}
+    silent: bool = False
+
+
+class Session(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Requests of one connection, and who published what they are answered."""
+
+    door: str
+    source: str
+    asked: tuple[Asked, ...]
+
+
+class Verdict(msgspec.Struct, frozen=True):
+    """One source: how many of its facts hold at our door, and those that do not, in words."""
+
+    door: str
+    source: str
+    facts: int
+    wrong: tuple[str, ...]
+
+
+def command(write: Annotated[bool, typer.Option("--write", help="Write docs/fidelity.md.")] = False) -> None:
+    """Compare the doors of this version with published answers of real robots, and with themselves."""
+    text = asyncio.run(page(ADDRESSES))
+    if write:
+        PAGE.write_text(text, encoding="utf-8")
+    else:
+        sys.stdout.write(text)
+
+
+def published(door: str = "") -> tuple[Session, ...]:
+    """Return what was published of real robots, or of those that speak one protocol."""
+    found = tomllib.loads(PUBLISHED.read_text(encoding="utf-8"))
+    sessions = msgspec.convert(found["session"], tuple[Session, ...])
+    return tuple(session for session in sessions if door in ("", session.door))
+
+
+async def page(addresses: str) -> str:
+    """Return the page; robots are opened at these addresses of the machine, in lockstep, so it is always the same."""
+    doors, sessions = sorted(BODY), defaultdict[str, list[Sequence[Exchange]]](list)
+    verdicts: list[Verdict] = []
+    for seed in SEEDS:
+        async with _Served(addresses, seed) as served:
+            for door in doors:
+                sessions[door].append(await probe(served.targets[door], askable(door), RealClock()))
+            if seed == SEEDS[0]:
+                verdicts = [await _judge(session, served) for door in doors for session in published(door)]
+    compared = {door: compare_behaviour(found[0], found[1]) for door, found in sessions.items()}
+    selves = [(door, sum(row.checks for row in found.rows), found.fidelity) for door, found in compared.items()]
+    return _page(verdicts, selves)
+
+
+async def _judge(session: Session, served: _Served) -> Verdict:
+    """Ask one of our robots what was asked of a real one."""
+    wrong: list[str] = []
+    facts = 0
+    line = served.targets[session.door].line(RealClock(), lambda _operation, _data: None)
+    passing = asyncio.get_running_loop().create_task(_pass(served.clock))
+    try:
+        await line.open()
+        for asked in session.asked:
+            operation, payload = _request(session.door, asked.request)
+            for good, what in _facts(asked, await line.ask(operation, payload, 1)):
+                facts += 1
+                if not good:
+                    wrong.append(f"`{asked.request[:60]}`: {what}")
+        await line.close()
+    finally:
+        passing.cancel()
+    return Verdict(session.door, session.source, facts, tuple(wrong))
+
+
+def _request(door: str, text: str) -> tuple[str, bytes]:
+    """Return the operation and the payload, in the tap's form."""
+    if door == "slamware":
+        head, brace, body = text.partition(" {")
+        return head, f"{head}\n\n{brace.strip()}{body}".encode()
+    if door == "cyberdog":
+        code, _, params = text.partition(" ")
+        return code, params.encode()
+    return text.rstrip(";"), text.encode()
+
+
+def _facts(asked: Asked, answers: Sequence[tuple[bytes, str]]) -> list[tuple[bool, str]]:
+    """Return each known fact: whether it holds, and what came instead."""
+    if asked.silent:
+        return [(not answers, f"{len(answers)} answers")]
+    if not answers:
+        return [(False, "no answer")]
+    payload, status = answers[0]
+    text = payload.decode("utf-8", "replace").strip()
+    found: list[tuple[bool, str]] = []
+    if asked.status:
+        found.append((status == asked.status, f"status {status}"))
+    if asked.pattern:
+        found.append((re.fullmatch(asked.pattern, text) is not None, f"`{text[:60]}`"))
+    values: dict[str, Any] = dict(leaves(tree(payload)))
+    for path, kind in asked.fields.items():
+        inner = any(name.startswith((f"{path}.", f"{path}[")) for name in values)
+        there = kind_of(values[path]) if path in values else kind if inner else "nothing"
+        found.append((there == kind, f"{path} is {there}"))
+    return found
+
+
+class _Served:
+    """Robots in lockstep while ``with`` lasts; ``targets``: their doors."""
+
+    def __init__(self, addresses: str, seed: int) -> None:
+        self._addresses, self._seed = addresses, seed
+        self._folder = tempfile.TemporaryDirectory(prefix="roboglot-fidelity-")
+
+    async def __aenter__(self) -> _Served:
+        data = Path(self._folder.name)
+        bodies = sorted(set(BODY.values()))
+        address = {body: f"{self._addresses}.{number}" for number, body in enumerate(bodies, 1)}
+        values = {
+            "data": str(data),
+            "world": "empty",
+            "lockstep": True,
+            "seed": self._seed,
+            "robots": [{"name": body, "body": body, "address": address[body]} for body in bodies],
+            "console": {"enabled": False},
+        }
+        self._runtime = Runtime(load_config(None, values, sections()))
+        await self._runtime.start()
+        assert isinstance(self._runtime.clock, LockstepClock)
+        self.clock = self._runtime.clock
+        await self.clock.advance(float(self._seed))
+        export_client(data / FOLDER, data / "app")
+        options = {"cyberdog": f"?certs={data / 'app'}"}
+        self.targets = {door: Target(f"{door}://{address[b]}{options.get(door, '')}") for door, b in BODY.items()}
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self._runtime.close()
+        self._folder.cleanup()
+
+
+async def _pass(clock: LockstepClock) -> None:
+    """Let robot time pass while answers are waited for that need some."""
+    while True:
+        await clock.advance(0.1)
+        await asyncio.sleep(0.005)
+
+
+def _page(verdicts: Sequence[Verdict], selves: Sequence[tuple[str, int, float]]) -> str:
+    by_door: dict[str, list[Verdict]] = defaultdict(list)
+    for verdict in verdicts:
+        by_door[verdict.door].append(verdict)
+    lines = [*HEAD, "## Against what was published of real robots", "", *EXPLAINED, ""]
+    lines += ["| protocol | facts | hold | agree |", "|---|---|---|---|"]
+    for door, found in sorted(by_door.items()):
+        facts = sum(verdict.facts for verdict in found)
+        hold = facts - sum(len(verdict.wrong) for verdict in found)
+        lines.append(f"| {door} | {facts} | {hold} | {percent(hold / facts)} |")
+    for verdict in verdicts:
+        hold = verdict.facts - len(verdict.wrong)
+        lines += ["", *wrap(f"**{verdict.door}**, {hold} of {verdict.facts}: {verdict.source}", WIDTH)]
+        lines += ["", *(f"- {words}" for words in verdict.wrong)] if verdict.wrong else []
+    lines += ["", "## Against themselves", "", *THEMSELVES, ""]
+    lines += ["| protocol | compared | agree |", "|---|---|---|"]
+    lines += [f"| {door} | {checks} | {percent(share)} |" for door, checks, share in selves]
+    return "\n".join([*lines, "", *TAIL, ""])
+
+
+HEAD = (
+    "# Fidelity",
+    "",
+    "For who asks whether a robot that is not there is like theirs. After this page you know what was compared with",
+    "what, and can add a recording of your own robot.",
+    "",
+    "Made by `roboglot fidelity --write` from this version's doors; do not edit.",
+    "",
+)
+EXPLAINED = (
+    "No recording of a real robot was sent to us yet. What there is: answers that owners of real robots published,",
+    "what clients rely on that their authors tried on real robots, and open source of a robot's own software. Each",
+    "fact (a status, a form of an answer, a field and its type) is asked of our door as it comes, without settings.",
+)
+THEMSELVES = (
+    "Two robots of ours, in worlds of other seeds and ages, are asked everything that changes nothing, and compared",
+    "by behaviour ([how](recording.md#replay-and-compare)). It shows what the comparison itself finds where there",
+    "is nothing to be found, not how near a real robot is.",
+)
+TAIL = (
+    "## Against real robots: send a recording",
+    "",
+    "Five minutes with your robot make the first line of this section:",
+    "",
+    "1. `roboglot record slamware://ROBOT --listen 127.0.0.9 --to mine.mcap` (or `robomaster://`, `visual://`); the",
+    "   app or client then connects to 127.0.0.9. Use the robot as ever, then press Ctrl-C.",
+    "2. `roboglot record info mine.mcap` shows what is in it. Passwords, tokens, Wi-Fi names and keys, accounts,",
+    "   names and faces are replaced by `[redacted]` while recording ([which",
+    "   fields](recording.md#limits-and-redaction)); maps, texts that the robot speaks and positions are not.",
+    "   `redact` in the configuration adds fields.",
+    "3. Without a client: `roboglot compare slamware://ROBOT slamware://127.0.0.1 --html report.html` asks your",
+    "   robot and a simulated one all that changes nothing, and prints one number.",
+    "4. Open an issue with the file or the report, the robot's model and the version of its firmware.",
+)

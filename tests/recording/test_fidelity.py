@@ -1,0 +1,29 @@
+"""The page about fidelity says what this version's doors answer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from roboglot.cli.recordings.fidelity import Asked, _facts, page, published
+from tests.recording.test_playback import WORKER
+
+PAGE = Path(__file__).parents[2] / "docs" / "fidelity.md"
+
+
+async def test_the_page_is_up_to_date() -> None:
+    assert PAGE.read_text(encoding="utf-8") == await page(f"127.0.{211 + WORKER}"), "run: roboglot fidelity --write"
+
+
+def test_every_published_answer_says_something() -> None:
+    for session in published():
+        assert session.source
+        assert all(a.status or a.pattern or a.fields or a.silent for a in session.asked)
+
+
+def test_facts_that_do_not_hold_are_named() -> None:
+    answers = [(b'{"a": {"b": 1}, "c": "x"}', "200")]
+    asked = Asked("GET /", status="404", pattern="no", fields={"$.a": "object", "$.a.b": "string", "$.d": "number"})
+    found = _facts(asked, answers)
+    assert [good for good, _ in found] == [False, False, True, False, False]
+    assert _facts(asked, []) == [(False, "no answer")]
+    assert _facts(Asked("x", silent=True), answers) == [(False, "1 answers")]
