@@ -248,6 +248,7 @@ class RobotAdmission(Admission):
         self._needs: dict[str, Right] = {}
         self._allowed: dict[tuple[str, str], Right] = {}  # the right that sufficed, until rights change
         self._listeners: list[Callable[[str], None]] = []
+        self._offers: dict[int, tuple[asyncio.Server, Callable[[], asyncio.Protocol]]] = {}
         robot.admission = self
         robot.tap.listen(self._note_reply)
 
@@ -308,6 +309,14 @@ class RobotAdmission(Admission):
     def may(self, right: Right) -> bool:
         """Whether the client that is asked for has ``right``."""
         return right in self._rights.get(identity(), NOTHING)
+
+    def offer(self, server: asyncio.Server, factory: Callable[[], asyncio.Protocol]) -> None:
+        """Tunnels reach this port without the kernel."""
+        self._offers[server.sockets[0].getsockname()[1]] = server, factory
+
+    def offered(self, port: int) -> tuple[asyncio.Server, Callable[[], asyncio.Protocol]] | None:
+        """See ``Admission.offered``."""
+        return self._offers.get(port)
 
     def on_lost(self, listener: Callable[[str], None]) -> Callable[[], None]:
         """Call ``listener`` with who lost a right."""

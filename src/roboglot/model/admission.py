@@ -5,6 +5,7 @@ Where nothing is configured, nothing is asked: ``asks`` is false, and that is al
 
 from __future__ import annotations
 
+from asyncio import Protocol, Server
 from collections.abc import Callable
 from enum import StrEnum
 from typing import NamedTuple
@@ -83,6 +84,13 @@ class Admission:
     def carries_datagrams(self, address: str) -> bool:
         """Whether a client can be sent UDP of any port: not through a tunnel, which carries the vendors' own."""
         return True
+
+    def offer(self, server: Server, factory: Callable[[], Protocol]) -> None:
+        """A door listens by ``server``; what comes to its port gets ``factory``'s protocols."""
+
+    def offered(self, port: int) -> tuple[Server, Callable[[], Protocol]] | None:
+        """What was offered last for ``port``."""
+        return None
 
     def on_lost(self, listener: Callable[[str], None]) -> Callable[[], None]:
         """Call ``listener`` with who lost a right; returns what ends that."""

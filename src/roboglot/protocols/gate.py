@@ -20,6 +20,7 @@ from roboglot.transport.seldom import Seldom
 from roboglot.transport.tls import Tls, TlsPort
 
 log = logging.getLogger(__name__)
+BACKLOG = 100
 OPEN_MAX = 1024  # connections of all clients to the ports of one door
 
 Factory = Callable[[], asyncio.Protocol]
@@ -55,6 +56,25 @@ class Gate:
             self._leave = self._admission.on_lost(self._cut_off)
         port = Port(name, right, Connections(most))
         return lambda: _Gatekeeper(self, factory, port)
+
+    async def listen(
+        self,
+        factory: Factory,
+        name: str,
+        address: str,
+        port: int,
+        right: Right | None = None,
+        most: int = OPEN_MAX,
+        backlog: int = BACKLOG,
+    ) -> asyncio.Server:
+        """Listen at a port of the robot, with ``before`` in front; tunnels reach it within the process, too.
+
+        Raises OSError naming an address that is taken.
+        """
+        gated = self.before(factory, name, right, most)
+        server = await asyncio.get_running_loop().create_server(gated, address, port, backlog=backlog)
+        self._admission.offer(server, gated)
+        return server
 
     def close(self) -> None:
         """Stop cutting clients off."""

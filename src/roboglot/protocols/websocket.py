@@ -75,8 +75,14 @@ class WebSocketServer:
         self.browsers.warn_if_open()
         self._leave = self.admission.on_lost(self._disconnect)
         loop = asyncio.get_running_loop()
-        gated = self._gate.before(lambda: Connection(self), f"{self.door} WebSocket", most=CONNECTIONS_MAX)
-        self._server = await loop.create_server(gated, self.address, self.port, backlog=BACKLOG)
+        self._server = await self._gate.listen(
+            lambda: Connection(self),
+            f"{self.door} WebSocket",
+            self.address,
+            self.port,
+            most=CONNECTIONS_MAX,
+            backlog=BACKLOG,
+        )
         self.port = self._server.sockets[0].getsockname()[1]
         self._loading = loop.run_in_executor(None, importlib.import_module, LIBRARY)
 

@@ -55,6 +55,7 @@ class Valve:
 
     def __init__(self, transport: asyncio.Transport, meter: Metered, spend: Spend) -> None:
         self._transport, self._meter, self._spend = transport, meter, spend
+        self.is_closing = transport.is_closing  # asked for every message
         self._paused = False  # by the inner protocol
         self._waiting: asyncio.TimerHandle | None = None
 

@@ -1,7 +1,8 @@
-"""TLS in front of any protocol, on a port that takes plain connections, too: the first byte decides.
+"""TLS in front of any protocol: on a port that takes plain connections, too (the first byte decides), and to a port.
 
-The handshake is asked for before it costs anything, and ends within HANDSHAKE_SECONDS_MAX. Works over every loop's
-transports, and needs none of their own TLS, which begins before anything can be asked.
+A port's handshake is asked for before it costs anything, and ends within HANDSHAKE_SECONDS_MAX. Works over every loop's
+transports, and needs none of their own TLS, which begins before anything can be asked, and takes twice as long for a
+short message.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ seldom = Seldom(log)
 
 HANDSHAKE_SECONDS_MAX = 5.0
 HANDSHAKE_BYTES_MAX = 64 * 1024  # from the client, until the handshake is over
-PIECE = 64 * 1024
+RECORD_MAX = 16 * 1024  # bytes that one record carries
 HELLO = 0x16  # the first byte of a TLS connection: a handshake record
 
 Factory = Callable[[], asyncio.Protocol]
@@ -46,14 +47,15 @@ def server_context(certificate: Path, key: Path, oldest: ssl.TLSVersion = ssl.TL
     return context
 
 
-class TlsPort(asyncio.Protocol):
-    """One connection. ``admit`` is asked with the client's host before a handshake."""
+class TlsEnd(asyncio.Protocol):
+    """One end of one connection: what both have in common, once the handshake has begun."""
 
-    def __init__(self, factory: Factory, tls: Tls, admit: Callable[[str], bool] = lambda _host: True) -> None:
-        self._factory, self._tls, self._admit = factory, tls, admit
+    def __init__(self, factory: Factory) -> None:
+        self._factory = factory
         self.inner: asyncio.Protocol | None = None
         self._transport: asyncio.Transport
-        self._incoming, self._outgoing = ssl.MemoryBIO(), ssl.MemoryBIO()
+        self._incoming: ssl.MemoryBIO
+        self._outgoing: ssl.MemoryBIO
         self._tunnel: ssl.SSLObject | None = None
         self._received = 0
         self._host = ""
@@ -66,16 +68,14 @@ class TlsPort(asyncio.Protocol):
         self._patience = asyncio.get_running_loop().call_later(HANDSHAKE_SECONDS_MAX, self._transport.abort)
 
     def data_received(self, data: bytes) -> None:
-        """Find out what it is; then decrypt."""
-        if self._tunnel is None and not self._begin(data):
-            return
+        """Decrypt, once hands are shaken."""
         self._incoming.write(data)
         if self.inner is None and not self._shake_hands(len(data)):
             return
         self._read()
 
     def eof_received(self) -> bool | None:
-        """The client sends no more."""
+        """The other end sends no more."""
         if self.inner is None:
             return False
         self.inner.eof_received()
@@ -105,7 +105,7 @@ class TlsPort(asyncio.Protocol):
             self._flush()
 
     def say_goodbye(self) -> None:
-        """Signal the end to the client."""
+        """Signal the end to the other end."""
         if self._tunnel is not None and not self._transport.is_closing():
             with contextlib.suppress(ssl.SSLError):
                 self._tunnel.unwrap()
@@ -116,25 +116,9 @@ class TlsPort(asyncio.Protocol):
         """The encryption; None: there is none yet."""
         return self._tunnel
 
-    def _begin(self, data: bytes) -> bool:
-        """Whether it is TLS and may be; plain connections go to their protocol."""
-        if data[0] != HELLO:
-            self._calm_down()
-            if not self._tls.plain:
-                seldom.warning(self._host, "%s turned away: this port takes TLS only", self._host)
-                self._transport.abort()
-                return False
-            inner = self._factory()
-            self._transport.set_protocol(inner)
-            inner.connection_made(self._transport)
-            inner.data_received(data)
-            return False
-        if not self._admit(self._host):
-            seldom.warning(self._host, "%s turned away: too many TLS handshakes", self._host)
-            self._transport.abort()
-            return False
-        self._tunnel = self._tls.context.wrap_bio(self._incoming, self._outgoing, server_side=True)
-        return True
+    def _encrypt(self, context: ssl.SSLContext, *, server_side: bool) -> None:
+        self._incoming, self._outgoing = ssl.MemoryBIO(), ssl.MemoryBIO()
+        self._tunnel = context.wrap_bio(self._incoming, self._outgoing, server_side=server_side)
 
     def _shake_hands(self, size: int) -> bool:
         assert self._tunnel is not None
@@ -158,28 +142,32 @@ class TlsPort(asyncio.Protocol):
         return True
 
     def _read(self) -> None:
+        """Hand on what came. An attempt to read what is not there costs more than a message, so none is made."""
         assert self._tunnel is not None
         try:
-            while not self._transport.is_closing():
-                data = self._tunnel.read(PIECE)
+            while (self._incoming.pending or self._tunnel.pending()) and not self._transport.is_closing():
+                data = self._tunnel.read(RECORD_MAX)
                 if not data:
-                    break
+                    self._end()
+                    return
                 assert self.inner is not None
                 self.inner.data_received(data)
-            else:
-                return
         except ssl.SSLWantReadError:
-            self._flush()
-            return
+            pass  # a record is not whole yet
         except ssl.SSLError as error:
             if not isinstance(error, ssl.SSLZeroReturnError):
                 log.info("%s: TLS broke: %s", self._host, error.reason)
+            self._end()
+            return
+        self._flush()
+
+    def _end(self) -> None:
         self._flush()
         self._transport.close()
 
     def _flush(self) -> None:
-        if data := self._outgoing.read():
-            self._transport.write(data)
+        if self._outgoing.pending:
+            self._transport.write(self._outgoing.read())
 
     def _calm_down(self) -> None:
         if self._patience is not None:
@@ -187,17 +175,78 @@ class TlsPort(asyncio.Protocol):
             self._patience = None
 
 
+class TlsPort(TlsEnd):
+    """A connection that came. ``admit`` is asked with the client's host before a handshake."""
+
+    def __init__(self, factory: Factory, tls: Tls, admit: Callable[[str], bool] = lambda _host: True) -> None:
+        super().__init__(factory)
+        self._tls, self._admit = tls, admit
+
+    def data_received(self, data: bytes) -> None:
+        """Find out what it is; then decrypt."""
+        if self._tunnel is not None or self._begin(data):
+            super().data_received(data)
+
+    def _begin(self, data: bytes) -> bool:
+        """Whether it is TLS and may be; plain connections go to their protocol."""
+        if data[0] != HELLO:
+            self._calm_down()
+            if not self._tls.plain:
+                seldom.warning(self._host, "%s turned away: this port takes TLS only", self._host)
+                self._transport.abort()
+                return False
+            inner = self._factory()
+            self._transport.set_protocol(inner)
+            inner.connection_made(self._transport)
+            inner.data_received(data)
+            return False
+        if not self._admit(self._host):
+            seldom.warning(self._host, "%s turned away: too many TLS handshakes", self._host)
+            self._transport.abort()
+            return False
+        self._encrypt(self._tls.context, server_side=True)
+        return True
+
+
+class TlsCall(TlsEnd):
+    """A connection that is made from here; ``over`` is done when hands are shaken, or with ConnectionError."""
+
+    def __init__(self, factory: Factory, context: ssl.SSLContext) -> None:
+        super().__init__(factory)
+        self._encryption = context
+        self.over: asyncio.Future[asyncio.Protocol] = asyncio.get_running_loop().create_future()
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Begin the handshake."""
+        super().connection_made(transport)
+        self._encrypt(self._encryption, server_side=False)
+        self._shake_hands(0)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Notify the inner protocol, and who waits."""
+        super().connection_lost(exc)
+        if not self.over.done():
+            self.over.set_exception(ConnectionError(f"no TLS with {self._host}: {exc or 'it hung up'}"))
+
+    def _shake_hands(self, size: int) -> bool:
+        shaken = super()._shake_hands(size)
+        if shaken and self.inner is not None and not self.over.done():
+            self.over.set_result(self.inner)
+        return shaken
+
+
 class _Encrypted:
     """The transport as the inner protocol sees it."""
 
-    def __init__(self, port: TlsPort, transport: asyncio.Transport) -> None:
-        self._port, self._transport = port, transport
+    def __init__(self, end: TlsEnd, transport: asyncio.Transport) -> None:
+        self._end, self._transport = end, transport
+        self.is_closing = transport.is_closing  # asked for every message
 
     def write(self, data: bytes | bytearray | memoryview) -> None:
-        self._port.send(data)
+        self._end.send(data)
 
     def writelines(self, pieces: list[bytes]) -> None:
-        self._port.send(b"".join(pieces))
+        self._end.send(b"".join(pieces))
 
     def write_eof(self) -> None:
         self.close()
@@ -206,21 +255,21 @@ class _Encrypted:
         return False
 
     def close(self) -> None:
-        self._port.say_goodbye()
+        self._end.say_goodbye()
         self._transport.close()
 
     def set_protocol(self, protocol: asyncio.BaseProtocol) -> None:
-        self._port.inner = cast(asyncio.Protocol, protocol)
+        self._end.inner = cast(asyncio.Protocol, protocol)
 
     def get_protocol(self) -> asyncio.BaseProtocol | None:
-        return self._port.inner
+        return self._end.inner
 
     def get_extra_info(self, name: str, default: Any = None) -> Any:
         match name:
             case "sslcontext":
-                return self._port.tunnel.context if self._port.tunnel else default
+                return self._end.tunnel.context if self._end.tunnel else default
             case "ssl_object":
-                return self._port.tunnel
+                return self._end.tunnel
         return self._transport.get_extra_info(name, default)
 
     def __getattr__(self, name: str) -> Any:

@@ -11,11 +11,12 @@ import socket
 import ssl
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from roboglot.access.tunnel.frames import Kind
 from roboglot.access.tunnel.link import Link
 from roboglot.access.tunnel.tunnel import Tunnel
+from roboglot.transport.tls import TlsCall
 
 log = logging.getLogger(__name__)
 
@@ -70,7 +71,8 @@ class Connector:
         context.minimum_version = ssl.TLSVersion.TLSv1_3
         context.check_hostname, context.verify_mode = False, ssl.CERT_NONE  # the fingerprint is what is checked
         loop = asyncio.get_running_loop()
-        _, link = await loop.create_connection(Link, self._gateway, self._port, ssl=context)
+        _, call = await loop.create_connection(lambda: TlsCall(Link, context), self._gateway, self._port)
+        link = cast(Link, await call.over)
         try:
             certificate = link.transport.get_extra_info("ssl_object").getpeercert(binary_form=True)
             fingerprint, new = self._known.check(f"{self._gateway}:{self._port}", certificate)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import itertools
 import json
 import logging
 import ssl
@@ -17,6 +18,7 @@ from functools import partial
 from ipaddress import IPv4Address
 from pathlib import Path
 from typing import cast
+from weakref import WeakValueDictionary
 
 from roboglot.access.guard import Guard
 from roboglot.access.tunnel.frames import BadFrame, Kind
@@ -27,6 +29,7 @@ from roboglot.model.robot import Robot
 from roboglot.model.tap import Direction, Exchange
 from roboglot.transport.connections import Connections
 from roboglot.transport.metered import Metered
+from roboglot.transport.pipe import join
 from roboglot.transport.seldom import Seldom
 from roboglot.transport.tls import Tls, TlsPort, server_context
 
@@ -38,6 +41,7 @@ TUNNELS_OF_ONE_MAX = 64  # of one identity
 CONNECTIONS_MAX = 512  # tunnels, and connections that are not yet tunnels
 HELLO_SECONDS_MAX = 5.0
 FIRST_ADDRESS = IPv4Address("127.64.0.1")
+PORTS_WITHIN = range(1, 1024)  # of connections within the process: the kernel gives others
 BROADCASTS = ("127.255.255.255", "255.255.255.255")
 
 
@@ -117,10 +121,11 @@ class Gateway:
         robot, ports = found
         with self._address(who) as own:
             log.info("%s drives robot %s through a tunnel from %s", who, name, peer[0])
+            calls = _Calls(robot, ports, own)
             tunnel = Tunnel(
                 link,
                 first=2,
-                opened=lambda port, protocol: _connect(ports, port, own, protocol),
+                opened=calls.connect,
                 datagram=lambda _port, _data: None,
                 quiet=lambda: _stop(robot, own),
             )
@@ -183,11 +188,29 @@ def _hello(payload: bytes) -> tuple[str, str]:
         raise BadFrame("this is no client of ours") from None
 
 
-async def _connect(ports: Ports, port: int, own: str, protocol: Callable[[], asyncio.Protocol]) -> object:
-    if port not in ports.tcp:
-        raise OSError(f"{port} is none of the robot's ports")
-    loop = asyncio.get_running_loop()
-    return await loop.create_connection(protocol, ports.address, port, local_addr=(own, 0))
+class _Calls:
+    """One tunnel's connections to the robot's ports."""
+
+    def __init__(self, robot: Robot, ports: Ports, own: str) -> None:
+        self._robot, self._ports, self._own = robot, ports, own
+        self._numbers = itertools.cycle(PORTS_WITHIN)
+        self._open = WeakValueDictionary[int, asyncio.Protocol]()
+
+    async def connect(self, port: int, protocol: Callable[[], asyncio.Protocol]) -> object:
+        """Within the process where the door lets us, else (gRPC) over loopback. Raises OSError."""
+        if port not in self._ports.tcp:
+            raise OSError(f"{port} is none of the robot's ports")
+        address = self._ports.address
+        if (offered := self._robot.admission.offered(port)) is None:
+            loop = asyncio.get_running_loop()
+            return await loop.create_connection(protocol, address, port, local_addr=(self._own, 0))
+        server, door = offered
+        if not server.is_serving():
+            raise ConnectionRefusedError(f"nothing listens at {port} now")
+        number = next(free for free in self._numbers if free not in self._open)
+        stream = self._open[number] = protocol()
+        join(stream, door(), (self._own, number), (address, port))
+        return None
 
 
 @contextlib.asynccontextmanager

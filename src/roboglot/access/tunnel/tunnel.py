@@ -114,7 +114,12 @@ class Tunnel:
 
     def _take(self, kind: Kind, number: int, payload: bytes) -> None:
         self._heard = self._loop.time()
-        if (stream := self._streams.get(number)) is not None:
+        stream = self._streams.get(number)
+        if stream is not None and kind is Kind.DATA:
+            stream.deliver(payload)
+            if stream.undelivered > RECEIVED_MAX:
+                raise BadFrame("more was sent than the window allows")
+        elif stream is not None:
             self._feed(stream, kind, payload)
         elif kind is Kind.OPEN:
             if len(payload) != PORT.size or number % 2 == self._next % 2:
@@ -127,10 +132,6 @@ class Tunnel:
 
     def _feed(self, stream: Stream, kind: Kind, payload: bytes) -> None:
         match kind:
-            case Kind.DATA:
-                stream.deliver(payload)
-                if stream.undelivered > RECEIVED_MAX:
-                    raise BadFrame("more was sent than the window allows")
             case Kind.CREDIT if len(payload) == CREDIT.size:
                 stream.give(min(WINDOW, CREDIT.unpack(payload)[0]))
             case Kind.EOF:

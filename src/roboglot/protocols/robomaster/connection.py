@@ -69,14 +69,11 @@ class ControlConnection(asyncio.Protocol):
             log.warning("robomaster: %s turned away, %d connections are open", self.host, len(self._connections))
             transport.abort()
             return
-        connection = transport.get_extra_info("socket")
-        self.driver = Driver(self._name, self.host, connection)
+        self.driver = Driver(self._name, self.host, transport.get_extra_info("socket"))
         self._connections.add(self)
         transport.set_write_buffer_limits(high=OUTPUT_MAX)
-        if connection:
-            probe_for_life(connection)
-        else:
-            self._greeting.known = True  # a serial line: no browser gets there
+        probe_for_life(transport)
+        self._greeting.known = transport.get_extra_info("sockname") is None  # a serial line: no browser gets there
         log.info("robomaster: %s connected", self.host)
 
     def data_received(self, data: bytes) -> None:
@@ -122,8 +119,7 @@ class ControlConnection(asyncio.Protocol):
 
     def _look(self) -> None:
         """Whether the client that is not read from has hung up; then what it has not been answered is dropped."""
-        connection = self.transport.get_extra_info("socket")
-        if connection is not None and hung_up(connection):
+        if hung_up(self.transport):
             self.transport.abort()
         else:
             self._resting = asyncio.get_running_loop().call_later(LEFT_PERIOD, self._look)

@@ -83,8 +83,8 @@ class RoboMasterDoor:
             for name, (factory, port) in ports.items():
                 if port is not None:
                     right, most = PORT_RIGHTS.get(name, Right.SEE), CONNECTIONS_MAX.get(name, CONTROL_CONNECTIONS_MAX)
-                    gated = self._gate.before(factory, f"robomaster {name}", right, most)
-                    self._servers[name] = await loop.create_server(gated, self._address, port)
+                    what = f"robomaster {name}"
+                    self._servers[name] = await self._gate.listen(factory, what, self._address, port, right, most)
             if self._config.uart:
                 self._serial = SerialLine(self._serial_link, self._serial_connection)
         except OSError:

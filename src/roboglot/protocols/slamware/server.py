@@ -120,8 +120,9 @@ class SlamwareDoor:
         def connection() -> asyncio.Protocol:
             return HttpConnection(config, self._state, {}, loop)
 
-        gated = self._gate.before(connection, "slamware REST", most=CONNECTIONS_MAX)
-        self._server = await loop.create_server(gated, self._address, self.port, backlog=BACKLOG)
+        self._server = await self._gate.listen(
+            connection, "slamware REST", self._address, self.port, most=CONNECTIONS_MAX, backlog=BACKLOG
+        )
         self.port = self._server.sockets[0].getsockname()[1]
 
     def _fall_silent(self) -> None:

@@ -9,6 +9,8 @@ APP_NAME = "cyberdog2.client"
 
 MESSAGE_MAX = 5_242_880  # bytes of one message, in either direction, on the robot's side
 STREAMS_MAX = 256  # calls under way on one connection
+CONNECTIONS_MAX = 512  # with a robot at once: one costs 20 kB before its handshake, and 20 more when that breaks
+HANDSHAKE_SECONDS_MAX = 5  # a connection that says nothing is hung up on then
 PUSH_MAX = 4_194_304 - 64  # bytes of text in a push: an app's gRPC takes 4 MiB by default
 
 HEARTBEAT_PERIOD = 0.5  # s
@@ -32,6 +34,8 @@ def server_options() -> Options:
         *_KEEPALIVE,
         ("grpc.http2.min_ping_interval_without_data_ms", 500),
         ("grpc.max_concurrent_streams", STREAMS_MAX),
+        ("grpc.max_allowed_incoming_connections", CONNECTIONS_MAX),
+        ("grpc.server_handshake_timeout_ms", 1000 * HANDSHAKE_SECONDS_MAX),
         ("grpc.so_reuseport", 0),
     ]
 

@@ -58,7 +58,7 @@ class _Reader(asyncio.Protocol):
             transport.abort()
             return
         self._transports.add(transport)
-        probe_for_life(transport.get_extra_info("socket"))
+        probe_for_life(transport)
 
     def data_received(self, data: bytes) -> None:
         turn_away_strangers(self._greeting, self.transport, data)

@@ -86,7 +86,7 @@ class _Watcher(asyncio.Protocol):
             transport.abort()
             return
         transport.set_write_buffer_limits(high=MEDIA_BACKLOG_MAX)
-        probe_for_life(transport.get_extra_info("socket"))
+        probe_for_life(transport)
         self.follow()
 
     def data_received(self, data: bytes) -> None:
