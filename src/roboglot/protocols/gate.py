@@ -20,7 +20,7 @@ from roboglot.transport.seldom import Seldom
 from roboglot.transport.tls import Tls, TlsPort
 
 log = logging.getLogger(__name__)
-BACKLOG = 100
+BACKLOG = 2048  # connections that wait to be taken
 OPEN_MAX = 1024  # connections of all clients to the ports of one door
 
 Factory = Callable[[], asyncio.Protocol]
@@ -65,14 +65,13 @@ class Gate:
         port: int,
         right: Right | None = None,
         most: int = OPEN_MAX,
-        backlog: int = BACKLOG,
     ) -> asyncio.Server:
         """Listen at a port of the robot, with ``before`` in front; tunnels reach it within the process, too.
 
         Raises OSError naming an address that is taken.
         """
         gated = self.before(factory, name, right, most)
-        server = await asyncio.get_running_loop().create_server(gated, address, port, backlog=backlog)
+        server = await asyncio.get_running_loop().create_server(gated, address, port, backlog=BACKLOG)
         self._admission.offer(server, gated)
         return server
 

@@ -36,7 +36,6 @@ UNSENT_MAX = 16 * 1024 * 1024  # bytes waiting for a slow reader; at the next te
 ROOM = 256 * 1024  # bytes waiting for a slow reader before programs wait for it
 STALLED_SECONDS_MAX = 10.0  # in which such a reader takes nothing at all; then it is disconnected
 OPENING_SECONDS_MAX = 10.0
-BACKLOG = 64
 HEAD_END = b"\r\n\r\n"
 REASON_BYTES_MAX = 123  # of a close frame
 GOING_AWAY, UNSUPPORTED, NOT_UTF8, POLICY, TRY_LATER = 1001, 1003, 1007, 1008, 1013  # close codes of RFC 6455
@@ -75,14 +74,8 @@ class WebSocketServer:
         self.browsers.warn_if_open()
         self._leave = self.admission.on_lost(self._disconnect)
         loop = asyncio.get_running_loop()
-        self._server = await self._gate.listen(
-            lambda: Connection(self),
-            f"{self.door} WebSocket",
-            self.address,
-            self.port,
-            most=CONNECTIONS_MAX,
-            backlog=BACKLOG,
-        )
+        name, most = f"{self.door} WebSocket", CONNECTIONS_MAX
+        self._server = await self._gate.listen(lambda: Connection(self), name, self.address, self.port, None, most)
         self.port = self._server.sockets[0].getsockname()[1]
         self._loading = loop.run_in_executor(None, importlib.import_module, LIBRARY)
 

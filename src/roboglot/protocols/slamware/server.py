@@ -36,7 +36,6 @@ from roboglot.protocols.slamware.http_connection import CONNECTIONS_MAX, KEEP_AL
 from roboglot.transport.tls import Tls
 from roboglot.wire.slamware.platform import GeneralEvent
 
-BACKLOG = 2048
 GOODBYE_SECONDS = 0.3  # for answers under way when the door closes
 
 
@@ -120,9 +119,8 @@ class SlamwareDoor:
         def connection() -> asyncio.Protocol:
             return HttpConnection(config, self._state, {}, loop)
 
-        self._server = await self._gate.listen(
-            connection, "slamware REST", self._address, self.port, most=CONNECTIONS_MAX, backlog=BACKLOG
-        )
+        name, most = "slamware REST", CONNECTIONS_MAX
+        self._server = await self._gate.listen(connection, name, self._address, self.port, None, most)
         self.port = self._server.sockets[0].getsockname()[1]
 
     def _fall_silent(self) -> None:
