@@ -20,15 +20,19 @@ class Seldom:
         """Warn, once in PERIOD for each ``key``."""
         self._say(logging.WARNING, key, message, values)
 
+    def error(self, key: str, message: str, *values: object) -> None:
+        """Log an error with the traceback at hand, once in PERIOD for each ``key``."""
+        self._say(logging.ERROR, key, message, values, traceback=True)
+
     def info(self, key: str, message: str, *values: object) -> None:
         """Say it, once in PERIOD for each ``key``."""
         self._say(logging.INFO, key, message, values)
 
-    def _say(self, level: int, key: str, message: str, values: tuple[object, ...]) -> None:
+    def _say(self, level: int, key: str, message: str, values: tuple[object, ...], *, traceback: bool = False) -> None:
         now = time.monotonic()
         new = now - self._said.get(key, -PERIOD) >= PERIOD
         if new:
             if len(self._said) >= KINDS_MAX:
                 self._said.pop(next(iter(self._said)))
             self._said[key] = now
-        self._log.log(level if new else logging.DEBUG, message, *values)
+        self._log.log(level if new else logging.DEBUG, message, *values, exc_info=traceback)

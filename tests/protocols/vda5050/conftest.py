@@ -27,6 +27,16 @@ PATIENCE = 20.0  # real s
 ADDRESS = "127.0.0.83"
 
 
+def listening(port: int) -> None:
+    """Return when a broker answers there."""
+    for _ in range(200):
+        try:
+            socket.create_connection((ADDRESS, port), 0.1).close()
+            return
+        except OSError:
+            time.sleep(0.05)
+
+
 @pytest.fixture(scope="module")
 def broker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
     """The port of a mosquitto of our own."""
@@ -37,12 +47,7 @@ def broker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
     file = tmp_path_factory.mktemp("mosquitto") / "conf"
     file.write_text(f"listener {port} {ADDRESS}\nallow_anonymous true\n")
     process = subprocess.Popen([MOSQUITTO, "-c", str(file)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    for _ in range(200):
-        try:
-            socket.create_connection((ADDRESS, port), 0.1).close()
-            break
-        except OSError:
-            time.sleep(0.05)
+    listening(port)
     yield port
     process.terminate()
     process.wait()
@@ -73,9 +78,11 @@ class Control:
             _, _, _, self.serial, name = topic.split("/")
             self.heard.setdefault(name, []).append(json.loads(payload))
 
-    def send(self, name: str, message: dict[str, Any] | bytes) -> None:
+    def send(self, name: str, message: dict[str, Any] | bytes, *, wait: bool = True) -> None:
         data = message if isinstance(message, bytes) else encoded(message)
-        self._client.publish(f"uagv/{self.level}/roboglot/{self.serial}/{name}", data, qos=1).wait_for_publish(PATIENCE)
+        sent = self._client.publish(f"uagv/{self.level}/roboglot/{self.serial}/{name}", data, qos=1)
+        if wait:
+            sent.wait_for_publish(PATIENCE)
 
     @property
     def state(self) -> dict[str, Any]:
@@ -125,9 +132,9 @@ async def yard(broker: int, tmp_path: Path) -> AsyncIterator[Opened]:
     """Open a robot: its fleet control's version, and what its configuration says beside."""
     opened: list[Yard] = []
 
-    async def open(version: str = "3.0", **more: Any) -> Yard:
-        control = Control(broker, {"3.0": "v3", "2.1": "v2"}[version])
-        door = {"broker": f"{ADDRESS}:{broker}", "version": version, "serials": {"a": tmp_path.name}}
+    async def open(version: str = "3.0", port: int = broker, **more: Any) -> Yard:
+        control = Control(port, {"3.0": "v3", "2.1": "v2"}[version])
+        door = {"broker": f"{ADDRESS}:{port}", "version": version, "serials": {"a": tmp_path.name}}
         values = {
             "data": str(tmp_path / "data"),
             "world": "empty",

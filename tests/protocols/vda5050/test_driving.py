@@ -12,6 +12,7 @@ from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.components.system.lease import PERSON, Lease
 from roboglot.model.geometry import Twist
+from roboglot.protocols.vda5050 import vocabulary
 from tests.protocols.vda5050.conftest import Opened, Yard
 from tests.protocols.vda5050.orders import action, instant, order
 
@@ -95,7 +96,7 @@ async def test_pause_holds_and_cancel_ends(yard: Opened) -> None:
     [
         (lambda o: o["nodes"][1]["nodePosition"].update(mapId="moon"), "UNKNOWN_MAP_ID"),
         (lambda o: o["nodes"][1].pop("nodePosition"), "UNSUPPORTED_PARAMETER"),
-        (lambda o: o["nodes"][1].update(actions=[action("pick", "1")]), "INVALID_ORDER_ACTION"),
+        (lambda o: o["nodes"][1].update(actions=[action("wave", "1")]), "INVALID_ORDER_ACTION"),
         (lambda o: o["edges"][0].update(actions=[action("beep", "1")]), "INVALID_ORDER_ACTION"),
         (lambda o: o["edges"][0].update(trajectory={"degree": 1}), "UNSUPPORTED_PARAMETER"),
         (lambda o: o["edges"][0].update(maximumHeight=0.01), "UNSUPPORTED_PARAMETER"),
@@ -183,3 +184,34 @@ async def test_a_message_that_breaks_the_door_ends_nothing(yard: Opened, monkeyp
         await one.until(lambda: any("broke" in e["errorDescription"] for e in one.control.state["errors"]))
     one.control.send("order", order("two", [(0, 0), (0.5, 0)]))
     await one.until(lambda: one.control.state["lastNodeId"] == "n1")
+
+
+async def test_a_state_that_cannot_be_made_ends_no_state_after_it(
+    yard: Opened, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    one = await yard()
+
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError("a defect")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(vocabulary, "velocity", broken)
+        await one.clock.advance(3)
+    assert caplog.text.count("sending state to fleet control broke") == 1
+    assert caplog.text.count("sending visualization to fleet control broke") == 1
+    one.control.send("order", order("one", [(0, 0), (0.5, 0)]))
+    await one.until(lambda: one.control.state["lastNodeId"] == "n1")
+    heard = len(one.control.heard["visualization"])
+    await one.until(lambda: len(one.control.heard["visualization"]) > heard)
+
+
+async def test_an_order_whose_driving_breaks_is_reported(yard: Opened, monkeypatch: pytest.MonkeyPatch) -> None:
+    one = await yard()
+
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError("a defect")
+
+    monkeypatch.setattr("roboglot.protocols.vda5050.session.Session.speed_ratio", broken)
+    one.control.send("order", order("one", [(0, 0), (0.5, 0)]))
+    await one.until(lambda: one.control.errors == ["NODE_UNREACHABLE"])
+    assert one.control.state["errors"][0]["errorLevel"] == "CRITICAL"

@@ -23,6 +23,7 @@ class ActionStatus(StrEnum):
     INITIALIZING = "INITIALIZING"
     RUNNING = "RUNNING"
     PAUSED = "PAUSED"
+    RETRIABLE = "RETRIABLE"  # 3.0: failed, and waits for retry or skipRetry
     FINISHED = "FINISHED"
     FAILED = "FAILED"
 

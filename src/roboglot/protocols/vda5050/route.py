@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -22,6 +23,7 @@ from roboglot.wire.vda5050.versions import ErrorKind, Level
 if TYPE_CHECKING:
     from roboglot.protocols.vda5050.session import Session
 
+log = logging.getLogger(__name__)
 TOLERANCE = 0.05  # m: as near as the robot goes where the order allows no deviation
 STANDS = ("SOFT", "HARD")  # blocking types of actions that the robot stands for
 ALONE = ("SINGLE", "HARD")  # those that no other action runs beside
@@ -62,13 +64,13 @@ class Route:
     def begin(self, first: Node) -> None:
         """Drive a new order, whose first node is where the robot is."""
         self._more.clear()
-        self._task = asyncio.get_running_loop().create_task(self._run(first))
+        self._task = asyncio.get_running_loop().create_task(self._guarded(first))
 
     def go_on(self) -> None:
         """Look at the order again: there is more of it."""
         self._more.set()
         if self._task is None or self._task.done():
-            self._task = asyncio.get_running_loop().create_task(self._run(None))
+            self._task = asyncio.get_running_loop().create_task(self._guarded(None))
 
     def pause(self, on: bool) -> None:
         """Hold where the robot is, or go on."""
@@ -90,6 +92,16 @@ class Route:
             driving.cancel("fleet control cancelled the order")
             await driving.done()
         self._task = self._driving = None
+
+    async def _guarded(self, first: Node | None) -> None:
+        """Drive, and say so if driving breaks: an order must not come to rest in silence."""
+        try:
+            await self._run(first)
+        except Exception as error:
+            session = self._session
+            log.exception("robot %s: driving order %s broke", session.robot.id, session.book.order_id)
+            references = {"orderId": session.book.order_id}
+            session.report(ErrorKind.UNREACHABLE, Level.CRITICAL, f"driving broke: {error}", references)
 
     async def _run(self, first: Node | None) -> None:
         """Do the first node's actions, then leg after leg until nothing released is left."""

@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import logging
 import ssl
-from collections.abc import Mapping, Sequence
+from collections.abc import AsyncIterator, Coroutine, Mapping, Sequence
 from typing import Any
 
 import msgspec
@@ -14,11 +14,12 @@ import msgspec
 from roboglot.extras import explaining
 from roboglot.model.admission import Unknown
 from roboglot.model.client_context import ask_for
+from roboglot.model.components.energy.power import Power, PowerMode
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.protocols.door import Endpoint
 from roboglot.protocols.vda5050 import vocabulary
-from roboglot.protocols.vda5050.chapters import actions, messages  # noqa: F401 - these fill the table
+from roboglot.protocols.vda5050.chapters import actions, loads, messages, power, sensing  # noqa: F401 - fill the table
 from roboglot.protocols.vda5050.config import Vda5050Config
 from roboglot.protocols.vda5050.errors import Rejected
 from roboglot.protocols.vda5050.session import Error, Session
@@ -37,6 +38,13 @@ KEEPALIVE = 15  # s after which the broker says that the robot is gone
 CLOSING = 1.0  # s to take leave of the broker
 
 
+HEARD = {"v2": ("order", "instantActions"), "v3": ("order", "instantActions", "zoneSet", "responses")}  # topics
+
+
+class SwitchedOff(Exception):
+    """The robot was switched off; the door dials again when it is on."""
+
+
 class Vda5050Door:
     """One robot at one broker; with no broker it is closed."""
 
@@ -51,7 +59,9 @@ class Vda5050Door:
         self._task: asyncio.Task[None] | None = None
         self._client: Any = None
         self._seldom = Seldom(log)
-        self._sent: Any = None
+        self._sent: Any = None  # the last state, coarsely, and when it was sent (robot time)
+        self._sent_at = 0.0
+        self._rests = False  # hibernation was announced
 
     @property
     def endpoints(self) -> Sequence[Endpoint]:
@@ -95,8 +105,12 @@ class Vda5050Door:
                 self._seldom.warning(
                     "dial", "robot %s: no fleet control at %s:%d: %s", self._robot.id, host, port, error
                 )
+            except SwitchedOff:
+                log.info("robot %s: takes leave of fleet control, it is switched off", self._robot.id)
             finally:
                 self._client = None
+            while self._is_off:  # noqa: ASYNC110 - seldom, and no event says so of every robot
+                await asyncio.sleep(LOOK_PERIOD)  # noqa: TID251 - the broker's time, not the robot's
             await asyncio.sleep(RETRY)  # noqa: TID251 - the broker's time, not the robot's
 
     async def _serve(self, host: str, port: int) -> None:
@@ -122,7 +136,7 @@ class Vda5050Door:
         ) as client:
             self._client = client
             await self._introduce(f"{host}:{port}")
-            for name in ("order", "instantActions"):
+            for name in HEARD[self._version.level]:
                 await client.subscribe(self._topic(name), qos=1)
             await self._send_connection("ONLINE")
             await self._send_factsheet()
@@ -134,14 +148,12 @@ class Vda5050Door:
                 self._version.number,
             )
             self._sent = None
-            speaking = [asyncio.create_task(self._report()), asyncio.create_task(self._visualize())]
-            try:
-                async for message in client.messages:
-                    await self._take(str(message.topic).rpartition("/")[2], message.payload)
-            finally:
-                for task in speaking:
-                    task.cancel()
-                await asyncio.gather(*speaking, return_exceptions=True)
+            self._rests = False
+            await _until_one_ends(self._listen(client), self._report(), self._visualize())
+
+    async def _listen(self, client: Any) -> None:
+        async for message in client.messages:
+            await self._take(str(message.topic).rpartition("/")[2], message.payload)
 
     async def _introduce(self, address: str) -> None:
         """From here on, what is done is done for the fleet control behind this broker."""
@@ -158,9 +170,10 @@ class Vda5050Door:
             began = tap.request(self.name, name, data[:MESSAGE_MAX])
         operation = TABLE.get(name)
         try:
-            if operation is not None:
-                self._session.check(name, operation.right or Right.ADMIN)
-                await operation.call(self._session, {"payload": data})
+            if operation is None:
+                raise Rejected(ErrorKind.UNSUPPORTED, f"this robot uses no zones and asks for none: {name} is not read")
+            self._session.check(name, operation.right or Right.ADMIN)
+            await operation.call(self._session, {"payload": data})
         except Rejected as rejected:
             status, why = self._version.error(rejected.kind), str(rejected)
             self._session.refuse(rejected)
@@ -174,19 +187,56 @@ class Vda5050Door:
 
     async def _report(self) -> None:
         """Send the state whenever it changed, and now and then."""
-        clock, session = self._robot.clock, self._session
-        last = clock.time()
-        async for now in clock.every(LOOK_PERIOD):
-            state = self._state()
-            if session.changed.is_set() or self._sent != _coarse(state) or now - last >= STATE_PERIOD:
-                session.changed.clear()
-                self._sent, last = _coarse(state), now
-                await self._send("state", state)
+        async for now in self._robot.clock.every(LOOK_PERIOD):
+            if self._rests and self._session.hibernating:
+                continue
+            async with self._surviving("state"):
+                await self._report_at(now)
+            if self._session.leaving or self._is_off:
+                self._session.leaving = False
+                await self._send_connection("OFFLINE")
+                raise SwitchedOff
+
+    async def _report_at(self, now: float) -> None:
+        session = self._session
+        if self._rests:
+            self._rests = False
+            await self._send_connection("ONLINE")
+        state = self._state()
+        if session.changed.is_set() or self._sent != _coarse(state) or now - self._sent_at >= STATE_PERIOD:
+            session.changed.clear()
+            self._sent, self._sent_at = _coarse(state), now
+            await self._send("state", state)
+        if session.hibernating:
+            self._rests = True
+            await self._send_connection("HIBERNATING")
 
     async def _visualize(self) -> None:
         async for _ in self._robot.clock.every(self._config.visualization_period):
-            place = vocabulary.position(self._robot, self._version, self._config.map)
-            await self._send("visualization", place | vocabulary.velocity(self._robot))
+            if self._rests:
+                continue
+            async with self._surviving("visualization"):
+                place = vocabulary.position(self._robot, self._version, self._config.map)
+                refers = (
+                    {"referenceStateHeaderId": self._headers.get("state", 1) - 1} if self._version.new_words else {}
+                )
+                await self._send("visualization", refers | place | vocabulary.velocity(self._robot))
+
+    @contextlib.asynccontextmanager
+    async def _surviving(self, name: str) -> AsyncIterator[None]:
+        """Log what breaks one message and go on with the next; a broken link ends the connection instead."""
+        import aiomqtt
+
+        try:
+            yield
+        except (aiomqtt.MqttError, OSError):
+            raise
+        except Exception:  # noqa: BLE001 - it is logged, with its traceback
+            self._seldom.error(name, "robot %s: sending %s to fleet control broke", self._robot.id, name)
+
+    @property
+    def _is_off(self) -> bool:
+        return Power in self._robot and self._robot[Power].mode is PowerMode.OFF
 
     def _state(self) -> dict[str, Any]:
         """Return all that the robot says about itself."""
@@ -197,6 +247,7 @@ class Vda5050Door:
             **vocabulary.progress(session.book),
             **vocabulary.position(robot, version, self._config.map),
             **vocabulary.velocity(robot),
+            **vocabulary.loads(robot, session.load),
             "driving": vocabulary.is_driving(robot),
             "paused": session.paused,
             "newBaseRequest": session.needs_base,
@@ -251,6 +302,19 @@ class Vda5050Door:
         await self._client.publish(self._topic(name), data, qos=qos, retain=retain)
 
 
+async def _until_one_ends(*jobs: Coroutine[Any, Any, None]) -> None:
+    """Run all until the first ends, end the others, and raise what it raised."""
+    tasks = [asyncio.create_task(job) for job in jobs]
+    try:
+        done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        for task in done:
+            task.result()
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
 def _level(text: str) -> str:
     """Return a text as a level of a topic."""
     return "".join("_" if sign in "/+#\0 " else sign for sign in text) or "_"
@@ -259,7 +323,7 @@ def _level(text: str) -> str:
 def _coarse(state: Mapping[str, Any]) -> dict[str, Any]:
     """Return what counts as a change: all but where it is, how fast, and small changes of the charge."""
     fine = ("agvPosition", "mobileRobotPosition", "velocity", "powerSupply", "batteryState")
-    power = state.get("powerSupply") or state.get("batteryState") or {}
-    charge = power.get("stateOfCharge", power.get("batteryCharge", 0.0))
+    battery = state.get("powerSupply") or state.get("batteryState") or {}
+    charge = battery.get("stateOfCharge", battery.get("batteryCharge", 0.0))
     kept = {key: value for key, value in state.items() if key not in fine}
-    return kept | {"charging": power.get("charging"), "charge": int(charge)}
+    return kept | {"charging": battery.get("charging"), "charge": int(charge)}

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Coroutine
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,12 +16,12 @@ from roboglot.model.admission import Forbidden, Right
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.system.health import FaultLevel, Health
-from roboglot.model.errors import RobotError
 from roboglot.model.geometry import Point
 from roboglot.model.robot import Robot
 from roboglot.operations import BadParameters, Operation
 from roboglot.protocols.vda5050.errors import Rejected
 from roboglot.protocols.vda5050.order_book import ACTIONS_KEPT_MAX, ActionState, ActionStatus, OrderBook
+from roboglot.protocols.vda5050.performing import Performer
 from roboglot.protocols.vda5050.route import Route
 from roboglot.protocols.vda5050.table import AT_NODES, INSTANT, operation_of
 from roboglot.protocols.vda5050.vocabulary import DOOR
@@ -58,10 +58,14 @@ class Session:
         self.instant: dict[str, ActionState] = {}
         self.errors: list[Error] = []
         self.paused = False
+        self.hibernating = False  # heard by the door: no states, and nothing is taken but stopHibernation
+        self.leaving = False  # the robot switches off: the door takes leave of the broker
+        self.load: dict[str, str] = {}  # what fleet control said of the load that was picked
         self.changed = asyncio.Event()
         self._trigger = asyncio.Event()
         self._tasks: set[asyncio.Task[None]] = set()
         self._route = Route(self)
+        self._performer = Performer(self)
 
     def touch(self) -> None:
         """Have the state sent."""
@@ -90,6 +94,9 @@ class Session:
 
     def take_order(self, payload: bytes) -> None:
         """Take an order or an update and drive it. Raises Rejected."""
+        if self.hibernating:
+            log.info("robot %s: hibernates, and takes no order", self.robot.id)
+            return
         order = self._read(payload, Order)
         self._check_usable(order)
         new = order.order_id != self.book.order_id
@@ -119,11 +126,18 @@ class Session:
         for action in message.actions:
             if action.action_id in self.instant:
                 continue  # sent again
+            if self.hibernating and action.action_type != "stopHibernation":
+                log.info("robot %s: hibernates, and does no %s", self.robot.id, action.action_type)
+                continue
             state = self.instant[action.action_id] = ActionState(action)
             _forget_oldest(self.instant)
-            task = asyncio.get_running_loop().create_task(self._do_instantly(state))
-            self._tasks.add(task)
-            task.add_done_callback(self._tasks.discard)
+            self.run_beside(self._do_instantly(state))
+
+    def run_beside(self, work: Coroutine[Any, Any, None]) -> None:
+        """Run ``work`` until it ends or the door closes."""
+        task = asyncio.get_running_loop().create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
 
     def _read(self, payload: bytes, kind: type[Any]) -> Any:
         try:
@@ -147,29 +161,21 @@ class Session:
 
     async def perform(self, state: ActionState, operation: Operation[str], *, instant: bool = False) -> None:
         """Do one action and keep how it goes."""
-        action = state.action
-        state.status = ActionStatus.RUNNING
-        self.touch()
-        try:
-            self.check(operation.key, operation.right)
-            state.result = await operation.call(self, action.values) or ""
-            state.status = ActionStatus.FINISHED
-        except asyncio.CancelledError:
-            state.status, state.result = ActionStatus.FAILED, "it was cancelled"
-            raise
-        except Rejected as rejected:
-            state.status, state.result = ActionStatus.FAILED, str(rejected)
-            references = {**rejected.references, "actionId": action.action_id}
-            self.report(rejected.kind, rejected.level, str(rejected), references)
-        except (RobotError, BadParameters, ValueError) as error:
-            state.status, state.result = ActionStatus.FAILED, str(error)
-            kind = ErrorKind.INSTANT_ACTION if instant else ErrorKind.ACTION_FAILED
-            self.report(kind, Level.WARNING, str(error), {"actionId": action.action_id}, order=not instant)
-        finally:
-            self.touch()
+        await self._performer.perform(state, operation, instant=instant)
+
+    def answer_retry(self, action_id: str, *, again: bool) -> None:
+        """Try an action in RETRIABLE again, or let it fail. Raises Rejected where none waits."""
+        self._performer.answer(action_id, again=again)
+
+    def forget_errors_of(self, action_id: str) -> None:
+        """Drop the errors about one action: it is tried again."""
+        about = ("actionId", action_id)
+        self.errors = [error for error in self.errors if about not in error.references]
 
     def _check_usable(self, order: Order) -> None:
         """Raise Rejected for what this robot cannot use or do."""
+        if order.zone_set_id:
+            raise _unsupported("this robot uses no zones", {"zoneSetId": order.zone_set_id})
         for node in order.nodes:
             place = node.node_position
             if place is None:
@@ -250,6 +256,10 @@ class Session:
         """Stop and forget what is left; returns when the robot stands. Raises Rejected if nothing is left."""
         if self.book.idle or self.book.canceling or order_id not in ("", self.book.order_id):
             raise Rejected(ErrorKind.NO_ORDER, "there is no such order to cancel")
+        await self.clear_order()
+
+    async def clear_order(self) -> None:
+        """Stop, and forget what is left of the order, if anything is."""
         self.book.canceling = True
         try:
             await self._route.stop()

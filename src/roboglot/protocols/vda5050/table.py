@@ -13,8 +13,25 @@ ONLY_IN: dict[str, str] = {
     "initializePosition": "v3",
     "clearInstantActions": "v3",
     "trigger": "v3",
+    "retry": "v3",
+    "skipRetry": "v3",
+    "startHibernation": "v3",
+    "stopHibernation": "v3",
+    "shutdown": "v3",
 }
-AT_NODES = frozenset({"initPosition", "initializePosition", "startCharging", "stopCharging", "waitForTrigger"})
+AT_NODES = frozenset(
+    {
+        "initPosition",
+        "initializePosition",
+        "startCharging",
+        "stopCharging",
+        "waitForTrigger",
+        "pick",
+        "drop",
+        "detectObject",
+        "finePositioning",
+    }
+)
 INSTANT = frozenset(
     {
         "startPause",
@@ -24,6 +41,12 @@ INSTANT = frozenset(
         "factsheetRequest",
         "clearInstantActions",
         "trigger",
+        "retry",
+        "skipRetry",
+        "startHibernation",
+        "stopHibernation",
+        "shutdown",
+        "logReport",
         "initPosition",
         "initializePosition",
         "startCharging",
@@ -38,6 +61,7 @@ FIELDS = (
     "order.nodes.actions",
     "order.edges.maximumSpeed",
     "order.edges.maximumHeight",
+    "state.loads",
 )
 
 
@@ -52,7 +76,7 @@ def partly() -> dict[str, str]:
 
 
 class Messages:
-    """What the robot sends, and which optional fields of orders it uses."""
+    """What the robot sends, and which optional fields it uses."""
 
     @staticmethod
     def implemented() -> set[str]:

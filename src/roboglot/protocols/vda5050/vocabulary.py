@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 from typing import Any
 
 from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.logistics.jack import Jack
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.base import Base
-from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.components.sensing.bumper import Bumper
 from roboglot.model.components.sensing.odometry import Odometry
@@ -22,6 +22,9 @@ from roboglot.protocols.vda5050.table import AT_NODES, INSTANT, ONLY_IN, TABLE
 from roboglot.wire.vda5050.orders import ACTIONS_MAX, MESSAGE_MAX, NODES_MAX, PARAMETERS_MAX, Edge, Node
 from roboglot.wire.vda5050.versions import Version
 
+JACK_POSITION = "jack"  # the one load handling device, and the one load position
+SHELF = "shelf"  # the one station type for loads
+NUMBERS = ("x", "y", "theta", "height", "depth")  # parameters of actions that are no text
 STILL = 0.01  # m/s and rad/s below which the robot does not drive
 DOOR = "vda5050"
 
@@ -97,6 +100,13 @@ def safety(robot: Robot, version: Version) -> dict[str, Any]:
     return {"safetyState": {name: "MANUAL" if stopped else "NONE", "fieldViolation": touched}}
 
 
+def loads(robot: Robot, known: Mapping[str, str]) -> dict[str, Any]:
+    """Return what the jack carries, with what fleet control said of it; nothing for a robot without a jack."""
+    if Jack not in robot:
+        return {}
+    return {"loads": [{**known, "loadPosition": JACK_POSITION}] if robot[Jack].loaded else []}
+
+
 def progress(book: OrderBook) -> dict[str, Any]:
     """Return what is left of the order."""
     return {
@@ -146,6 +156,7 @@ def factsheet(robot: Robot, version: Version, state_period: float, visualization
             "maximumLoadMass" if new else "maxLoadMass": 0.0,
             "localizationTypes": ["NATURAL"],
             "navigationTypes": ["FREELY_NAVIGATING" if new else "AUTONOMOUS"],
+            **({"supportedZones": []} if new else {}),
         },
         "physicalParameters": {
             "minimumSpeed" if new else "speedMin": 0.0,
@@ -169,7 +180,7 @@ def factsheet(robot: Robot, version: Version, state_period: float, visualization
             f"{robot_word}Actions": [_described(name, new) for name in _actions(robot, version)],
         },
         f"{robot_word}Geometry": {},
-        "loadSpecification": {},
+        "loadSpecification": {"loadPositions": [JACK_POSITION]} if Jack in robot else {},
     }
 
 
@@ -198,11 +209,12 @@ def _limits(new: bool, state_period: float, visualization_period: float) -> dict
 
 def _actions(robot: Robot, version: Version) -> list[str]:
     """Return the actions that this robot has in this version."""
-    there = [operation.key for operation in TABLE if operation.key in AT_NODES | INSTANT]
     return [
-        name
-        for name in there
-        if ONLY_IN.get(name, version.level) == version.level and (not name.endswith("Charging") or Docking in robot)
+        operation.key
+        for operation in TABLE
+        if operation.key in AT_NODES | INSTANT
+        and ONLY_IN.get(operation.key, version.level) == version.level
+        and all(kind in robot for kind in operation.needs)
     ]
 
 
@@ -211,16 +223,20 @@ def _described(name: str, new: bool) -> dict[str, Any]:
     assert operation is not None
     scopes = ["INSTANT"] * (name in INSTANT) + ["NODE"] * (name in AT_NODES)
     parameters = [
-        {"key": key, "valueDataType": "STRING" if key.endswith(("Id", "Type")) else "NUMBER"}
+        {"key": key, "valueDataType": "NUMBER" if key in NUMBERS else "STRING"}
         | {"isOptional": not operation.requires(key)}
         for key in operation.names
     ]
-    more = {"pauseAllowed": False, "cancelAllowed": name in AT_NODES} if new else {}
+    # Version 2.1's schema wants a word in blockingTypes where its text wants an array, so there it is left out.
+    more = {
+        "pauseAllowed": False,
+        "cancelAllowed": name in AT_NODES,
+        "blockingTypes": ["NONE", "SOFT", "SINGLE", "HARD"],
+    }
     return {
         "actionType": name,
         "actionDescription": operation.summary,
         "actionScopes": scopes,
         "actionParameters": parameters,
-        "blockingTypes": ["NONE", "SOFT", *(["SINGLE"] if new else []), "HARD"],
-        **more,
+        **(more if new else {}),
     }

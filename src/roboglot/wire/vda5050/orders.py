@@ -15,6 +15,7 @@ PARAMETERS_MAX = 64
 
 Id = Annotated[str, msgspec.Meta(min_length=1, max_length=256)]
 Text = Annotated[str, msgspec.Meta(max_length=4096)]
+Texts = Annotated[tuple[Text, ...], msgspec.Meta(max_length=64)]
 Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
 Metres = Annotated[float, msgspec.Meta(ge=-100_000, le=100_000)]
 Angle = Annotated[float, msgspec.Meta(ge=-3.1416, le=3.1416)]
@@ -39,6 +40,7 @@ class Action(msgspec.Struct, frozen=True, rename="camel"):
     action_id: Id
     blocking_type: Literal["NONE", "SINGLE", "SOFT", "HARD"] = "HARD"
     action_parameters: Annotated[tuple[Parameter, ...], msgspec.Meta(max_length=PARAMETERS_MAX)] = ()
+    retriable: bool = False  # 3.0: it may be tried again after a failure
 
     @property
     def values(self) -> dict[str, Any]:
@@ -133,6 +135,7 @@ class Order(msgspec.Struct, frozen=True, rename="camel"):
     order_update_id: Count
     nodes: Annotated[tuple[Node, ...], msgspec.Meta(min_length=1, max_length=NODES_MAX)]
     edges: Annotated[tuple[Edge, ...], msgspec.Meta(max_length=NODES_MAX)]
+    zone_set_id: Text = ""
 
     @property
     def parts(self) -> tuple[Part, ...]:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Pose
 from roboglot.operations import Right
+from roboglot.protocols.vda5050.performing import ended
 from roboglot.protocols.vda5050.session import SOURCE, Session
 from roboglot.protocols.vda5050.table import TABLE
-from roboglot.wire.vda5050.orders import Angle, Id, Metres
+from roboglot.wire.vda5050.orders import Angle, Id, Metres, Text, Texts
 
 
 @TABLE.on("startPause", right=Right.DRIVE)
@@ -64,10 +63,11 @@ async def trigger(session: Session) -> str:
 
 
 @TABLE.on("waitForTrigger", right=Right.DRIVE)
-async def wait_for_trigger(session: Session, *, triggerType: str = "") -> str:  # noqa: N803
-    """Wait until the trigger action comes, or the order is cancelled."""
+async def wait_for_trigger(session: Session, *, triggerType: Text | Texts = "") -> str:  # noqa: N803
+    """Wait until the trigger action comes, or the order is cancelled; triggerType is only repeated in the result."""
     await session.wait_for_trigger()
-    return f"triggered {triggerType}".strip()
+    kinds = [triggerType] if isinstance(triggerType, str) else triggerType
+    return " ".join(("triggered", *kinds)).strip()
 
 
 @TABLE.on("initPosition", "initializePosition", right=Right.EDIT, needs=(Localization,))
@@ -91,20 +91,26 @@ async def initialize_position(
 @TABLE.on("startCharging", right=Right.DRIVE, needs=(Docking,))
 async def start_charging(session: Session) -> str:
     """Drive to the dock and onto its contacts."""
-    await _done(session.robot[Docking].dock(source=SOURCE))
+    await ended(session.robot[Docking].dock(source=SOURCE))
     return "charging"
 
 
 @TABLE.on("stopCharging", right=Right.DRIVE, needs=(Docking,))
 async def stop_charging(session: Session) -> str:
     """Leave the dock."""
-    await _done(session.robot[Docking].undock(source=SOURCE))
+    await ended(session.robot[Docking].undock(source=SOURCE))
     return ""
 
 
-async def _done(action: Any) -> None:
-    """Wait for the end; who waits no longer wants it no longer."""
-    try:
-        await action.succeeded()
-    finally:
-        action.cancel("fleet control cancelled it")
+@TABLE.on("retry", right=Right.DRIVE)
+async def retry(session: Session, *, actionId: Id) -> str:  # noqa: N803
+    """Try an action again that failed and is RETRIABLE."""
+    session.answer_retry(actionId, again=True)
+    return ""
+
+
+@TABLE.on("skipRetry", right=Right.DRIVE)
+async def skip_retry(session: Session, *, actionId: Id) -> str:  # noqa: N803
+    """Let an action fail that is RETRIABLE."""
+    session.answer_retry(actionId, again=False)
+    return ""

@@ -1,0 +1,156 @@
+"""Actions beyond driving, each through the broker: loads, marks, objects, another try, hibernation, switching off."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+from roboglot.model.components.energy.power import Power, PowerMode
+from roboglot.model.components.logistics.jack import Jack
+from roboglot.model.components.system.file_store import FileStore
+from tests.protocols.vda5050.conftest import Opened, Yard
+from tests.protocols.vda5050.orders import action, instant, order
+
+MARKS = str(Path(__file__).parents[2] / "autonomy" / "marks.toml")
+
+
+def robot_at(x: float, y: float, body: str = "hermes") -> dict[str, object]:
+    """The one robot of a world with a shelf and a tag, looking east."""
+    robot = {"name": "a", "body": body, "address": "127.0.0.83", "start": {"x": x, "y": y, "yaw": 0.0}}
+    return {"world": MARKS, "robots": [robot]}
+
+
+def here(*actions: dict[str, object], id: str = "here") -> dict[str, object]:
+    """An order of nothing but actions where the robot stands."""
+    made = order(id, [(0, 0)])
+    made["nodes"][0]["actions"] = list(actions)
+    return made
+
+
+def states(yard: Yard) -> dict[str, tuple[str, str]]:
+    """Status and result of all actions by their ids."""
+    state = yard.control.state
+    return {
+        one["actionId"]: (one["actionStatus"], one.get("actionResult", ""))
+        for one in (*state["actionStates"], *state["instantActionStates"])
+    }
+
+
+async def test_a_load_is_picked_reported_and_dropped(yard: Opened) -> None:
+    one = await yard(**robot_at(7.5, 6.0))
+    assert one.control.state["loads"] == []
+    one.control.send(
+        "order", here(action("pick", "p", loadId="L1", loadType="shelf"), action("drop", "wrong", lhd="x"))
+    )
+    await one.until(lambda: states(one).get("wrong", ("", ""))[0] == "FAILED")
+    assert states(one)["p"][0] == "FINISHED"
+    assert one.robot[Jack].loaded
+    assert one.control.state["loads"] == [{"loadId": "L1", "loadType": "shelf", "loadPosition": "jack"}]
+    one.control.send("order", here(action("drop", "d", loadId="L1"), action("drop", "again"), id="two"))
+    await one.until(lambda: states(one).get("again", ("", ""))[0] == "FAILED")
+    assert states(one)["d"][0] == "FINISHED"
+    assert one.control.state["loads"] == []
+    assert one.control.errors.count("ACTION_FAILED") == 1
+
+
+async def test_a_failed_action_waits_to_be_tried_again(yard: Opened) -> None:
+    one = await yard(**robot_at(5.0, 5.0))
+    made = here(action("pick", "p") | {"retriable": True})
+    one.control.send("order", made)
+    await one.until(lambda: states(one).get("p", ("", ""))[0] == "RETRIABLE")
+    assert "ACTION_FAILED" in one.control.errors, one.control.state["errors"]
+    one.control.send("instantActions", instant(action("retry", "r", actionId="p")))
+    await one.until(lambda: states(one).get("r", ("", ""))[0] == "FINISHED" and states(one)["p"][0] == "RUNNING")
+    assert "ACTION_FAILED" not in one.control.errors, one.control.state["errors"]
+    await one.until(lambda: states(one)["p"][0] == "RETRIABLE")
+    one.control.send("instantActions", instant(action("skipRetry", "s", actionId="p")))
+    await one.until(lambda: states(one)["p"] == ("FAILED", "there is no load over the platform"))
+    one.control.send("instantActions", instant(action("retry", "late", actionId="p")))
+    await one.until(lambda: states(one).get("late", ("", ""))[0] == "FAILED")
+    assert "INVALID_INSTANT_ACTION" in one.control.errors
+
+
+async def test_an_object_is_found_and_a_mark_driven_to(yard: Opened) -> None:
+    one = await yard(**robot_at(7.8, 4.2, "universal"))
+    made = here(
+        action("detectObject", "tag", objectType="tag"),
+        action("detectObject", "person", objectType="person"),
+        action("finePositioning", "fine", stationType="printed", stationName="12"),
+    )
+    one.control.send("order", made)
+    await one.until(lambda: states(one).get("fine", ("", ""))[0] in ("FINISHED", "FAILED"), 120)
+    assert states(one)["tag"][0] == "FINISHED"
+    assert states(one)["tag"][1].startswith("tag 12 at 2.")
+    assert states(one)["person"] == ("FAILED", "no person is in sight")
+    assert states(one)["fine"][0] == "FINISHED"
+    one.control.send("order", here(action("finePositioning", "f", stationType="station"), id="no"))
+    await one.until(lambda: "INVALID_ORDER_ACTION" in one.control.errors)
+
+
+async def test_a_log_report_is_kept_as_a_file(yard: Opened) -> None:
+    one = await yard()
+    one.control.send("instantActions", instant(action("logReport", "log", reason="it stood still")))
+    await one.until(lambda: states(one).get("log", ("", ""))[0] == "FINISHED")
+    text = (await one.robot[FileStore].read(states(one)["log"][1])).decode()
+    assert "it stood still" in text.splitlines()[0]
+
+
+async def test_hibernation_is_silent_until_it_ends(yard: Opened) -> None:
+    one = await yard()
+    control = one.control
+    control.send("order", order("one", [(0, 0), (3, 0)]))
+    await one.until(lambda: control.state["driving"])
+    control.send("instantActions", instant(action("startHibernation", "sleep")))
+    await one.until(lambda: control.heard["connection"][-1]["connectionState"] == "HIBERNATING")
+    assert states(one)["sleep"][0] == "FINISHED"
+    assert (control.state["nodeStates"], control.state["driving"]) == ([], False)
+    heard = len(control.heard["state"])
+    control.send("order", order("two", [(0, 0), (1, 0)]))
+    control.send("instantActions", instant(action("stateRequest", "ignored")))
+    await one.clock.advance(40)
+    control.hear()
+    assert len(control.heard["state"]) == heard
+    control.send("instantActions", instant(action("stopHibernation", "wake")))
+    await one.until(lambda: control.heard["connection"][-1]["connectionState"] == "ONLINE")
+    await one.until(lambda: states(one).get("wake", ("", ""))[0] == "FINISHED")
+    assert "ignored" not in states(one)
+    assert control.state["orderId"] == "one"
+    assert one.robot[Power].mode is PowerMode.AWAKE
+
+
+async def test_it_wakes_up_by_itself_at_the_time_that_was_set(yard: Opened) -> None:
+    one = await yard()
+    control = one.control
+    control.send("instantActions", instant(action("startHibernation", "no", wakeUpTime="yesterday")))
+    await one.until(lambda: states(one).get("no", ("", ""))[0] == "FAILED")
+    then = one.clock.epoch() + 30
+    text = datetime.fromtimestamp(then, UTC).isoformat()
+    control.send("instantActions", instant(action("startHibernation", "sleep", wakeUpTime=text)))
+    await one.until(lambda: control.heard["connection"][-1]["connectionState"] == "HIBERNATING")
+    await one.until(lambda: control.heard["connection"][-1]["connectionState"] == "ONLINE")
+    assert one.clock.epoch() >= then
+
+
+async def test_a_robot_that_is_switched_off_takes_leave(yard: Opened) -> None:
+    one = await yard()
+    control = one.control
+    control.send("order", order("one", [(0, 0), (3, 0)]))
+    await one.until(lambda: control.state["driving"])
+    control.send("instantActions", instant(action("shutdown", "early")))
+    await one.until(lambda: states(one).get("early", ("", ""))[0] == "FAILED")
+    control.send("instantActions", instant(action("cancelOrder", "c")))
+    await one.until(lambda: states(one).get("c", ("", ""))[0] == "FINISHED")
+    control.send("instantActions", instant(action("shutdown", "off")))
+    await one.until(lambda: control.heard["connection"][-1]["connectionState"] == "OFFLINE")
+    assert states(one)["off"][0] == "FINISHED"
+    assert one.robot[Power].mode is PowerMode.OFF
+
+
+async def test_zones_are_refused_aloud(yard: Opened) -> None:
+    one = await yard()
+    one.control.send("zoneSet", {"zoneSet": {"mapId": "map", "zoneSetId": "z", "zones": []}})
+    await one.until(lambda: one.control.errors == ["UNSUPPORTED_PARAMETER"])
+    one.control.send("order", order("one", [(0, 0)]) | {"zoneSetId": "z"})
+    await one.until(lambda: len(one.control.errors) == 2)
+    assert one.control.state["orderId"] == ""
+    assert one.control.heard["factsheet"][0]["typeSpecification"]["supportedZones"] == []

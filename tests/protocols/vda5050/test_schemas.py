@@ -1,0 +1,62 @@
+"""What is sent and read fits the standard's JSON schemas: 2.1's as the vda5050-sdk carries them, ours of 3.0.
+
+`schemas/` holds the messages of 3.0, written from the standard's tables: names, required fields, types, words.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+from hypothesis import given, settings
+from vda5050.validation import SchemaValidator
+
+from tests.protocols.vda5050.conftest import Opened
+from tests.protocols.vda5050.orders import action, encoded, instant, order, valid_orders
+
+FOLDER = Path(__file__).with_name("schemas")
+OFFICIAL = SchemaValidator()
+OWN = {
+    file.stem: jsonschema.Draft202012Validator(json.loads(file.read_text()), format_checker=jsonschema.FormatChecker())
+    for file in FOLDER.glob("*.json")
+}
+
+
+def complaints(version: str, name: str, message: dict[str, Any]) -> list[str]:
+    """What the schema has against a message."""
+    if version == "2.1":
+        return OFFICIAL.errors(name, message)
+    return [f"{error.json_path}: {error.message}" for error in OWN[name].iter_errors(message)]
+
+
+@pytest.mark.parametrize(("version", "number"), [("2.1", "2.1.0"), ("3.0", "3.0.0")])
+async def test_all_that_a_robot_says_fits_the_schemas(yard: Opened, version: str, number: str) -> None:
+    one = await yard(version)
+    made = order("one", [(0, 0), (0.6, 0), (1.2, 0)], released=2, version=number)
+    made["nodes"][0]["actions"] = [action("detectObject", "look", objectType="tag")]
+    one.control.send("order", made)
+    one.control.send("instantActions", instant(action("nonsense", "n"), action("stateRequest", "s"), version=number))
+    one.control.send("order", b"{}")
+    await one.until(lambda: one.control.state["lastNodeId"] == "n1" and not one.control.state["driving"])
+    await one.close()
+    await one.until(lambda: one.control.heard["connection"][-1]["connectionState"] == "OFFLINE", 0)
+    assert {"state", "visualization", "connection", "factsheet"} <= one.control.heard.keys()
+    assert any(state["errors"] for state in one.control.heard["state"])
+    for name in ("state", "visualization", "connection", "factsheet"):
+        for message in one.control.heard[name]:
+            assert complaints(version, name, message) == []
+    assert complaints(version, "state", one.control.state | {"driving": "no"})  # they can say no
+
+
+@settings(max_examples=50)
+@given(valid_orders())
+def test_the_orders_of_the_other_tests_are_valid(made: dict[str, Any]) -> None:
+    made = json.loads(encoded(made))
+    assert complaints("3.0", "order", made) == []
+    for node in made["nodes"]:
+        if isinstance(node["nodePosition"].get("allowedDeviationXY"), dict):
+            del node["nodePosition"]["allowedDeviationXY"]  # an ellipse is 3.0's
+    assert complaints("2.1", "order", made) == []
