@@ -28,6 +28,7 @@ COMMANDS = {
     "record": "record everything that robots say, hear and do; show and mend recordings",
     "rerun": "run the world of a lockstep recording again with the same inputs, to the last byte",
     "replay": "send the requests of a recording to a robot again and compare its answers",
+    "export": "a recording as a bag of ROS 2",
     "compare": "two recordings or robots, and how much of them agrees",
     "fidelity": "how much the doors agree with what was published of real robots",
     "test": "play test scenarios (YAML) on simulated robots, with a JUnit report",
@@ -41,9 +42,9 @@ COMMANDS = {
     "doctor": "what is missing on this machine, and how to get it",
 }
 # Commands whose files have a folder of their own.
-FOLDERS = dict.fromkeys(("compare", "fidelity", "record", "replay", "rerun"), "recordings")
+FOLDERS = dict.fromkeys(("compare", "export", "fidelity", "record", "replay", "rerun"), "recordings")
 # The extra to install for a command whose modules are missing; else the one that brings the module.
-EXTRAS = {"demo": "demo", "mcp": "mcp"} | dict.fromkeys(
+EXTRAS = {"demo": "demo", "mcp": "mcp", "export": "logs"} | dict.fromkeys(
     ("up", "coverage", "capabilities", "fidelity", "doctor", "cloud", "map", "test"), "up"
 )
 

@@ -1,0 +1,39 @@
+"""``roboglot export``: a recording in a form that others read."""
+
+from __future__ import annotations
+
+import sys
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from roboglot.extras import explaining
+from roboglot.hosting.visible import visible
+
+
+class Storage(StrEnum):
+    """How a bag of ROS 2 is stored."""
+
+    MCAP = "mcap"
+    SQLITE = "sqlite3"
+
+
+def command(
+    file: Annotated[Path, typer.Argument(help="A recording.")],
+    rosbag2: Annotated[Path, typer.Option(metavar="FOLDER", help="Write a bag of ROS 2 into this new folder.")],
+    storage: Annotated[Storage, typer.Option(help="mcap as from ROS 2 Iron on, sqlite3 as before.")] = Storage.MCAP,
+    robot: Annotated[str, typer.Option(help="Only this robot's topics.")] = "",
+) -> None:
+    """Write a recording as a bag of ROS 2."""
+    with explaining("roboglot export", "logs"):
+        from roboglot.recording.rosbag2 import export
+    try:
+        written = export(file, rosbag2, storage.value, robot)
+    except (OSError, ValueError) as error:
+        print(f"roboglot export: {visible(str(error))}", file=sys.stderr)
+        raise typer.Exit(2) from None
+    for topic, count in sorted(written.items()):
+        print(f"{count:8} {visible(topic)}")
+    print(f"{written.total():8} messages in {rosbag2}")

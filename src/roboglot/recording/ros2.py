@@ -1,0 +1,267 @@
+"""Recorded messages in ROS 2's types, as CDR: scans, frames, odometry, poses, maps, batteries, video, logs.
+
+What ROS has no type for (the doors' exchanges, events, actions, states) is JSON in a ``std_msgs/String``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
+from rosbags.typesys import Stores, get_typestore
+
+from roboglot.model.geometry import Pose, wrap_angle
+from roboglot.recording.foxglove import LEVELS, TYPES
+from roboglot.recording.reader import Record
+
+JSON = "std_msgs/msg/String"
+ROS_LEVELS = {number: python for python, number in LEVELS.items()}  # rcl's levels are Python's
+SPEED_SPAN = 0.5  # s of poses that a speed is made of
+STORE = get_typestore(Stores.ROS2_HUMBLE)
+
+
+class RosMessage(NamedTuple):
+    """One message; ``kept``: who comes late gets the last one (transient local)."""
+
+    topic: str
+    type: str
+    at: int  # ns since 1970
+    data: bytes
+    kept: bool = False
+
+
+def _new(type: str, **fields: Any) -> Any:
+    return STORE.types[type](**fields)
+
+
+def _time(at: int) -> Any:
+    return _new("builtin_interfaces/msg/Time", sec=at // 1_000_000_000, nanosec=at % 1_000_000_000)
+
+
+def _header(at: int, frame: str) -> Any:
+    return _new("std_msgs/msg/Header", stamp=_time(at), frame_id=frame)
+
+
+def _pose(message: Any) -> Any:
+    place, turn = message.position, message.orientation
+    return _new(
+        "geometry_msgs/msg/Pose",
+        position=_new("geometry_msgs/msg/Point", x=place.x, y=place.y, z=place.z),
+        orientation=_new("geometry_msgs/msg/Quaternion", x=turn.x, y=turn.y, z=turn.z, w=turn.w),
+    )
+
+
+def _vector(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Any:
+    return _new("geometry_msgs/msg/Vector3", x=x, y=y, z=z)
+
+
+class Ros2Words:
+    """Translates one recording, in its order: speeds and reaches are made of what came before.
+
+    ``robot``: only what is this robot's; empty: everything.
+    """
+
+    def __init__(self, robot: str = "") -> None:
+        self._robot = robot
+        self._reach: dict[str, float] = {}
+        self._past: dict[str, deque[tuple[int, Pose]]] = {}
+        self._mounts: dict[str, tuple[float, ...]] = {}
+        self._by_schema: Mapping[str, Callable[[Record, Any], Iterator[RosMessage]]] = {
+            "foxglove.LaserScan": self._scan,
+            "foxglove.FrameTransforms": self._transforms,
+            "foxglove.PoseInFrame": self._place,
+            "foxglove.Grid": self._grid,
+            "foxglove.CompressedVideo": self._video,
+            "foxglove.Log": self._log,
+            "roboglot.Battery": self._battery,
+        }
+
+    def translate(self, record: Record) -> Iterator[RosMessage]:
+        """Yield the messages that say what ``record`` says. Raises ValueError for a damaged one."""
+        if self._robot and record.topic != "/tf" and self._robot not in record.topic.split("/")[1:3]:
+            return
+        if record.schema in TYPES:
+            try:
+                message = TYPES[record.schema].FromString(record.data)
+            except DecodeError as error:
+                raise ValueError(f"{record.topic}: {error}") from None
+            handler = self._by_schema.get(record.schema)
+            if handler is not None:
+                yield from handler(record, message)
+        elif record.schema == "roboglot.Battery":
+            yield from self._battery(record, msgspec.json.decode(record.data))
+            yield self._json(record, f"{record.topic}/state")
+        else:
+            yield self._json(record, record.topic)
+
+    def _made(self, topic: str, type: str, at: int, message: Any, *, kept: bool = False) -> RosMessage:
+        return RosMessage(topic, type, at, bytes(STORE.serialize_cdr(message, type)), kept)
+
+    def _json(self, record: Record, topic: str) -> RosMessage:
+        text = _new(JSON, data=record.data.decode("utf-8", "replace"))
+        return self._made(topic, JSON, record.at, text)
+
+    def _scan(self, record: Record, message: Any) -> Iterator[RosMessage]:
+        ranges = np.array(message.ranges, np.float32)
+        farthest = float(ranges[np.isfinite(ranges)].max(initial=0.0))
+        reach = self._reach[record.topic] = max(self._reach.get(record.topic, 0.0), farthest)
+        scan = _new(
+            "sensor_msgs/msg/LaserScan",
+            header=_header(record.at, message.frame_id),
+            angle_min=message.start_angle,
+            angle_max=message.end_angle,
+            angle_increment=(message.end_angle - message.start_angle) / max(1, len(ranges) - 1),
+            time_increment=0.0,
+            scan_time=0.0,
+            range_min=0.0,
+            range_max=reach + 1e-3,
+            ranges=ranges,
+            intensities=np.array([], np.float32),
+        )
+        yield self._made(record.topic, "sensor_msgs/msg/LaserScan", record.at, scan)
+
+    def _transforms(self, record: Record, message: Any) -> Iterator[RosMessage]:
+        moving = []
+        for frame in message.transforms:
+            robot, _, child = frame.child_frame_id.rpartition("/")
+            if self._robot not in ("", robot):
+                continue
+            transform = self._transform(record.at, frame)
+            if child == "laser":
+                yield from self._mount(record.at, frame, transform)
+                continue
+            moving.append(transform)
+            if child == "base_link":
+                yield self._odometry(record.at, robot, frame)
+        if moving:
+            yield self._made(
+                "/tf", "tf2_msgs/msg/TFMessage", record.at, _new("tf2_msgs/msg/TFMessage", transforms=moving)
+            )
+
+    def _transform(self, at: int, frame: Any) -> Any:
+        turn, way = frame.rotation, frame.translation
+        return _new(
+            "geometry_msgs/msg/TransformStamped",
+            header=_header(at, frame.parent_frame_id),
+            child_frame_id=frame.child_frame_id,
+            transform=_new(
+                "geometry_msgs/msg/Transform",
+                translation=_vector(way.x, way.y, way.z),
+                rotation=_new("geometry_msgs/msg/Quaternion", x=turn.x, y=turn.y, z=turn.z, w=turn.w),
+            ),
+        )
+
+    def _mount(self, at: int, frame: Any, transform: Any) -> Iterator[RosMessage]:
+        """Where the laser is mounted, when that is new."""
+        place = (frame.translation.x, frame.translation.y, frame.rotation.z, frame.rotation.w)
+        if self._mounts.get(frame.child_frame_id) != place:
+            self._mounts[frame.child_frame_id] = place
+            message = _new("tf2_msgs/msg/TFMessage", transforms=[transform])
+            yield self._made("/tf_static", "tf2_msgs/msg/TFMessage", at, message, kept=True)
+
+    def _odometry(self, at: int, robot: str, frame: Any) -> RosMessage:
+        way, turn = frame.translation, frame.rotation
+        here = Pose(way.x, way.y, 2.0 * math.atan2(turn.z, turn.w))
+        speed = self._speed(robot, at, here)
+        message = _new(
+            "nav_msgs/msg/Odometry",
+            header=_header(at, frame.parent_frame_id),
+            child_frame_id=frame.child_frame_id,
+            pose=_new(
+                "geometry_msgs/msg/PoseWithCovariance",
+                pose=_new(
+                    "geometry_msgs/msg/Pose",
+                    position=_new("geometry_msgs/msg/Point", x=way.x, y=way.y, z=way.z),
+                    orientation=_new("geometry_msgs/msg/Quaternion", x=turn.x, y=turn.y, z=turn.z, w=turn.w),
+                ),
+                covariance=np.zeros(36),
+            ),
+            twist=_new(
+                "geometry_msgs/msg/TwistWithCovariance",
+                twist=_new("geometry_msgs/msg/Twist", linear=_vector(speed.x, speed.y), angular=_vector(z=speed.yaw)),
+                covariance=np.zeros(36),
+            ),
+        )
+        return self._made(f"/{robot}/odom", "nav_msgs/msg/Odometry", at, message)
+
+    def _speed(self, robot: str, at: int, here: Pose) -> Pose:
+        """Metres and radians a second in base_link, over the last half second: stamps of poses are a little off."""
+        past = self._past.setdefault(robot, deque())
+        while past and not 0.0 < at - past[0][0] <= SPEED_SPAN * 1e9:
+            past.popleft()
+        past.append((at, here))
+        then, before = past[0]
+        seconds = (at - then) / 1e9
+        if seconds == 0.0:
+            return Pose()
+        way = here.relative_to(before)
+        return Pose(way.x / seconds, way.y / seconds, wrap_angle(way.yaw) / seconds)
+
+    def _place(self, record: Record, message: Any) -> Iterator[RosMessage]:
+        type = "geometry_msgs/msg/PoseStamped"
+        pose = _new(type, header=_header(record.at, message.frame_id), pose=_pose(message.pose))
+        yield self._made(record.topic, type, record.at, pose)
+
+    def _grid(self, record: Record, message: Any) -> Iterator[RosMessage]:
+        cells = np.frombuffer(message.data, np.int8)
+        width = message.column_count
+        info = _new(
+            "nav_msgs/msg/MapMetaData",
+            map_load_time=_time(record.at),
+            resolution=message.cell_size.x,
+            width=width,
+            height=len(cells) // width if width else 0,
+            origin=_pose(message.pose),
+        )
+        type = "nav_msgs/msg/OccupancyGrid"
+        grid = _new(type, header=_header(record.at, message.frame_id), info=info, data=cells)
+        yield self._made(record.topic, type, record.at, grid, kept=True)
+
+    def _video(self, record: Record, message: Any) -> Iterator[RosMessage]:
+        type = "sensor_msgs/msg/CompressedImage"
+        data = np.frombuffer(message.data, np.uint8)
+        picture = _new(type, header=_header(record.at, message.frame_id), format=message.format, data=data)
+        yield self._made(f"{record.topic}/compressed", type, record.at, picture)
+
+    def _log(self, record: Record, message: Any) -> Iterator[RosMessage]:
+        type, level = "rcl_interfaces/msg/Log", ROS_LEVELS.get(message.level, 20)
+        line = _new(
+            type,
+            stamp=_time(record.at),
+            level=level,
+            name=message.name,
+            msg=message.message,
+            file="",
+            function="",
+            line=0,
+        )
+        yield self._made("/rosout", type, record.at, line)
+
+    def _battery(self, record: Record, state: Any) -> Iterator[RosMessage]:
+        type, unknown = "sensor_msgs/msg/BatteryState", math.nan
+        charging = 1 if state.get("charging") else 2
+        message = _new(
+            type,
+            header=_header(record.at, ""),
+            voltage=float(state.get("voltage") or unknown),
+            temperature=unknown,
+            current=float(state.get("current") or 0.0),
+            charge=unknown,
+            capacity=unknown,
+            design_capacity=unknown,
+            percentage=float(state.get("percentage", unknown)),
+            power_supply_status=charging,
+            power_supply_health=0,
+            power_supply_technology=0,
+            present=True,
+            cell_voltage=np.array([], np.float32),
+            cell_temperature=np.array([], np.float32),
+            location="",
+            serial_number="",
+        )
+        yield self._made(f"{record.topic}_state", type, record.at, message)

@@ -1,0 +1,55 @@
+"""Writes a recording as a bag of ROS 2: a folder with ``metadata.yaml`` and an MCAP or SQLite file."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import Any, Literal
+
+from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
+from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
+
+from roboglot.recording.reader import BadRecording, read_messages
+from roboglot.recording.ros2 import STORE, Ros2Words, RosMessage
+
+VERSION: Literal[8] = 8  # of metadata.yaml
+STORAGES = {"mcap": StoragePlugin.MCAP, "sqlite3": StoragePlugin.SQLITE3}
+NEVER = QosTime(2147483647, 4294967295)
+
+
+def export(recording: Path, bag: Path, storage: str = "mcap", robot: str = "") -> Counter[str]:
+    """Write the messages of a recording, or of one robot, into the new folder ``bag``; returns how many by topic.
+
+    Raises BadRecording, OSError.
+    """
+    words, written = Ros2Words(robot), Counter[str]()
+    try:
+        with Writer(bag, version=VERSION, storage_plugin=STORAGES[storage]) as writer:
+            connections: dict[tuple[str, str], Any] = {}
+            for record in read_messages(recording):
+                for message in words.translate(record):
+                    key = message.topic, message.type
+                    connection = connections.get(key) or _connection(writer, message)
+                    connections[key] = connection
+                    writer.write(connection, message.at, message.data)
+                    written[message.topic] += 1
+    except WriterError as error:
+        raise BadRecording(str(error)) from None
+    except ValueError as error:
+        raise BadRecording(f"{recording}: {error}") from None
+    return written
+
+
+def _connection(writer: Writer, message: RosMessage) -> Any:
+    qos = Qos(
+        QosHistory.KEEP_LAST,
+        1 if message.kept else 10,
+        QosReliability.RELIABLE,
+        QosDurability.TRANSIENT_LOCAL if message.kept else QosDurability.VOLATILE,
+        NEVER,
+        NEVER,
+        QosLiveliness.AUTOMATIC,
+        NEVER,
+        avoid_ros_namespace_conventions=False,
+    )
+    return writer.add_connection(message.topic, message.type, typestore=STORE, offered_qos_profiles=[qos])
