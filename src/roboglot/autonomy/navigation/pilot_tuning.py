@@ -31,7 +31,7 @@ class PilotTuning:
     arounds_max: int = 40  # … and taken so often in one drive
     stray: float = 0.4  # beside the route at which it plans anew
     unknown_seam: float = 1.0  # of unknown floor on a way that count as known: the map has holes along its edges
-    search_after: float = 15.0  # s of waiting for what stands on a known way before unknown floor is searched
+    search_after: float = 10.0  # s of waiting for what stands on a known way before unknown floor is searched
     search_share: float = 2.0  # times the first way, and search_more: driven at most through unknown floor
     search_more: float = 10.0
 
