@@ -22,7 +22,7 @@ from roboglot.autonomy.navigation.course import Course
 from roboglot.autonomy.navigation.driving import OdometryDriving
 from roboglot.autonomy.navigation.navigation import GridNavigation
 from roboglot.autonomy.navigation.restricted import RestrictedAreas
-from roboglot.autonomy.navigation.sweeping import LaneSweeping
+from roboglot.autonomy.navigation.sweeping.component import LaneSweeping
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.inertial_displacement import InertialDisplacement
 from roboglot.autonomy.slam.localization import LidarLocalization

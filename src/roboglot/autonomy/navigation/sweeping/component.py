@@ -10,15 +10,15 @@ import numpy as np
 from roboglot.autonomy.navigation.base_actions import start_on_base
 from roboglot.autonomy.navigation.course import Course, Goal
 from roboglot.autonomy.navigation.journey import Journey
-from roboglot.autonomy.navigation.lanes import (
+from roboglot.autonomy.navigation.navigation import GridNavigation
+from roboglot.autonomy.navigation.sweeping.lanes import (
     Part,
     Stretch,
     open_stretches,
     parts,
     zigzag,
 )
-from roboglot.autonomy.navigation.navigation import GridNavigation
-from roboglot.autonomy.navigation.swept import Swept
+from roboglot.autonomy.navigation.sweeping.swept import Swept
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.mapping.annotations import Area, AreaKind
 from roboglot.model.components.mapping.localization import Localization

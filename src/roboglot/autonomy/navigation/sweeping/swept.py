@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.autonomy.navigation.lanes import STRETCH_MIN, Stretch
+from roboglot.autonomy.navigation.sweeping.lanes import STRETCH_MIN, Stretch
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.model.actions import Action
 from roboglot.model.components.motion.sweeping import SweepFeedback
