@@ -12,9 +12,9 @@ from typing import Any
 import httpx
 import pytest
 
-from roboglot.console.verbs import VERBS
+from roboglot.console.verbs.robots import VERBS
+from roboglot.console.verbs.world import WORLD_VERBS
 from roboglot.console.wire_log import rows
-from roboglot.console.world_verbs import WORLD_VERBS
 from roboglot.model.admission import Forbidden
 from roboglot.model.client_context import ask_for
 from roboglot.operations import OperationTable, Right

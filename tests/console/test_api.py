@@ -11,8 +11,8 @@ import pytest
 
 from roboglot.config import AccessConfig, ConsoleConfig, RobotConfig, load_config
 from roboglot.console.resend import resend
-from roboglot.console.verbs import VERBS
-from roboglot.console.world_verbs import WORLD_VERBS
+from roboglot.console.verbs.robots import VERBS
+from roboglot.console.verbs.world import WORLD_VERBS
 from roboglot.model.clock import LockstepClock, RealClock
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.motion.docking import Docking

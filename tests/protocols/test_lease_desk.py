@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from roboglot.cli.lease import _ask, command, in_words
+from roboglot.cli.control.lease import _ask, command, in_words
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
 from roboglot.hosting.local_socket import CALLERS_MAX, LINE_MAX
 from roboglot.model.client_context import asking_for
@@ -118,7 +118,7 @@ def test_the_command_says_when_there_is_no_such_robot(tmp_path: Path, monkeypatc
     async def answer(path: Path, wish: Request) -> Answer:
         return Answer([Control("a", "", "", 0.0, "", "", "")])
 
-    monkeypatch.setattr("roboglot.cli.lease._ask", answer)
+    monkeypatch.setattr("roboglot.cli.control.lease._ask", answer)
     command("a", data=tmp_path)
     with pytest.raises(SystemExit, match="there is no robot 'b'; there are a"):
         command("b", data=tmp_path)

@@ -42,7 +42,9 @@ COMMANDS = {
     "doctor": "what is missing on this machine, and how to get it",
 }
 # Commands whose files have a folder of their own.
-FOLDERS = dict.fromkeys(("compare", "export", "fidelity", "record", "replay", "rerun"), "recordings")
+FOLDERS = dict.fromkeys(("compare", "export", "fidelity", "record", "replay", "rerun"), "recordings") | dict.fromkeys(
+    ("lease", "stop", "reset"), "control"
+)
 # The extra to install for a command whose modules are missing; else the one that brings the module.
 EXTRAS = {"demo": "demo", "mcp": "mcp", "export": "logs"} | dict.fromkeys(
     ("up", "coverage", "capabilities", "fidelity", "doctor", "cloud", "map", "test"), "up"

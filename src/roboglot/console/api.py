@@ -13,7 +13,6 @@ from roboglot.console.camera import Calls, send_film, send_photo
 from roboglot.console.copies import FORMS, LABELS, copy
 from roboglot.console.desk import CLIENT, Desk
 from roboglot.console.http import Problem, Receive, Scope, Send, answer, answer_json, read_json
-from roboglot.console.map_verbs import map_archive
 from roboglot.console.openapi import document
 from roboglot.console.people.classes import Classes, Wish
 from roboglot.console.recordings import RecordingWish
@@ -21,6 +20,7 @@ from roboglot.console.resend import resend
 from roboglot.console.studio import blocks, lessons
 from roboglot.console.studio.plans import rehearse
 from roboglot.console.thumbnails import thumbnail
+from roboglot.console.verbs.maps import map_archive
 from roboglot.console.wire_log import readable
 from roboglot.model.admission import Right
 from roboglot.model.components.mapping.localization import Localization

@@ -6,12 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from roboglot.console import drawings, map_verbs
-from roboglot.console.clock_verbs import CLOCK_VERBS
+from roboglot.console import drawings
 from roboglot.console.studio.programs import Studio
-from roboglot.console.verbs import VERBS
+from roboglot.console.verbs import maps as map_verbs
+from roboglot.console.verbs.clock import CLOCK_VERBS
+from roboglot.console.verbs.robots import VERBS
+from roboglot.console.verbs.world import WORLD_VERBS
 from roboglot.console.views import RobotView
-from roboglot.console.world_verbs import WORLD_VERBS
 from roboglot.model.admission import Right
 from roboglot.model.client_context import identity
 from roboglot.model.clock import Clock, RealClock

@@ -7,11 +7,11 @@ from typing import Any
 
 import msgspec
 
-from roboglot.console import map_verbs
-from roboglot.console.clock_verbs import CLOCK_VERBS
 from roboglot.console.desk import TAKE
-from roboglot.console.verbs import VERBS
-from roboglot.console.world_verbs import WORLD_VERBS
+from roboglot.console.verbs import maps as map_verbs
+from roboglot.console.verbs.clock import CLOCK_VERBS
+from roboglot.console.verbs.robots import VERBS
+from roboglot.console.verbs.world import WORLD_VERBS
 from roboglot.operations import Operation
 
 assert map_verbs  # registers its verbs

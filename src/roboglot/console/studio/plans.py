@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import msgspec
 
 from roboglot.console.desk import CLIENT, Desk
-from roboglot.console.verbs import Meters, Moment, Speed
+from roboglot.console.verbs.robots import Meters, Moment, Speed
 from roboglot.model.admission import Right
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.errors import Busy, NotFound

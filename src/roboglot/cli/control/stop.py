@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from roboglot.cli.lease import Data, wish
+from roboglot.cli.control.lease import Data, wish
 from roboglot.protocols.lease_desk import Request
 
 

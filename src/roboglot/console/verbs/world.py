@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import msgspec
 
-from roboglot.console.verbs import Meters, Name, Radians, Text
+from roboglot.console.verbs.robots import Meters, Name, Radians, Text
 from roboglot.model.geometry import Pose, Vector3
 from roboglot.model.stage import Stage
 from roboglot.operations import OperationTable, Right

@@ -13,7 +13,7 @@ from typing import Annotated
 import msgspec
 
 from roboglot.console.drawings import NAMES
-from roboglot.console.verbs import SOURCE, VERBS, Meters, Name, Radians, Spot, Started, started
+from roboglot.console.verbs.robots import SOURCE, VERBS, Meters, Name, Radians, Spot, Started, started
 from roboglot.media.ros_map import encode_ros_map
 from roboglot.model.components.mapping.annotations import (
     Annotations,
