@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from roboglot.cli.up import access_section
 from roboglot.config import (
     Config,
     RobotConfig,
@@ -93,6 +94,16 @@ def test_robots_others_can_reach_need_a_word(address: str, alone: bool) -> None:
     else:
         with pytest.raises(ValueError, match="--insecure"):
             refuse_unguarded(config)
+
+
+def test_insecure_lets_everyone_in_although_the_file_asks(tmp_path: Path) -> None:
+    file = tmp_path / "robots.toml"
+    file.write_text("[access]\non = true\n")
+    options = {"insecure": True, "access": access_section(on=False, insecure=True)}
+    assert load_config(file, options, sections()).access.on is False
+    assert load_config(file, {"access": access_section(on=False, insecure=False)}, sections()).access.on is True
+    with pytest.raises(ValueError, match="one of them"):
+        access_section(on=True, insecure=True)
 
 
 def test_robots_on_the_command_line() -> None:

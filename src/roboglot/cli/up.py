@@ -70,7 +70,11 @@ def command(
     ] = False,
     insecure: Annotated[
         bool,
-        typer.Option("--insecure", envvar="ROBOGLOT_INSECURE", help="Let anyone drive robots outside loopback."),
+        typer.Option(
+            "--insecure",
+            envvar="ROBOGLOT_INSECURE",
+            help="Let anyone drive robots outside loopback, whatever [access] says.",
+        ),
     ] = False,
     console: Annotated[bool, typer.Option(help="Pages to see and drive the robots in a browser.")] = True,
     open_console: Annotated[bool, typer.Option("--open", help="Open the console in this machine's browser.")] = False,
@@ -99,7 +103,7 @@ def command(
                 "data": str(data) if data else None,
                 "database": database,
                 **_sections(doors),
-                "access": {"on": True} if access else None,
+                "access": access_section(on=access, insecure=insecure),
                 "console": None if console else {"enabled": False},
                 "record": ({"to": record} if record else {}) | ({"ring": True} if record_ring else {}) or None,
                 "insecure": insecure or None,
@@ -118,6 +122,13 @@ def command(
     import uvloop
 
     sys.exit(uvloop.run(_serve(settings, open_console=open_console)))
+
+
+def access_section(*, on: bool, insecure: bool) -> dict[str, Any] | None:
+    """Return what the options say of [access]; --insecure beats a file that is on. Raises ValueError for both."""
+    if on and insecure:
+        raise ValueError("--access asks who comes and --insecure lets everyone in: give one of them")
+    return {"on": on} if on or insecure else None
 
 
 def _parameter(option: Option) -> str:
