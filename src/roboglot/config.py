@@ -121,7 +121,8 @@ class AccessConfig:
 class ConsoleConfig:
     """The web console, one for all robots: on ``port``, or the next free one. ``origins``, ``hosts``: as in [slamware].
 
-    ``address``: outside loopback only with [access], as for the robots' own addresses.
+    ``address``: outside loopback only with [access], as for the robots' own addresses. ``otlp``: the URL of an
+    OpenTelemetry collector to which metrics are pushed every ``otlp_period`` s; empty: none.
     """
 
     enabled: bool = True
@@ -129,6 +130,12 @@ class ConsoleConfig:
     port: Port = 50080
     origins: tuple[str, ...] = ()
     hosts: tuple[str, ...] = ()
+    otlp: str = ""
+    otlp_period: Annotated[float, msgspec.Meta(ge=1, le=3600)] = 10.0
+
+    def __post_init__(self) -> None:
+        if self.otlp and not self.otlp.startswith(("http://", "https://")):
+            raise ValueError(f"console.otlp is the http:// or https:// address of a collector, not {self.otlp!r}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,6 +29,7 @@ EXTRA_OF = {
     "mujoco": "simulation",
     "numba": "simulation",
     "numpy": "simulation",
+    "opentelemetry": "otlp",
     "PIL": "simulation",
     "prometheus_client": "console",
     "psycopg": "postgresql",
@@ -55,6 +56,7 @@ MODULES: dict[str, tuple[str, ...]] = {
     "postgresql": ("psycopg",),
     "testing": ("pytest_asyncio",),
     "mcp": ("mcp",),
+    "otlp": ("opentelemetry.proto", "prometheus_client"),
     "vda5050": ("aiomqtt",),
     "demo": ("httpx", "robomasterpy", "cv2"),
 }

@@ -1,12 +1,19 @@
 """What Prometheus reads, by its own parser."""
 
 import asyncio
+import contextlib
 import json
 import re
+import threading
+from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
+import pytest
+from opentelemetry.proto.collector.metrics.v1.metrics_service_pb2 import ExportMetricsServiceRequest
 from prometheus_client.parser import text_string_to_metric_families
 
+from roboglot.console.otlp import Pusher
 from roboglot.model.components.energy.battery import Battery
 from tests.console.conftest import ADDRESS, Shown
 
@@ -86,3 +93,64 @@ async def test_the_board_and_the_page_name_what_there_is(shown: Shown) -> None:
     for text in (asked, (ROOT / "docs/metrics.md").read_text()):
         for name in re.findall(r"\broboglot_[a-z_]+", text):
             assert name.removesuffix("_total").removesuffix("_bucket") in told, name
+
+
+async def test_a_collector_gets_the_same_values(shown: Shown) -> None:
+    await scraped(shown)
+    await say("command;", "robot battery ?;", "chassis speed x 99;")
+    assert shown.runtime.console is not None
+    metrics = await shown.runtime.console._application.metrics()  # type: ignore[union-attr]
+    seen = await scraped(shown)
+    taken: list[tuple[str, str, bytes]] = []
+    with collector(taken) as address:
+        pushing = asyncio.create_task(Pusher(metrics, address, 0.01).run())
+        while not taken:  # noqa: ASYNC110 - another thread fills it
+            await asyncio.sleep(0.01)
+        pushing.cancel()
+    path, kind, body = taken[0]
+    assert (path, kind) == ("/v1/metrics", "application/x-protobuf")
+    (resource,) = ExportMetricsServiceRequest.FromString(body).resource_metrics
+    assert ("service.name", "roboglot") in {(a.key, a.value.string_value) for a in resource.resource.attributes}
+    pushed = {metric.name: metric for metric in resource.scope_metrics[0].metrics}
+    counted = {
+        tuple(sorted(a.value.string_value for a in point.attributes)): point.as_double
+        for point in pushed["roboglot_requests"].sum.data_points
+    }
+    assert counted == {key[1:]: value for key, value in seen.items() if key[0] == "roboglot_requests_total"}
+    assert pushed["roboglot_requests"].sum.is_monotonic
+    (latency,) = pushed["roboglot_reply_seconds"].histogram.data_points
+    assert latency.count == sum(latency.bucket_counts) == seen["roboglot_reply_seconds_count", "a", "robomaster"]
+    assert len(latency.bucket_counts) == len(latency.explicit_bounds) + 1
+    battery = shown.robot[Battery].state.percentage
+    assert pushed["roboglot_battery_ratio"].gauge.data_points[0].as_double == pytest.approx(battery, abs=0.01)
+    shown.runtime.console._application._metrics.close()  # type: ignore[union-attr]
+
+
+async def test_a_collector_that_is_not_there_is_logged(shown: Shown, caplog: pytest.LogCaptureFixture) -> None:
+    metrics = await shown.runtime.console._application.metrics()  # type: ignore[union-attr]
+    pushing = asyncio.create_task(Pusher(metrics, f"http://{ADDRESS}:9", 0.01).run())
+    while "took no metrics" not in caplog.text:  # noqa: ASYNC110
+        await asyncio.sleep(0.01)
+    pushing.cancel()
+
+
+@contextlib.contextmanager
+def collector(taken: list[tuple[str, str, bytes]]) -> Iterator[str]:
+    """The address of an HTTP server that keeps what is posted: path, content type, body."""
+
+    class Take(BaseHTTPRequestHandler):
+        def do_POST(self) -> None:
+            body = self.rfile.read(int(self.headers["content-length"]))
+            taken.append((self.path, self.headers["content-type"], body))
+            self.send_response(200)
+            self.end_headers()
+
+        def log_message(self, *_: object) -> None:
+            pass
+
+    with ThreadingHTTPServer((ADDRESS, 0), Take) as server:
+        thread = threading.Thread(target=server.serve_forever, daemon=True)
+        thread.start()
+        yield f"http://{ADDRESS}:{server.server_address[1]}"
+        server.shutdown()
+        thread.join()

@@ -104,18 +104,19 @@ class Application:
         for robot in self._desk.robots.values():
             if not robot.admission.may(Right.SEE):
                 raise Problem(403, "metrics are for who may see every robot")
-        if self._metrics is None:
-            self._metrics = await self._start_counting()
-        await answer(send, 200, self._metrics.content_type, self._metrics.text(), [(b"cache-control", b"no-store")])
-
-    async def _start_counting(self) -> Metrics:
-        """Follow the taps from now on. Raises Problem."""
         try:
-            with explaining("/metrics", "console"):
-                metrics = await asyncio.to_thread(import_module, "roboglot.console.metrics")
+            metrics = await self.metrics()
         except MissingExtra as missing:
             raise Problem(501, str(missing)) from None
-        return self._metrics or cast("Metrics", metrics.Metrics(self._desk))
+        await answer(send, 200, metrics.content_type, metrics.text(), [(b"cache-control", b"no-store")])
+
+    async def metrics(self) -> Metrics:
+        """Return what counts, from the first call on. Raises MissingExtra."""
+        if self._metrics is None:
+            with explaining("/metrics", "console"):
+                module = await asyncio.to_thread(import_module, "roboglot.console.metrics")
+            self._metrics = self._metrics or cast("Metrics", module.Metrics(self._desk))
+        return self._metrics
 
     async def _serve_file(self, scope: Scope, send: Send) -> None:
         if scope["path"] in ("/studio", "/studio/") and not await self._knows(scope):

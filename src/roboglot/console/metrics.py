@@ -63,6 +63,10 @@ class Metrics:
         """Return all values, in the text format 0.0.4."""
         return generate_latest(self._registry)
 
+    def families(self) -> Iterator[Metric]:
+        """Return all values, as they are now."""
+        return iter(self._registry.collect())
+
     def close(self) -> None:
         """Stop counting."""
         for leave in self._leave:

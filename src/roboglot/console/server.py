@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from roboglot.config import ConsoleConfig
 from roboglot.console.desk import Desk
 from roboglot.console.settings import BEAT, PORTS_TRIED_MAX
+from roboglot.extras import MissingExtra, in_words, is_there
 from roboglot.model.admission import Admission
 from roboglot.protocols.browsers import Browsers
 from roboglot.protocols.gate import Gate
@@ -48,7 +49,12 @@ class Console:
         return f"{'https' if self._tls else 'http'}://{host}:{self.port}"
 
     def open(self) -> None:
-        """Bind the port, or the next free one, and get ready in the background. No console is no reason to fail."""
+        """Bind the port, or the next free one, and get ready in the background. No console is no reason to fail.
+
+        Raises MissingExtra where metrics are to be pushed and cannot.
+        """
+        if self._config.otlp and not is_there("opentelemetry.proto"):
+            raise MissingExtra(in_words("[console] otlp", ["opentelemetry-proto"], "otlp"))
         try:
             self._socket = _bound(self._config.address, self._config.port)
         except OSError as error:
@@ -93,6 +99,13 @@ class Console:
         gated = self._gate.before(lambda: HttpToolsProtocol(config, state, {}, loop), "console pages")
         self._server = await loop.create_server(gated, sock=listening, backlog=BACKLOG)
         self._tasks.append(loop.create_task(self._beat(self._application), name="console beat"))
+        if self._config.otlp:
+            self._tasks.append(loop.create_task(self._push(self._application), name="metrics to a collector"))
+
+    async def _push(self, application: Application) -> None:
+        """Send metrics to the collector."""
+        otlp = await asyncio.to_thread(importlib.import_module, "roboglot.console.otlp")
+        await otlp.Pusher(await application.metrics(), self._config.otlp, self._config.otlp_period).run()
 
     async def _beat(self, application: Application) -> None:
         """Have every page look again; robots are read only while a page is open."""
