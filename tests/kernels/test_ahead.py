@@ -18,6 +18,7 @@ from roboglot.fleet import Fleet, build_fleet
 from roboglot.kernels import MODULES, ahead
 from roboglot.kernels.ahead import KernelsUnavailable, compile_ahead, compile_beside, missing
 from roboglot.model.clock import LockstepClock
+from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
 from roboglot.model.components.system.health import FaultLevel, Health
 from roboglot.model.errors import NotReady, Refused
@@ -120,6 +121,11 @@ async def test_navigation_is_not_ready_while_compiling(
     assert "robot a can be driven, seen and programmed; maps, localization and navigation follow" in caplog.text
     with pytest.raises(NotReady, match="warming up"):
         robot[Navigation].navigate_to([Point(1.0, 0.0)], NavigationOptions())
+    search = robot[Localization].relocalize()
+    assert isinstance(robot.clock, LockstepClock)
+    await robot.clock.advance(11.0)
+    assert isinstance(search.error, NotReady)
+    assert not robot[Health].has("not localized"), "nothing has looked for its place yet"
     compiled.set()
     await fleet_of_one.start(wait=True)
     assert not robot[Health].has(UNAVAILABLE)

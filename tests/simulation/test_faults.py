@@ -180,7 +180,7 @@ async def test_a_dismissed_fault_comes_back_while_its_cause_persists(sim):
 
 async def test_who_was_lost_is_found_only_when_sure(sim):
     class Guess:
-        enabled, quality, lost = True, 0.9, None
+        enabled, started, quality, lost = True, True, 0.9, None
 
     sim.robot.add(Localization, Guess())
     told = []

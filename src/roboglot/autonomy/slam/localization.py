@@ -9,7 +9,7 @@ from roboglot.autonomy.computing import computed
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.mapping.localization import LOCALIZATION, Localization, Region
-from roboglot.model.errors import InvalidGoal, NotLocalized
+from roboglot.model.errors import InvalidGoal, NotLocalized, NotReady
 from roboglot.model.events import LostReason, PoseJumped
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.robot import Robot
@@ -40,6 +40,10 @@ class LidarLocalization(Localization):
         return self._belief.quality
 
     @property
+    def started(self) -> bool:
+        return self.estimator is not None and self.estimator.started
+
+    @property
     def lost(self) -> LostReason | None:
         return self._belief.lost if self._belief.localizing else None
 
@@ -68,6 +72,8 @@ class LidarLocalization(Localization):
             deadline = self._robot.clock.time() + SEARCH_SECONDS
             while (count := await self._find(region)) != 1:
                 if self._robot.clock.time() > deadline:
+                    if not self.started:
+                        raise NotReady("localization is warming up: no scan has been compared with the map yet")
                     raise NotLocalized(
                         f"{count} places look like what the lidar sees: drive to where they differ"
                         if count

@@ -152,6 +152,11 @@ class Slam:
         if event.given:
             self.whereabouts.be_given(event.stamp)
 
+    @property
+    def started(self) -> bool:
+        """Whether a scan has been compared with the map."""
+        return self._matched_odometry is not None
+
     def believe(self, found: Match, odometry: Pose, means: RecoveryMeans = RecoveryMeans.WHOLE_MAP) -> None:
         """The robot was found to have been there when odometry said ``odometry``."""
         self._belief.move_to(found.pose, odometry)

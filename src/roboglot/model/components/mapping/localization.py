@@ -40,6 +40,11 @@ class Localization(Component):
         """0..1: how well the last scans fit the map."""
 
     @property
+    def started(self) -> bool:
+        """False while the first scan is still to be compared with the map: ``quality`` says nothing yet."""
+        return True
+
+    @property
     def lost(self) -> LostReason | None:
         """Why the robot does not know its place in the map now; None while it does."""
         return None
@@ -62,5 +67,5 @@ class Localization(Component):
         """Find the robot anywhere in the map, or with its centre in ``region``, by what the lidar sees; it stays put.
 
         Aborts with NotLocalized when no place, or more than one, fits within some seconds; driving on may help to
-        distinguish them. InvalidGoal for an empty region.
+        distinguish them; with NotReady when it cannot be tried yet. InvalidGoal for an empty region.
         """

@@ -58,6 +58,12 @@ def _netless(card: Network) -> bool:
     return not card.connected and card.state.mode is NetworkMode.STATION
 
 
+def _is_in_doubt(localization: Localization, quality: float) -> bool:
+    """True if it should know the place, has looked, and is less sure than ``quality``."""
+    known = localization.lost is None and localization.quality >= quality
+    return localization.enabled and localization.started and not known
+
+
 WATCHES = (
     _Watch(Base, MOTOR_ALARM, "base", ERROR, "a wheel's motor does not turn", lambda base: base.dead_wheels),
     _Watch(Base, "fallen", "base", FATAL, "the robot fell down", lambda base: base.locked_by("fallen")),
@@ -77,8 +83,7 @@ WATCHES = (
     _Watch(Network, "network slow", "network", WARNING, "answers come late", lambda it: it.delay > 0.0),
     _Watch(Disk, "disk full", "disk", ERROR, "the disk is full", lambda it: it.free <= 0),
     _Watch(Localization, "not localized", "localization", WARNING, "the robot does not know where it is",
-           lambda it: it.enabled and (it.lost is not None or it.quality < DOUBT),
-           lambda it: it.enabled and (it.lost is not None or it.quality < CERTAIN)),
+           lambda it: _is_in_doubt(it, DOUBT), lambda it: _is_in_doubt(it, CERTAIN)),
 )  # fmt: skip
 
 
