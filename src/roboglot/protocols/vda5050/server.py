@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import logging
 import ssl
-from collections.abc import AsyncIterator, Coroutine, Mapping, Sequence
+from collections.abc import AsyncIterator, Awaitable, Mapping, Sequence
 from typing import Any
 
 import msgspec
@@ -302,9 +302,9 @@ class Vda5050Door:
         await self._client.publish(self._topic(name), data, qos=qos, retain=retain)
 
 
-async def _until_one_ends(*jobs: Coroutine[Any, Any, None]) -> None:
+async def _until_one_ends(*jobs: Awaitable[None]) -> None:
     """Run all until the first ends, end the others, and raise what it raised."""
-    tasks = [asyncio.create_task(job) for job in jobs]
+    tasks = [asyncio.ensure_future(job) for job in jobs]
     try:
         done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         for task in done:

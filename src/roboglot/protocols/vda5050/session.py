@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable, Coroutine
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -63,7 +63,7 @@ class Session:
         self.load: dict[str, str] = {}  # what fleet control said of the load that was picked
         self.changed = asyncio.Event()
         self._trigger = asyncio.Event()
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._tasks: set[asyncio.Future[None]] = set()
         self._route = Route(self)
         self._performer = Performer(self)
 
@@ -133,9 +133,9 @@ class Session:
             _forget_oldest(self.instant)
             self.run_beside(self._do_instantly(state))
 
-    def run_beside(self, work: Coroutine[Any, Any, None]) -> None:
+    def run_beside(self, work: Awaitable[None]) -> None:
         """Run ``work`` until it ends or the door closes."""
-        task = asyncio.get_running_loop().create_task(work)
+        task = asyncio.ensure_future(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
