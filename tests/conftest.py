@@ -13,6 +13,8 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
+from tests import warm_start
+
 settings.register_profile("same", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("explore", deadline=None, max_examples=1000)  # scripts/test --hypothesis-profile explore
 settings.load_profile("same")
@@ -20,6 +22,8 @@ settings.load_profile("same")
 # httpx's pool tries to import it at every request: a third of a request's time went into looking for what isn't there.
 if importlib.util.find_spec("sniffio") is None:
     sys.modules["sniffio"] = None  # type: ignore[assignment]
+
+warm_start.install()
 
 TESTS = Path(__file__).parent
 PROCESSES = (
@@ -50,6 +54,7 @@ def pytest_collection_finish() -> None:
     """Leave all modules that were imported out of garbage collections: they stay."""
     gc.collect()
     gc.freeze()
+    gc.set_threshold(20_000, 20, 20)  # a test's world is thousands of objects that all end together
 
 
 VENDOR_PORTS = (40924, 40926)  # UDP

@@ -1,6 +1,6 @@
 """``python -m roboglot``."""
 
-from roboglot.cli import main
+from roboglot.cli import run_process
 
 if __name__ == "__main__":
-    main()
+    run_process()

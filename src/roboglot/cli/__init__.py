@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import atexit
 import importlib
 import io
+import os
 import sys
-from typing import TYPE_CHECKING
+import threading
+from typing import TYPE_CHECKING, NoReturn
 
 from roboglot.extras import explained
 
@@ -41,6 +44,7 @@ COMMANDS = {
     "certs": "the certificates that CyberDog clients need",
     "doctor": "what is missing on this machine, and how to get it",
 }
+FLUSH_FAILED = 120  # Python's own status for it
 # Commands whose files have a folder of their own.
 FOLDERS = dict.fromkeys(("compare", "export", "fidelity", "record", "replay", "rerun"), "recordings") | dict.fromkeys(
     ("lease", "stop", "reset"), "control"
@@ -49,6 +53,30 @@ FOLDERS = dict.fromkeys(("compare", "export", "fidelity", "record", "replay", "r
 EXTRAS = {"demo": "demo", "mcp": "mcp", "export": "logs"} | dict.fromkeys(
     ("up", "coverage", "capabilities", "fidelity", "doctor", "cloud", "map", "test"), "up"
 )
+
+
+def run_process() -> NoReturn:
+    """Run ``main`` and end the process as ``sys.exit`` would, but leave its memory to the kernel.
+
+    The interpreter would take it apart object by object: 0.7 s of processor time for a robot's server.
+    """
+    status = 0
+    try:
+        main()
+    except SystemExit as end:
+        status = end.code if isinstance(end.code, int) else int(end.code is not None)
+        if isinstance(end.code, str):
+            print(end.code, file=sys.stderr)
+    # No public names, but multiprocessing ends its children in the same way.
+    vars(threading)["_shutdown"]()  # waits for threads
+    vars(atexit)["_run_exitfuncs"]()
+    try:
+        for stream in (sys.stdout, sys.stderr):
+            if stream is not None and not stream.closed:
+                stream.flush()
+    except OSError:  # a full disk, or a reader who has gone
+        status = status or FLUSH_FAILED
+    os._exit(status & 0xFF)
 
 
 def main() -> None:

@@ -12,6 +12,7 @@ import re
 import sqlite3
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar
@@ -192,11 +193,22 @@ def connect(path: Path | str) -> sqlite3.Connection:
         connection.execute("PRAGMA journal_mode=WAL")
         connection.execute("PRAGMA synchronous=FULL")
         connection.execute("PRAGMA foreign_keys=ON")
-        _migrate(connection)
+        if str(path) == ":memory:" and hasattr(connection, "deserialize"):
+            connection.deserialize(_empty())
+        else:
+            _migrate(connection)
     except BaseException:
         connection.close()
         raise
     return connection
+
+
+@cache
+def _empty() -> bytes:
+    """Return an empty database with the newest schema."""
+    with contextlib.closing(sqlite3.connect(":memory:", isolation_level=None)) as connection:
+        _migrate(connection)
+        return connection.serialize()
 
 
 def _migrate(connection: sqlite3.Connection) -> None:

@@ -65,7 +65,7 @@ async def bare_door(bare: Robot) -> AsyncIterator[SlamwareDoor]:
 @pytest.fixture
 async def bare_client(bare_door: SlamwareDoor) -> AsyncIterator[httpx.AsyncClient]:
     """A client of the bare robot."""
-    async with httpx.AsyncClient(base_url=bare_door.endpoints[0].address, timeout=60) as client:
+    async with httpx.AsyncClient(base_url=bare_door.endpoints[0].address, timeout=60, verify=False) as client:
         yield client
 
 
@@ -79,7 +79,7 @@ async def door(robot: Robot) -> AsyncIterator[SlamwareDoor]:
 @pytest.fixture
 async def client(door: SlamwareDoor) -> AsyncIterator[httpx.AsyncClient]:
     """A client of the simulated robot."""
-    async with httpx.AsyncClient(base_url=door.endpoints[0].address, timeout=30.0) as client:
+    async with httpx.AsyncClient(base_url=door.endpoints[0].address, timeout=30.0, verify=False) as client:
         yield client
 
 

@@ -26,9 +26,9 @@ def sideways(way: Points, echoes: Points, clearance: float) -> tuple[Points, flo
     length = np.hypot(along[:, 0], along[:, 1])
     along /= np.maximum(length, 1e-9)[:, None]
     normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
-    offset = echoes[None, :, :] - way[:, None, :]
-    ahead = np.abs((offset * along[:, None, :]).sum(axis=2))
-    left = (offset * normal[:, None, :]).sum(axis=2)
+    x, y = echoes[None, :, 0] - way[:, None, 0], echoes[None, :, 1] - way[:, None, 1]
+    ahead = np.abs(x * along[:, None, 0] + y * along[:, None, 1])
+    left = x * normal[:, None, 0] + y * normal[:, None, 1]
     near = (ahead < clearance) & (np.abs(left) < 2.0 * clearance)
     reach = np.sqrt(np.maximum(0.0, clearance**2 - ahead**2))
     upper = np.where(near & (left > 0.0), left - reach, np.inf).min(axis=1, initial=np.inf)

@@ -37,7 +37,7 @@ class LowMemory:
         points = _placed(view.obstacles, pose)
         points = points[_far_from_occupied(grid, points)]
         if len(points) and len(echoes):
-            squares = ((points[:, None] - echoes) ** 2).sum(axis=2)
+            squares = (points[:, None, 0] - echoes[:, 0]) ** 2 + (points[:, None, 1] - echoes[:, 1]) ** 2
             points = points[squares.min(axis=1) > EXPLAINED**2]
         columns, rows = _cells(grid, points)
         seen[rows, columns] = max(now, 1e-3)

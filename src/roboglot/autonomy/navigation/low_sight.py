@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +47,8 @@ class LowSight:
             grids.append(_depth_grid(image))
         if TimeOfFlight in robot:
             eyes = robot[TimeOfFlight]
-            grids += [_zone_grid(eyes.reading(name)) for name in eyes.names]
+            zones = [_zone_grid(eyes.reading(name)) for name in eyes.names]
+            grids += [np.stack(zones)] if len({grid.shape for grid in zones}) == 1 else zones
         if not grids:
             return LowView(NONE, NONE)
         seen = [_sorted_out(grid, robot.description.height) for grid in grids]
@@ -59,26 +61,36 @@ class LowSight:
 
 
 def _sorted_out(grid: Points, height: float) -> LowView:
-    """What of ``grid`` (rows from above, columns, x y z; NaN without an echo) stands, and what is floor."""
+    """What of ``grid`` (any number of sensors, rows from above, columns, x y z; NaN: no echo) stands, what is floor."""
     away, z = np.hypot(grid[..., 0], grid[..., 1]), grid[..., 2]
+    upper, beside = z[..., :-1, :], away[..., :-1, :]
     with np.errstate(invalid="ignore"):
-        rise, way = z[:-1] - z[1:], away[:-1] - away[1:]  # each against what is seen right below
-        stands = (rise > STEEP * np.maximum(way, 0.0)) & (z[:-1] > LOW) & (z[:-1] < height) & (away[:-1] < NEAR)
+        rise, way = upper - z[..., 1:, :], beside - away[..., 1:, :]  # each against what is seen right below
+        stands = (rise > STEEP * np.maximum(way, 0.0)) & (upper > LOW) & (upper < height) & (beside < NEAR)
         floor = (np.abs(z) < FLOOR) & (away < NEAR)
-    return LowView(grid[:-1][stands][:, :2], grid[floor][:, :2])
+    return LowView(grid[..., :-1, :, :][stands][:, :2], grid[floor][:, :2])
 
 
 def _depth_grid(image: DepthImage) -> Points:
     """Every pixel's place in base_link."""
-    rows, columns = image.depths.shape
-    across = np.tan(np.linspace(image.width / 2, -image.width / 2, columns))
-    down = np.tan(np.linspace(image.height / 2, -image.height / 2, rows))
-    left, up = np.meshgrid(across, down)
     depths = np.where(np.isfinite(image.depths), image.depths, np.nan).astype(np.float64)
-    c, s = math.cos(image.attitude.pitch), math.sin(image.attitude.pitch)
     mount = np.array((image.mount.x, image.mount.y, image.mount.z))
-    grid: Points = np.stack((c + s * up, left, c * up - s), axis=-1) * depths[..., None] + mount
+    rays = _rays(image.depths.shape, image.width, image.height, image.attitude.pitch)
+    grid: Points = rays * depths[..., None] + mount
     return grid
+
+
+@lru_cache(maxsize=64)
+def _rays(shape: tuple[int, int], width: float, height: float, pitch: float) -> Points:
+    """Every pixel's way through base_link for 1 m along the optical axis."""
+    rows, columns = shape
+    across = np.tan(np.linspace(width / 2, -width / 2, columns))
+    down = np.tan(np.linspace(height / 2, -height / 2, rows))
+    left, up = np.meshgrid(across, down)
+    c, s = math.cos(pitch), math.sin(pitch)
+    rays: Points = np.stack((c + s * up, left, c * up - s), axis=-1)
+    rays.setflags(write=False)
+    return rays
 
 
 def _zone_grid(reading: ZoneDistances) -> Points:

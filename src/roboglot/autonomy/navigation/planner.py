@@ -381,6 +381,12 @@ def _without(evidence: NDArray[np.int16], corner: Point, gone: NDArray[np.float6
 def _mark_line(trodden: NDArray[np.uint8], corner: Point, start: Point, end: Point) -> None:
     """Set the cells of ``trodden`` under a straight way, two cells wide."""
     count = math.ceil(start.distance_to(end) / RESOLUTION) + 1
+    if count <= 2:  # from one scan to the next
+        for place in (start, end)[:count]:
+            column = math.floor((place.x - corner.x) / RESOLUTION - 0.5)
+            row = math.floor((place.y - corner.y) / RESOLUTION - 0.5)
+            trodden[max(0, row) : max(0, row + 2), max(0, column) : max(0, column + 2)] = 1
+        return
     x = np.linspace(start.x - corner.x, end.x - corner.x, count) / RESOLUTION
     y = np.linspace(start.y - corner.y, end.y - corner.y, count) / RESOLUTION
     columns, rows = np.floor(x - 0.5).astype(int).tolist(), np.floor(y - 0.5).astype(int).tolist()

@@ -10,6 +10,7 @@ import logging
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import version
 
 import numpy as np
@@ -59,6 +60,11 @@ class RobotPlacement:
     body: str = "universal"
     start: Pose | None = None
     floor: int = 0
+
+
+@cache
+def _version() -> str:
+    return version("roboglot")
 
 
 class World:
@@ -127,7 +133,7 @@ class World:
     def description_of(self, name: str) -> Description:
         """Return a robot's name plate."""
         serial = f"RG-{self._seed:04d}-{name}"
-        return self._population.hull(name).body.describe(serial=serial, software_version=version("roboglot"))
+        return self._population.hull(name).body.describe(serial=serial, software_version=_version())
 
     def equip(self, robot: Robot) -> None:
         """Give ``robot`` the simulated components of the body that was placed under its id."""

@@ -1,0 +1,200 @@
+"""``python -m roboglot …`` forked from a process that has imported everything: a tenth of the processor time.
+
+``install`` has ``subprocess.Popen``, and with it asyncio, start such commands like this. The process is a child of ours
+as if we had started it ourselves: output, signals, exit status and waiting are the same. Commands with an environment
+for another interpreter, and all other programs, start cold. ``ROBOGLOT_TESTS_COLD=1`` has all of them start so.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import importlib
+import inspect
+import json
+import os
+import pkgutil
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NoReturn
+
+COLD = "ROBOGLOT_TESTS_COLD"
+ROBOGLOT = [sys.executable, "-m", "roboglot"]
+SAME_SEED = {"rerun"}  # a fork has its parent's hash seed: whether another one gives the same trace would not be seen
+PLAIN = {
+    "shell": False,
+    "preexec_fn": None,
+    "close_fds": True,
+    "restore_signals": True,
+    "gid": None,
+    "gids": None,
+    "uid": None,
+    "umask": -1,
+    "process_group": -1,
+}
+OF_THE_INTERPRETER = ("PYTHON", "LC_", "LANG", "NUMBA_", "OPENBLAS_", "OMP_", "MKL_", "GRPC_", "LD_", "MALLOC_")
+MESSAGE_MAX = 1 << 20
+PR_SET_CHILD_SUBREAPER = 36
+SERVER_FD_LIMIT = 4096
+
+_execute_cold: Any = subprocess.Popen._execute_child  # type: ignore[attr-defined]
+_signature = inspect.signature(_execute_cold)
+
+
+class WarmParent:
+    """The process that forks, started when it is needed first."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._line: socket.socket | None = None
+        self._libc = ctypes.CDLL(None, use_errno=True)
+
+    def start(self, wish: dict[str, Any], descriptors: list[int]) -> int:
+        """Return the number of a new process that is our child. Raises OSError."""
+        with self._lock:
+            line = self._line or self._open()
+            self._line = line
+            self._libc.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)  # its parent ends at once: it becomes ours
+            try:
+                socket.send_fds(line, [json.dumps(wish).encode()], descriptors)
+                answer = line.recv(64)
+            finally:
+                self._libc.prctl(PR_SET_CHILD_SUBREAPER, 0, 0, 0, 0)
+        if not answer:
+            raise OSError("the process that forks has died")
+        return int(answer)
+
+    def _open(self) -> socket.socket:
+        from roboglot.shards.warmth import ENVIRONMENT
+
+        ours, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with its:
+            subprocess.Popen(
+                [sys.executable, "-m", __name__, str(its.fileno())],
+                pass_fds=[its.fileno()],
+                stdin=subprocess.DEVNULL,
+                cwd=Path(__file__).parents[1],
+                env={**os.environ, **ENVIRONMENT},
+                start_new_session=True,
+            ).returncode = 0  # it ends with our socket; no one needs to wait for it
+        return ours
+
+
+_parent = WarmParent()
+
+
+def install() -> None:
+    """Start ``python -m roboglot`` warm from now on."""
+    if not os.environ.get(COLD) and sys.platform == "linux":
+        subprocess.Popen._execute_child = _execute  # type: ignore[attr-defined]
+
+
+def _execute(process: Any, *arguments: Any, **named: Any) -> None:
+    """Do what ``Popen`` does with these arguments of its own."""
+    wanted = _signature.bind(process, *arguments, **named).arguments
+    if not _is_warm(wanted):
+        _execute_cold(process, *arguments, **named)
+        return
+    ends = [wanted[name] for name in ("p2cread", "p2cwrite", "c2pread", "c2pwrite", "errread", "errwrite")]
+    given = [end if end != -1 else own for own, end in enumerate((ends[0], ends[3], ends[5]))]
+    wish = {
+        "arguments": [str(os.fspath(word)) for word in wanted["args"][3:]],
+        "folder": str(wanted["cwd"] or Path.cwd()),
+        "environment": dict(os.environ if wanted["env"] is None else wanted["env"]),
+        "session": bool(wanted["start_new_session"]),
+    }
+    try:
+        process.pid = _parent.start(wish, given)
+        process._child_created = True
+    finally:
+        process._close_pipe_fds(*ends)
+
+
+def _is_warm(wanted: Mapping[str, Any]) -> bool:
+    words = wanted["args"]
+    if not isinstance(words, list) or words[:3] != ROBOGLOT or not SAME_SEED.isdisjoint(words[3:4]):
+        return False
+    if wanted["pass_fds"] or any(wanted.get(name, usual) != usual for name, usual in PLAIN.items()):
+        return False
+    environment = wanted["env"]
+    return environment is None or _of_the_interpreter(environment) == _of_the_interpreter(os.environ)
+
+
+def _of_the_interpreter(environment: Mapping[Any, Any]) -> dict[Any, Any]:
+    return {name: value for name, value in environment.items() if str(name).startswith(OF_THE_INTERPRETER)}
+
+
+# -- the process that forks --------------------------------------------------------------------------------------------
+
+
+def serve(line: socket.socket) -> None:
+    """Fork a process for each message until the other end closes."""
+    while True:
+        message, descriptors, _, _ = socket.recv_fds(line, MESSAGE_MAX, 3)
+        if not message:
+            return
+        reading, writing = os.pipe()
+        middle = os.fork()
+        if middle == 0:
+            if (pid := os.fork()) == 0:
+                _become(json.loads(message), descriptors)
+            os.write(writing, str(pid).encode())
+            os._exit(0)
+        os.waitpid(middle, 0)
+        line.send(os.read(reading, 64))
+        for descriptor in (*descriptors, reading, writing):
+            os.close(descriptor)
+
+
+def _become(wish: Any, descriptors: list[int]) -> NoReturn:
+    """In the fork: be the process that was wanted."""
+    status = 70
+    try:
+        for number, descriptor in enumerate([os.dup(given) for given in descriptors]):
+            os.dup2(descriptor, number)
+        os.closerange(3, SERVER_FD_LIMIT)
+        if wish["session"]:
+            os.setsid()
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        os.chdir(wish["folder"])
+        os.environ.clear()
+        os.environ.update(wish["environment"])
+        sys.stdin, sys.stdout = os.fdopen(0, encoding="utf-8"), os.fdopen(1, "w", encoding="utf-8")
+        sys.stderr = os.fdopen(2, "w", encoding="utf-8", errors="backslashreplace", buffering=1)
+        package = importlib.import_module("roboglot")
+        sys.argv = [str(Path(str(package.__file__)).with_name("__main__.py")), *wish["arguments"]]
+        sys.path[0] = wish["folder"]
+        from roboglot.cli import run_process
+
+        run_process()
+    except KeyboardInterrupt:
+        status = 130
+    except BaseException:  # noqa: BLE001 - a forked child has no caller to raise to
+        sys.excepthook(*sys.exc_info())
+        status = 1
+    finally:
+        sys.stderr.flush()
+        os._exit(status)
+
+
+def main(descriptor: int) -> None:
+    """Load everything, then serve."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    from roboglot import cli
+    from roboglot.shards.warmth import ENVIRONMENT, refuse_threads, warm
+
+    for module in pkgutil.walk_packages(cli.__path__, f"{cli.__name__}."):
+        importlib.import_module(module.name)
+    warm()
+    refuse_threads()
+    for name in ENVIRONMENT:
+        os.environ.pop(name, None)
+    serve(socket.socket(fileno=descriptor))
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]))
