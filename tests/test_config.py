@@ -33,6 +33,7 @@ def test_defaults() -> None:
         "visual": [50053],
         "vda5050": [],
         "foxglove": [8765],
+        "ros2": [],
     }
 
 

@@ -21,6 +21,8 @@ TOTALS = {
     "vda5050_messages": 27,
     "foxglove": 14,
     "foxglove_messages": 15,
+    "ros2": 3,
+    "ros2_messages": 10,
 }
 
 

@@ -41,6 +41,7 @@ EXTRA_OF = {
     "websockets": "programs",
     "wsproto": "console",
     "yaml": "simulation",
+    "zenoh": "ros2",
     "zstandard": "recording",
 }
 # What each extra brings, as modules.
@@ -58,6 +59,7 @@ MODULES: dict[str, tuple[str, ...]] = {
     "mcp": ("mcp",),
     "otlp": ("opentelemetry.proto", "prometheus_client"),
     "vda5050": ("aiomqtt",),
+    "ros2": ("zenoh", "rosbags", "foxglove_schemas_protobuf", "google", "mcap", "numpy", "zstandard"),
     "demo": ("httpx", "robomasterpy", "cv2"),
 }
 

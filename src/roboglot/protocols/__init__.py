@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from roboglot.config import Config
-from roboglot.protocols import cyberdog, foxglove, robomaster, slamware, vda5050, visual
+from roboglot.protocols import cyberdog, foxglove, robomaster, ros2, slamware, vda5050, visual
 from roboglot.protocols.door import Door, DoorType, Site
 
 DOORS: tuple[DoorType, ...] = (
@@ -13,6 +13,7 @@ DOORS: tuple[DoorType, ...] = (
     visual.DOOR,
     vda5050.DOOR,
     foxglove.DOOR,
+    ros2.DOOR,
 )
 
 

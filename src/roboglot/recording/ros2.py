@@ -6,6 +6,7 @@ What ROS has no type for (the doors' exchanges, events, actions, states) is JSON
 from __future__ import annotations
 
 import math
+import struct
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, NamedTuple
@@ -13,6 +14,7 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
+from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
 from roboglot.model.geometry import Pose, wrap_angle
@@ -22,7 +24,7 @@ from roboglot.recording.reader import Record
 JSON = "std_msgs/msg/String"
 ROS_LEVELS = {number: python for python, number in LEVELS.items()}  # rcl's levels are Python's
 SPEED_SPAN = 0.5  # s of poses that a speed is made of
-STORE = get_typestore(Stores.ROS2_HUMBLE)
+STORE = get_typestore(Stores.ROS2_JAZZY)
 
 
 class RosMessage(NamedTuple):
@@ -33,6 +35,14 @@ class RosMessage(NamedTuple):
     at: int  # ns since 1970
     data: bytes
     kept: bool = False
+
+
+def read_cdr(data: bytes, type: str) -> Any:
+    """Return a message. Raises ValueError for what is none."""
+    try:
+        return STORE.deserialize_cdr(data, type)
+    except (SerdeError, struct.error, LookupError, AssertionError, OverflowError) as error:
+        raise ValueError(f"{type}: {error}") from None
 
 
 def _new(type: str, **fields: Any) -> Any:
@@ -223,24 +233,32 @@ class Ros2Words:
         yield self._made(record.topic, type, record.at, grid, kept=True)
 
     def _video(self, record: Record, message: Any) -> Iterator[RosMessage]:
+        yield self._compressed(f"{record.topic}/compressed", record.at, message.frame_id, message.format, message.data)
+
+    def picture(self, at: int, frame: str, jpeg: bytes) -> RosMessage:
+        """Return a picture; its topic is the caller's."""
+        return self._compressed("", at, frame, "jpeg", jpeg)
+
+    def _compressed(self, topic: str, at: int, frame: str, form: str, data: bytes) -> RosMessage:
         type = "sensor_msgs/msg/CompressedImage"
-        data = np.frombuffer(message.data, np.uint8)
-        picture = _new(type, header=_header(record.at, message.frame_id), format=message.format, data=data)
-        yield self._made(f"{record.topic}/compressed", type, record.at, picture)
+        picture = _new(type, header=_header(at, frame), format=form, data=np.frombuffer(data, np.uint8))
+        return self._made(topic, type, at, picture)
+
+    def joints(self, at: int, positions: Mapping[str, float]) -> RosMessage:
+        """Return where joints stand (rad); its topic is the caller's."""
+        type, none = "sensor_msgs/msg/JointState", np.array([], np.float64)
+        angles = np.array(list(positions.values()), np.float64)
+        message = _new(type, header=_header(at, ""), name=list(positions), position=angles, velocity=none, effort=none)
+        return self._made("", type, at, message)
 
     def _log(self, record: Record, message: Any) -> Iterator[RosMessage]:
-        type, level = "rcl_interfaces/msg/Log", ROS_LEVELS.get(message.level, 20)
-        line = _new(
-            type,
-            stamp=_time(record.at),
-            level=level,
-            name=message.name,
-            msg=message.message,
-            file="",
-            function="",
-            line=0,
-        )
-        yield self._made("/rosout", type, record.at, line)
+        yield self.line(record.at, ROS_LEVELS.get(message.level, 20), message.name, message.message)
+
+    def line(self, at: int, level: int, name: str, text: str) -> RosMessage:
+        """Return a line of the log."""
+        type = "rcl_interfaces/msg/Log"
+        line = _new(type, stamp=_time(at), level=level, name=name, msg=text, file="", function="", line=0)
+        return self._made("/rosout", type, at, line)
 
     def _battery(self, record: Record, state: Any) -> Iterator[RosMessage]:
         type, unknown = "sensor_msgs/msg/BatteryState", math.nan

@@ -13,14 +13,12 @@ from roboglot.model.components.interaction.speaker import Speaker
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping as Mapper
 from roboglot.model.components.motion.base import Base
-from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
 
 DOOR = "foxglove"
-FAR = 1e6  # m, m/s: what is beyond is a mistake
 
 
 class Vector(msgspec.Struct):
@@ -88,28 +86,13 @@ class RosTwist(msgspec.Struct):
 
 
 def twist(message: RosTwist) -> Twist:
-    """Return the velocity. Raises InvalidGoal."""
-    found = Twist(message.linear.x, message.linear.y, message.angular.z)
-    if not all(abs(value) < FAR for value in (found.x, found.y, found.yaw)):
-        raise InvalidGoal("a velocity is not finite")
-    return found
+    """Return the velocity."""
+    return Twist(message.linear.x, message.linear.y, message.angular.z)
 
 
-def pose_in_map(robot: Robot, frame: str, message: RosPose) -> Pose:
-    """Return the pose in the robot's map. Raises InvalidGoal, ComponentMissing."""
-    pose = Pose(message.position.x, message.position.y, message.orientation.yaw)
-    if not (abs(pose.x) < FAR and abs(pose.y) < FAR):
-        raise InvalidGoal("the position is not finite")
-    match frame.removeprefix("/").removeprefix(f"{robot.id}/"):
-        case "" | "map":
-            return pose
-        case "base_link":
-            return robot[Localization].pose.compose(pose)
-        case "odom":
-            here = robot[Localization].pose
-            return here.compose(robot[Odometry].reading.pose.inverse()).compose(pose)
-        case other:
-            raise InvalidGoal(f"there is no frame {other[:80]!r}: the frames are map, odom and base_link")
+def pose(message: RosPose) -> Pose:
+    """Return the pose, in the frame of the message. Raises InvalidGoal."""
+    return Pose(message.position.x, message.position.y, message.orientation.yaw)
 
 
 @dataclass(frozen=True, slots=True)

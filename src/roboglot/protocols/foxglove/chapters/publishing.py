@@ -6,20 +6,16 @@ from collections.abc import Callable, Mapping
 
 import msgspec
 
-from roboglot.model.clock import RealClock
-from roboglot.model.components.mapping.localization import Localization
-from roboglot.model.components.motion.base import Base
-from roboglot.model.components.motion.driving import Driving
-from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
 from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.operations import Right
+from roboglot.protocols import ros_commands
 from roboglot.protocols.foxglove.context import Context, Published
 from roboglot.protocols.foxglove.table import TABLE
 from roboglot.protocols.foxglove.vocabulary import (
     PoseStamped,
     PoseWithCovarianceStamped,
     RosTwist,
-    pose_in_map,
+    pose,
     twist,
 )
 
@@ -69,28 +65,20 @@ def _name(context: Context, topic: str) -> str:
 
 def _drive(context: Context, data: bytes) -> None:
     """geometry_msgs/Twist: drive so until the next one, or for as long as the dead-man's time."""
-    robot = context.robot
     wish = twist(msgspec.json.decode(data, type=RosTwist))
-    limits = robot[Base].limits
-    if not limits.holonomic:
-        wish = type(wish)(wish.x, 0.0, wish.yaw)
-    pace = robot.clock.speed if isinstance(robot.clock, RealClock) else 1.0
-    seconds = context.config.dead_man * pace
-    robot[Driving].drive(wish.clamped(limits.twist), lifetime=seconds, source=context.source)
+    ros_commands.drive(context.robot, wish, context.config.dead_man, context.source)
 
 
 def _go(context: Context, data: bytes) -> None:
     """geometry_msgs/PoseStamped: go there; a status reports if that fails."""
-    robot, goal = context.robot, msgspec.json.decode(data, type=PoseStamped)
-    pose = pose_in_map(robot, goal.header.frame_id, goal.pose)
-    options = NavigationOptions(yaw=pose.yaw)
-    context.follow(robot[Navigation].navigate_to([pose.point], options, source=context.source))
+    goal = msgspec.json.decode(data, type=PoseStamped)
+    context.follow(ros_commands.go(context.robot, goal.header.frame_id, pose(goal.pose), context.source))
 
 
 def _place(context: Context, data: bytes) -> None:
     """geometry_msgs/PoseWithCovarianceStamped: the robot is there."""
-    robot, place = context.robot, msgspec.json.decode(data, type=PoseWithCovarianceStamped)
-    robot[Localization].set_pose(pose_in_map(robot, place.header.frame_id, place.pose.pose))
+    there = msgspec.json.decode(data, type=PoseWithCovarianceStamped)
+    ros_commands.place(context.robot, there.header.frame_id, pose(there.pose.pose))
 
 
 TOPICS: Mapping[str, Callable[[Context, bytes], None]] = {

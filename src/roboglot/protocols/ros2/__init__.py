@@ -1,0 +1,49 @@
+"""ROS 2 in front of a robot, without ROS: its topics over Zenoh, as rmw_zenoh sends them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from roboglot.operations import OperationTable
+from roboglot.protocols.door import Contract, Door, DoorType, Implementation, Option, PortKind, PortSetting, Site
+from roboglot.protocols.ros2.config import Ros2Config
+from roboglot.wire.contracts import contract
+
+
+def _open(config: Ros2Config, site: Site) -> Door:
+    from roboglot.protocols.ros2.server import Ros2Door
+
+    return Ros2Door(site.robot, site.address, config)
+
+
+def _implementation() -> Implementation:
+    from roboglot.protocols.ros2 import dispatch, table  # noqa: F401 - the chapters fill the table
+
+    return table
+
+
+def _messages() -> Implementation:
+    from roboglot.protocols.ros2.table import Messages
+
+    return Messages()
+
+
+def _table() -> OperationTable[Any]:
+    from roboglot.protocols.ros2 import dispatch, table  # noqa: F401 - the chapters fill the table
+
+    return table.TABLE
+
+
+DOOR = DoorType(
+    name="ros2",
+    title="ROS 2",
+    config=Ros2Config,
+    contracts=(
+        Contract("ros2", lambda: contract("ros2"), _implementation),
+        Contract("ros2_messages", lambda: contract("ros2_messages"), _messages),
+    ),
+    table=_table,
+    ports=(PortSetting("ROS 2 over Zenoh", "port", PortKind.APP),),
+    open=_open,
+    options=(Option("--ros2", "enabled", "Publish the robots' topics for ROS 2 with rmw_zenoh.", True),),
+)

@@ -1,0 +1,18 @@
+"""The one place where the model's errors become ROS's: levels of lines of ``/rosout``, for topics have no answers."""
+
+from __future__ import annotations
+
+import logging
+
+from roboglot.model.errors import Busy, Refused, RobotError
+
+LEVELS: dict[type[RobotError], int] = {
+    Busy: logging.WARNING,
+    Refused: logging.WARNING,
+    RobotError: logging.ERROR,
+}
+
+
+def level_of(error: RobotError) -> int:
+    """Return how bad ``error``, or its nearest ancestor in the table, is; rcl's levels are Python's."""
+    return next(LEVELS[kind] for kind in type(error).__mro__ if kind in LEVELS)

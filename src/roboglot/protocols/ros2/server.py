@@ -1,0 +1,273 @@
+"""The door: a Zenoh router at the robot's address, where its topics are published and others listened to."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import time
+import uuid
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+from roboglot.extras import explaining
+from roboglot.model.actions import Action, ActionStatus
+from roboglot.model.background import beside
+from roboglot.model.client_context import ask_for
+from roboglot.model.components.motion.gimbal import Gimbal
+from roboglot.model.components.sensing.camera import Camera
+from roboglot.model.robot import Robot
+from roboglot.protocols.door import Endpoint
+from roboglot.protocols.ros2.config import Ros2Config
+from roboglot.protocols.ros2.context import Context
+from roboglot.protocols.ros2.dispatch import answer
+from roboglot.protocols.ros2.vocabulary import DOOR, TYPES
+from roboglot.transport.seldom import Seldom
+from roboglot.wire.ros2.zenoh import KEPT, RELIABLE, Node, attachment, topic_key
+
+log = logging.getLogger(__name__)
+PENDING_MAX = 32  # messages that wait to be done; then they are dropped, and the log says so
+PICTURE_PERIOD = 0.2  # s
+JPEG_QUALITY = 80
+NODE = "roboglot"
+SHOWN = frozenset({"scan", "transforms", "pose", "grid", "battery"})  # kinds of a recording that are published
+
+
+class Ros2Door:
+    """One robot's; closed unless it is asked for."""
+
+    name = DOOR
+
+    def __init__(self, robot: Robot, address: str, config: Ros2Config) -> None:
+        self._robot, self._address, self._config = robot, address, config
+        self._namespace = config.namespaces.get(robot.id, robot.id)
+        self._session: Any = None
+        self._node: Node | None = None
+        self._tokens: list[Any] = []
+        self._publishers: dict[str, Any] = {}
+        self._numbers = 0
+        self._sequence = 0
+        self._gid = uuid.uuid4().bytes
+        self._pending = 0
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._sampler: Any = None
+        self._battery: Any = None
+        self._words: Any = None
+        self._seldom = Seldom(log)
+
+    @property
+    def endpoints(self) -> Sequence[Endpoint]:
+        """The router's address."""
+        if self._session is None:
+            return ()
+        listen = f"ZENOH_CONFIG_OVERRIDE='connect/endpoints=[\"{self._locator}\"]' ros2 topic list"
+        return [Endpoint("ROS 2", self._locator, listen)]
+
+    @property
+    def _locator(self) -> str:
+        return f"tcp/{self._address}:{self._config.port}"
+
+    async def start(self) -> None:
+        """Listen and publish. Raises MissingExtra without its libraries, OSError for an address that is taken."""
+        if not self._config.enabled:
+            return
+        if self._robot.admission.asks:
+            log.warning("robot %s: the ROS 2 door stays closed: Zenoh shows no one's rights", self._robot.id)
+            return
+        with explaining("the ROS 2 door", "ros2"):
+            import zenoh
+
+            from roboglot.recording.ros2 import Ros2Words
+            from roboglot.recording.sampler import Sampler
+        loop = asyncio.get_running_loop()
+        try:
+            self._session = await loop.run_in_executor(None, zenoh.open, self._zenoh_config(zenoh))
+        except zenoh.ZError as error:
+            raise OSError(f"{self._locator}: {error}") from None
+        self._words = Ros2Words(self._robot.id)
+        self._node = Node(self._config.domain, str(self._session.zid()), f"/{self._namespace}", NODE)
+        self._tokens.append(self._session.liveliness().declare_token(self._node.token))
+        for key, type in TYPES.items():
+            self._subscribe(key, type)
+        self._sampler = Sampler(self._robot, self._put)
+        self._follow(self._sample())
+        if Camera in self._robot:
+            self._follow(self._film())
+
+    def _zenoh_config(self, zenoh: Any) -> Any:
+        config = zenoh.Config()
+        for key, value in {
+            "mode": "router",
+            "listen/endpoints": [self._locator],
+            "connect/endpoints": list(self._config.connect),
+            "scouting/multicast/enabled": False,
+        }.items():
+            config.insert_json5(key, json.dumps(value))
+        return config
+
+    async def close(self) -> None:
+        """Publish no more, and stop what was commanded here."""
+        for task in tuple(self._tasks):
+            task.cancel()
+        if self._sampler is not None:
+            self._sampler.close()
+            self._sampler = None
+        for action in self._robot.actions.running():
+            if action.source == DOOR:
+                action.cancel("the ROS 2 door closes")
+        session, self._session = self._session, None
+        self._publishers.clear()
+        self._tokens.clear()
+        if session is not None:
+            await asyncio.get_running_loop().run_in_executor(None, session.close)
+
+    def _follow(self, work: Any) -> None:
+        task = asyncio.get_running_loop().create_task(work, name=f"ros2 {self._robot.id}")
+        self._tasks.add(task)
+        task.add_done_callback(self._ended)
+
+    def _ended(self, task: asyncio.Task[None]) -> None:
+        self._tasks.discard(task)
+        if not task.cancelled() and (error := task.exception()) is not None:
+            log.error("robot %s: the ROS 2 door: %s", self._robot.id, error, exc_info=error)
+
+    # -- listening -----------------------------------------------------------------------------------------------------
+
+    def _subscribe(self, key: str, type: str) -> None:
+        from roboglot.recording.ros2 import STORE
+
+        assert self._node is not None
+        topic, hashed = self._topic(key), STORE.hash_rihs01(type)
+        self._numbers += 1
+        token = self._node.subscription_token(self._numbers, topic, type, hashed, RELIABLE)
+        self._tokens.append(self._session.liveliness().declare_token(token))
+        loop = asyncio.get_running_loop()
+
+        def hear(sample: Any) -> None:  # in a thread of Zenoh's
+            loop.call_soon_threadsafe(self._take, key, sample.payload.to_bytes())
+
+        key_of_all = topic_key(self._config.domain, topic, type, "*")
+        self._tokens.append(self._session.declare_subscriber(key_of_all, hear))
+
+    def _topic(self, name: str) -> str:
+        return f"/{self._namespace}/{name}" if self._namespace else f"/{name}"
+
+    def _take(self, key: str, data: bytes) -> None:
+        if self._session is None:
+            return
+        if self._pending >= PENDING_MAX:
+            self._seldom.warning(key, "robot %s: messages of %s are dropped, too many come", self._robot.id, key)
+            return
+        self._pending += 1
+        self._follow(self._answer(key, data))
+
+    async def _answer(self, key: str, data: bytes) -> None:
+
+        from roboglot.recording.ros2 import read_cdr
+
+        try:
+            ask_for(DOOR)
+            level, why = await answer(Context(self._robot, self._config, self._report), key, data, read_cdr)
+            if why:
+                self._say(level, why)
+        finally:
+            self._pending -= 1
+
+    def _report(self, action: Action) -> None:
+        async def wait() -> None:
+            if await action.done() is not ActionStatus.SUCCEEDED:
+                end = action.status.name.lower()
+                self._say(logging.WARNING, f"{action.name} {end}: {action.reason or 'another command came'}")
+
+        self._follow(wait())
+
+    # -- publishing ----------------------------------------------------------------------------------------------------
+
+    async def _sample(self) -> None:
+        from roboglot.recording.sampler import POSE_PERIOD, STATE_BEATS
+
+        number = 0
+        self._sampler.beat(number)
+        async for _ in self._robot.clock.every(POSE_PERIOD):
+            number += 1
+            self._sampler.beat(number)
+            if self._battery is not None and number % STATE_BEATS == 0:
+                self._show(self._battery._replace(at=self._now()))
+            if Gimbal in self._robot:
+                self._publish(self._words.joints(self._now(), self._joints()), "joint_states")
+
+    def _joints(self) -> dict[str, float]:
+        attitude = self._robot[Gimbal].attitude
+        return {"gimbal_pitch": attitude.pitch, "gimbal_yaw": attitude.yaw}
+
+    async def _film(self) -> None:
+        from roboglot.media.stills import jpeg
+
+        async for _ in self._robot.clock.every(PICTURE_PERIOD):
+            topic = self._topic("image/compressed")
+            publisher = self._publishers.get(topic)
+            if publisher is not None and not publisher.matching_status.matching:
+                continue
+            if publisher is None:
+                self._declare(topic, "sensor_msgs/msg/CompressedImage", kept=False)
+                continue
+            frame = await self._robot[Camera].capture()
+            picture = await beside(partial(jpeg, frame, JPEG_QUALITY))
+            self._publish(self._words.picture(self._now(), f"{self._robot.id}/camera", picture), "image/compressed")
+
+    def _put(self, entry: Any) -> None:
+        """Publish what a recording would keep, as far as ROS has a type for it."""
+        if entry.kind == "battery":  # a recording has its changes; ROS wants it now and then
+            self._battery = entry
+        if entry.kind in SHOWN:
+            self._show(entry)
+
+    def _show(self, entry: Any) -> None:
+        from roboglot.recording.entries import KINDS
+        from roboglot.recording.reader import Record
+
+        kind = KINDS[entry.kind]
+        record = Record(entry.topic, kind.schema, entry.at, kind.encode(entry.at, entry.value))
+        for message in self._words.translate(record):
+            if message.type != "std_msgs/msg/String":
+                self._publish(message)
+
+    def _say(self, level: int, text: str) -> None:
+        log.info("robot %s: %s", self._robot.id, text)
+        self._publish(self._words.line(self._now(), level, NODE, text))
+
+    def _now(self) -> int:
+        return round(self._robot.clock.epoch() * 1e9)
+
+    def _publish(self, message: Any, name: str = "") -> None:
+        if self._session is None:
+            return
+        topic = message.topic
+        if topic.startswith(f"/{self._robot.id}/"):
+            topic = self._topic(topic.removeprefix(f"/{self._robot.id}/"))
+        topic = self._topic(name) if name else topic
+        publisher = self._publishers.get(topic) or self._declare(topic, message.type, kept=message.kept)
+        self._sequence += 1
+        publisher.put(message.data, attachment=attachment(self._sequence, time.time_ns(), self._gid))
+
+    def _declare(self, topic: str, type: str, *, kept: bool) -> Any:
+        import zenoh
+        from zenoh.ext import CacheConfig, declare_advanced_publisher
+
+        from roboglot.recording.ros2 import STORE
+
+        assert self._node is not None
+        hashed = STORE.hash_rihs01(type)
+        self._numbers += 1
+        token = self._node.publisher_token(self._numbers, topic, type, hashed, KEPT if kept else RELIABLE)
+        key = topic_key(self._config.domain, topic, type, hashed)
+        options: dict[str, Any] = {"congestion_control": zenoh.CongestionControl.DROP}
+        publisher = (
+            declare_advanced_publisher(self._session, key, cache=CacheConfig(1), publisher_detection=True, **options)
+            if kept
+            else self._session.declare_publisher(key, **options)
+        )
+        self._publishers[topic] = publisher
+        self._tokens.append(self._session.liveliness().declare_token(token))
+        return publisher

@@ -1,0 +1,32 @@
+"""What the robot listens to, by the contract's keys, and what it publishes. The chapter fills the table."""
+
+from __future__ import annotations
+
+from roboglot.operations import OperationTable
+
+TABLE: OperationTable[str] = OperationTable("ros2")
+PUBLISHED = frozenset({"scan", "odom", "tf", "tf_static", "map", "battery_state", "pose", "rosout", "image/compressed"})
+
+
+def implemented() -> set[str]:
+    """Keys of the operations that are there."""
+    return {operation.key for operation in TABLE if not operation.partial}
+
+
+def partly() -> dict[str, str]:
+    """Keys of those that are there in part, with what is missing."""
+    return {operation.key: operation.partial for operation in TABLE if operation.partial}
+
+
+class Messages:
+    """What the robot publishes."""
+
+    @staticmethod
+    def implemented() -> set[str]:
+        """Keys of ``ros2_messages``."""
+        return set(PUBLISHED)
+
+    @staticmethod
+    def partly() -> dict[str, str]:
+        """What is published in part."""
+        return {"joint_states": "the gimbal alone, of robots that have one"}

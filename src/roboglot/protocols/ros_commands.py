@@ -1,0 +1,54 @@
+"""What ROS's usual topics have a robot do, for every door that takes them: cmd_vel, goal_pose, initialpose."""
+
+from __future__ import annotations
+
+from roboglot.model.actions import Action
+from roboglot.model.clock import RealClock
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.errors import InvalidGoal
+from roboglot.model.geometry import Pose, Twist
+from roboglot.model.robot import Robot
+
+FAR = 1e6  # m, m/s: what is beyond is a mistake
+
+
+def drive(robot: Robot, wish: Twist, dead_man: float, source: str) -> None:
+    """Drive so until the next command, for ``dead_man`` s of a person's time at most. Raises RobotError."""
+    if not all(abs(value) < FAR for value in (wish.x, wish.y, wish.yaw)):
+        raise InvalidGoal("a velocity is not finite")
+    limits = robot[Base].limits
+    if not limits.holonomic:
+        wish = Twist(wish.x, 0.0, wish.yaw)
+    pace = robot.clock.speed if isinstance(robot.clock, RealClock) else 1.0
+    robot[Driving].drive(wish.clamped(limits.twist), lifetime=dead_man * pace, source=source)
+
+
+def go(robot: Robot, frame: str, pose: Pose, source: str) -> Action:
+    """Go there around obstacles. Raises RobotError."""
+    goal = pose_in_map(robot, frame, pose)
+    return robot[Navigation].navigate_to([goal.point], NavigationOptions(yaw=goal.yaw), source=source)
+
+
+def place(robot: Robot, frame: str, pose: Pose) -> None:
+    """Take it that the robot is there. Raises RobotError."""
+    robot[Localization].set_pose(pose_in_map(robot, frame, pose))
+
+
+def pose_in_map(robot: Robot, frame: str, pose: Pose) -> Pose:
+    """Return the pose in the robot's map; a frame may have the robot's name before it. Raises RobotError."""
+    if not (abs(pose.x) < FAR and abs(pose.y) < FAR):
+        raise InvalidGoal("the position is not finite")
+    match frame.removeprefix("/").removeprefix(f"{robot.id}/"):
+        case "" | "map":
+            return pose
+        case "base_link":
+            return robot[Localization].pose.compose(pose)
+        case "odom":
+            here = robot[Localization].pose
+            return here.compose(robot[Odometry].reading.pose.inverse()).compose(pose)
+        case other:
+            raise InvalidGoal(f"there is no frame {other[:80]!r}: the frames are map, odom and base_link")

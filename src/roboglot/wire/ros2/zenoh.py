@@ -1,0 +1,62 @@
+"""rmw_zenoh's key expressions and attachments, and how its graph is known: by liveliness tokens.
+
+A topic's messages have the key ``DOMAIN/TOPIC/TYPE/HASH``; each node, publisher and subscription has a token.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+
+_ATTACHMENT = struct.Struct("<qqB16s")
+RELIABLE, KEPT, SENSORS = "::,10:,:,:,,", ":1:,1:,:,:,,", "2::,5:,:,:,,"  # QoS as tokens have it
+GRAPH = "@ros2_lv"
+
+
+def dds_type(type: str) -> str:
+    """Return ``sensor_msgs/msg/LaserScan`` as ``sensor_msgs::msg::dds_::LaserScan_``."""
+    package, kind, name = type.split("/")
+    return f"{package}::{kind}::dds_::{name}_"
+
+
+def topic_key(domain: int, topic: str, type: str, type_hash: str) -> str:
+    """Return the key of a topic's messages; ``type_hash`` may be ``*`` to listen to all versions of the type."""
+    return f"{domain}/{topic.strip('/')}/{dds_type(type)}/{type_hash}"
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """A node of ROS; ``session``: the id of its Zenoh session."""
+
+    domain: int
+    session: str
+    namespace: str
+    name: str
+    id: int = 0
+
+    @property
+    def token(self) -> str:
+        """The key of the token that says that it is there."""
+        return f"{self._head(self.id, 'NN')}"
+
+    def publisher_token(self, number: int, topic: str, type: str, type_hash: str, qos: str) -> str:
+        """The key of the token of a publisher; ``number`` is its own among the node's ends."""
+        return f"{self._head(number, 'MP')}/{mangled(topic)}/{dds_type(type)}/{type_hash}/{qos}"
+
+    def subscription_token(self, number: int, topic: str, type: str, type_hash: str, qos: str) -> str:
+        """The key of the token of a subscription."""
+        return f"{self._head(number, 'MS')}/{mangled(topic)}/{dds_type(type)}/{type_hash}/{qos}"
+
+    def _head(self, number: int, kind: str) -> str:
+        namespace = mangled(self.namespace or "/")
+        return f"{GRAPH}/{self.domain}/{self.session}/{self.id}/{number}/{kind}/%/{namespace}/{self.name}"
+
+
+def mangled(name: str) -> str:
+    """Return a name with ``%`` for ``/``, as it stands in a token."""
+    return name.replace("/", "%")
+
+
+def attachment(sequence: int, at: int, gid: bytes) -> bytes:
+    """Return what comes beside a message: its number, its time (ns since 1970), and who sends it (16 bytes)."""
+    return _ATTACHMENT.pack(sequence, at, len(gid), gid)

@@ -1,0 +1,147 @@
+"""A peer that knows rmw_zenoh's form alone sees the robot's topics and drives it."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.components.system.lease import Lease
+from tests.protocols.ros2.conftest import STORE, Opened, Peer, Scene
+
+TWIST, STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/PoseStamped"
+WITH_COVARIANCE = "geometry_msgs/msg/PoseWithCovarianceStamped"
+LOG = "rcl_interfaces/msg/Log"
+
+
+def made(type: str, **fields: Any) -> Any:
+    return STORE.types[type](**fields)
+
+
+def vector(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Any:
+    return made("geometry_msgs/msg/Vector3", x=x, y=y, z=z)
+
+
+def header(frame: str) -> Any:
+    return made("std_msgs/msg/Header", stamp=made("builtin_interfaces/msg/Time", sec=0, nanosec=0), frame_id=frame)
+
+
+def pose(x: float, y: float, yaw: float = 0.0) -> Any:
+    turn = made("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=math.sin(yaw / 2), w=math.cos(yaw / 2))
+    return made("geometry_msgs/msg/Pose", position=made("geometry_msgs/msg/Point", x=x, y=y, z=0.0), orientation=turn)
+
+
+FORWARD = made(TWIST, linear=vector(0.3), angular=vector())
+
+
+async def published(scene: Scene, topic: str, type: str, message: Any) -> None:
+    """Publish, and return when the robot has heard it."""
+    heard: list[Any] = []
+    leave = scene.robot.tap.listen(heard.append)
+    scene.peer.publish(topic, type, message)
+    await scene.peer.until(lambda: len(heard) >= 2)
+    leave()
+
+
+async def test_topics_come_with_the_robots_values(opened: Opened) -> None:
+    scene = await opened()
+    peer = scene.peer
+    kinds = {
+        "/a/scan": "sensor_msgs/msg/LaserScan",
+        "/a/odom": "nav_msgs/msg/Odometry",
+        "/tf": "tf2_msgs/msg/TFMessage",
+        "/a/pose": STAMPED,
+        "/a/joint_states": "sensor_msgs/msg/JointState",
+        "/a/image/compressed": "sensor_msgs/msg/CompressedImage",
+    }
+    for topic, type in kinds.items():
+        peer.listen(topic, type)
+    kept = {
+        "/a/map": "nav_msgs/msg/OccupancyGrid",
+        "/tf_static": "tf2_msgs/msg/TFMessage",
+    }
+    await peer.until(lambda: all(peer.heard[topic] for topic in kinds), 8.0)
+    for topic, type in kept.items():  # a latecomer
+        peer.listen(topic, type, history=True)
+    await peer.until(lambda: all(peer.heard[topic] for topic in kept), 7.0)
+    scan = peer.heard["/a/scan"][-1]
+    assert scan.header.frame_id == "a/laser"
+    assert len(scan.ranges) > 100
+    pairs = {(t.header.frame_id, t.child_frame_id) for message in peer.heard["/tf"] for t in message.transforms}
+    assert pairs == {("a/map", "a/odom"), ("a/odom", "a/base_link")}
+    grid = peer.heard["/a/map"][-1]
+    assert grid.info.resolution == pytest.approx(0.05, abs=0.03)
+    assert len(grid.data) == grid.info.width * grid.info.height > 0
+    picture = peer.heard["/a/image/compressed"][-1]
+    assert (picture.format, bytes(picture.data[:2])) == ("jpeg", b"\xff\xd8")
+    assert peer.heard["/a/joint_states"][-1].name == ["gimbal_pitch", "gimbal_yaw"]
+    assert all(length == 16 for _, _, length, _ in peer.attachments)
+    assert len({gid for *_, gid in peer.attachments}) == 1
+
+
+async def test_the_battery_is_there_for_who_comes_late(opened: Opened) -> None:
+    scene = await opened()
+    scene.peer.listen("/a/battery_state", "sensor_msgs/msg/BatteryState", history=True)
+    await scene.peer.until(lambda: scene.peer.heard["/a/battery_state"], 5.0)
+    assert 0.0 < scene.peer.heard["/a/battery_state"][-1].percentage <= 1.0
+
+
+async def test_the_graph_shows_a_node_with_its_ends(opened: Opened) -> None:
+    scene = await opened()
+    await scene.peer.clock.advance(1.0)
+    tokens = await asyncio.to_thread(scene.peer.graph)
+    nodes = [token for token in tokens if token[5] == "NN"]
+    assert [token[6:] for token in nodes] == [["%", "%a", "roboglot"]]
+    ends = {(token[5], token[9]): token for token in tokens if token[5] != "NN"}
+    assert {("MS", "%a%cmd_vel"), ("MS", "%a%goal_pose"), ("MS", "%a%initialpose"), ("MP", "%tf")} <= set(ends)
+    assert ends["MS", "%a%cmd_vel"][10:12] == ["geometry_msgs::msg::dds_::Twist_", STORE.hash_rihs01(TWIST)]
+    assert len({token[4] for token in tokens}) == len(tokens)
+
+
+async def test_cmd_vel_drives_until_the_dead_mans_time(opened: Opened) -> None:
+    scene = await opened()
+    await published(scene, "/a/cmd_vel", TWIST, FORWARD)
+    await scene.peer.clock.advance(3.0)
+    assert 0.05 < scene.robot[Odometry].reading.pose.x < 0.25  # half a second at 0.3 m/s, then it brakes
+
+
+async def test_a_goal_is_reached_and_the_pose_is_set(opened: Opened) -> None:
+    scene = await opened()
+    goal = made(STAMPED, header=header("a/map"), pose=pose(0.6, 0.0, 1.0))
+    await published(scene, "/a/goal_pose", STAMPED, goal)
+    await scene.peer.until(lambda: not scene.robot.actions.running(), 60.0)
+    assert scene.robot[Localization].pose.x == pytest.approx(0.6, abs=0.1)
+    covariance = made("geometry_msgs/msg/PoseWithCovariance", pose=pose(2.0, 1.0), covariance=np.zeros(36))
+    there = made(WITH_COVARIANCE, header=header("map"), pose=covariance)
+    await published(scene, "/a/initialpose", WITH_COVARIANCE, there)
+    assert scene.robot[Localization].pose.x == pytest.approx(2.0, abs=0.05)
+
+
+async def test_what_cannot_be_done_is_a_line_of_the_log(opened: Opened) -> None:
+    scene = await opened()
+    peer: Peer = scene.peer
+    peer.listen("/rosout", LOG)
+    await scene.robot[Lease].take()
+    lines = peer.heard["/rosout"]
+    await published(scene, "/a/cmd_vel", TWIST, FORWARD)
+    await peer.until(lambda: any("control is taken by a person" in line.msg for line in lines))
+    await scene.robot[Lease].release()
+    await published(scene, "/a/cmd_vel", TWIST, b"\x00\x01")
+    await peer.until(lambda: any("cannot be read" in line.msg for line in lines))
+    await published(scene, "/a/cmd_vel", TWIST, made(TWIST, linear=vector(math.nan), angular=vector()))
+    await published(scene, "/a/goal_pose", STAMPED, made(STAMPED, header=header("moon"), pose=pose(0, 0)))
+    await peer.until(lambda: any("no frame 'moon'" in line.msg for line in lines))
+    assert not scene.robot.actions.running()
+
+
+async def test_another_namespace(opened: Opened) -> None:
+    scene = await opened(namespaces={"a": ""})
+    scene.peer.listen("/odom", "nav_msgs/msg/Odometry")
+    await scene.peer.until(lambda: scene.peer.heard["/odom"], 2.0)
+    await published(scene, "/cmd_vel", TWIST, FORWARD)
+    assert scene.robot.actions.running()
