@@ -20,6 +20,7 @@ from typing import Any, get_type_hints
 from roboglot.model.components.component import Component
 
 DEPTH_MAX = 12
+SHARED = "roboglot.protocols.ros_commands"  # by doors
 
 
 def used_by(handler: Callable[..., Any]) -> frozenset[type[Component]]:
@@ -63,7 +64,7 @@ def _component(name: str, function: FunctionType) -> Iterator[type[Component]]:
 
 
 def _calls(node: ast.AST, function: FunctionType) -> Iterator[Any]:
-    """Functions of the same package that are called, or handed on to be called."""
+    """Functions of the same package, or shared by doors, that are called, or handed on to be called."""
     names, package = function.__globals__, _package_of(function)
     found: Any = None
     match node:
@@ -75,7 +76,7 @@ def _calls(node: ast.AST, function: FunctionType) -> Iterator[Any]:
             found = _methods(package).get(attribute)
             if isinstance(found, property):  # anything may have a "pose": only what is known to be of that class counts
                 found = found.fget if _is_of_package(value, function, package) else None
-    if isinstance(found, FunctionType) and found.__module__.startswith(package):
+    if isinstance(found, FunctionType) and found.__module__.startswith((package, SHARED)):
         yield found
 
 
@@ -111,7 +112,7 @@ def _is_of_package(value: ast.expr, function: FunctionType, package: str) -> boo
 @cache
 def _methods(package: str) -> dict[str, FunctionType | property]:
     """Methods and properties of the package's classes by name, those whose name is there once."""
-    for module in pkgutil.walk_packages(sys.modules[package].__path__, f"{package}."):
+    for module in pkgutil.walk_packages(getattr(sys.modules[package], "__path__", ()), f"{package}."):
         importlib.import_module(module.name)
     classes = {
         value

@@ -9,7 +9,7 @@ import math
 import struct
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import msgspec
 import numpy as np
@@ -24,6 +24,7 @@ from roboglot.recording.reader import Record
 JSON = "std_msgs/msg/String"
 ROS_LEVELS = {number: python for python, number in LEVELS.items()}  # rcl's levels are Python's
 SPEED_SPAN = 0.5  # s of poses that a speed is made of
+Ros: TypeAlias = Any  # a message of rosbags or protobuf, whose classes are made at run time
 STORE = get_typestore(Stores.ROS2_JAZZY)
 
 
@@ -37,7 +38,7 @@ class RosMessage(NamedTuple):
     kept: bool = False
 
 
-def read_cdr(data: bytes, type: str) -> Any:
+def read_cdr(data: bytes, type: str) -> Ros:
     """Return a message. Raises ValueError for what is none."""
     try:
         return STORE.deserialize_cdr(data, type)
@@ -45,19 +46,19 @@ def read_cdr(data: bytes, type: str) -> Any:
         raise ValueError(f"{type}: {error}") from None
 
 
-def _new(type: str, **fields: Any) -> Any:
+def _new(type: str, **fields: Ros) -> Ros:
     return STORE.types[type](**fields)
 
 
-def _time(at: int) -> Any:
+def _time(at: int) -> Ros:
     return _new("builtin_interfaces/msg/Time", sec=at // 1_000_000_000, nanosec=at % 1_000_000_000)
 
 
-def _header(at: int, frame: str) -> Any:
+def _header(at: int, frame: str) -> Ros:
     return _new("std_msgs/msg/Header", stamp=_time(at), frame_id=frame)
 
 
-def _pose(message: Any) -> Any:
+def _pose(message: Ros) -> Ros:
     place, turn = message.position, message.orientation
     return _new(
         "geometry_msgs/msg/Pose",
@@ -66,7 +67,7 @@ def _pose(message: Any) -> Any:
     )
 
 
-def _vector(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Any:
+def _vector(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Ros:
     return _new("geometry_msgs/msg/Vector3", x=x, y=y, z=z)
 
 
@@ -81,7 +82,7 @@ class Ros2Words:
         self._reach: dict[str, float] = {}
         self._past: dict[str, deque[tuple[int, Pose]]] = {}
         self._mounts: dict[str, tuple[float, ...]] = {}
-        self._by_schema: Mapping[str, Callable[[Record, Any], Iterator[RosMessage]]] = {
+        self._by_schema: Mapping[str, Callable[[Record, Ros], Iterator[RosMessage]]] = {
             "foxglove.LaserScan": self._scan,
             "foxglove.FrameTransforms": self._transforms,
             "foxglove.PoseInFrame": self._place,
@@ -109,14 +110,14 @@ class Ros2Words:
         else:
             yield self._json(record, record.topic)
 
-    def _made(self, topic: str, type: str, at: int, message: Any, *, kept: bool = False) -> RosMessage:
+    def _made(self, topic: str, type: str, at: int, message: Ros, *, kept: bool = False) -> RosMessage:
         return RosMessage(topic, type, at, bytes(STORE.serialize_cdr(message, type)), kept)
 
     def _json(self, record: Record, topic: str) -> RosMessage:
         text = _new(JSON, data=record.data.decode("utf-8", "replace"))
         return self._made(topic, JSON, record.at, text)
 
-    def _scan(self, record: Record, message: Any) -> Iterator[RosMessage]:
+    def _scan(self, record: Record, message: Ros) -> Iterator[RosMessage]:
         ranges = np.array(message.ranges, np.float32)
         farthest = float(ranges[np.isfinite(ranges)].max(initial=0.0))
         reach = self._reach[record.topic] = max(self._reach.get(record.topic, 0.0), farthest)
@@ -135,7 +136,7 @@ class Ros2Words:
         )
         yield self._made(record.topic, "sensor_msgs/msg/LaserScan", record.at, scan)
 
-    def _transforms(self, record: Record, message: Any) -> Iterator[RosMessage]:
+    def _transforms(self, record: Record, message: Ros) -> Iterator[RosMessage]:
         moving = []
         for frame in message.transforms:
             robot, _, child = frame.child_frame_id.rpartition("/")
@@ -153,7 +154,7 @@ class Ros2Words:
                 "/tf", "tf2_msgs/msg/TFMessage", record.at, _new("tf2_msgs/msg/TFMessage", transforms=moving)
             )
 
-    def _transform(self, at: int, frame: Any) -> Any:
+    def _transform(self, at: int, frame: Ros) -> Ros:
         turn, way = frame.rotation, frame.translation
         return _new(
             "geometry_msgs/msg/TransformStamped",
@@ -166,7 +167,7 @@ class Ros2Words:
             ),
         )
 
-    def _mount(self, at: int, frame: Any, transform: Any) -> Iterator[RosMessage]:
+    def _mount(self, at: int, frame: Ros, transform: Ros) -> Iterator[RosMessage]:
         """Where the laser is mounted, when that is new."""
         place = (frame.translation.x, frame.translation.y, frame.rotation.z, frame.rotation.w)
         if self._mounts.get(frame.child_frame_id) != place:
@@ -174,7 +175,7 @@ class Ros2Words:
             message = _new("tf2_msgs/msg/TFMessage", transforms=[transform])
             yield self._made("/tf_static", "tf2_msgs/msg/TFMessage", at, message, kept=True)
 
-    def _odometry(self, at: int, robot: str, frame: Any) -> RosMessage:
+    def _odometry(self, at: int, robot: str, frame: Ros) -> RosMessage:
         way, turn = frame.translation, frame.rotation
         here = Pose(way.x, way.y, 2.0 * math.atan2(turn.z, turn.w))
         speed = self._speed(robot, at, here)
@@ -212,12 +213,12 @@ class Ros2Words:
         way = here.relative_to(before)
         return Pose(way.x / seconds, way.y / seconds, wrap_angle(way.yaw) / seconds)
 
-    def _place(self, record: Record, message: Any) -> Iterator[RosMessage]:
+    def _place(self, record: Record, message: Ros) -> Iterator[RosMessage]:
         type = "geometry_msgs/msg/PoseStamped"
         pose = _new(type, header=_header(record.at, message.frame_id), pose=_pose(message.pose))
         yield self._made(record.topic, type, record.at, pose)
 
-    def _grid(self, record: Record, message: Any) -> Iterator[RosMessage]:
+    def _grid(self, record: Record, message: Ros) -> Iterator[RosMessage]:
         cells = np.frombuffer(message.data, np.int8)
         width = message.column_count
         info = _new(
@@ -232,7 +233,7 @@ class Ros2Words:
         grid = _new(type, header=_header(record.at, message.frame_id), info=info, data=cells)
         yield self._made(record.topic, type, record.at, grid, kept=True)
 
-    def _video(self, record: Record, message: Any) -> Iterator[RosMessage]:
+    def _video(self, record: Record, message: Ros) -> Iterator[RosMessage]:
         yield self._compressed(f"{record.topic}/compressed", record.at, message.frame_id, message.format, message.data)
 
     def picture(self, at: int, frame: str, jpeg: bytes) -> RosMessage:
@@ -251,7 +252,7 @@ class Ros2Words:
         message = _new(type, header=_header(at, ""), name=list(positions), position=angles, velocity=none, effort=none)
         return self._made("", type, at, message)
 
-    def _log(self, record: Record, message: Any) -> Iterator[RosMessage]:
+    def _log(self, record: Record, message: Ros) -> Iterator[RosMessage]:
         yield self.line(record.at, ROS_LEVELS.get(message.level, 20), message.name, message.message)
 
     def line(self, at: int, level: int, name: str, text: str) -> RosMessage:
@@ -260,7 +261,7 @@ class Ros2Words:
         line = _new(type, stamp=_time(at), level=level, name=name, msg=text, file="", function="", line=0)
         return self._made("/rosout", type, at, line)
 
-    def _battery(self, record: Record, state: Any) -> Iterator[RosMessage]:
+    def _battery(self, record: Record, state: Ros) -> Iterator[RosMessage]:
         type, unknown = "sensor_msgs/msg/BatteryState", math.nan
         charging = 1 if state.get("charging") else 2
         message = _new(

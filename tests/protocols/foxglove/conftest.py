@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
 import struct
 from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
@@ -19,7 +20,8 @@ from roboglot.model.clock import LockstepClock
 from roboglot.protocols import DOORS, sections
 from roboglot.runtime import Runtime
 
-ADDRESS = "127.0.0.85"
+WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])  # files of this folder run side by side
+ADDRESS = f"127.0.194.{1 + WORKER}"
 PORT = 8765
 PATIENCE = 20.0  # real s
 

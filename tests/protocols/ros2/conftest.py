@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import struct
 from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
@@ -22,7 +23,8 @@ from roboglot.model.clock import LockstepClock
 from roboglot.protocols import DOORS, sections
 from roboglot.runtime import Runtime
 
-ADDRESS, PORT = "127.0.0.86", 7447
+WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])  # files of this folder run side by side
+ADDRESS, PORT = f"127.0.195.{1 + WORKER}", 7447
 PATIENCE = 20.0  # real s
 STORE = get_typestore(Stores.ROS2_JAZZY)
 

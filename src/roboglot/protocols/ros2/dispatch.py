@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from typing import Any
 
 from roboglot.model.errors import RobotError
 from roboglot.operations import Right
@@ -12,11 +11,11 @@ from roboglot.protocols.ros2.chapters import subscriptions  # noqa: F401 - fills
 from roboglot.protocols.ros2.context import Context
 from roboglot.protocols.ros2.errors import level_of
 from roboglot.protocols.ros2.table import TABLE
-from roboglot.protocols.ros2.vocabulary import DOOR, TYPES
+from roboglot.protocols.ros2.vocabulary import DOOR, TYPES, Ros
 
 log = logging.getLogger(__name__)
 MESSAGE_MAX = 65536  # bytes
-Read = Callable[[bytes, str], Any]  # CDR and type; raises ValueError
+Read = Callable[[bytes, str], Ros]  # CDR and type; raises ValueError
 
 
 async def answer(context: Context, key: str, data: bytes, read: Read) -> tuple[int, str]:

@@ -7,9 +7,9 @@ import json
 import logging
 import time
 import uuid
-from collections.abc import Sequence
+from collections.abc import Coroutine, Sequence
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from roboglot.extras import explaining
 from roboglot.model.actions import Action, ActionStatus
@@ -26,7 +26,13 @@ from roboglot.protocols.ros2.vocabulary import DOOR, TYPES
 from roboglot.transport.seldom import Seldom
 from roboglot.wire.ros2.zenoh import KEPT, RELIABLE, Node, attachment, topic_key
 
+if TYPE_CHECKING:
+    from roboglot.recording.entries import Entry
+    from roboglot.recording.ros2 import Ros2Words, RosMessage
+    from roboglot.recording.sampler import Sampler
+
 log = logging.getLogger(__name__)
+Zenoh: TypeAlias = Any  # what the library hands out; it is imported when the door opens
 PENDING_MAX = 32  # messages that wait to be done; then they are dropped, and the log says so
 PICTURE_PERIOD = 0.2  # s
 JPEG_QUALITY = 80
@@ -42,18 +48,18 @@ class Ros2Door:
     def __init__(self, robot: Robot, address: str, config: Ros2Config) -> None:
         self._robot, self._address, self._config = robot, address, config
         self._namespace = config.namespaces.get(robot.id, robot.id)
-        self._session: Any = None
+        self._session: Zenoh = None
         self._node: Node | None = None
-        self._tokens: list[Any] = []
-        self._publishers: dict[str, Any] = {}
+        self._tokens: list[Zenoh] = []
+        self._publishers: dict[str, Zenoh] = {}
         self._numbers = 0
         self._sequence = 0
         self._gid = uuid.uuid4().bytes
         self._pending = 0
         self._tasks: set[asyncio.Task[None]] = set()
-        self._sampler: Any = None
-        self._battery: Any = None
-        self._words: Any = None
+        self._sampler: Sampler | None = None
+        self._battery: Entry | None = None
+        self._translator: Ros2Words | None = None
         self._seldom = Seldom(log)
 
     @property
@@ -63,6 +69,11 @@ class Ros2Door:
             return ()
         listen = f"ZENOH_CONFIG_OVERRIDE='connect/endpoints=[\"{self._locator}\"]' ros2 topic list"
         return [Endpoint("ROS 2", self._locator, listen)]
+
+    @property
+    def _words(self) -> Ros2Words:
+        assert self._translator is not None  # made when the door opens
+        return self._translator
 
     @property
     def _locator(self) -> str:
@@ -85,17 +96,17 @@ class Ros2Door:
             self._session = await loop.run_in_executor(None, zenoh.open, self._zenoh_config(zenoh))
         except zenoh.ZError as error:
             raise OSError(f"{self._locator}: {error}") from None
-        self._words = Ros2Words(self._robot.id)
+        self._translator = Ros2Words(self._robot.id)
         self._node = Node(self._config.domain, str(self._session.zid()), f"/{self._namespace}", NODE)
         self._tokens.append(self._session.liveliness().declare_token(self._node.token))
         for key, type in TYPES.items():
             self._subscribe(key, type)
         self._sampler = Sampler(self._robot, self._put)
-        self._follow(self._sample())
+        self._follow(self._sample(self._sampler))
         if Camera in self._robot:
             self._follow(self._film())
 
-    def _zenoh_config(self, zenoh: Any) -> Any:
+    def _zenoh_config(self, zenoh: Zenoh) -> Zenoh:
         config = zenoh.Config()
         for key, value in {
             "mode": "router",
@@ -122,7 +133,7 @@ class Ros2Door:
         if session is not None:
             await asyncio.get_running_loop().run_in_executor(None, session.close)
 
-    def _follow(self, work: Any) -> None:
+    def _follow(self, work: Coroutine[None, None, None]) -> None:
         task = asyncio.get_running_loop().create_task(work, name=f"ros2 {self._robot.id}")
         self._tasks.add(task)
         task.add_done_callback(self._ended)
@@ -144,7 +155,7 @@ class Ros2Door:
         self._tokens.append(self._session.liveliness().declare_token(token))
         loop = asyncio.get_running_loop()
 
-        def hear(sample: Any) -> None:  # in a thread of Zenoh's
+        def hear(sample: Zenoh) -> None:  # in a thread of Zenoh's
             loop.call_soon_threadsafe(self._take, key, sample.payload.to_bytes())
 
         key_of_all = topic_key(self._config.domain, topic, type, "*")
@@ -184,14 +195,14 @@ class Ros2Door:
 
     # -- publishing ----------------------------------------------------------------------------------------------------
 
-    async def _sample(self) -> None:
+    async def _sample(self, sampler: Sampler) -> None:
         from roboglot.recording.sampler import POSE_PERIOD, STATE_BEATS
 
         number = 0
-        self._sampler.beat(number)
+        sampler.beat(number)
         async for _ in self._robot.clock.every(POSE_PERIOD):
             number += 1
-            self._sampler.beat(number)
+            sampler.beat(number)
             if self._battery is not None and number % STATE_BEATS == 0:
                 self._show(self._battery._replace(at=self._now()))
             if Gimbal in self._robot:
@@ -216,14 +227,14 @@ class Ros2Door:
             picture = await beside(partial(jpeg, frame, JPEG_QUALITY))
             self._publish(self._words.picture(self._now(), f"{self._robot.id}/camera", picture), "image/compressed")
 
-    def _put(self, entry: Any) -> None:
+    def _put(self, entry: Entry) -> None:
         """Publish what a recording would keep, as far as ROS has a type for it."""
         if entry.kind == "battery":  # a recording has its changes; ROS wants it now and then
             self._battery = entry
         if entry.kind in SHOWN:
             self._show(entry)
 
-    def _show(self, entry: Any) -> None:
+    def _show(self, entry: Entry) -> None:
         from roboglot.recording.entries import KINDS
         from roboglot.recording.reader import Record
 
@@ -240,7 +251,7 @@ class Ros2Door:
     def _now(self) -> int:
         return round(self._robot.clock.epoch() * 1e9)
 
-    def _publish(self, message: Any, name: str = "") -> None:
+    def _publish(self, message: RosMessage, name: str = "") -> None:
         if self._session is None:
             return
         topic = message.topic
@@ -251,7 +262,7 @@ class Ros2Door:
         self._sequence += 1
         publisher.put(message.data, attachment=attachment(self._sequence, time.time_ns(), self._gid))
 
-    def _declare(self, topic: str, type: str, *, kept: bool) -> Any:
+    def _declare(self, topic: str, type: str, *, kept: bool) -> Zenoh:
         import zenoh
         from zenoh.ext import CacheConfig, declare_advanced_publisher
 
@@ -262,7 +273,7 @@ class Ros2Door:
         self._numbers += 1
         token = self._node.publisher_token(self._numbers, topic, type, hashed, KEPT if kept else RELIABLE)
         key = topic_key(self._config.domain, topic, type, hashed)
-        options: dict[str, Any] = {"congestion_control": zenoh.CongestionControl.DROP}
+        options: dict[str, Zenoh] = {"congestion_control": zenoh.CongestionControl.DROP}
         publisher = (
             declare_advanced_publisher(self._session, key, cache=CacheConfig(1), publisher_detection=True, **options)
             if kept

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, TypeAlias
 
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Pose, Twist
 
 DOOR = "ros2"
+Ros: TypeAlias = Any  # a message of rosbags, whose classes are made at run time
 TYPES = {
     "cmd_vel": "geometry_msgs/msg/Twist",
     "goal_pose": "geometry_msgs/msg/PoseStamped",
@@ -16,12 +17,12 @@ TYPES = {
 }
 
 
-def twist(message: Any) -> Twist:
+def twist(message: Ros) -> Twist:
     """Return the velocity of a geometry_msgs/Twist."""
     return Twist(message.linear.x, message.linear.y, message.angular.z)
 
 
-def pose(message: Any) -> Pose:
+def pose(message: Ros) -> Pose:
     """Return a geometry_msgs/Pose. Raises InvalidGoal."""
     turn = message.orientation
     parts = turn.x, turn.y, turn.z, turn.w
