@@ -14,7 +14,7 @@ from roboglot.testing import assert_pose, passed_in_order
 from tests.docs_terminal import ROOT, commands, terminal
 from tests.test_docs import blocks
 
-README, DOCS = ROOT / "README.md", ROOT / "docs/protocols"
+STARTS, DOCS = [ROOT / "docs/start.md", ROOT / "docs/start.zh.md"], ROOT / "docs/protocols"
 SLACK = 0.08  # m: what odometry is wrong by after half a metre
 GOAL = 0.12  # m: how near a goal a dog's task ends, and what localization is wrong by
 
@@ -24,9 +24,10 @@ def block_with(page: Path, words: str, language: str = "sh") -> str:
     return found
 
 
-async def test_the_first_drive_ends_where_it_says(tmp_path: Path) -> None:
+@pytest.mark.parametrize("page", STARTS, ids=lambda page: page.name)
+async def test_the_first_drive_ends_where_it_says(tmp_path: Path, page: Path) -> None:
     async with terminal(tmp_path, "127.0.0.71") as user:
-        said = await user.type_block(block_with(README, "MoveToAction"))
+        said = await user.type_block(block_with(page, "MoveToAction"))
         told = re.fullmatch(r"ok;ok;(\S+) (\S+) (\S+);ok;", said[3].said)
         assert told, said
         x, y, clockwise = map(float, told.groups())
@@ -34,8 +35,8 @@ async def test_the_first_drive_ends_where_it_says(tmp_path: Path) -> None:
         assert clockwise == pytest.approx(30, abs=3)
         assert (tmp_path / "certs/client-key.pem").exists()
         assert_pose(user.moved, x=1.5, y=0.0, deg=-30)
-        (tmp_path / "my_program.py").write_text(block_with(README, "go_straight", "python"))
-        run = re.search(r"`(.*program run my_program.py)`", README.read_text())
+        (tmp_path / "my_program.py").write_text(block_with(page, "go_straight", "python"))
+        run = re.search(r"`(.*program run my_program.py)`", page.read_text())
         assert run
         assert (await user.type(run[1])).status == 0
         await user.stand()

@@ -1,4 +1,4 @@
-"""The test kit works for somebody who has nothing but the package: README's own example, in a folder of its own."""
+"""The test kit works for somebody who has nothing but the package: the start page's own example, in a folder of its own."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ import roboglot.fleet
 from roboglot.model.geometry import Pose
 from roboglot.testing import assert_pose
 
-README = Path(__file__).parents[2] / "README.md"
+START = Path(__file__).parents[2] / "docs/start.md"
 
 
-def test_readmes_example_passes_in_an_empty_folder(tmp_path: Path) -> None:
+def test_the_start_pages_example_passes_in_an_empty_folder(tmp_path: Path) -> None:
     [example] = [
-        block for block in re.findall(r"```python\n(.*?)```", README.read_text(), re.S) if "def test_" in block
+        block for block in re.findall(r"```python\n(.*?)```", START.read_text(), re.S) if "def test_" in block
     ]
     (tmp_path / "test_example.py").write_text(example)
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(tmp_path)]
