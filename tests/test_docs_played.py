@@ -24,6 +24,12 @@ def block_with(page: Path, words: str, language: str = "sh") -> str:
     return found
 
 
+def inline(page: Path, words: str) -> str:
+    """The command in the text that ends in ``words``."""
+    [found] = re.findall(rf"`([^`\n]*{re.escape(words)})`", page.read_text())
+    return str(found)
+
+
 @pytest.mark.parametrize("page", STARTS, ids=lambda page: page.name)
 async def test_the_first_drive_ends_where_it_says(tmp_path: Path, page: Path) -> None:
     async with terminal(tmp_path, "127.0.0.71") as user:
@@ -36,9 +42,7 @@ async def test_the_first_drive_ends_where_it_says(tmp_path: Path, page: Path) ->
         assert (tmp_path / "certs/client-key.pem").exists()
         assert_pose(user.moved, x=1.5, y=0.0, deg=-30)
         (tmp_path / "my_program.py").write_text(block_with(page, "go_straight", "python"))
-        run = re.search(r"`(.*program run my_program.py)`", page.read_text())
-        assert run
-        assert (await user.type(run[1])).status == 0
+        assert (await user.type(inline(page, "program run my_program.py"))).status == 0
         await user.stand()
         turned = math.radians(-30)
         assert_pose(user.moved, x=1.5 + 0.3 * math.cos(turned), y=0.3 * math.sin(turned), deg=-30)
