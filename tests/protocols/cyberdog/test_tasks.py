@@ -36,9 +36,11 @@ async def test_relocalisation_goes_through_its_feedback(client, robot, forward, 
     assert await state(client) == 101
 
 
-async def test_navigation_needs_localization(client, robot, forward) -> None:
+async def test_navigation_needs_localization(client, robot, forward, caplog) -> None:
+    caplog.set_level("INFO")
     await forward(seconds=1)
     assert await client.ask(6004, {"type": 1, "goalX": 1.0, "goalY": 0.0}) == {"accepted": 2}
+    assert "6004: the robot is not localized; 6004 of type 7 localizes it" in caplog.text
     assert await client.ask(6004, {"type": 1, "goalX": 1.0}) == {"error_code": 323}
 
 
@@ -217,7 +219,7 @@ async def test_relocalisation_that_does_not_fit_asks_to_drive_and_gives_up(
 ) -> None:
     await forward(seconds=1)
     monkeypatch.setattr(type(robot[Localization]), "quality", property(lambda _: 0.1))
-    monkeypatch.setattr(robot[Localization], "estimator", None)  # nothing fits anywhere
+    monkeypatch.setattr(robot[Localization].estimator, "placing", lambda _: None)  # nothing fits anywhere
     monkeypatch.setattr(navigation, "GIVE_UP_AFTER", 10.0)
     stream = Stream(client, 6004, {"type": 7})
     await until(lambda: 3104 in stream.codes)

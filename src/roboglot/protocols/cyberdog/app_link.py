@@ -182,7 +182,7 @@ class AppLink:
             try:
                 await self._clock.wait_for(self._stub.heartbeat(self._ticks(own)), HEARTBEAT_DEADLINE)
             except (grpc.aio.AioRpcError, TimeoutError) as error:
-                log.debug("no heartbeat to %s: %s", target, error)
+                log.debug("no heartbeat to %s: %s", target, _in_short(error))
                 if self._clock.time() - last >= LOST_AFTER:
                     break
             else:
@@ -230,10 +230,10 @@ class AppLink:
         try:
             await self._clock.wait_for(_read_to_the_end(self._stub.sendMsg(_request(code, text))), PUSH_DEADLINE)
         except TimeoutError as error:
-            log.debug("push %d failed: %s", code, error)
+            log.debug("push %d failed: %s", code, _in_short(error))
             return Delivery.SILENT
         except (grpc.aio.AioRpcError, grpc.aio.UsageError) as error:
-            log.debug("push %d failed: %s", code, error)
+            log.debug("push %d failed: %s", code, _in_short(error))
             return _after(error)
         except asyncio.CancelledError:  # the channel was closed under it; or its outbox is
             if (task := asyncio.current_task()) and task.cancelling():
@@ -241,6 +241,13 @@ class AppLink:
             log.debug("push %d failed: the app was lost", code)
             return Delivery.FAILED
         return Delivery.DONE
+
+
+def _in_short(error: Exception) -> str:
+    """Return the failure of a call in one line."""
+    if isinstance(error, grpc.aio.AioRpcError):
+        return f"{error.code().name.lower()}: {error.details()}"
+    return str(error) or "it takes too long"
 
 
 def _after(error: grpc.aio.AioRpcError | grpc.aio.UsageError) -> Delivery:

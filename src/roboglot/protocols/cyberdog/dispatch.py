@@ -105,8 +105,7 @@ async def _answered(call: Call) -> object | None:
             if len(taken) < len(values):
                 wrong = misfits(values, operation.parameters)
             values = taken
-        last: object = await operation.call(call, values)
-        return last
+        return _logged(call, await operation.call(call, values))
     except BadParameters as bad:
         call.why = "; ".join(wrong) or str(bad)
         log.info("%d: %s", call.code, call.why)
@@ -123,6 +122,13 @@ async def _answered(call: Call) -> object | None:
         call.why = f"internal error: {broken}"
         log.exception("%d broke", call.code)
         return error(InBandError.UNAVAILABLE)
+
+
+def _logged(call: Call, last: object) -> object:
+    """Log why the handler's answer says no, if it does; return the answer."""
+    if call.why:
+        log.info("%d: %s", call.code, call.why)
+    return last
 
 
 def _status(answered: object) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from roboglot.operations import OperationTable
 from roboglot.wire.contracts import contract
@@ -13,6 +13,7 @@ from roboglot.wire.cyberdog.codes import UNPUBLISHED
 if TYPE_CHECKING:
     from roboglot.protocols.cyberdog.context import Context
 
+Answer = TypeVar("Answer")
 TABLE: OperationTable[int] = OperationTable("cyberdog")
 
 
@@ -29,6 +30,11 @@ class Call:
     context: Context
     reply: Callable[[object], Awaitable[None]]
     why: str = ""  # it was refused, in plain words
+
+    def refused(self, answer: Answer, why: str) -> Answer:
+        """Return ``answer``, which says no; ``why`` is for the log and who watches the exchange."""
+        self.why = why
+        return answer
 
 
 @dataclass(frozen=True, slots=True)

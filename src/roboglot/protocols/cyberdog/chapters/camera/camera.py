@@ -168,9 +168,9 @@ async def camera(call: Call, *, command: Int32) -> dict[str, int]:
             case 3:
                 await kept.stop()
             case _:
-                return {"result": int(FileError.ARGUMENTS)}
+                return call.refused({"result": int(FileError.ARGUMENTS)}, f"there is no command {command}")
     except (RobotError, OSError) as error:
-        return {"result": int(_told(error))}
+        return call.refused({"result": int(_told(error))}, str(error))
     return {"result": int(FileError.NONE)}
 
 

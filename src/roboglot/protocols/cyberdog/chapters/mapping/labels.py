@@ -123,13 +123,13 @@ async def set_labels(
                 raise NotFound(f"no label {missing}")
             await library.put(replace(stored, labels=tuple(x for x in stored.labels if x.name not in names)))
         elif len(names) > LABELS_MAX or len(set(names)) < len(names) or not all(x.valid for x in labels):
-            return {"success": 1}
+            return call.refused({"success": 1}, f"at most {LABELS_MAX} labels, each with a name of its own and a place")
         else:
             kept = tuple(Label(x.labelName, Point(x.physicX, x.physicY)) for x in labels)
             await _take_number(library, stored.name, map_id)
             await library.put(replace(stored, labels=kept, number=map_id or stored.number))
-    except NotFound:
-        return {"success": 1}
+    except NotFound as error:
+        return call.refused({"success": 1}, str(error))
     return {"success": 0}
 
 

@@ -83,7 +83,7 @@ async def start_task(
     """Answers ``accepted``, feedback codes, ``result``; the task goes on if the stream breaks."""
     context = call.context
     if type not in NEEDS:
-        return {"accepted": int(Accepted.NO)}
+        return call.refused({"accepted": int(Accepted.NO)}, f"there is no task of type {type}")
     kind = TaskType(type)
     order = Order(kind, outdoor and kind in IN_A_MAP, object_tracking and kind is TaskType.VISION_FOLLOWING)
     for component in NEEDS_FOR_THINGS if order.thing else NEEDS[kind]:
@@ -91,11 +91,25 @@ async def start_task(
     if kind is TaskType.NAVIGATION and (goalX is None or goalY is None):
         raise InvalidGoal("a goal has goalX and goalY")
     manner = manner_of(relative_pos, keep_distance) if kind in FOLLOWS else manner_of(AUTOMATIC, 0.0)
-    if context.tasks.state not in order.begins_in or context.gaits.state is MachineState.LOW_POWER:
-        return {"accepted": int(Accepted.NO)}
+    if why := _hindrance(context, order):
+        return call.refused({"accepted": int(Accepted.NO)}, why)
     run = _run(context, order, Goal(goalX or 0.0, goalY or 0.0, theta), manner)
     task = context.tasks.start(order, run, then=LEAVES if kind is TaskType.LOCALIZATION else {})
     return await follow(call, task.stream, STREAM_MAX)
+
+
+def _hindrance(context: Context, order: Order) -> str:
+    """Return why the task cannot begin now; "" if it can."""
+    if context.gaits.state is MachineState.LOW_POWER:
+        return "the robot is in low power"
+    state = context.tasks.state
+    if state in order.begins_in:
+        return ""
+    if context.tasks.current is not None:
+        return f"another task is under way ({state.name.lower().replace('_', ' ')})"
+    if order.kind is TaskType.NAVIGATION:
+        return "the robot is not localized; 6004 of type 7 localizes it"
+    return f"a task of type {int(order.kind)} cannot begin while the robot is {state.name.lower().replace('_', ' ')}"
 
 
 def _run(context: Context, order: Order, goal: Goal, manner: Manner) -> Callable[[Task], Awaitable[TaskResult]]:
@@ -120,7 +134,7 @@ async def join_task(call: Call, *, type: Int32) -> object:
     """Take the stream of a running task over, from its latest feedback on."""
     task = call.context.tasks.current
     if task is None or task.kind != _kind_of(call.context, type):
-        return {"accepted": int(Accepted.NOTHING_TO_JOIN)}
+        return call.refused({"accepted": int(Accepted.NOTHING_TO_JOIN)}, f"no task of type {type} is under way")
     return await follow(call, task.stream, STREAM_MAX)
 
 

@@ -33,11 +33,11 @@ async def align_with_stairs(call: Call, *, data: bool) -> dict[str, object]:
     robot, gaits = call.context.robot, call.context.gaits
     alignment = robot[StairAlignment]
     if gaits.busy or refusal_of(robot, Motion.TROT_SLOW) is not None:
-        return {"success": False}
+        return call.refused({"success": False}, "the robot cannot walk now")
     try:
         action = alignment.align(StairDirection.UP if data else StairDirection.DOWN, source=SOURCE)
-    except RobotError:
-        return {"success": False}
+    except RobotError as error:
+        return call.refused({"success": False}, str(error))
     try:
         await robot.clock.wait_for(_begun(robot, action), ANSWER_MAX)
     except TimeoutError:

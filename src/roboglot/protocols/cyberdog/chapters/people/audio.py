@@ -48,9 +48,9 @@ async def audio_token(
     lasts = _seconds(token_expires_in)
     account = str(uid)
     if not account or len(account) > ID_MAX or not token_access or lasts is None:
-        return {"result": False}
+        return call.refused({"result": False}, "uid, token_access and a time to live are needed")
     if max(len(token_access), len(token_fresh)) > TOKEN_MAX:
-        return {"result": False}
+        return call.refused({"result": False}, f"a token has at most {TOKEN_MAX} characters")
     await call.context.robot[Settings].put(ACCOUNT, {"uid": account, "until": call.context.robot.clock.epoch() + lasts})
     return {"result": True}
 

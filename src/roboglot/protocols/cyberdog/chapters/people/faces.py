@@ -156,8 +156,8 @@ async def enter_face(
                 return {"result": int(FaceResult.DONE), "allfaces": ",".join(names)}
             case _:
                 result = FaceResult.ARGUMENTS
-    except (NotFound, InvalidGoal):
-        result = FaceResult.ARGUMENTS
+    except (NotFound, InvalidGoal) as error:
+        return call.refused({"result": int(FaceResult.ARGUMENTS)}, str(error))
     return {"result": int(result)}
 
 

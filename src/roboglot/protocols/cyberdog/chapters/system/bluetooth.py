@@ -69,8 +69,8 @@ async def connect(call: Call, *, selected_device: object = None) -> dict[str, in
     if selected_device is None:
         try:
             await radio.disconnect()
-        except Refused:
-            return {"result": NOT_CONNECTED}
+        except Refused as error:
+            return call.refused({"result": NOT_CONNECTED}, str(error))
         return {"result": DONE}
     try:
         device = msgspec.convert(selected_device, WireDevice)
@@ -81,7 +81,9 @@ async def connect(call: Call, *, selected_device: object = None) -> dict[str, in
         status = await robot.clock.wait_for(connecting.done(), CONNECT_MAX)
     except TimeoutError:
         return {"error_code": int(InBandError.TIMEOUT)}
-    return {"result": DONE if status is ActionStatus.SUCCEEDED else RADIO_FAILED}
+    if status is not ActionStatus.SUCCEEDED:
+        return call.refused({"result": RADIO_FAILED}, connecting.reason)
+    return {"result": DONE}
 
 
 @TABLE.on(Code.BLUETOOTH_CONNECTED, right=Right.SEE, needs=(Bluetooth,))
@@ -110,8 +112,8 @@ async def forget(call: Call, *, mac: str = "") -> dict[str, bool]:
     """Strike a device from the history; without ``mac`` all but the connected one."""
     try:
         await call.context.robot[Bluetooth].forget(mac or None)
-    except NotFound:
-        return {"success": False}
+    except NotFound as error:
+        return call.refused({"success": False}, str(error))
     return {"success": True}
 
 

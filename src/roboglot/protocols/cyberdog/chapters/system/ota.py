@@ -222,11 +222,10 @@ async def download_update(call: Call, *, modules: object) -> dict[str, Any]:
     try:
         package, digests = package_of(modules)
         if firmware.progress.state in UNDER_WAY:
-            return {"response": False, "code": BUSY}
+            return call.refused({"response": False, "code": BUSY}, "an update is under way")
         call.context.updates.download(package, digests)
     except InvalidGoal as error:
-        log.info("5003: %s", error)
-        return {"response": False, "code": ARGUMENTS}
+        return call.refused({"response": False, "code": ARGUMENTS}, str(error))
     return {"response": True, "code": GOOD}
 
 

@@ -43,7 +43,7 @@ async def switch_nickname(call: Call, *, enable: bool) -> dict[str, bool]:
 async def set_nickname(call: Call, *, nick_name: Name, wake_name: str = "") -> dict[str, bool]:
     """Another name and the word that wakes the robot; without that, a short name twice."""
     if len(wake_name) > NAME_MAX:
-        return {"success": False}
+        return call.refused({"success": False}, f"wake_name has more than {NAME_MAX} characters")
     settings = call.context.robot[Settings]
     await settings.put(NICKNAME, nick_name)
     await settings.put(WAKE_WORD, wake_name or (nick_name * 2 if len(nick_name) <= 3 else nick_name))
@@ -55,7 +55,7 @@ async def set_nickname(call: Call, *, nick_name: Name, wake_name: str = "") -> d
 async def set_volume(call: Call, *, volume: Int32) -> dict[str, bool]:
     """0 silent to 100."""
     if not 0 <= volume <= 100:
-        return {"success": False}
+        return call.refused({"success": False}, "volume is 0 to 100")
     call.context.robot[Speaker].set_volume(volume / 100.0)
     return {"success": True}
 
@@ -85,7 +85,7 @@ async def set_eye_light(call: Call, *, eyelight: Int32) -> dict[str, bool]:
     if EYES not in light.zones:
         raise ComponentMissing(Light)
     if not 0 <= eyelight <= BRIGHTEST:
-        return {"success": False}
+        return call.refused({"success": False}, f"eyelight is 0 to {BRIGHTEST}")
     light.shine(EYES, WHITE.dimmed(eyelight / BRIGHTEST), LightEffect.SOLID)
     return {"success": True}
 

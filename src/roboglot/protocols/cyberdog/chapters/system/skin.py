@@ -28,7 +28,7 @@ async def set_skin(call: Call, *, mode: Int32, wave_cycle_time: Int32) -> dict[s
     """Modes 0 to 6; the time, in ms, counts for 2 to 5, and for 6 chooses the shade of the legs on the floor."""
     skin = call.context.robot[ElectronicSkin]
     if mode not in tuple(SkinMode):
-        return {"success": False}
+        return call.refused({"success": False}, f"there is no mode {mode}")
     pattern = SkinPattern[SkinMode(mode).name]
     try:
         if mode in OVER_TIME:
@@ -36,6 +36,5 @@ async def set_skin(call: Call, *, mode: Int32, wave_cycle_time: Int32) -> dict[s
         else:
             skin.show(pattern, standing=Shade.DARK if wave_cycle_time else Shade.LIGHT)
     except (InvalidGoal, Refused) as refused:
-        log.info("11002: %s", refused)
-        return {"success": False}
+        return call.refused({"success": False}, str(refused))
     return {"success": True}

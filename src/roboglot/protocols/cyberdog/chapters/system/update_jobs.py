@@ -208,8 +208,10 @@ def _progress(progress: FirmwareProgress) -> dict[str, Any]:
 async def start_update(call: Call, *, operate: str = "", id: Id = "", data: object = None) -> object:
     """Answers ``accepted``, feedback, result; the work goes on if the stream breaks."""
     call.context.robot[Firmware]
-    if operate not in OPERATIONS or call.context.jobs.stream is not None:
-        return {"accepted": int(Accepted.NO)}
+    if operate not in OPERATIONS:
+        return call.refused({"accepted": int(Accepted.NO)}, f"operate is one of {', '.join(OPERATIONS)}")
+    if call.context.jobs.stream is not None:
+        return call.refused({"accepted": int(Accepted.NO)}, "another goal is under way")
     return await follow(call, call.context.jobs.start(Goal(operate, id, data)), STREAM_MAX)
 
 
@@ -219,5 +221,5 @@ async def join_update(call: Call) -> object:
     call.context.robot[Firmware]
     stream = call.context.jobs.stream
     if stream is None:
-        return {"accepted": int(Accepted.NOTHING_TO_JOIN)}
+        return call.refused({"accepted": int(Accepted.NOTHING_TO_JOIN)}, "no goal is under way")
     return await follow(call, stream, STREAM_MAX)

@@ -63,8 +63,8 @@ async def upload_log(call: Call) -> dict[str, Any]:
     except TimeoutError:
         action.cancel("it took too long")
         return {"error_code": int(InBandError.TIMEOUT)}
-    except RobotError:
-        return {"success": False}
+    except RobotError as error:
+        return call.refused({"success": False}, str(error))
     return {"success": True}
 
 
