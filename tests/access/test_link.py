@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from roboglot.access.tunnel import tunnel as carrying
 from roboglot.access.tunnel.frames import BadFrame, Kind, encode
 from roboglot.access.tunnel.link import Link
 from roboglot.access.tunnel.tunnel import Tunnel
@@ -45,7 +46,7 @@ def test_what_is_no_frame_is_refused_at_its_first_byte(data: bytes) -> None:
 
 
 @contextlib.asynccontextmanager
-async def tunnels(port: int) -> AsyncIterator[Tunnel]:
+async def tunnels(port: int, drives: Callable[[], bool] = lambda: False) -> AsyncIterator[Tunnel]:
     """Two ends on a connection; what the first carries comes out as connections to ``port``."""
     loop = asyncio.get_running_loop()
     made: asyncio.Future[Link] = loop.create_future()
@@ -60,7 +61,7 @@ async def tunnels(port: int) -> AsyncIterator[Tunnel]:
     async def opened(_: int, protocol: object) -> object:
         return await loop.create_connection(protocol, "127.0.0.1", port)  # type: ignore[arg-type,type-var]
 
-    far = Tunnel(await made, first=2, opened=opened, datagram=lambda *_: None)
+    far = Tunnel(await made, first=2, opened=opened, datagram=lambda *_: None, drives=drives)
     own = Tunnel(near, first=1, opened=opened, datagram=lambda *_: None)
     running = [asyncio.ensure_future(tunnel.run()) for tunnel in (far, own)]
     yield own
@@ -119,3 +120,27 @@ async def test_a_reader_that_rests_holds_up_the_sender_alone() -> None:
         lazy.transport.abort()
         local.close()
     server.close()
+
+
+async def test_while_the_client_drives_both_ends_show_often_that_they_are_there(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(carrying, "PING_PERIOD", 1000.0)
+    loop = asyncio.get_running_loop()
+    drives = False
+    asked = asyncio.Event()
+
+    def driven() -> bool:
+        asked.set()
+        return drives
+
+    async with tunnels(0, drives=driven) as own, asyncio.timeout(20.0):
+        sent: list[bytes] = []
+        monkeypatch.setattr(own._link, "send", lambda *frame: sent.append(frame[-1]))
+        await asked.wait()
+        assert loop.time() >= own._quick_until
+        drives = True
+        while len(sent) < 3:  # noqa: ASYNC110 - this end answers in kind
+            await asyncio.sleep(0)
+        assert own._quick_until > loop.time()
+        assert not any(sent), "only the end that knows who drives asks for it"

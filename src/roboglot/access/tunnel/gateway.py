@@ -24,6 +24,7 @@ from roboglot.access.guard import Guard
 from roboglot.access.tunnel.frames import BadFrame, Kind
 from roboglot.access.tunnel.link import Link
 from roboglot.access.tunnel.tunnel import Tunnel, TunnelLost
+from roboglot.model.actions import Action
 from roboglot.model.admission import Proof, ProofKind, Right, Unknown
 from roboglot.model.robot import Robot
 from roboglot.model.tap import Direction, Exchange
@@ -128,6 +129,7 @@ class Gateway:
                 opened=calls.connect,
                 datagram=lambda _port, _data: None,
                 quiet=lambda: _stop(robot, own),
+                drives=lambda: next(_driven(robot, own), None) is not None,
             )
             leave = robot.admission.on_lost(lambda lost: link.end("rights were lost") if lost == who else None)
             try:
@@ -171,12 +173,17 @@ class _Entry(asyncio.Protocol):
         inner.connection_made(transport)
 
 
-def _stop(robot: Robot, own: str) -> None:
-    """What a client drives by hand stops: it would stop if its connection were lost."""
+def _driven(robot: Robot, own: str) -> Iterator[Action]:
+    """What a client of the tunnel drives by hand: it would stop if its connection were lost."""
     for action in robot.actions.running():
         if action.connection.rpartition(":")[0] == own and action.source.endswith(action.connection):
-            log.warning("a tunnel is silent: %s of %s stops", action.name, action.client)
-            action.cancel("its client is out of reach")
+            yield action
+
+
+def _stop(robot: Robot, own: str) -> None:
+    for action in tuple(_driven(robot, own)):
+        log.warning("a tunnel is silent: %s of %s stops", action.name, action.client)
+        action.cancel("its client is out of reach")
 
 
 def _hello(payload: bytes) -> tuple[str, str]:

@@ -15,10 +15,14 @@ log = logging.getLogger(__name__)
 STREAMS_MAX = 64
 UNSENT_MAX = 1024 * 1024  # bytes that wait for the tunnel; datagrams beyond are lost, as datagrams are
 DATAGRAM_MAX = 32 * 1024  # bytes
-PING_PERIOD, LOOK_PERIOD = 0.1, 0.05  # s
+PING_PERIOD = 0.1  # s
+QUICK_PERIOD = 0.025  # s, while the client drives: a packet that is lost twice still comes within QUIET_AFTER
+QUICK_SECONDS = 0.5  # that this end goes on with it after the other did
 QUIET_AFTER = 0.35  # s of silence after which the client is as good as gone: what it drives by hand stops
 QUIET_LOOKS = 2  # in a row that see it
 LOST_AFTER = 5.0  # s of silence that the tunnel and its connections bear: lines that lose packets come back
+
+QUICK = b"!"  # of a PING: answer in kind
 
 Opened = Callable[[int, Callable[[], asyncio.Protocol]], Awaitable[object]]
 
@@ -31,7 +35,8 @@ class Tunnel:
     """``run`` until it is lost.
 
     ``opened`` connects a port that the other end asks for to a protocol of this end. ``first``: streams that one end
-    opens are odd, the other's even. ``quiet`` is called when the other end has said nothing for QUIET_AFTER.
+    opens are odd, the other's even. ``quiet`` is called when the other end has said nothing for QUIET_AFTER; while
+    ``drives``, both show often that they are there.
     """
 
     def __init__(
@@ -42,14 +47,15 @@ class Tunnel:
         opened: Opened,
         datagram: Callable[[int, bytes], None],
         quiet: Callable[[], None] = lambda: None,
+        drives: Callable[[], bool] = lambda: False,
     ) -> None:
         self._link = link
         self._next = first
-        self._opened, self._datagram, self._quiet = opened, datagram, quiet
+        self._opened, self._datagram, self._quiet, self._drives = opened, datagram, quiet, drives
         self._streams: dict[int, Stream] = {}
         self._opening: set[asyncio.Task[None]] = set()
         self._over = False
-        self._heard = 0.0
+        self._heard = self._quick_until = 0.0
         self._loop = asyncio.get_running_loop()
 
     async def run(self) -> None:
@@ -100,17 +106,17 @@ class Tunnel:
     async def _beat(self) -> None:
         said, looks = 0.0, 0
         while True:
-            now = self._loop.time()
-            if now - said >= PING_PERIOD:
+            now, drives = self._loop.time(), self._drives()
+            if drives or now < self._quick_until or now - said >= PING_PERIOD:
                 said = now
-                self._link.send(Kind.PING)
+                self._link.send(Kind.PING, 0, QUICK if drives else b"")
             silent = now - self._heard
             looks = looks + 1 if silent >= QUIET_AFTER else 0
             if looks == QUIET_LOOKS:  # a single one may only mean that this end was held up
                 self._quiet()
             if silent >= LOST_AFTER:
                 self._link.end("the other end is silent")
-            await asyncio.sleep(LOOK_PERIOD)
+            await asyncio.sleep(QUICK_PERIOD)
 
     def _take(self, kind: Kind, number: int, payload: bytes) -> None:
         self._heard = self._loop.time()
@@ -127,6 +133,8 @@ class Tunnel:
             if len(self._streams) >= STREAMS_MAX:
                 raise BadFrame("too many streams")
             self._open(number, PORT.unpack(payload)[0])
+        elif kind is Kind.PING and payload == QUICK:
+            self._quick_until = self._heard + QUICK_SECONDS
         elif kind is Kind.DATAGRAM and len(payload) >= PORT.size:
             self._datagram(PORT.unpack_from(payload)[0], payload[PORT.size :])
 
