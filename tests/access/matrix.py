@@ -12,6 +12,7 @@ import grpc
 import httpx
 from websockets.asyncio.client import connect
 from websockets.exceptions import InvalidStatus
+from websockets.typing import Subprotocol
 
 from roboglot.access.rights import NOTHING, whole
 from roboglot.clients.visual import TextLink
@@ -22,6 +23,9 @@ from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import GrpcAppStub
 
 ADDRESS = f"127.0.95.{100 + int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0')[2:])}"  # one for each process
+
+
+SUBPROTOCOL = Subprotocol("foxglove.websocket.v1")
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,3 +125,24 @@ async def frame_states(link: TextLink, frames: list[dict[str, object]]) -> list[
                 states.append((body.get("state", 0), body.get("describe", "")))
                 break
     return states
+
+
+async def viewer_refusals(address: str, keys: list[str]) -> int | None:
+    """How many of these messages of a viewer (Foxglove) are refused for want of a right; None: it was not let in."""
+    try:
+        link = await connect(
+            f"ws://{ADDRESS}:8765/", compression=None, local_addr=(address, 0), subprotocols=[SUBPROTOCOL]
+        )
+    except InvalidStatus:
+        return None
+    for key in keys:
+        await link.send(b"\x01\0\0\0\0" if key == "messageData" else json.dumps({"op": key}))
+    await link.send("the end")
+    refused = 0
+    async for text in link:
+        words = text if isinstance(text, str) else ""
+        refused += "has no right to" in words
+        if "no JSON" in words:
+            break
+    await link.close()
+    return refused

@@ -21,11 +21,16 @@ from roboglot.operations import OperationTable, Right
 from roboglot.programs.functions import table as functions
 from roboglot.programs.functions.session import Session
 from roboglot.protocols.cyberdog.table import TABLE as DOG
+from roboglot.protocols.foxglove.table import TABLE as VIEWER
 from roboglot.protocols.robomaster.table import TABLE as TEXT
 from roboglot.protocols.slamware.table import TABLE as REST
+from roboglot.protocols.vda5050.order_book import ActionState
+from roboglot.protocols.vda5050.server import Vda5050Door
+from roboglot.protocols.vda5050.table import TABLE as FLEET
 from roboglot.runtime import Runtime
 from roboglot.wire.contracts import contract
 from roboglot.wire.cyberdog.codes import Code, FileError
+from roboglot.wire.vda5050.orders import Action
 from roboglot.wire.visual.requests import MODES, Kind
 from roboglot.wire.visual.requests import OPERATIONS as FRAMES
 from tests.access.matrix import (
@@ -38,6 +43,7 @@ from tests.access.matrix import (
     frame_states,
     open_frames,
     rest_status,
+    viewer_refusals,
 )
 
 REFUSED = (401, 403)
@@ -70,7 +76,7 @@ def reached(monkeypatch: pytest.MonkeyPatch) -> Iterator[set[object]]:
 
         return handler
 
-    for table in (REST, TEXT, DOG):
+    for table in (REST, TEXT, DOG, VIEWER, FLEET):
         kept: dict[Any, Any] = table._operations  # type: ignore[attr-defined]
         for key, operation in list(kept.items()):
             monkeypatch.setitem(kept, key, dataclasses.replace(operation, handler=stand_in(key, operation.handler)))
@@ -123,6 +129,44 @@ async def test_cyberdog_does_what_the_right_allows(runtime: Runtime, reached: se
             assert all(answer.get("error_code", 1) for answer in answers[code]), (caller.name, code)
         if Right.SEE in caller.rights:
             assert {10001, 1001} <= reached
+
+
+async def test_viewers_do_what_the_right_allows(runtime: Runtime, reached: set[object]) -> None:
+    keys = {operation.key for operation in VIEWER}
+    for caller in CALLERS:
+        reached.clear()
+        refused = await viewer_refusals(caller.address, sorted(keys))
+        if refused is None:
+            assert Right.SEE not in caller.rights
+            assert not reached
+            continue
+        may_not = {key for key in keys if not may(caller, VIEWER, key)}
+        assert not reached & may_not, caller.name
+        assert refused == len(may_not), caller.name
+
+
+async def test_fleet_control_does_what_its_right_allows(runtime: Runtime, reached: set[object]) -> None:
+    [door] = [door for door in runtime.doors["a"]._doors if isinstance(door, Vda5050Door)]
+    keys = {operation.key for operation in FLEET}
+    messages = {"order", "instantActions"}  # what is sent by itself; all others are actions within
+
+    async def ask(caller: Caller) -> set[str]:
+        """The actions that were refused for want of a right."""
+        await door._introduce(f"{caller.address}:1883")
+        for name in messages:
+            await door._take(name, b"{}")
+        states = {key: ActionState(Action(key, key)) for key in keys - messages}
+        for key, state in states.items():
+            await door._session._performer.perform(state, FLEET._operations[key], instant=True)
+        return {key for key, state in states.items() if "has no right to" in state.result}
+
+    for caller in CALLERS:
+        reached.clear()
+        refused = await asyncio.create_task(ask(caller))
+        allowed = {key for key in keys if may(caller, FLEET, key)}
+        assert refused == keys - allowed - messages, caller.name
+        assert reached <= allowed, caller.name
+        assert messages & reached == messages & allowed, caller.name
 
 
 async def test_files_of_the_dog_need_rights(runtime: Runtime, data: Path) -> None:
