@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from roboglot.config import Config, ConsoleConfig, RobotConfig
+from roboglot.config import AccessConfig, Config, ConsoleConfig, RobotConfig
 from roboglot.model.clock import LockstepClock
 from roboglot.model.events import BumperPressed
 from roboglot.model.geometry import Pose
@@ -168,7 +168,9 @@ def free_port() -> int:
 
 
 @asynccontextmanager
-async def terminal(folder: Path, address: str, body: str = "universal") -> AsyncIterator[Terminal]:
+async def terminal(
+    folder: Path, address: str, body: str = "universal", access: AccessConfig | None = None
+) -> AsyncIterator[Terminal]:
     """``roboglot up`` in lockstep, in this process, with the doors' own ports, and somebody beside it."""
     (folder / "tools").mkdir()
     for name, text in TOOLS.items():
@@ -179,7 +181,14 @@ async def terminal(folder: Path, address: str, body: str = "universal") -> Async
     dog = CyberDogConfig(app_port=free_port())
     robots = (RobotConfig("a", body, address),)
     console = ConsoleConfig(address=address)
-    config = Config(robots=robots, lockstep=True, data=folder / "data", doors={"cyberdog": dog}, console=console)
+    config = Config(
+        robots=robots,
+        lockstep=True,
+        data=folder / "data",
+        doors={"cyberdog": dog},
+        console=console,
+        access=access or AccessConfig(),
+    )
     runtime = Runtime(config)
     try:
         await runtime.start()

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from roboglot.config import AccessConfig
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.geometry import Point, Pose
 from roboglot.testing import assert_pose, passed_in_order
@@ -134,6 +135,46 @@ async def test_the_page_of_recordings_records_what_runs(tmp_path: Path) -> None:
         await user.type_block(block_with(DOCS.parent / "recording.md", "record mark", "bash"))
         ended = await user.type(".venv/bin/roboglot record info today.mcap")
         assert ended.status == 0, ended
+
+
+async def test_the_page_of_access_lets_in_and_throws_out(tmp_path: Path) -> None:
+    page = DOCS.parent / "access.md"
+    pose = "http://127.0.0.1:1448/api/core/slam/v1/localization/pose"
+    async with terminal(tmp_path, "127.0.0.84", access=AccessConfig(on=True, local=False)) as user:
+        guard = user.runtime.guard
+        assert guard is not None
+
+        async def status(options: str) -> str:
+            guard.reload()  # as its thread does four times a second
+            return (await user.type(f"curl -s -o answer -w '%{{http_code}}' {options} {pose}")).said
+
+        said: dict[str, str] = {}
+        for line in commands(block_with(page, "access add cell7")):
+            if "revoke" in line:
+                assert await status("-u anna:staple-horse") == "200"
+            ended = await user.type(f"echo staple-horse | {line}" if "--person" in line else line)
+            assert ended.status == 0, ended
+            said[line.split()[2]] = ended.said
+        assert await status("-u anna:staple-horse") == "401"
+        assert await status(f"-H 'Authorization: Bearer {said['rotate'].strip()}'") == "200"
+        assert all(name in said["list"] for name in ("cell7", "phone", "10.0.0.7"))
+        assert (tmp_path / "phone/client-cert.pem").exists()
+
+        pupil, _ = [line for line in commands(block_with(page, "allow 10.0.0.21")) if "allow" in line]
+        assert await status("--interface 127.0.95.21") == "401"
+        assert (await user.type(pupil.replace("10.0.0.21", "127.0.95.21"))).status == 0
+        assert await status("--interface 127.0.95.21") == "200"
+
+        plant, person, curl = commands(block_with(page, "access add mes"))
+        token = (await user.type(plant)).said.strip()
+        assert (await user.type(f"echo staple-horse | {person}")).status == 0
+        guard.reload()
+        assert '"yaw"' in (await user.type(f"TOKEN={token}; {curl.replace('10.0.0.5', '127.0.0.1')}")).said
+
+        assert "401" not in (await user.type(".venv/bin/roboglot audit --verify")).said
+        told = await user.type(".venv/bin/roboglot doctor --security")
+        assert "shift-lead" in told.said
+        assert token not in told.said
 
 
 async def test_the_text_client_drives_and_listens(tmp_path: Path, vendor_ports: None) -> None:

@@ -8,6 +8,7 @@ from typing import Any, cast
 
 Spend = Callable[[int], float]
 PAUSE_MIN = 0.01  # s: shorter debts are left standing
+STEP = 4096  # bytes that are counted together: most messages are short
 
 
 class Metered(asyncio.Protocol):
@@ -57,10 +58,15 @@ class Valve:
         self._transport, self._meter, self._spend = transport, meter, spend
         self.is_closing = transport.is_closing  # asked for every message
         self._paused = False  # by the inner protocol
+        self._uncounted = 0  # bytes
         self._waiting: asyncio.TimerHandle | None = None
 
     def count(self, size: int) -> None:
         """Read later if it is too much."""
+        self._uncounted += size
+        if self._uncounted < STEP:
+            return
+        size, self._uncounted = self._uncounted, 0
         wait = self._spend(size)
         if wait > PAUSE_MIN and self._waiting is None and not self._transport.is_closing():
             self._transport.pause_reading()

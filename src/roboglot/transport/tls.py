@@ -102,7 +102,7 @@ class TlsEnd(asyncio.Protocol):
         assert self._tunnel is not None
         if data and not self._transport.is_closing():
             self._tunnel.write(data)
-            self._flush()
+            self._transport.write(self._outgoing.read())
 
     def say_goodbye(self) -> None:
         """Signal the end to the other end."""

@@ -87,6 +87,12 @@ class Link(asyncio.Protocol):
         self.transport.abort()
 
     def _cut(self, data: bytes) -> None:
+        if not self._buffer and len(data) >= HEAD.size:  # mostly it is one frame
+            number, stream, length = HEAD.unpack_from(data)
+            kind = _KINDS.get(number)
+            if kind is not None and len(data) == HEAD.size + length:
+                self._hand_on(kind, stream, data[HEAD.size :])
+                return
         buffer: bytes | bytearray = data
         if self._buffer:
             self._buffer += data
