@@ -33,11 +33,25 @@ def command(
         sys.exit(f"roboglot demo: {problem}")
     os.environ.setdefault("GRPC_VERBOSITY", "ERROR")  # a robot that hangs up is no news to this phone
     try:
+        _compile_kernels()
         sys.exit(asyncio.run(_demo(world, address, out, speed)))
     except (TimeoutError, ConnectionError, NotUp) as error:
         sys.exit(f"roboglot demo: {str(error) or 'the robot did not answer in time'}")
     except KeyboardInterrupt:
         sys.exit(130)
+
+
+def _compile_kernels() -> None:
+    """Compile what is not compiled yet, after an installation: the tour does not wait for it on its way."""
+    from roboglot.kernels.ahead import KernelsUnavailable, compile_ahead
+
+    def report(name: str, done: int, total: int) -> None:
+        print(f"compiled kernel {done} of {total}: {name}", flush=True)
+
+    try:
+        compile_ahead(report=report)
+    except KernelsUnavailable as error:
+        sys.exit(f"roboglot demo: {error}")
 
 
 def _obstacle(address: str, out: Path) -> str:
