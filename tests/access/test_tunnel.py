@@ -13,6 +13,7 @@ from pathlib import Path
 import httpx
 import pytest
 
+from roboglot.access import audit
 from roboglot.access.store import FILE, AccessStore, Grant
 from roboglot.access.tunnel import tunnel as carrying
 from roboglot.access.tunnel.connector import Connector, KnownGateways, NotTrusted, Refused
@@ -91,6 +92,13 @@ async def test_the_text_protocol_passes_with_its_pushes(
         assert sender[0] == HERE  # clients tell robots apart by that
         [action] = runtime.fleet.robots["a"].actions.running()
         assert action.identity == "cell"
+        noted: set[str] = set()
+        async with asyncio.timeout(10.0):
+            while not noted:  # a thread writes it
+                await asyncio.sleep(0.01)
+                rows = audit.read(runtime.config.data / audit.FILE)
+                noted = {entry.address for _, entry in rows if entry.operation == "chassis speed"}
+        assert noted == {"127.0.0.1 by tunnel"}  # where it comes from, not where the tunnel ends
         writer.close()
     inbox.close()
     async with asyncio.timeout(10.0):

@@ -10,7 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 from roboglot.access import audit
 from roboglot.access.book import LOCAL, Book, Rights
@@ -41,6 +41,13 @@ ALLOWED_MAX = 4096  # pairs of an identity and an operation that need no further
 BURST_SECONDS = 2.0  # of bytes that may come at once
 
 
+class Tunnelled(NamedTuple):
+    """Who is at the other end of a tunnel, and the host that it came from."""
+
+    who: str
+    host: str
+
+
 class Guard:
     """One for all robots. ``start`` begins to follow the file; ``reload`` does it at once."""
 
@@ -56,7 +63,7 @@ class Guard:
         self.now = now
         self.audit = audit.Audit(folder / audit.FILE)
         self.requests = Limiter(config.requests, config.requests, time.monotonic)
-        self.tunnels: dict[str, str] = {}  # loopback addresses of tunnels, and who is at their other end
+        self.tunnels: dict[str, Tunnelled] = {}  # by the loopback address that stands for each
         self._path = folder / FILE
         self._store = AccessStore(self._path)
         self._book = Book(self._store.identities())
@@ -104,8 +111,8 @@ class Guard:
         if proof is not NO_PROOF:
             return self._proofs.get(proof.value) if proof.kind is HTTP else self._certified(proof)
         host = host_of(address)
-        if (who := self.tunnels.get(host)) is not None:
-            return who
+        if (tunnelled := self.tunnels.get(host)) is not None:
+            return tunnelled.who
         if self._book.has(host, Kind.ADDRESS):
             return host
         return LOCAL if self.config.local and is_loopback(host) else None
@@ -353,5 +360,7 @@ class RobotAdmission(Admission):
             self._note(who, exchange.connection, exchange.door, exchange.operation, outcome, exchange.refusal)
 
     def _note(self, who: str, address: str, door: str, operation: str, outcome: str, reason: str) -> None:
+        if (tunnelled := self._guard.tunnels.get(host_of(address))) is not None:
+            address = f"{tunnelled.host} by tunnel"
         entry = audit.Entry(audit.now(), who, address, self._name, door, operation, outcome, reason)
         self._guard.audit.note(entry)

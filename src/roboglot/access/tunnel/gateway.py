@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import cast
 from weakref import WeakValueDictionary
 
-from roboglot.access.guard import Guard
+from roboglot.access.guard import Guard, Tunnelled
 from roboglot.access.tunnel.frames import BadFrame, Kind
 from roboglot.access.tunnel.link import Link
 from roboglot.access.tunnel.tunnel import Tunnel, TunnelLost
@@ -120,7 +120,7 @@ class Gateway:
         if found is None or not self._guard.may(who, name, Right.SEE):
             raise Unknown(f"{who} has no right to see a robot {name!r}")
         robot, ports = found
-        with self._address(who) as own:
+        with self._address(who, str(peer[0])) as own:
             log.info("%s drives robot %s through a tunnel from %s", who, name, peer[0])
             calls = _Calls(robot, ports, own)
             tunnel = Tunnel(
@@ -141,14 +141,14 @@ class Gateway:
                 leave()
 
     @contextlib.contextmanager
-    def _address(self, who: str) -> Iterator[str]:
+    def _address(self, who: str, host: str) -> Iterator[str]:
         """A loopback address for one tunnel, at which the guard knows ``who``."""
         mine = sum(each == who for each in self._addresses.values())
         if len(self._addresses) >= TUNNELS_MAX or mine >= TUNNELS_OF_ONE_MAX:
             raise Unknown(f"{mine} tunnels of {who} are open, and {len(self._addresses)} together: no more")
         own = next(a for n in range(TUNNELS_MAX) if (a := str(FIRST_ADDRESS + n)) not in self._addresses)
         self._addresses[own] = who
-        self._guard.tunnels[own] = who
+        self._guard.tunnels[own] = Tunnelled(who, host)
         try:
             yield own
         finally:
