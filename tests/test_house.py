@@ -4,6 +4,7 @@ import ast
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -35,9 +36,15 @@ BY_PROGRAM = [ROOT / "docs" / name for name in ("capabilities.md", "coverage.md"
 PAGES = sorted(p for p in [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")] if p not in BY_PROGRAM)
 
 
+@cache
+def tree_of(path: Path) -> ast.Module:
+    """A file, parsed once for all tests."""
+    return ast.parse(path.read_text())
+
+
 def functions(path: Path) -> Iterator[tuple[str, int]]:
     """Name and number of lines of each function, without decorators and docstring."""
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             begin = node.body[1].lineno if ast.get_docstring(node) and len(node.body) > 1 else node.lineno
             yield node.name, (node.end_lineno or begin) - begin + 1
@@ -116,7 +123,7 @@ def test_a_walk_in_the_docs_is_the_way_through_the_code(walk: list[tuple[str, st
     assert len(walk) > 5
     mentioned: set[str] = {walk[0][1]}
     for file, name in walk:
-        tree = ast.parse((ROOT / "src" / "roboglot" / file).read_text())
+        tree = tree_of(ROOT / "src" / "roboglot" / file)
         steps = defined(tree, name)
         assert steps, f"{file} has no {name}"
         registered = any(isinstance(mark, ast.Call) for step in steps for mark in getattr(step, "decorator_list", ()))
@@ -131,7 +138,7 @@ def test_a_walk_in_the_docs_is_the_way_through_the_code(walk: list[tuple[str, st
 def imports(path: Path, modules: Mapping[str, Path]) -> set[str]:
     """The modules of ours that a file imports, those for its types included."""
     found = set()
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.ImportFrom) and node.module:
             for alias in node.names:
                 module = f"{node.module}.{alias.name}"

@@ -2,7 +2,7 @@
 
 ``install`` has ``subprocess.Popen``, and with it asyncio, start such commands like this. The process is a child of ours
 as if we had started it ourselves: output, signals, exit status and waiting are the same. Commands with an environment
-for another interpreter, and all other programs, start cold. ``ROBOGLOT_TESTS_COLD=1`` has all of them start so.
+for another interpreter, and all other programs, start cold; so do those with ``ROBOGLOT_TESTS_COLD=1`` in theirs.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ _parent = WarmParent()
 
 def install() -> None:
     """Start ``python -m roboglot`` warm from now on."""
-    if not os.environ.get(COLD) and sys.platform == "linux":
+    if sys.platform == "linux":
         subprocess.Popen._execute_child = _execute  # type: ignore[attr-defined]
 
 
@@ -116,12 +116,13 @@ def _execute(process: Any, *arguments: Any, **named: Any) -> None:
 
 def _is_warm(wanted: Mapping[str, Any]) -> bool:
     words = wanted["args"]
-    if not isinstance(words, list) or words[:3] != ROBOGLOT or not SAME_SEED.isdisjoint(words[3:4]):
+    words = [words] if isinstance(words, str | bytes | os.PathLike) else list(words)
+    if words[:3] != ROBOGLOT or not SAME_SEED.isdisjoint(words[3:4]):
         return False
     if wanted["pass_fds"] or any(wanted.get(name, usual) != usual for name, usual in PLAIN.items()):
         return False
-    environment = wanted["env"]
-    return environment is None or _of_the_interpreter(environment) == _of_the_interpreter(os.environ)
+    environment = os.environ if wanted["env"] is None else wanted["env"]
+    return COLD not in environment and _of_the_interpreter(environment) == _of_the_interpreter(os.environ)
 
 
 def _of_the_interpreter(environment: Mapping[Any, Any]) -> dict[Any, Any]:

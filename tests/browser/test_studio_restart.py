@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import socket
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable
@@ -61,6 +62,7 @@ async def server(tmp_path: Path) -> AsyncIterator[tuple[str, Life]]:
         life = await asyncio.create_subprocess_exec(
             sys.executable, "-m", "roboglot", "up", "--config", str(settings),
             stdout=asyncio.subprocess.DEVNULL, stderr=asyncio.subprocess.DEVNULL,
+            env={**os.environ, "ROBOGLOT_TESTS_COLD": "1"},  # down for as long as a server that really starts anew
         )  # fmt: skip
         lives.append(life)
         for _ in range(1200):

@@ -86,6 +86,9 @@ class Body:
     hull: HullSection
     sections: Mapping[type[Struct], Struct]
 
+    def __hash__(self) -> int:
+        return hash((self.maker, self.model, self.hull))  # sections may hold mappings
+
     def get(self, section: type[S]) -> S | None:
         """Return the section of this type; None if the robot has no such part."""
         found = self.sections.get(section)

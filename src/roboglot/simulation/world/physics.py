@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from typing import Any
 
 import mujoco
 import numpy as np
+from msgspec.structs import replace
 
 from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Pose
@@ -22,13 +25,24 @@ from roboglot.simulation.world.rays import Rays
 from roboglot.simulation.world.scene import TIMESTEP, build
 
 LIGHT = 1.0  # kg; a thing that weighs less gives way before a bumper does
+_compiled = lru_cache(maxsize=8)(build)
+
+
+def _model_of(world: WorldDescription, bodies: Mapping[str, Body]) -> Any:
+    """Return a model of its own, compiled once for all worlds that are the same: those that are reset or reopened."""
+    what = replace(world, faults=()), tuple(bodies.items())
+    try:
+        hash(what)
+    except TypeError:  # made by hand, with lists
+        return build(*what)
+    return copy.copy(_compiled(*what))
 
 
 class Physics:
     """Raises BadFile if the world cannot be built."""
 
     def __init__(self, world: WorldDescription, bodies: Mapping[str, Body]) -> None:
-        self._model: Any = build(world, list(bodies.items()))
+        self._model: Any = _model_of(world, bodies)
         self._data: Any = mujoco.MjData(self._model)
         model = self._model
         self._elevations = [world.elevation(number) for number in range(len(world.floors))]
