@@ -125,6 +125,29 @@ async def test_the_last_minutes_are_written_when_a_fault_comes(tmp_path: Path) -
     assert "FaultRaised" in events
 
 
+async def test_the_last_minutes_are_written_when_something_breaks_that_no_one_catches(tmp_path: Path) -> None:
+    loop = asyncio.get_running_loop()
+    heard: list[object] = []
+    loop.set_exception_handler(lambda _loop, context: heard.append(context.get("exception")))
+    started = Runtime(config(tmp_path / "data", RecordConfig(ring=True, ring_seconds=3.0)))
+    await started.start()
+    await advance(started, 2.0)
+    before = loop.get_exception_handler()
+
+    def break_down() -> None:
+        raise ZeroDivisionError("the motor's driver divides by nothing")
+
+    loop.call_soon(break_down)
+    await asyncio.sleep(0)
+    await advance(started, 0.5)
+    (path,) = (tmp_path / "data" / "recordings").iterdir()
+    await started.close()
+    assert "crash-ZeroDivisionError" in path.name
+    assert read_recording(path).topics["/a/pose"] >= 15
+    assert [type(error) for error in heard] == [ZeroDivisionError]  # it is handled as ever, too
+    assert loop.get_exception_handler() is not before
+
+
 async def test_an_endless_stream_of_pushes_is_recorded_in_order(tmp_path: Path) -> None:
     path = tmp_path / "r.mcap"
     started = Runtime(config(tmp_path / "data", RecordConfig(to=str(path))))

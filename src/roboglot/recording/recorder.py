@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 from roboglot.config import RecordConfig
 from roboglot.model.clock import Clock, LockstepClock
@@ -152,7 +153,11 @@ class Recorder:
     # -- the ring ------------------------------------------------------------------------------------------------------
 
     def keep_ring(self, folder: Path) -> None:
-        """Keep the last minutes in memory from now on, and write them into ``folder`` when a robot has a new fault."""
+        """Keep the last minutes in memory from now on.
+
+        They are written into ``folder`` when a robot has a new fault, and when something in this program breaks that
+        no one catches.
+        """
         if self._ring is not None:
             return
         self._ring = Ring(self._origin, self._redaction, self._config.ring_seconds)
@@ -163,7 +168,24 @@ class Recorder:
                 self._clock.call_later(AFTER_FAULT, lambda: self._save_by_itself(folder, event.fault.name))
 
         self._leave += [robot.events.listen(FaultRaised, note) for robot in self._robots.values()]
+        self._leave.append(self._watch_loop(folder))
         self._look_at_robots()
+
+    def _watch_loop(self, folder: Path) -> Callable[[], None]:
+        """Save at what breaks in the event loop, then have it handled as ever; returns what ends that."""
+        loop = asyncio.get_running_loop()
+        before = loop.get_exception_handler()
+
+        def handle(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+            if isinstance(context.get("exception"), Exception):
+                self._save_by_itself(folder, f"crash {type(context['exception']).__name__}")
+            if before is None:
+                loop.default_exception_handler(context)
+            else:
+                before(loop, context)
+
+        loop.set_exception_handler(handle)
+        return lambda: loop.set_exception_handler(before) if loop.get_exception_handler() is handle else None
 
     def save_ring(self, path: Path) -> int:
         """Write the last minutes to ``path``; returns how many values. Raises NotRecording, OSError."""
