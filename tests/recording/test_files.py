@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import struct
 import subprocess
 import sys
 import threading
@@ -10,6 +11,7 @@ import time
 from pathlib import Path
 
 import pytest
+import zstandard
 from mcap.reader import make_reader
 
 from roboglot.recording.entries import NANO, Entry
@@ -19,6 +21,7 @@ from roboglot.recording.reader import parts, read_messages, records
 from roboglot.recording.redaction import Redaction
 from roboglot.recording.ring import Ring
 from roboglot.recording.thread import WriterThread
+from tests.recording.doctor import Doctor
 
 CHILD = Path(__file__).parent / "writing_child.py"
 KILLS = 10
@@ -51,7 +54,15 @@ def test_a_file_opens_with_the_reader_of_mcap_itself(tmp_path: Path) -> None:
         assert {m.name: m.metadata for m in reader.iter_metadata()} == {"roboglot": {"version": "1", "part": "1"}}
 
 
-def test_what_was_written_survives_kill_9(tmp_path: Path) -> None:
+@pytest.mark.parametrize("rounds", [1, pytest.param(10, marks=pytest.mark.slow)])
+def test_what_was_written_survives_kill_9(tmp_path: Path, rounds: int) -> None:
+    for number in range(rounds):
+        (tmp_path / str(number)).mkdir()
+        kill_writers(tmp_path / str(number))
+
+
+def kill_writers(tmp_path: Path) -> None:
+    """Kill ten programs that write, and look at what they have written."""
     children = [
         subprocess.Popen([sys.executable, CHILD, tmp_path / f"{n}.mcap"], stdout=subprocess.PIPE) for n in range(KILLS)
     ]
@@ -187,3 +198,38 @@ def test_a_ring_writes_the_last_minutes_and_no_more(tmp_path: Path) -> None:
     assert 2999 - 620 <= found[0] <= 2999 - 580
     kinds = [type(record).__name__ for record, _, _ in records(tmp_path / "last.mcap")]
     assert kinds[-1] == "Footer"
+
+
+def test_a_file_keeps_the_rules_of_mcap_doctor(tmp_path: Path) -> None:
+    path = tmp_path / "x.mcap"
+    part = PartWriter(path, ORIGIN, Redaction(), 0)
+    for number in range(40):
+        part.write(tick(number, number / 7))
+        part.write(Entry("/marks", "mark", number, number, {"text": "x" * number}))
+        if number % 6 == 0:
+            part.flush()
+    part.close()
+    data = path.read_bytes()
+    assert Doctor(data).examine() == []
+    for place in (len(data) // 2, len(data) - 30):  # and it finds what is wrong
+        broken = bytearray(data)
+        broken[place] ^= 0xFF
+        assert not is_well(bytes(broken))
+
+
+def is_well(data: bytes) -> bool:
+    try:
+        return Doctor(data).examine() == []
+    except (struct.error, AssertionError, zstandard.ZstdError, KeyError, ValueError):
+        return False
+
+
+def test_a_mended_file_keeps_them_too(tmp_path: Path) -> None:
+    part = PartWriter(tmp_path / "x.mcap", ORIGIN, Redaction(), 0)
+    for number in range(20):
+        part.write(tick(number, number))
+        part.flush()
+    (tmp_path / "cut.mcap").write_bytes((tmp_path / "x.mcap").read_bytes()[:-11])
+    part.close()
+    mend(tmp_path / "cut.mcap", tmp_path / "whole.mcap")
+    assert Doctor((tmp_path / "whole.mcap").read_bytes()).examine() == []
