@@ -125,7 +125,9 @@ def main() -> None:
             for _ in range(ROUNDS):
                 near_spent.append(statistics.median(round_trips(near)))
                 far_spent.append(statistics.median(round_trips(far)))
+            pairs = statistics.median(there - here for here, there in zip(near_spent, far_spent, strict=True))
             print(f"round trip: {min(near_spent):.0f} µs directly, {min(far_spent):.0f} µs through the tunnel")
+            print(f"in the middle of {ROUNDS} turns {pairs:.0f} µs more; load of the machine {os.getloadavg()[0]:.1f}")
             claims.at_most("added to a round trip", min(far_spent) - min(near_spent), 100.0, "µs")
             usual = jitter(near, DIRECT)
             through = jitter(far, "127.0.0.1")
