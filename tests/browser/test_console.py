@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import json
+import re
 from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
 from typing import Any
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
 
 import pytest
 import pytest_asyncio
@@ -23,7 +27,7 @@ Open = Callable[..., Awaitable[Page]]
 PATIENCE = 15_000  # ms of the machine's time until a page shows something
 AXE = (Path(__file__).parent / "vendor" / "axe.min.js").read_text(encoding="utf-8")
 VIEWS = {
-    "live": ("state", "drive", "actions"),
+    "live": ("state", "drive", "actions", "plots"),
     "world": ("people", "faults", "drawn", "clock"),
     "robots": (),
     "class": (),
@@ -168,7 +172,19 @@ async def test_a_recording_is_begun_marked_and_ended(served: Served, open_consol
     assert read_recording(file).topics["/marks"] == 1
 
 
-async def test_two_browsers_contend_for_control(served: Served, open_console: Open) -> None:
+def rest(served: Served, x: float) -> tuple[int, str]:
+    """Ask by Slamware's REST to go there; the status and the answer."""
+    goal = {"target": {"x": x, "y": 0, "z": 0}}
+    wish = {"action_name": "slamtec.agent.actions.MoveToAction", "options": goal}
+    address = f"http://{ADDRESS}:1448/api/core/motion/v1/actions"
+    try:
+        with urlopen(Request(address, json.dumps(wish).encode(), {"content-type": "application/json"})) as reply:
+            return reply.status, reply.read().decode()
+    except HTTPError as error:
+        return error.code, error.read().decode()
+
+
+async def test_two_browsers_and_a_rest_client_contend_for_control(served: Served, open_console: Open) -> None:
     anna, ben = await open_console("anna"), await open_console("ben")
     await anna.click("text=Take control")
     await anna.wait_for_selector("text=You alone move this robot.")
@@ -177,11 +193,31 @@ async def test_two_browsers_contend_for_control(served: Served, open_console: Op
     box = await ben.locator("canvas").bounding_box()
     await ben.mouse.click(box["x"] + box["width"] / 2 + 60, box["y"] + box["height"] / 2)
     await ben.wait_for_selector("text=Refused: control is taken by console anna")
+    status, answer = await asyncio.to_thread(rest, served, 1.0)
+    assert (status, "console anna" in answer) != (200, False)
+    assert status >= 400, answer
     assert served.robot.actions.running() == []
     await ben.click("text=Take control")
     await anna.wait_for_selector("text=Only console ben may move this robot.")
     await anna.click("text=Release")
     await ben.wait_for_selector("text=Free: the newest command counts.")
+    status, answer = await asyncio.to_thread(rest, served, 0.5)
+    assert status == 200, answer
+    await anna.wait_for_selector("text=/slamware .* moves it/")  # both pages say who
+    await ben.wait_for_selector("text=/slamware .* moves it/")
+
+
+async def test_plots_show_the_robots_speed_and_battery(served: Served, open_console: Open) -> None:
+    page = await open_console()
+    await page.click("#tab-plots")
+    for _ in range(4):
+        await asyncio.sleep(0.55)
+        await served.clock.advance(0.5)
+    for plot in ("speed", "battery", "fit", "link"):
+        canvas = page.locator(f"[data-plot={plot}] canvas")
+        await canvas.wait_for()
+        said = await page.locator(f"[data-plot={plot}] [role=img]").get_attribute("aria-label")
+        assert re.search(r": [\d.]+ ", said), said
 
 
 async def test_the_wire_shows_requests_and_why_they_fail(served: Served, open_console: Open) -> None:

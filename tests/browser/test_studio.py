@@ -231,3 +231,67 @@ async def test_no_serious_finding_of_axe(studio: Open, tab: str, theme: str) -> 
         if one["impact"] in ("serious", "critical")
     ]
     assert serious == []
+
+
+async def test_the_program_is_simulated_first(studio: Open, opened: Served) -> None:
+    page = await loaded(await studio(), COUNTING)
+    await page.click("#tab-robot")
+    await page.click("text=Simulate first")
+    await until(page, "document.querySelector('.failure.fine')")
+    assert opened.robot.actions.running() == []
+    assert await printed(page) == []  # the robot's own log
+    assert page.errors == []
+
+
+async def test_a_change_of_language_and_look_loses_nothing(studio: Open) -> None:
+    page = await loaded(await studio(), COUNTING)
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    await page.evaluate("studio.editor.toggleBreak('say')")
+    await page.keyboard.press("F5")
+    held = "studio.runner.phase.value === 'paused' && document.querySelector('.lit')?.dataset.id === 'say'"
+    await until(page, held)
+    code = await page.evaluate("studio.editor.code.value")
+    await page.evaluate(AXE)
+    for look in ("contrast", "dyslexia"):
+        await page.select_option(".looks select", look)
+        await until(page, f"document.documentElement.dataset.look === {look!r}")
+        found = await page.evaluate("axe.run({ resultTypes: ['violations'] })")
+        assert [v["id"] for v in found["violations"] if v["impact"] in ("serious", "critical")] == []
+    await page.click("header >> text=中文")
+    await page.wait_for_selector("text=运行")
+    await until(page, held)
+    assert await page.evaluate("studio.editor.code.value") == code
+    assert await page.evaluate("studio.editor.breaks.value.join()") == "say"
+    await page.keyboard.press("F8")
+    await until(page, "studio.runner.printed.value.some(e => e.text === '6')")
+    assert {url for url in asked if not url.startswith(page.url.split("/studio/")[0])} == set()  # offline, too
+    assert page.errors == []
+
+
+async def test_a_key_pressed_without_a_link_counts_when_it_is_back(studio: Open, browser: Any) -> None:
+    context = await browser.new_context(viewport={"width": 1400, "height": 900}, locale="en-US")
+    links: list[Any] = []
+    broken = asyncio.Event()
+
+    async def route(link: Any) -> None:
+        if broken.is_set():
+            await link.close()
+        else:
+            link.connect_to_server()
+            links.append(link)
+
+    await context.route_web_socket("**/studio", route)
+    page = await loaded(await studio(context), COUNTING)
+    await page.evaluate("studio.editor.toggleBreak('more')")
+    await page.keyboard.press("F5")
+    held = "(studio.runner.phase.value === 'paused' ? document.querySelector('.lit')?.dataset.id : '')"
+    await until(page, f"{held} === 'more'")
+    broken.set()
+    await links[-1].close()
+    await until(page, "document.querySelector('.banner.bad')")
+    await page.keyboard.press("F8")
+    await page.wait_for_selector("text=It is done as soon as the connection is back.")
+    broken.clear()
+    await until(page, f"{held} === 'say'")
+    await context.close()

@@ -14,10 +14,15 @@ from roboglot.console.resend import resend
 from roboglot.console.verbs.robots import VERBS
 from roboglot.console.verbs.world import WORLD_VERBS
 from roboglot.model.clock import LockstepClock, RealClock
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.map_library import MapLibrary, StoredMap
+from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.system.lease import Lease
 from roboglot.model.errors import Unconnected
+from roboglot.model.geometry import Point
+from roboglot.model.maps import OccupancyGrid
 from roboglot.model.tap import Direction, Exchange
 from roboglot.operations import BadParameters
 from roboglot.protocols.door import Endpoint
@@ -214,3 +219,21 @@ async def test_a_closed_door_and_too_many_at_once_are_refused(shown: Shown, monk
     status, answer = await shown.ask(f"/api/robots/a/wire/{wire.last}/resend", {})
     assert (status, "a moment ago" in answer["error"]) == (409, True)
     wire.close()
+
+
+async def test_a_kept_map_is_merged_where_its_walls_fit(shown: Shown) -> None:
+    await shown.clock.advance(2.0)
+    whole = shown.robot[Mapping].grid.trimmed()
+    part = whole.window(whole.origin.x, whole.origin.y, 0.5, 50.0)  # what lies to the robot's back, and a bit more
+    moved = OccupancyGrid(part.log_odds, part.resolution, Point(part.origin.x - 3.0, part.origin.y + 1.0))
+    await shown.robot[MapLibrary].put(StoredMap("west", moved, 0.0))
+    east = whole.window(-0.5, whole.origin.y, 50.0, 50.0)
+    shown.robot[Mapping].load(east, shown.robot[Localization].pose)
+    status, answer = await shown.ask("/api/robots/a/merge_map", {"map": "west", "x": 2.8, "y": -0.85, "yaw": 0.04})
+    assert status == 200, answer
+    placed = answer["result"]
+    assert (placed["x"], placed["y"], placed["yaw"]) == pytest.approx((3.0, -1.0, 0.0), abs=0.06)
+    assert shown.robot[Mapping].grid.trimmed().width >= whole.width - 2
+    assert (await shown.ask("/api/robots/a/merge_map", {"map": "none"}))[0] == 404
+    status, answer = await shown.ask("/api/robots/a/merge_map", {"map": "west", "x": 9000})
+    assert (status, "too far apart" in answer["error"]) == (409, True)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator
+from pathlib import Path
 
 import pytest
 import pytest_asyncio
+import typer
 
+from roboglot.cli.lesson import command
 from roboglot.console.studio.lessons import FOLDER, Grade, Lesson, grade, load, read
 from roboglot.rehearsal import Rehearsals
 
@@ -74,3 +78,19 @@ async def test_an_endless_program_is_ended(rehearsals: Rehearsals) -> None:
 async def test_what_is_no_mission_is_refused_in_words(wrong: str) -> None:
     with pytest.raises(ValueError, match=r"\w+"):
         read(wrong)
+
+
+async def test_the_command_plays_a_mission_back(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "bark.toml"
+    file.write_text(TEN_LINES + '[[wrong]]\nfails = "say"\nprogram = "x = 1"\n', "utf-8")
+    await asyncio.to_thread(command, [file])
+    assert capsys.readouterr().out.splitlines() == [
+        "ok     bark: solution: 3 of 3 stars",
+        "ok     bark: mistake 1: not passed",
+        "       say: The dog said nothing.",
+    ]
+    file.write_text(TEN_LINES + '[[wrong]]\nfails = "reach"\nprogram = "x = 1"\n', "utf-8")
+    with pytest.raises(typer.Exit) as left:
+        await asyncio.to_thread(command, [file])
+    assert left.value.exit_code == 1
+    assert "mistake 1: not passed, but reach should have failed" in capsys.readouterr().out

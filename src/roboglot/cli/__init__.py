@@ -38,6 +38,7 @@ COMMANDS = {
     "mirror": "live state of any robot in the terminal",
     "map": "ROS maps to a robot, its map to a ROS map, and maps from recorded drives",
     "program": "check, run, save and list block programs, and read their logs",
+    "lesson": "play missions of the studio back: the solution, typical mistakes, a program",
     "mcp": "robots as tools for agents, by the Model Context Protocol",
     "cloud": "a back end for block programs: accounts, favourites, records",
     "cyberdog": "watch, drive and film a CyberDog 2, ours or a real one",
@@ -51,7 +52,7 @@ FOLDERS = dict.fromkeys(("compare", "export", "fidelity", "record", "replay", "r
 )
 # The extra to install for a command whose modules are missing; else the one that brings the module.
 EXTRAS = {"demo": "demo", "mcp": "mcp", "export": "logs"} | dict.fromkeys(
-    ("up", "coverage", "capabilities", "fidelity", "doctor", "cloud", "map", "test"), "up"
+    ("up", "coverage", "capabilities", "fidelity", "doctor", "cloud", "map", "test", "lesson"), "up"
 )
 
 

@@ -32,9 +32,19 @@ from roboglot.model.errors import NotFound, Refused
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.map_loading import known_dock
 from roboglot.model.map_loading import load_map as take_into_use
-from roboglot.model.maps import PointOfInterest
+from roboglot.model.map_merging import aligned, merged
+from roboglot.model.maps import OccupancyGrid, PointOfInterest
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
+
+
+class Placed(msgspec.Struct):
+    """Where the origin of a map lies in another, m, rad."""
+
+    x: float
+    y: float
+    yaw: float
+
 
 HalfWidth = Annotated[float, msgspec.Meta(gt=0, le=1000)]
 
@@ -123,6 +133,26 @@ async def load_map(robot: Robot, *, map: Name, x: Meters = 0.0, y: Meters = 0.0,
     """Use a kept map from now on; the robot stands near the given pose in it, or looks for itself everywhere."""
     take_into_use(robot, await robot[MapLibrary].get(map), Pose(x, y, yaw))
     return started(robot[Localization].relocalize(source=SOURCE))
+
+
+@VERBS.on("merge_map", right=Right.EDIT)
+async def merge_map(robot: Robot, *, map: Name, x: Meters = 0.0, y: Meters = 0.0, yaw: Radians = 0.0) -> Placed:
+    """Add a kept map to the map in use; its origin lies near the given pose, and exactly where walls fit.
+
+    The answer is where it was laid.
+    """
+    stored, here = await robot[MapLibrary].get(map), robot[Mapping].grid
+    if not here.width:
+        raise Refused("the map is empty")
+    place, grid = await asyncio.to_thread(_both, here, stored.grid, Pose(x, y, yaw))
+    robot[Mapping].load(grid, robot[Localization].pose)
+    return Placed(place.x, place.y, place.yaw)
+
+
+def _both(here: OccupancyGrid, other: OccupancyGrid, guess: Pose) -> tuple[Pose, OccupancyGrid]:
+    here = OccupancyGrid(here.log_odds.copy(), here.resolution, here.origin)
+    place = aligned(here, other, guess)
+    return place, merged(here, other, place)
 
 
 @VERBS.on("remove_map", right=Right.EDIT)

@@ -1,23 +1,15 @@
 // The frame of the page: header with what must always be seen, the four views, messages.
 import { render } from "preact";
-import { useEffect, useState } from "preact/hooks";
+import { useEffect } from "preact/hooks";
 import { signal } from "@preact/signals";
 import { Button, Icon, html, lacks, language, loadWords, notice, robotWord, t, theme } from "./base.js";
 import { age, changeWorld, choose, command, connect, current, hello, me, pace, recording, signOut, state, status, want } from "./link.js";
 import { Live } from "./views/live.js";
+import { later } from "./views/later.js";
 import { Robots } from "./views/robots.js";
 import { Wire } from "./views/wire.js";
 import { World } from "./views/world.js";
 
-/** A view whose file is loaded when it is shown first. @param {() => Promise<any>} load */
-function later(load) {
-  let view = null;
-  return function Later() {
-    const [, shown] = useState(false);
-    useEffect(() => { if (!view) load().then((loaded) => { view = loaded; shown(true); }); }, []);
-    return view ? html`<${view} />` : null;
-  };
-}
 const SignIn = later(() => import("./views/sign.js").then((m) => m.SignIn));
 const Class = later(() => import("./views/class.js").then((m) => m.Class));
 

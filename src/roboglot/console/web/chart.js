@@ -55,13 +55,14 @@ export class Chart {
     this.context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
     const ratio = Math.min(devicePixelRatio || 1, 2);
     const box = canvas.getBoundingClientRect();
-    [this.width, this.height] = [box.width, box.height];
+    this.width = box.width;
+    this.height = box.height;
     const [w, h] = [Math.round(box.width * ratio), Math.round(box.height * ratio)];
     if (canvas.width !== w || canvas.height !== h) [canvas.width, canvas.height] = [w, h];
     this.context.setTransform(ratio, 0, 0, ratio, 0, 0);
   }
 
-  /** @param {number[]} p */
+  /** @param {number[]} p @returns {[number, number]} */
   at(p) {
     return [this.width / 2 + (p[0] - this.camera.x) * this.camera.scale, this.height / 2 - (p[1] - this.camera.y) * this.camera.scale];
   }

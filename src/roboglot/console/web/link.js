@@ -128,6 +128,7 @@ export async function changeWorld(verb, values = {}) {
 /** Drive by hand: shares of the top speeds. The server brakes when this falls silent.
  * @param {number} x @param {number} y @param {number} yaw */
 export function drive(x, y, yaw) {
+  if (status.value !== "open") { if (x || y || yaw) say(t("refused", { why: t("link.lost") }), true); return; }
   const stamp = server.now + performance.now() - server.at;
   send({ type: "drive", robot: current.value, seq: ++sequence, stamp, x, y, yaw });
 }

@@ -36,9 +36,24 @@ export function fit(size) {
   camera.value = { x: (x0 + x1) / 2, y: (y0 + y1) / 2, scale: Math.min(SCALE_MAX / 4, Math.max(SCALE_MIN, scale)) };
 }
 
+const floorChosen = signal(/** @type {number | null} */ (null)); // null: the robot's own
+const ownFloor = () => truth.value?.robots[current.value]?.[3] ?? state.value?.place?.floor ?? 0;
+/** The floor that is shown, by number. */
+export const floorShown = () => floorChosen.value ?? ownFloor();
+
 function plan() {
-  const floor = truth.value?.robots[current.value]?.[3] ?? 0;
-  return hello.value?.floors.find((f) => f.number === floor);
+  return hello.value?.floors.find((f) => f.number === floorShown());
+}
+
+function FloorChoice() {
+  const floors = hello.value?.floors ?? [];
+  if (!simulated.value || floors.length < 2) return null;
+  const choose = (event) => {
+    floorChosen.value = event.target.value === "" ? null : Number(event.target.value);
+    if (floorChosen.value !== null) want({ truth: true });
+  };
+  return html`<select class="floors" aria-label=${t("floor.shown")} value=${floorChosen.value ?? ""} onChange=${choose}>
+    <option value="">${t("floor.own", { floor: ownFloor() })}</option>${floors.map((f) => html`<option value=${f.number}>${t("floor")} ${f.number}${f.name ? ` · ${f.name}` : ""}</option>`)}</select>`;
 }
 
 let bitmap = { grid: null, theme: "", image: null };
@@ -50,18 +65,20 @@ function paint(canvas, overlay) {
   const c = /** @type {any} */ (colours.value);
   const chart = new Chart(canvas, camera.value);
   chart.clear(c.bg);
-  const known = grid.value;
+  const elsewhere = floorShown() !== ownFloor(), known = elsewhere ? null : grid.value; // what the robot knows is of its own floor
   if (known && (bitmap.grid !== known || bitmap.theme !== theme.value)) bitmap = { grid: known, theme: theme.value, image: picture(known, c) };
   if (known && bitmap.image) chart.bitmap(bitmap.image, known);
   chart.mesh(c.grid);
   if (wanted.value.truth && anchor()) paintTruth(chart, c);
-  paintDrawings(chart, c);
-  paintMotion(chart, c);
+  if (!elsewhere) {
+    paintDrawings(chart, c);
+    paintMotion(chart, c);
+  }
   if (overlay) paintOverlay(chart, c, overlay);
 }
 
 function paintTruth(chart, c) {
-  const map = anchor(), here = truth.value?.robots[current.value], floor = here?.[3] ?? 0;
+  const map = anchor(), floor = floorShown();
   const inMap = (outline) => outline.map((p) => into(map, p));
   for (const outline of plan()?.furniture ?? []) chart.line(inMap(outline), { fill: c.furniture, closed: true });
   for (const outline of plan()?.walls ?? []) chart.line(inMap(outline), { fill: c.plan, closed: true });
@@ -191,7 +208,7 @@ export function MapView({ tool, overlay, children }) {
     redraw.current = () => { due ||= requestAnimationFrame(draw); };
     pointers(canvas, () => newest.current.tool);
     const stop = effect(() => {
-      [grid.value, scan.value, path.value, poses.value, state.value, truth.value, wanted.value, theme.value, hello.value].length;
+      [grid.value, scan.value, path.value, poses.value, state.value, truth.value, wanted.value, theme.value, hello.value, floorChosen.value].length;
       const here = poses.value[current.value], view = camera.value;
       if (grid.value && fitted !== current.value) { fitted = current.value; fit(canvas.getBoundingClientRect()); }
       if (following.value && here && (Math.abs(here[0] - view.x) > 0.01 || Math.abs(here[1] - view.y) > 0.01) && fitted === current.value) camera.value = { ...view, x: here[0], y: here[1] };
@@ -213,6 +230,7 @@ export function MapView({ tool, overlay, children }) {
       <${Button} compact icon="fit" label=${t("fit")} onClick=${() => { following.value = false; fit(element.current.getBoundingClientRect()); }} />
       ${simulated.value && html`<${Button} compact icon="eye" label=${t("truth")} on=${wanted.value.truth} onClick=${() => want({ truth: !wanted.value.truth })} />`}
     </div>
+    <${FloorChoice} />
     <div class="scale" aria-hidden="true"><i style=${{ width: `${meters * camera.value.scale}px` }}></i>${meters} m</div>
   </section>`;
 }

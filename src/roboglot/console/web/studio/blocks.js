@@ -1,5 +1,5 @@
 // Blocks made at run time from the table of functions (GET /api/blocks), and the Python that they write.
-import * as Blockly from "/studio/vendor/blockly.mjs";
+import * as Blockly from "blockly";
 import { language } from "../base.js";
 import { defineLanguage } from "./language.js";
 

@@ -1,5 +1,5 @@
 // The workspace of blocks: made, loaded, watched; which block is lit, where it halts, what is wrong with it.
-import * as Blockly from "/studio/vendor/blockly.mjs";
+import * as Blockly from "blockly";
 import { effect, signal } from "@preact/signals";
 import { kept, language, say, t, theme as shade } from "../base.js";
 import { defineModule, newId, pythonOf } from "./blocks.js";

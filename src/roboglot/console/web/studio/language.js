@@ -1,5 +1,5 @@
 // Blocks of the language that Blockly does not bring: pauses, dictionaries, fields of answers, errors that are caught.
-import * as Blockly from "/studio/vendor/blockly.mjs";
+import * as Blockly from "blockly";
 import { t } from "../base.js";
 
 const { Blocks, FieldTextInput, FieldNumber, Order, pythonGenerator: python } = Blockly;

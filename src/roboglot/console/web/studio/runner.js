@@ -4,7 +4,7 @@ import { language, say, t } from "../base.js";
 import { blocksOfLines } from "./blocks.js";
 import * as bubbles from "./bubbles.js";
 import * as editor from "./editor.js";
-import { ask, debug, frame, listen, opened } from "./link.js";
+import { ask, debug, frame, listen, online, opened } from "./link.js";
 import { isStored, program, python, saveFrame } from "./program.js";
 
 const LINES_MAX = 500, READINGS_MAX = 40;
@@ -32,8 +32,19 @@ function stops(step = false) {
     first_block: step && blocks, first: step && !blocks, watched: true };
 }
 
+let postponed = /** @type {(() => unknown) | null} */ (null);
+/** Do it now, or say that it is done when the link is back; the newest wish counts. @param {() => unknown} what */
+function orLater(what) {
+  if (online.value === "open" && opened.value) return what();
+  postponed = what;
+  say(t("studio.later"), true);
+  return undefined;
+}
+
 /** Start it, or go on where it is held. @param {boolean} [step] */
-export async function run(step = false) {
+export function run(step = false) { return orLater(() => runNow(step)); }
+
+async function runNow(step) {
   if (phase.value === "paused") return go(step);
   if (phase.value !== "idle") return undefined;
   if (!python().trim()) { say(t("studio.empty")); return undefined; }
@@ -61,17 +72,18 @@ export async function run(step = false) {
 
 async function go(step) {
   const operate = step ? (program.value.kind === "blocks" ? "step_block" : "step") : "go";
-  const answer = await debug({ target_id: program.value.id, operate });
+  const answer = await debug({ target_id: program.value.id, operate }).catch(() => null);
+  if (!answer) { orLater(() => go(step)); return; } // the link broke meanwhile
   if (answer.error) {
     if (step) { const plain = await debug({ target_id: program.value.id, operate: "go" }); if (!plain.error) say(t("studio.step.not")); else say(answer.error, true); } else say(answer.error, true);
   }
 }
 
-export async function pause() { await operate("suspend"); }
-export async function stop() { await operate("shutdown"); }
+export const pause = () => orLater(() => operate("suspend"));
+export const stop = () => orLater(() => operate("shutdown"));
 export const step = () => run(true);
 
-/** @param {"suspend" | "shutdown"} operation @param {string} [id] */
+/** @param {"suspend" | "shutdown" | "recover"} operation @param {string} [id] */
 export async function operate(operation, id = program.value.id) {
   try {
     const { feedback } = await frame({ type: "task", operate: operation, target_id: [id] });
@@ -150,7 +162,7 @@ const entry = (/** @type {any} */ e) => ({ text: e.en ? `${words(e)}\n${e.text}`
 
 listen((message) => {
   switch (message.type) {
-    case "opened": catchUp().catch(() => undefined); break;
+    case "opened": catchUp().catch(() => undefined).then(() => { const wish = postponed; postponed = null; wish?.(); }); break;
     case "frame": report(message.frame); break;
     case "log":
       if (!mine(message.task)) break;

@@ -1,6 +1,6 @@
 // What makes Blockly load many blocks quickly: texts are measured without asking for styles, and what blocks are called
 // for screen readers is made once, after they are there, instead of several times while they are put together.
-import * as Blockly from "/studio/vendor/blockly.mjs";
+import * as Blockly from "blockly";
 
 const { Field, utils: { dom } } = Blockly;
 const SLICE = 8; // ms of work between two looks at what the person does

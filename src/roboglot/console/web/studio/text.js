@@ -6,7 +6,7 @@ import { line, problems, textBreaks } from "./runner.js";
 
 /** Make the editor in `element`. @param {HTMLElement} element @returns {Promise<{destroy: () => void, set: (text: string) => void, refresh: () => void}>} */
 export async function makeText(element) {
-  const cm = await import("/studio/vendor/codemirror.mjs");
+  const cm = await import("codemirror");
   const { Decoration, EditorState, EditorView, GutterMarker, StateEffect, StateField, RangeSet } = cm;
   class Dot extends GutterMarker { toDOM() { const dot = document.createElement("span"); dot.className = "dot"; return dot; } }
   const dot = new Dot(), show = StateEffect.define();

@@ -1,5 +1,5 @@
 // What can be taken: recently used, found, the language, the functions by group, modules of one's own.
-import * as Blockly from "/studio/vendor/blockly.mjs";
+import * as Blockly from "blockly";
 import { kept, t } from "../base.js";
 import { formsOf, stateOf, table, typeOf, words } from "./blocks.js";
 
@@ -25,7 +25,7 @@ const text = (words) => ({ shadow: { type: "text", fields: { TEXT: words } } });
 const block = (type, inputs = {}, more = {}) => ({ kind: "block", type, inputs, ...more });
 const choice = (owner) => ({ kind: "block", type: "robot_choice", extraState: { enum: owner, choices: Object.keys(table.enums[owner]) } });
 
-/** The language by category; every block that the round-trip test plays. */
+/** The language by category; every block that the round-trip test plays. @returns {Record<string, [string, any[]]>} */
 export function languageCategories() {
   return {
     control: ["loop_category", [
@@ -72,9 +72,9 @@ const category = (name, style, contents, id) => ({ kind: "category", toolboxitem
 /** @param {string[]} modules types of the blocks of modules @param {Set<string> | null} allowed types that a mission allows */
 export function toolbox(modules, allowed) {
   const may = (item) => !allowed || allowed.has(item.type) || (item.type === "field_of" && allowed.has(item.inputs.VALUE?.block?.type));
-  const contents = [
+  const contents = /** @type {any[]} */ ([
     { kind: "category", name: t("studio.found"), custom: "FOUND", categorystyle: "found_category", toolboxitemid: "found", hidden: "true" },
-    ...(allowed ? [] : [{ kind: "category", name: t("studio.recent"), custom: "RECENT", categorystyle: "found_category", toolboxitemid: "recent" }])];
+    ...(allowed ? [] : [{ kind: "category", name: t("studio.recent"), custom: "RECENT", categorystyle: "found_category", toolboxitemid: "recent" }])]);
   for (const [id, [style, blocks]] of Object.entries(languageCategories())) {
     const left = blocks.filter(may);
     if (left.length) contents.push(category(t(`studio.toolbox.${id}`), style, left, id));

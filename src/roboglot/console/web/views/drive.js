@@ -25,9 +25,10 @@ function push(x, y, yaw) {
 const letGo = () => { keys.clear(); push(0, 0, 0); };
 
 function fromKeys() {
-  const sum = [0, 0, 0];
+  const sum = /** @type {[number, number, number]} */ ([0, 0, 0]);
   for (const key of keys) KEYS[key].forEach((v, i) => { sum[i] += v; });
-  push(...sum.map((v) => Math.max(-1, Math.min(1, v))));
+  const [x, y, yaw] = sum.map((v) => Math.max(-1, Math.min(1, v)));
+  push(x, y, yaw);
 }
 
 function useKeys() {
@@ -104,7 +105,7 @@ const PANELS = {
     <${Slider} name=${t("yaw")} unit="°" min=${degrees(body.gimbal_reach[2])} max=${degrees(body.gimbal_reach[3])} step="1" value=${degrees(body.gimbal.yaw)} verb="aim" onChange=${(v) => command("aim", { yaw: radians(v) })} />
     <div class="buttons"><${Button} label=${t("recenter")} verb="recenter_gimbal" onClick=${() => command("recenter_gimbal")} /></div></div>`,
   arm: (body) => html`<div class="card"><h3>${t("arm")}</h3><p>x ${body.arm.x.toFixed(2)} · z ${body.arm.z.toFixed(2)} m</p><div class="buttons">
-    ${[["arm.out", 0.02, 0], ["arm.in", -0.02, 0], ["arm.up", 0, 0.02], ["arm.down", 0, -0.02]].map(([key, x, z]) => html`<${Button} label=${t(key)} verb="move_arm" onClick=${() => command("move_arm", { x, z })} />`)}
+    ${/** @type {[string, number, number][]} */ ([["arm.out", 0.02, 0], ["arm.in", -0.02, 0], ["arm.up", 0, 0.02], ["arm.down", 0, -0.02]]).map(([key, x, z]) => html`<${Button} label=${t(key)} verb="move_arm" onClick=${() => command("move_arm", { x, z })} />`)}
     <${Button} label=${t("recenter")} verb="recenter_arm" onClick=${() => command("recenter_arm")} /></div></div>`,
   gripper: (body) => html`<div class="card"><h3>${t("gripper")}</h3><p>${robotWord(body.gripper)}</p><div class="buttons">
     <${Button} label=${t("grip.open")} verb="grip" onClick=${() => command("grip", { close: false })} /><${Button} label=${t("grip.close")} verb="grip" onClick=${() => command("grip", { close: true })} /></div></div>`,

@@ -4,6 +4,7 @@ import { Button, Icon, duration, html, person, robotWord, say, t } from "../base
 import { MapView } from "../map.js";
 import { command, current, introduce, poses, simulated, state, wanted, you } from "../link.js";
 import { Drive } from "./drive.js";
+import { later } from "./later.js";
 import { Recording } from "./recording.js";
 
 const tool = signal("go");
@@ -117,7 +118,9 @@ function Actions() {
         <small>${a.client || t("itself")} · ${duration(a.seconds)}</small>${a.reason && html`<em>${a.reason}</em>`}</li>`)}</ol>` : html`<p class="muted">${t("actions.nothing")}</p>`}</div><${Recording} />`;
 }
 
-const TABS = { state: State, drive: Drive, actions: Actions };
+const plots = () => import("./plots.js").then((m) => m.Plots);
+setTimeout(plots, 2000); // it notes from then on
+const TABS = { state: State, drive: Drive, actions: Actions, plots: later(plots) };
 
 export function Tabs({ tabs, chosen, label }) {
   const move = (event) => {

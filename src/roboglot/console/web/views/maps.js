@@ -15,13 +15,29 @@ async function change(verb, values, done) {
   await refresh();
 }
 
+const merging = signal(""); // the map whose place is asked for
+
+function Merge() {
+  const merge = (event) => {
+    event.preventDefault();
+    const form = new FormData(event.target), [x, y, degrees] = ["x", "y", "degrees"].map((name) => Number(form.get(name)));
+    change("merge_map", { map: merging.value, x, y, yaw: degrees * Math.PI / 180 }, t("map.merged", { map: merging.value }));
+    merging.value = "";
+  };
+  return html`<form class="inline" onSubmit=${merge}><p class="muted">${t("map.merge.hint", { map: merging.value })}</p>
+    ${[["x", "x / m"], ["y", "y / m"], ["degrees", "°"]].map(([name, label]) => html`<label>${label} <input name=${name} type="number" step="any" defaultValue="0" required /></label>`)}
+    <${Button} type="submit" kind="main" label=${t("map.merge")} verb="merge_map" /><${Button} label=${t("cancel")} onClick=${() => { merging.value = ""; }} /></form>`;
+}
+
 export function Maps() {
   useEffect(() => { refresh(); }, [current.value]);
   const save = () => { const map = prompt(t("map.name")); if (map) change("save_map", { map }, t("map.saved", { map })); };
   return html`<div class="card"><h3>${t("maps")}</h3>
     ${kept.value.length ? html`<ul class="list">${kept.value.map((map) => html`<li><span>${map}</span>
       <${Button} label=${t("map.load")} verb="load_map" onClick=${() => change("load_map", { map }, t("map.loading", { map }))} />
+      <${Button} label=${t("map.merge")} verb="merge_map" on=${merging.value === map} onClick=${() => { merging.value = merging.value === map ? "" : map; }} />
       <${Button} label=${t("remove")} verb="remove_map" onClick=${() => { if (confirm(t("map.remove.sure", { map }))) change("remove_map", { map }, t("map.removed", { map })); }} /></li>`)}</ul>` : html`<p class="muted">${t("maps.none")}</p>`}
+    ${merging.value && html`<${Merge} />`}
     <div class="buttons"><${Button} label=${t("map.save")} verb="save_map" onClick=${save} />
       <a class="button" href=${`/api/robots/${current.value}/map.zip`} download="map.zip">${t("map.export")}</a></div></div>`;
 }

@@ -31,7 +31,7 @@ export function SignIn() {
   const code = new URLSearchParams(location.search).get("code") ?? "";
   return html`<form class="card sign" onSubmit=${signIn}><h1>${t("sign.title")}</h1><p class="muted">${t("sign.hint")}</p>
     <div class="buttons" role="group" aria-label=${t("sign.way")}>${Object.keys(WAYS).map((name) => html`
-      <${Button} label=${t(`sign.by.${name}`)} on=${way.value === name} onClick=${() => { way.value = name; wrong.value = ""; }} />`)}</div>
+      <${Button} label=${t(`sign.by.${name}`)} on=${way.value === name} onClick=${() => { way.value = /** @type {keyof typeof WAYS} */ (name); wrong.value = ""; }} />`)}</div>
     ${WAYS[way.value].map((name) => html`<label class="field" key=${`${way.value}-${name}`}><span>${t(`sign.${name}`)}</span>
       <input name=${name} type=${KINDS[name][0]} autocomplete=${KINDS[name][1]} defaultValue=${name === "code" ? code : ""} autocapitalize="off" spellcheck=${false} required /></label>`)}
     ${wrong.value && html`<p class="warned" role="alert">${wrong.value}</p>`}

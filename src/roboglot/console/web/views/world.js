@@ -2,7 +2,7 @@
 import { useEffect } from "preact/hooks";
 import { signal } from "@preact/signals";
 import { Button, html, robotWord, say, t } from "../base.js";
-import { MapView, toWorld } from "../map.js";
+import { MapView, floorShown as floor, toWorld } from "../map.js";
 import { changeWorld, command, current, hello, poses, simulated, state, truth, want } from "../link.js";
 import { Clock } from "./clock.js";
 import { Tabs } from "./live.js";
@@ -17,7 +17,6 @@ const someone = signal("");
 const facing = (from, to) => (to ? Math.atan2(to[1] - from[1], to[0] - from[0]) : 0);
 const arrow = (from, to) => { shape.value = { arrow: [from, Math.hypot(to[0] - from[0], to[1] - from[1]) > 0.15 ? to : null] }; };
 const drop = () => { shape.value = null; };
-const floor = () => truth.value?.robots[current.value]?.[3] ?? 0;
 const inWorld = (from, to) => { const [x, y, yaw] = toWorld([from[0], from[1], facing(from, to)]); return { x, y, yaw }; };
 
 async function draw(verb, values) { if ((await command(verb, values)) !== undefined) say(t("drawn")); }

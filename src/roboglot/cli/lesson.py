@@ -1,0 +1,82 @@
+"""``roboglot lesson``: play missions of the studio back: each solution must pass, each typical mistake must fail."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from roboglot.hosting.visible import visible
+
+if TYPE_CHECKING:
+    from roboglot.console.studio.lessons import Grade, Lesson
+    from roboglot.rehearsal import Rehearsals
+
+FILE_MAX = 64 * 1024
+
+
+def command(
+    files: Annotated[list[Path], typer.Argument(help="Missions (TOML); examples/lessons has twenty.")],
+    program: Annotated[Path | None, typer.Option(help="Try this program instead of what the mission holds.")] = None,
+    chinese: Annotated[bool, typer.Option("--chinese", help="Give the reasons in Chinese.")] = False,
+) -> None:
+    """Play missions in their own worlds, as fast as the machine can; the exit status is 1 if one is not as it says."""
+    from roboglot.console.studio.lessons import read
+
+    try:
+        found = [(path.stem, read(_text(path))) for path in files]
+        own = None if program is None else _text(program)
+    except (OSError, ValueError) as error:
+        print(f"roboglot lesson: {visible(str(error))}", file=sys.stderr)
+        raise typer.Exit(2) from None
+    if not asyncio.run(_play_all(found, own, chinese)):
+        raise typer.Exit(1)
+
+
+def _text(path: Path) -> str:
+    if path.stat().st_size > FILE_MAX:
+        raise ValueError(f"{path} has more than {FILE_MAX} bytes")
+    return path.read_text("utf-8")
+
+
+async def _play_all(lessons: list[tuple[str, Lesson]], own: str | None, chinese: bool) -> bool:
+    from roboglot.rehearsal import Rehearsals
+
+    rehearsals = Rehearsals()
+    fine = True
+    try:
+        for name, lesson in lessons:
+            if own is not None:
+                fine &= _judge(f"{name}: your program", await _graded(rehearsals, lesson, own), "", chinese)
+                continue
+            fine &= _judge(f"{name}: solution", await _graded(rehearsals, lesson, lesson.solution), "", chinese)
+            for number, mistake in enumerate(lesson.wrong, 1):
+                grade = await _graded(rehearsals, lesson, mistake.program)
+                fine &= _judge(f"{name}: mistake {number}", grade, mistake.fails, chinese)
+    finally:
+        await rehearsals.close()
+    return fine
+
+
+async def _graded(rehearsals: Rehearsals, lesson: Lesson, program: str) -> Grade:
+    from roboglot.console.studio.lessons import Grade, Row, grade
+
+    try:
+        return grade(lesson, program, await rehearsals.play(program, lesson.scene, speed=0))
+    except (SyntaxError, ValueError) as error:
+        return Grade(0, [Row("ends", False, False, str(error), str(error))])
+
+
+def _judge(what: str, grade: Grade, fails: str, chinese: bool) -> bool:
+    """Print a line and the reasons. ``fails``: the check that must fail; empty: all that are needed must pass."""
+    failed = [row for row in grade.rows if not row.passed]
+    right = grade.passed if not fails else fails in [row.kind for row in failed if not row.star]
+    stars = f"{grade.stars} of 3 stars" if grade.passed else "not passed"
+    expected = "" if right or not fails else f", but {fails} should have failed"
+    print(f"{'ok' if right else 'WRONG':6} {visible(what)}: {stars}{expected}")
+    for row in failed:
+        print(f"       {row.kind}{' (star)' if row.star else ''}: {visible(row.zh if chinese else row.en)}")
+    return right
