@@ -26,7 +26,7 @@ PICTURE = Path(__file__).parent.parent / "docs/images/console.png"
 SIZES = ((1600, 900), (820, 1180), (360, 740))
 LOOKS = (("en", "dark"), ("zh", "light"))
 VIEWS = {
-    "live": ("state", "drive", "actions"),
+    "live": ("state", "drive", "actions", "plots"),
     "wire": (),
     "world": ("people", "faults", "drawn", "clock"),
     "robots": (),

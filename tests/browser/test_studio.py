@@ -253,13 +253,16 @@ async def test_a_change_of_language_and_look_loses_nothing(studio: Open) -> None
     await until(page, held)
     code = await page.evaluate("studio.editor.code.value")
     await page.evaluate(AXE)
-    for look in ("contrast", "dyslexia"):
+    marks = {"contrast": "#000", "dyslexia": "OpenDyslexic"}
+    for look in marks:
         await page.select_option(".looks select", look)
         await until(page, f"document.documentElement.dataset.look === {look!r}")
+        style = "getComputedStyle(document.body)"
+        assert marks[look] in await page.evaluate(f"{style}.fontFamily + {style}.getPropertyValue('--text')")
         found = await page.evaluate("axe.run({ resultTypes: ['violations'] })")
         assert [v["id"] for v in found["violations"] if v["impact"] in ("serious", "critical")] == []
     await page.click("header >> text=中文")
-    await page.wait_for_selector("text=运行")
+    await until(page, "document.documentElement.lang === 'zh-CN'")
     await until(page, held)
     assert await page.evaluate("studio.editor.code.value") == code
     assert await page.evaluate("studio.editor.breaks.value.join()") == "say"

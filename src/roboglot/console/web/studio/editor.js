@@ -7,6 +7,7 @@ import { together } from "./speed.js";
 import { found, noteUse, recentBlocks, theme, toolbox, wanted } from "./toolbox.js";
 
 export const look = kept("studio.look", "plain");
+effect(() => { document.documentElement.dataset.look = look.value; });
 export const code = signal("");
 export const selected = signal("");
 export const breaks = signal(/** @type {string[]} */ ([]));

@@ -57,8 +57,8 @@ function made(uPlot, place, name, range) {
   const ago = (plot, values) => values.map((v) => `${Math.round(v - (plot.data[0].at(-1) ?? 0))} s`);
   return new uPlot({
     width: place.clientWidth, height: HEIGHT, legend: { show: false }, cursor: { show: false }, padding: [8, 8, 0, 0],
-    scales: { x: { time: false }, ...(range ? { y: { range } } : {}) },
-    axes: [{ ...axis, values: ago, space: 60 }, { ...axis, size: 46 }],
+    scales: { x: { time: false }, y: { range: range ?? ((_, low, high) => [Math.min(low, 0), Math.max(high, 1)]) } },
+    axes: [{ ...axis, values: ago, space: 60, size: 26 }, { ...axis, size: 46 }],
     series: [{}, { stroke: c.path, width: 2, points: { show: false } }],
   }, columns(name), place);
 }
