@@ -69,7 +69,7 @@ function Plot({ name, unit, range }) {
   const place = useRef(/** @type {any} */ (null));
   useEffect(() => {
     let plot = null, stop = () => {}, gone = false;
-    const watcher = new ResizeObserver(() => plot?.setSize({ width: place.current.clientWidth, height: HEIGHT }));
+    const watcher = new ResizeObserver(() => { if (place.current) plot?.setSize({ width: place.current.clientWidth, height: HEIGHT }); });
     plotting().then((uPlot) => {
       if (gone) return;
       plot = made(uPlot, place.current, name, range);
