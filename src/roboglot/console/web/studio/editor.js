@@ -45,7 +45,7 @@ export function remake() {
   if (view) { workspace.setScale(view.scale); workspace.scroll(view.x, view.y); }
 }
 
-effect(() => { void language.value; void look.value; void shade.value; if (workspace) remake(); });
+effect(() => { void language.value; void look.value; void shade.value; if (workspace) { remake(); light(lit); } });
 
 /** @param {any} event */
 function noticed(event) {
