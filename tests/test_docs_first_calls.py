@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import sys
+import zlib
 from collections.abc import AsyncIterator
 from pathlib import Path
 
@@ -37,8 +38,9 @@ def first_call(page: str, language: str) -> str:
 
 
 @pytest.fixture
-async def user(tmp_path: Path) -> AsyncIterator[Terminal]:
-    async with terminal(tmp_path, "127.0.0.77") as opened:
+async def user(tmp_path: Path, request: pytest.FixtureRequest) -> AsyncIterator[Terminal]:
+    address = f"127.0.7.{zlib.crc32(request.node.name.encode()) % 250 + 2}"  # tests run beside each other
+    async with terminal(tmp_path, address) as opened:
         assert (await opened.type(".venv/bin/roboglot certs --export phone")).status == 0
         yield opened
 
@@ -83,8 +85,9 @@ async def test_visual(user: Terminal) -> None:
         assert "hello" in await said_by(user, "visual.md", language)
 
 
-@pytest.mark.parametrize("page", sorted(Path(ROOT, "docs/protocols").glob("*.md")), ids=lambda page: page.name)
-def test_every_door_says_why_it_refuses(page: Path) -> None:
+@pytest.mark.parametrize("name", ["slamware", "robomaster", "cyberdog", "visual", "vda5050", "foxglove"])
+def test_every_door_says_why_it_refuses(name: str) -> None:
+    page = ROOT / f"docs/protocols/{name}.md"
     text = page.read_text()
-    assert "## Why was I refused" in text or page.name.endswith(".zh.md")
+    assert "## Why was I refused" in text
     assert list(blocks(page, "sh", ""))
