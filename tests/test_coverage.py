@@ -22,7 +22,7 @@ TOTALS = {
     "foxglove": 14,
     "foxglove_messages": 15,
     "ros2": 3,
-    "ros2_messages": 10,
+    "ros2_messages": 11,
 }
 
 

@@ -56,6 +56,7 @@ KINDS = {
     "event": Kind("roboglot.Event", _plain),
     "action": Kind("roboglot.Action", _plain),
     "battery": Kind("roboglot.Battery", _plain),
+    "pressure": Kind("roboglot.Pressure", _plain),
     "state": Kind("roboglot.State", _plain),
     "mark": Kind("roboglot.Mark", _plain),
     "pose": Kind("foxglove.PoseInFrame", foxglove.encode_pose),

@@ -176,6 +176,7 @@ SCHEMAS = {  # JSON schemas, by name
     "roboglot.Battery": _schema(
         "roboglot.Battery", percentage=_NUMBER, voltage=_NUMBER, current=_NUMBER, charging={"type": "boolean"}
     ),
+    "roboglot.Pressure": _schema("roboglot.Pressure", stamp=_NUMBER, pressure=_NUMBER, deviation=_NUMBER),
     "roboglot.State": _schema("roboglot.State"),
     "roboglot.Mark": _schema("roboglot.Mark", text=_TEXT),
 }

@@ -107,6 +107,8 @@ class Ros2Words:
         elif record.schema == "roboglot.Battery":
             yield from self._battery(record, msgspec.json.decode(record.data))
             yield self._json(record, f"{record.topic}/state")
+        elif record.schema == "roboglot.Pressure":
+            yield self._pressure(record, msgspec.json.decode(record.data))
         else:
             yield self._json(record, record.topic)
 
@@ -260,6 +262,12 @@ class Ros2Words:
         type = "rcl_interfaces/msg/Log"
         line = _new(type, stamp=_time(at), level=level, name=name, msg=text, file="", function="", line=0)
         return self._made("/rosout", type, at, line)
+
+    def _pressure(self, record: Record, reading: Ros) -> RosMessage:
+        header = _header(record.at, f"{record.topic.split('/')[1]}/base_link")
+        type, deviation = "sensor_msgs/msg/FluidPressure", float(reading["deviation"])
+        message = _new(type, header=header, fluid_pressure=float(reading["pressure"]), variance=deviation * deviation)
+        return self._made(record.topic, type, record.at, message)
 
     def _battery(self, record: Record, state: Ros) -> Iterator[RosMessage]:
         type, unknown = "sensor_msgs/msg/BatteryState", math.nan

@@ -10,6 +10,7 @@ from typing import Any
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.sensing.barometer import Barometer
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.health import Health
 from roboglot.model.components.system.lease import Lease
@@ -142,6 +143,8 @@ class Sampler:
             self._send("body", "scene", (figure,), at, wall)
         if Battery in robot:
             self._send_changed("battery", "battery", plain(robot[Battery].state), at, wall)
+        if Barometer in robot:
+            self._send("pressure", "pressure", plain(robot[Barometer].reading), at, wall)
         if Health in robot:
             self._send_changed("faults", "state", {"faults": plain(robot[Health].faults)}, at, wall)
         if Lease in robot:

@@ -68,6 +68,8 @@ async def test_topics_are_those_of_recordings_and_their_schemas_describe_them(sc
     assert abs(pose.pose.position.x) < 0.05
     battery = await last(viewer, "/a/battery")
     assert 0.0 < battery["percentage"] <= 1.0
+    air = await last(viewer, "/a/pressure")
+    assert 80_000 < air["pressure"] < 110_000
     body = await last(viewer, "/a/body")
     assert body.entities[0].cylinders[0].size.x == pytest.approx(2 * scene.robot.description.radius)
     grid = await last(viewer, "/a/map", 6.0)

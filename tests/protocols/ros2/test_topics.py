@@ -91,6 +91,15 @@ async def test_the_battery_is_there_for_who_comes_late(opened: Opened) -> None:
     assert 0.0 < scene.peer.heard["/a/battery_state"][-1].percentage <= 1.0
 
 
+async def test_pressure_is_published_each_second(opened: Opened) -> None:
+    scene = await opened()
+    scene.peer.listen("/a/pressure", "sensor_msgs/msg/FluidPressure")
+    await scene.peer.until(lambda: len(scene.peer.heard["/a/pressure"]) > 1, 5.0)
+    message = scene.peer.heard["/a/pressure"][-1]
+    assert 80_000 < message.fluid_pressure < 110_000
+    assert (message.variance, message.header.frame_id) == (4.0, "a/base_link")
+
+
 async def test_the_graph_shows_a_node_with_its_ends(opened: Opened) -> None:
     scene = await opened()
     await scene.peer.clock.advance(1.0)

@@ -18,7 +18,8 @@ from roboglot.recording.sampler import POSE_PERIOD, STATE_BEATS, Sampler, Stamps
 
 CHANNELS_MAX = 200
 CAMERA = "camera"
-KEPT = frozenset({"battery", "state", "grid", "scene", "pose", "transforms", "scan"})  # newcomers get the last one
+# Kinds of a recording of which newcomers get the last one.
+KEPT = frozenset({"battery", "pressure", "state", "grid", "scene", "pose", "transforms", "scan"})
 
 
 @dataclass(frozen=True, slots=True)

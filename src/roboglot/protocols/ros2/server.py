@@ -37,7 +37,7 @@ PENDING_MAX = 32  # messages that wait to be done; then they are dropped, and th
 PICTURE_PERIOD = 0.2  # s
 JPEG_QUALITY = 80
 NODE = "roboglot"
-SHOWN = frozenset({"scan", "transforms", "pose", "grid", "battery"})  # kinds of a recording that are published
+SHOWN = frozenset({"scan", "transforms", "pose", "grid", "battery", "pressure"})  # kinds of a recording
 
 
 class Ros2Door:

@@ -5,7 +5,9 @@ from __future__ import annotations
 from roboglot.operations import OperationTable
 
 TABLE: OperationTable[str] = OperationTable("ros2")
-PUBLISHED = frozenset({"scan", "odom", "tf", "tf_static", "map", "battery_state", "pose", "rosout", "image/compressed"})
+PUBLISHED = frozenset(
+    {"scan", "odom", "tf", "tf_static", "map", "battery_state", "pose", "pressure", "rosout", "image/compressed"}
+)
 
 
 def implemented() -> set[str]:
