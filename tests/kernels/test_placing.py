@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from roboglot.kernels.placing import best_place, pyramid, turned_offsets
+from roboglot.kernels.placing import PlaceSearch, pyramid, turned_offsets
 
 
 @settings(max_examples=60, deadline=None)
@@ -22,9 +22,10 @@ def test_nothing_scores_higher_than_what_it_finds(seed: int, height: int, width:
             r, c = turned[:, 0] + row, turned[:, 1] + col
             inside = (r >= 0) & (c >= 0) & (r < height) & (c < width)
             best = max(best, int(field[r[inside], c[inside]].astype(int).sum()))
-    taken = np.empty((0, 3), np.int64)  # no place was found before
-    score, heading, row, col = best_place(pyramid(field, 4), pyramid(floor, 4), offsets, 0, taken, 0, 0)
+    search = PlaceSearch(pyramid(field, 4), pyramid(floor, 4), offsets, (0, 0))
+    score, heading, row, col = search.next(0)
     assert score == best
+    assert search.next(0)[0] <= score
     if score:
         r, c = offsets[heading, :, 0] + row, offsets[heading, :, 1] + col
         inside = (r >= 0) & (c >= 0) & (r < height) & (c < width)

@@ -101,7 +101,7 @@ def _is_taken(taken: Any, heading: int, row: int, col: int, apart: int, turned: 
 def _best_below(
     fields: Any, floors: Any, offsets: Any, enough: int, taken: Any, apart: int, turned: int, roots: Any
 ) -> Any:
-    """What ``best_place`` returns, of the places in the squares ``roots``."""
+    """The best (score, heading, row, col) above ``enough``, away from ``taken``, of the places in the squares ``roots``."""
     top = fields.shape[0] - 1
     pad = 1 << top
     height, width = fields.shape[1] - pad, fields.shape[2] - pad
@@ -145,12 +145,26 @@ def _best_below(
     return best
 
 
-def best_place(fields: Any, floors: Any, offsets: Any, enough: int, taken: Any, apart: int, turned: int) -> Any:
-    """(score, heading, row, col) of the best place on the floor that scores above ``enough``; score 0 if none does.
+class PlaceSearch:
+    """Finds one place after another on the floor, the best first; each away from all that were found before.
 
-    ``fields``, ``floors``: pyramids of the likelihood field and of where base_link may be; ``offsets``: see above.
-    Places within ``apart`` cells and ``turned`` headings of the ``taken`` ones (n, 3: heading, row, col) do not count.
+    ``fields``, ``floors``: pyramids of the likelihood field and of where base_link may be; ``offsets``: see above;
+    ``apart``: cells and headings within which two places are one.
     """
-    roots = _roots(fields, floors, offsets, enough)
-    best_first = np.ascontiguousarray(roots[np.argsort(-roots[:, 0], kind="stable")])
-    return _best_below(fields, floors, offsets, enough, taken, apart, turned, best_first)
+
+    def __init__(self, fields: Bytes, floors: Bytes, offsets: Any, apart: tuple[int, int]) -> None:
+        self._fields, self._floors, self._offsets, self._apart = fields, floors, offsets, apart
+        self._taken: NDArray[np.int64] = np.empty((0, 3), np.int64)
+        self._roots: NDArray[np.int64] | None = None
+
+    def next(self, enough: int) -> tuple[int, int, int, int]:
+        """(score, heading, row, col) of the next place that scores above ``enough``, no less than asked for before.
+
+        Score 0 if none does.
+        """
+        if self._roots is None:
+            roots = _roots(self._fields, self._floors, self._offsets, enough)
+            self._roots = np.ascontiguousarray(roots[np.argsort(-roots[:, 0], kind="stable")])
+        found = _best_below(self._fields, self._floors, self._offsets, enough, self._taken, *self._apart, self._roots)
+        self._taken = np.concatenate((self._taken, np.array([found[1:]], np.int64)))
+        return tuple(int(value) for value in found)  # type: ignore[return-value]

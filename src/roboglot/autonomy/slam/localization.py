@@ -71,14 +71,12 @@ class LidarLocalization(Localization):
         async def run(_action: Action) -> None:
             deadline = self._robot.clock.time() + SEARCH_SECONDS
             while (count := await self._find(region)) != 1:
+                if count > 1:  # another scan from the same place says no more
+                    raise NotLocalized(f"{count} places look like what the lidar sees: drive to where they differ")
                 if self._robot.clock.time() > deadline:
                     if not self.started:
                         raise NotReady("localization is warming up: no scan has been compared with the map yet")
-                    raise NotLocalized(
-                        f"{count} places look like what the lidar sees: drive to where they differ"
-                        if count
-                        else "what the lidar sees fits nowhere"
-                    )
+                    raise NotLocalized("what the lidar sees fits nowhere")
                 await self._robot.clock.sleep(SEARCH_PERIOD)
 
         return self._robot.actions.start(

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from roboglot.autonomy.slam.belief import SURE
 from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
 from roboglot.autonomy.slam.scan_points import ScanPoints
-from roboglot.kernels.matching import match
+from roboglot.kernels.matching import gaps, match
 from roboglot.kernels.occupancy import contradictions
-from roboglot.kernels.placing import best_place, pyramid, turned_offsets
+from roboglot.kernels.placing import PlaceSearch, pyramid, turned_offsets
 from roboglot.kernels.relocation import correlate, likelihood_field
 from roboglot.model.components.mapping.localization import Region
 from roboglot.model.geometry import Pose, wrap_angle
@@ -38,10 +38,14 @@ PLACE_SHARE_MIN = 0.35  # of the highest score
 PLACE_AGREEMENT = 0.7  # share of the points that must fit, of those that the map supports or denies
 PLACE_SUPPORTED, PLACE_KNOWN = 0.85, 0.75  # … by the map's walls and floor; share of all points that it must explain
 PLACE_HIDDEN = 0.06  # … whose rays may pass through walls
+SURE_SUPPORTED, SURE_KNOWN, SURE_HIDDEN = 0.94, 0.85, 0.02  # the same for a place to be believed by itself …
+SURE_AGREEMENT, CLOSE, CLOSE_SHARE = 0.95, 0.04, 0.9  # … share of its points within so many m of a surface …
+CROWDED_SUPPORTED, CROWDED_CLOSE = 0.88, 0.975  # … or, of those that are not on people, and are near a surface
 PLACES_MAX = 5  # that look alike are compared
 APART, TURNED = 8, 10  # cells, headings between two of them
 SAME, SAME_YAW = 0.3, math.radians(10.0)  # m, rad: nearer ones are one place
 RIVAL_SCORE, RIVAL_FIT = 0.85, 0.9  # of the best: rough score, points that fit, from which a place is a rival
+RIVAL_SUPPORTED = 0.06  # … and by how much less of it the map may support
 JUDGED_POINTS_MAX = 120
 SLACK = 0.15  # m that a point may lie off what the map shows
 
@@ -160,38 +164,54 @@ def place(grid: EvidenceGrid, scan: ScanPoints, region: Region | None) -> Match 
 
     The best of the ``places``, whether or not others look like it.
     """
-    found = places(grid, scan, region, most=1)
-    return found[0] if found else None
+    found = _candidates(grid, scan, region, 1)
+    return found[0][0] if found else None
 
 
 def places(grid: EvidenceGrid, scan: ScanPoints, region: Region | None, most: int = PLACES_MAX) -> list[Match]:
     """The places in the map (or in ``region`` of it) that explain the scan about equally well, the best first.
 
-    More than one: the scan alone does not say where the robot is. None: it is nowhere in the map.
+    More than one: the scan alone does not say where the robot is. None: it is nowhere in the map, or at a place that
+    the map knows too little of. In a ``region``, where the caller knows something already, less is enough.
     """
+    found = _candidates(grid, scan, region, most)
+    if not found:
+        return []
+    least = found[0][1].agreement - RIVAL_SUPPORTED
+    alike = [(match, said) for match, said in found if match.fit >= RIVAL_FIT * found[0][0].fit]
+    alike = [(match, said) for match, said in alike if said.agreement >= least]
+    if len(alike) == 1 and region is None and not _is_sure(grid, scan, *alike[0]):
+        return []
+    return [match for match, _ in alike]
+
+
+def _candidates(
+    grid: EvidenceGrid, scan: ScanPoints, region: Region | None, most: int
+) -> list[tuple[Match, Support]]:
+    """Places where the scan may have been taken, and what the map says of it there; the best first."""
     points, corner = _thinned(scan, PLACE_POINTS_MAX), grid.corner
     if len(points) < POINTS_MIN:
         return []
     fields = grid.kept("fields", lambda: pyramid(likelihood_field(grid.evidence), PYRAMID_LEVELS))
-    floors = pyramid(_floor(grid, region), PYRAMID_LEVELS)
-    offsets = turned_offsets(points, HEADINGS, RESOLUTION)
+    if region is None:
+        floors = grid.kept("floors", lambda: pyramid(_floor(grid, None), PYRAMID_LEVELS))
+    else:
+        floors = pyramid(_floor(grid, region), PYRAMID_LEVELS)
+    search = PlaceSearch(fields, floors, turned_offsets(points, HEADINGS, RESOLUTION), (APART, TURNED))
     enough = int(PLACE_SHARE_MIN * 255 * len(points))
-    found: list[Match] = []
-    taken: NDArray[np.int64] = np.empty((0, 3), np.int64)
-    for _ in range(most):
-        score, *at = best_place(fields, floors, offsets, enough, taken, APART, TURNED)
+    found: list[tuple[Match, Support]] = []
+    for number in range(most):
+        score, heading, row, col = search.next(enough)
         if score == 0:
             break
-        enough = max(enough, int(RIVAL_SCORE * score)) if not len(taken) else enough
-        heading, row, col = at
+        enough = enough if number else max(enough, int(RIVAL_SCORE * score))
         yaw = wrap_angle(math.tau * heading / HEADINGS)
         rough = Pose(corner.x + (col + 0.5) * RESOLUTION, corner.y + (row + 0.5) * RESOLUTION, yaw)
-        taken = np.concatenate((taken, np.array([at], np.int64)))
         best = fit(grid, scan, rough, FREE)
-        if _is_place(grid, scan, best) and not any(_is_same(best.pose, other.pose) for other in found):
-            found.append(best)
-    found.sort(key=lambda match: -match.fit)
-    return [match for match in found if match.fit >= RIVAL_FIT * found[0].fit]
+        said = supported(grid, scan, best.pose)
+        if _is_place(best, said) and not any(_is_same(best.pose, other.pose) for other, _ in found):
+            found.append((best, said))
+    return sorted(found, key=lambda place: -place[0].fit)
 
 
 def _floor(grid: EvidenceGrid, region: Region | None) -> NDArray[np.uint8]:
@@ -211,15 +231,33 @@ def _floor(grid: EvidenceGrid, region: Region | None) -> NDArray[np.uint8]:
     return floor
 
 
-def _is_place(grid: EvidenceGrid, scan: ScanPoints, found: Match) -> bool:
-    if found.fit < POINTS_MIN or found.agreement < PLACE_AGREEMENT:
-        return False
-    support = supported(grid, scan, found.pose)
+def _is_place(found: Match, said: Support) -> bool:
     return (
-        support.agreement >= PLACE_SUPPORTED
-        and support.fitting >= PLACE_KNOWN * support.points
-        and support.hidden <= PLACE_HIDDEN * support.points
+        found.fit >= POINTS_MIN
+        and found.agreement >= PLACE_AGREEMENT
+        and said.agreement >= PLACE_SUPPORTED
+        and said.fitting >= PLACE_KNOWN * said.points
+        and said.hidden <= PLACE_HIDDEN * said.points
     )
+
+
+def _is_sure(grid: EvidenceGrid, scan: ScanPoints, found: Match, said: Support) -> bool:
+    """Whether it is the place, not one that looks like another which the map does not have."""
+    if said.fitting < SURE_KNOWN * said.points or said.hidden > SURE_HIDDEN * said.points:
+        return False
+    close = _close_share(grid, scan, found.pose)
+    alone = found.agreement >= SURE_AGREEMENT and said.agreement >= SURE_SUPPORTED and close >= CLOSE_SHARE
+    return alone or (said.agreement >= CROWDED_SUPPORTED and close >= CROWDED_CLOSE)
+
+
+def _close_share(grid: EvidenceGrid, scan: ScanPoints, pose: Pose) -> float:
+    """Share of the points near a surface of the map that lie right on it."""
+    corner, sensor = grid.corner, np.array((scan.sensor.x, scan.sensor.y))
+    points = _thinned(scan, ALL_POINTS)
+    x, y = pose.x - corner.x, pose.y - corner.y
+    off = gaps(grid.surface, grid.evidence, points, x, y, pose.yaw, sensor, RESOLUTION)
+    near = off[np.isfinite(off)]
+    return float((near < CLOSE).mean()) if len(near) else 0.0
 
 
 def _is_same(one: Pose, other: Pose) -> bool:
