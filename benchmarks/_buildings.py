@@ -82,6 +82,7 @@ class Building:
             seen.append((float(nearest[0]), float(nearest[1])))
             yaw += 2.4
 
+
 @asynccontextmanager
 async def building(name: str, body: str = "universal", seed: int = 3) -> AsyncIterator[Building]:
     """The named building with a robot whose localization and mapping stand still."""

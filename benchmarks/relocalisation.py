@@ -1,8 +1,8 @@
 """Claim: at >= 1,000 places of six buildings, whole and half mapped: none wrong, >= 97 % right, <= 30 ms median.
 
 Asked is what localization asks: where in the whole map was this scan taken. Right is within 10 cm and 3 degrees. Places
-that the map does not show (less than 85 % of the echoes on its surfaces) need no answer, nor do those of which a scan at
-a rival place says the same: nine in ten echoes within 15 cm. ``--quick``: 40 places a building.
+that the map does not show (less than 85 % of the echoes on its surfaces) need no answer, nor do those of which a scan
+at a rival place says the same: nine in ten echoes within 15 cm. ``--quick``: 40 places a building.
 """
 
 from __future__ import annotations

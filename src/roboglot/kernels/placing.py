@@ -101,7 +101,7 @@ def _is_taken(taken: Any, heading: int, row: int, col: int, apart: int, turned: 
 def _best_below(
     fields: Any, floors: Any, offsets: Any, enough: int, taken: Any, apart: int, turned: int, roots: Any
 ) -> Any:
-    """The best (score, heading, row, col) above ``enough``, away from ``taken``, of the places in the squares ``roots``."""
+    """The best (score, heading, row, col) above ``enough``, away from ``taken``, in the squares ``roots``."""
     top = fields.shape[0] - 1
     pad = 1 << top
     height, width = fields.shape[1] - pad, fields.shape[2] - pad

@@ -12,6 +12,7 @@ from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.motion.driving import BASE, Driving
+from roboglot.model.events import LocalizationLost, LocalizationRecovered, LostReason, RecoveryMeans
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.chapters.mapping import navigation
@@ -229,3 +230,26 @@ async def test_relocalisation_that_does_not_fit_asks_to_drive_and_gives_up(
     assert stream.codes[-1] == 3106
     assert stream.answers[-1] == {"result": 3}
     assert await state(client) == 6
+
+
+async def test_a_robot_that_loses_its_place_says_so_until_it_knows_it_again(
+    client: Client, robot: Robot, forward: Forward, passing: Passing
+) -> None:
+    await forward(seconds=1)
+    await localized(client, passing)
+    lost = LocalizationLost(stamp=1.0, reason=LostReason.NO_FIT, quality=0.1)
+    found = LocalizationRecovered(stamp=2.0, means=RecoveryMeans.WHOLE_MAP, pose=Pose(), seconds=1.0)
+    robot.events.publish(lost)
+    assert await state(client) == 6
+    assert await client.ask(6004, {"type": 1, "goalX": 1.0, "goalY": 0.0}) == {"accepted": 2}
+    robot.events.publish(found)
+    assert await state(client) == 8
+    stream = Stream(client, 6004, {"type": 1, "goalX": 2, "goalY": 1, "theta": 1.5})
+    await passing(lambda: 307 in stream.codes)
+    robot.events.publish(lost)
+    await passing(lambda: 3107 in stream.codes)
+    robot.events.publish(found)
+    await passing(lambda: 3108 in stream.codes)
+    await passing(lambda: stream.ended)
+    assert stream.answers[-1] == {"result": 0}
+    assert await state(client) == 8

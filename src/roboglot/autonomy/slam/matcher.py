@@ -39,7 +39,7 @@ PLACE_AGREEMENT = 0.7  # share of the points that must fit, of those that the ma
 PLACE_SUPPORTED, PLACE_KNOWN = 0.85, 0.75  # … by the map's walls and floor; share of all points that it must explain
 PLACE_HIDDEN = 0.06  # … whose rays may pass through walls
 SURE_SUPPORTED, SURE_KNOWN, SURE_HIDDEN = 0.94, 0.85, 0.02  # the same for a place to be believed by itself …
-SURE_AGREEMENT, CLOSE, CLOSE_SHARE = 0.95, 0.04, 0.9  # … share of its points within so many m of a surface …
+SURE_AGREEMENT, CLOSE, CLOSE_SHARE = 0.95, 0.04, 0.85  # … share of its points within so many m of a surface …
 CROWDED_SUPPORTED, CROWDED_CLOSE = 0.88, 0.975  # … or, of those that are not on people, and are near a surface
 PLACES_MAX = 5  # that look alike are compared
 APART, TURNED = 8, 10  # cells, headings between two of them
@@ -185,9 +185,7 @@ def places(grid: EvidenceGrid, scan: ScanPoints, region: Region | None, most: in
     return [match for match, _ in alike]
 
 
-def _candidates(
-    grid: EvidenceGrid, scan: ScanPoints, region: Region | None, most: int
-) -> list[tuple[Match, Support]]:
+def _candidates(grid: EvidenceGrid, scan: ScanPoints, region: Region | None, most: int) -> list[tuple[Match, Support]]:
     """Places where the scan may have been taken, and what the map says of it there; the best first."""
     points, corner = _thinned(scan, PLACE_POINTS_MAX), grid.corner
     if len(points) < POINTS_MIN:

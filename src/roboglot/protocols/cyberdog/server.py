@@ -19,7 +19,7 @@ from roboglot.model.client_context import ask_for, identity
 from roboglot.model.components.motion.legs import Legs, Posture
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import RobotError
-from roboglot.model.events import BatteryChanged, MapReplaced
+from roboglot.model.events import BatteryChanged, LocalizationLost, LocalizationRecovered, MapReplaced
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.app_link import AppLink, AppRoute, host_of
 from roboglot.protocols.cyberdog.certificates import Certificates, CertificateStore
@@ -143,7 +143,12 @@ class CyberDogDoor:
         app.on_found.append(_once(lambda: _greet(context)))
         self._cleanup.append(robot.events.listen(BatteryChanged, lambda _: self._rest_if_empty(context)))
         self._cleanup.append(robot.admission.on_lost(lambda who: app.forget() if who == context.owner else None))
-        self._cleanup.append(robot.events.listen(MapReplaced, lambda _: context.map_replaced()))
+        listen, tasks = robot.events.listen, context.tasks
+        self._cleanup += [
+            listen(MapReplaced, lambda _: context.map_replaced()),
+            listen(LocalizationLost, lambda event: tasks.lose_place(event.reason)),
+            listen(LocalizationRecovered, lambda _: tasks.find_place()),
+        ]
         if robot.stand_in is not None:
             self._cleanup.append(robot.stand_in.join(self.name, self._play, _reads()))
         if self._relay:

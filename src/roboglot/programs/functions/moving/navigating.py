@@ -244,7 +244,10 @@ def _map_in_use(session: Session) -> str:
     """The map's name. Raises Refused while navigation is off, NotLocalized while the robot is lost."""
     if (name := session.part(NavigationMode).map) is None:
         raise Refused("navigation is off")
-    if session.robot[Localization].quality < GOOD_FIT:
+    localization = session.robot[Localization]
+    if localization.lost is not None:
+        raise NotLocalized(f"the robot does not know where it is: {localization.lost}")
+    if localization.quality < GOOD_FIT:
         raise NotLocalized("the robot does not know where it is")
     return name
 

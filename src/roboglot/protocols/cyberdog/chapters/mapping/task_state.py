@@ -28,6 +28,10 @@ OUTDOORS = {
     TaskState.LOCALIZED: TaskState.OUTDOOR_LOCALIZED,
 }
 KEEPS_LOCALIZATION = frozenset({TaskType.NAVIGATION, TaskType.DOCKING})
+FAILED = {
+    TaskState.LOCALIZED: TaskState.LOCALIZATION_FAILED,
+    TaskState.OUTDOOR_LOCALIZED: TaskState.OUTDOOR_LOCALIZATION_FAILED,
+}
 NOT_LOCALIZED = frozenset({TaskState.IDLE, TaskState.LOCALIZATION_FAILED, TaskState.OUTDOOR_LOCALIZATION_FAILED})
 
 
@@ -93,6 +97,7 @@ class Tasks:
 
     def __init__(self) -> None:
         self.state = self._rest = TaskState.IDLE  # now, and when no task runs
+        self._found_again: TaskState | None = None  # what follows when a lost place is found
         self.current: Task | None = None
         self.on_change: list[Callable[[TaskState], None]] = []
         self._running: asyncio.Task[None] | None = None
@@ -123,7 +128,7 @@ class Tasks:
                 result = task.stopped_as if task.stopping else result
                 self.current = self._running = None
                 if kind not in KEEPS_LOCALIZATION:
-                    self._rest = order.there(then.get(result, TaskState.IDLE))
+                    self._rest, self._found_again = order.there(then.get(result, TaskState.IDLE)), None
                 self._set_state(self._rest)
                 task.stream.end({"result": int(result)})
 
@@ -151,9 +156,29 @@ class Tasks:
 
     def leave(self) -> None:
         """Be idle: localization, or its failure, counts no longer."""
-        self._rest = TaskState.IDLE
+        self._rest, self._found_again = TaskState.IDLE, None
         if self.current is None:
             self._set_state(self._rest)
+
+    def lose_place(self, reason: str) -> None:
+        """The robot no longer knows where it is: localization has failed, until ``find_place``."""
+        if self._rest not in FAILED:
+            return
+        self._found_again, self._rest = self._rest, FAILED[self._rest]
+        self._tell_place(Feedback.LOCALIZATION_TRYING, reason)
+
+    def find_place(self) -> None:
+        """The robot knows again where it is."""
+        if self._found_again is None or FAILED[self._found_again] is not self._rest:
+            return
+        self._rest, self._found_again = self._found_again, None
+        self._tell_place(Feedback.LOCALIZATION_DONE, "")
+
+    def _tell_place(self, code: Feedback, message: str) -> None:
+        if self.current is None:
+            self._set_state(self._rest)
+        elif self.current.kind in KEEPS_LOCALIZATION:
+            self.current.feedback(code, message)
 
     def unbind(self) -> None:
         """The app is gone: streams end, the task goes on."""
