@@ -269,3 +269,32 @@ async def test_a_key_pressed_without_a_link_counts_when_it_is_back(studio: Open,
     broken.clear()
     await until(page, f"{held} === 'say'")
     await context.close()
+
+
+async def test_a_change_of_language_and_look_loses_nothing(studio: Open) -> None:
+    page = await loaded(await studio(), COUNTING)
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    await page.evaluate("studio.editor.toggleBreak('say')")
+    await page.keyboard.press("F5")
+    held = "studio.runner.phase.value === 'paused' && document.querySelector('.lit')?.dataset.id === 'say'"
+    await until(page, held)
+    code = await page.evaluate("studio.editor.code.value")
+    await page.evaluate(AXE)
+    marks = {"contrast": "#000", "dyslexia": "OpenDyslexic"}
+    for look in marks:
+        await page.select_option(".looks select", look)
+        await until(page, f"document.documentElement.dataset.look === {look!r}")
+        style = "getComputedStyle(document.body)"
+        assert marks[look] in await page.evaluate(f"{style}.fontFamily + {style}.getPropertyValue('--text')")
+        found = await page.evaluate("axe.run({ resultTypes: ['violations'] })")
+        assert [v["id"] for v in found["violations"] if v["impact"] in ("serious", "critical")] == []
+    await page.click("header >> text=中文")
+    await until(page, "document.documentElement.lang === 'zh-CN'")
+    await until(page, held)
+    assert await page.evaluate("studio.editor.code.value") == code
+    assert await page.evaluate("studio.editor.breaks.value.join()") == "say"
+    await page.keyboard.press("F8")
+    await until(page, "studio.runner.printed.value.some(e => e.text === '6')")
+    assert {url for url in asked if not url.startswith(page.url.split("/studio/")[0])} == set()  # offline, too
+    assert page.errors == []
