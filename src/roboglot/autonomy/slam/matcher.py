@@ -168,21 +168,23 @@ def place(grid: EvidenceGrid, scan: ScanPoints, region: Region | None) -> Match 
     return found[0][0] if found else None
 
 
-def places(grid: EvidenceGrid, scan: ScanPoints, region: Region | None, most: int = PLACES_MAX) -> list[Match]:
+def places(
+    grid: EvidenceGrid, scan: ScanPoints, region: Region | None, most: int = PLACES_MAX, known: Pose | None = None
+) -> list[Match]:
     """The places in the map (or in ``region`` of it) that explain the scan about equally well, the best first.
 
     More than one: the scan alone does not say where the robot is. None: it is nowhere in the map, or at a place that
-    the map knows too little of. In a ``region``, where the caller knows something already, less is enough.
+    the map knows too little of. In a ``region``, or at the pose where the robot is ``known`` to be, less is enough.
     """
-    found = _candidates(grid, scan, region, most)
-    if not found:
+    candidates = _candidates(grid, scan, region, most)
+    if not candidates:
         return []
-    least = found[0][1].agreement - RIVAL_SUPPORTED
-    alike = [(match, said) for match, said in found if match.fit >= RIVAL_FIT * found[0][0].fit]
+    least = candidates[0][1].agreement - RIVAL_SUPPORTED
+    alike = [(match, said) for match, said in candidates if match.fit >= RIVAL_FIT * candidates[0][0].fit]
     alike = [(match, said) for match, said in alike if said.agreement >= least]
-    if len(alike) == 1 and region is None and not _is_sure(grid, scan, *alike[0]):
-        return []
-    return [match for match, _ in alike]
+    found = [match for match, _ in alike]
+    expected = region is not None or (known is not None and _is_same(found[0].pose, known))
+    return found if len(found) > 1 or expected or _is_sure(grid, scan, *alike[0]) else []
 
 
 def _candidates(grid: EvidenceGrid, scan: ScanPoints, region: Region | None, most: int) -> list[tuple[Match, Support]]:

@@ -129,8 +129,10 @@ class Slam:
         """
         if self._newest is None or not self._belief.map.scans:
             return None
-        grid, scan = self._belief.map, self._belief.reader.read(self._newest.scan)
-        return (self._newest.odometry, lambda: places(grid, scan, region)) if len(scan.points) >= POINTS_MIN else None
+        belief, odometry = self._belief, self._newest.odometry
+        grid, scan = belief.map, belief.reader.read(self._newest.scan)
+        known = None if self._is_unsure or belief.in_doubt else belief.map_to_odom.compose(odometry)
+        return (odometry, lambda: places(grid, scan, region, known=known)) if len(scan.points) >= POINTS_MIN else None
 
     @property
     def way(self) -> float:
