@@ -1,6 +1,6 @@
 // The socket to the robot runtime: keeps what is known of every robot, carries commands, measures its own age.
 import { signal, computed, batch, effect } from "@preact/signals";
-import { lacks, person, rights, say, t, kept } from "./base.js";
+import { lacks, notice, person, rights, say, t, kept } from "./base.js";
 
 export const status = signal(/** @type {"opening" | "open" | "lost" | "out"} */ ("opening")); // out: a name is needed
 export const me = signal({ name: "", asks: false }); // who signed in here; whether names are asked for
@@ -128,7 +128,10 @@ export async function changeWorld(verb, values = {}) {
 /** Drive by hand: shares of the top speeds. The server brakes when this falls silent.
  * @param {number} x @param {number} y @param {number} yaw */
 export function drive(x, y, yaw) {
-  if (status.value !== "open") { if (x || y || yaw) say(t("refused", { why: t("link.lost") }), true); return; }
+  if (status.value !== "open") { // a held pad asks ten times a second: what the page says of the reason stays
+    if ((x || y || yaw) && !notice.value.bad) say(t("refused", { why: t("link.lost") }), true);
+    return;
+  }
   const stamp = server.now + performance.now() - server.at;
   send({ type: "drive", robot: current.value, seq: ++sequence, stamp, x, y, yaw });
 }
