@@ -67,3 +67,17 @@ async def succeeds(driven: Robot, patience: float = 20.0, speed: float | None = 
     async with asyncio.timeout(30):
         await until(driven.clock, lambda: action.status.ended, patience)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
+
+
+async def succeeds_slowly(driven: Robot, world: World, tries: int = 3) -> Pose:
+    """Where the move of 0.2 m at 0.1 m/s began; again where this machine paused for longer than the link delays."""
+    for left in reversed(range(tries)):
+        start = world.truth.pose_of("a")
+        try:
+            await succeeds(driven, speed=0.1)
+        except AssertionError as failed:
+            if "cannot settle" not in str(failed) or not left:
+                raise
+        else:
+            break
+    return start

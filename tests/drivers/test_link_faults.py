@@ -26,7 +26,19 @@ from roboglot.model.robot import Robot
 from roboglot.simulation.world.world import World
 from roboglot.testing import assert_pose
 from roboglot.wire.slamware.motion import Direction, MoveByOptions
-from tests.drivers.bad_link import BACKS, SPEED, Connect, cut, drives, healed, refused, stands, succeeds, until
+from tests.drivers.bad_link import (
+    BACKS,
+    SPEED,
+    Connect,
+    cut,
+    drives,
+    healed,
+    refused,
+    stands,
+    succeeds,
+    succeeds_slowly,
+    until,
+)
 from tests.drivers.chain import Open, OpenRest
 from tests.drivers.rig import Rig
 
@@ -124,8 +136,7 @@ async def test_a_bad_link_still_drives(back: str, fault: str, way: Rig, connect:
     async with connect() as driven:
         way.fault.delay = 0.05 if fault == "delay" else 0.0
         way.fault.lossy = fault == "loss"
-        start = world.truth.pose_of("a")
-        await succeeds(driven, speed=0.1)
+        start = await succeeds_slowly(driven, world)
         assert world.truth.pose_of("a").relative_to(start).x == pytest.approx(0.2, abs=0.05)
         assert driven[Link].state is LinkState.UP
         action = await drives(driven, world)  # and it stops when its client is gone
