@@ -123,15 +123,12 @@ class Slam:
         self.bias.restore(learnt)
 
     def placing(self, region: Region | None) -> tuple[Pose, Callable[[], list[Match]]] | None:
-        """Odometry at the newest scan, and what finds the places of the map (of ``region``) that look like it.
-
-        That may run in any thread.
-        """
+        """Odometry at the newest scan, and what finds the map's (``region``'s) places like it, in any thread."""
         if self._newest is None or not self._belief.map.scans:
             return None
-        belief, odometry = self._belief, self._newest.odometry
-        grid, scan = belief.map, belief.reader.read(self._newest.scan)
+        belief, odometry, scan = self._belief, self._newest.odometry, self._belief.reader.read(self._newest.scan)
         known = None if self._is_unsure or belief.in_doubt else belief.map_to_odom.compose(odometry)
+        grid = belief.map
         return (odometry, lambda: places(grid, scan, region, known=known)) if len(scan.points) >= POINTS_MIN else None
 
     @property
