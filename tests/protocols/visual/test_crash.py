@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import time
 from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from roboglot.model.robot import Robot
+from roboglot.programs.tasks.task_run import TaskRun
 from roboglot.storage.database import Database
 from roboglot.storage.journals import DatabaseJournalStore
 from roboglot.testing.process import child
@@ -79,3 +83,33 @@ async def test_a_program_does_not_outlive_its_server(
         assert (await app.ask("shutdown", "t"))[0]["state"] == 0
         assert await app.state("t") == "shutdown"
         assert DatabaseJournalStore(database, "a").headers_now() == {}
+
+
+async def test_recover_waits_until_the_task_is_restored(
+    connect: Callable[..., Coroutine[Any, Any, FrontEnd]],
+    plain_robot: Robot,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    path = tmp_path / "robot.db"
+    with child(SERVER, str(path)) as server:
+        assert server.stdout
+        next(line for line in iter(server.stdout.readline, "") if line.strip().isdigit())
+        server.kill()
+    begun, may_go_on, revive = asyncio.Event(), asyncio.Event(), TaskRun.revive
+
+    async def revive_slowly(run: TaskRun) -> None:
+        begun.set()
+        await may_go_on.wait()
+        await revive(run)
+
+    monkeypatch.setattr(TaskRun, "revive", revive_slowly)
+    with contextlib.closing(Database(path)) as database:
+        app = await connect(plain_robot, database)
+        await begun.wait()
+        recovering = asyncio.ensure_future(app.ask("recover", "t"))
+        await asyncio.sleep(0)
+        may_go_on.set()
+        assert (await recovering)[0]["state"] == 0
+        assert await app.state("t") == "run"
+        assert (await app.ask("shutdown", "t"))[0]["state"] == 0

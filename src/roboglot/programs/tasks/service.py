@@ -1,14 +1,14 @@
 """The tasks of one robot: saved, run at their time, debugged, suspended, ended, deleted, as the manual's tables allow.
 
-What is to be acknowledged is in the store first. Knows no frame and no socket: doors call it, and listen to its
-reports.
+What is to be acknowledged is in the store first. Knows no frame and no socket: doors call it and hear its reports.
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Collection
+from collections.abc import AsyncIterator, Collection
+from contextlib import asynccontextmanager
 from dataclasses import replace
 from datetime import UTC, tzinfo
 
@@ -160,7 +160,7 @@ class ProgramService:
         """Add or replace a task (its ``state`` is not looked at). One that is wrong is kept, too, and refused."""
         await self._check_table(TaskOperation.SAVE, task.id)
         problems, names = await self._inspector.inspect(task.body, self.library.functions)
-        async with self._lock:
+        async with self._turn():
             uses = self.library.ids(names)
             await self._keep(
                 replace(task, due=None, owner=identity()), TaskOperation.SAVE, correct=not problems, uses=uses
@@ -171,7 +171,7 @@ class ProgramService:
         """Save under the id debug and run at once; a debug run before this one is ended."""
         self.allow(TaskOperation.DEBUG)
         problems, names = await self._inspector.inspect(task.body, self.library.functions)
-        async with self._lock:
+        async with self._turn():
             uses = self.library.ids(names)
             if DEBUG in self._runs:
                 await self._runner.end(DEBUG, "another debug run took over")
@@ -186,7 +186,7 @@ class ProgramService:
 
     async def run(self, id: str, mode: str = "", condition: str = "") -> None:
         """Run a saved task at its time; ``mode`` and ``condition``, where given, replace what is stored."""
-        async with self._lock:
+        async with self._turn():
             state = await self._check_table(TaskOperation.RUN, id)
             task = await self._store.get(id)
             assert task is not None, "the table refuses to run what does not exist"
@@ -213,6 +213,8 @@ class ProgramService:
 
     async def refusal(self, operation: TaskOperation, id: str) -> ProgramError | None:
         """Return the error that ``operation`` would raise now, or None."""
+        if id in self._lost:
+            await self._revive()
         try:
             await self._check_table(operation, id)
         except ProgramError as refusal:
@@ -221,13 +223,13 @@ class ProgramService:
 
     async def suspend(self, id: str) -> None:
         """Suspend the program and the motion that it started."""
-        async with self._lock:
+        async with self._turn():
             await self._check_table(TaskOperation.SUSPEND, id)
             await self._runner.suspend(self._runs[id])
 
     async def recover(self, id: str) -> None:
         """Continue the program and its motion."""
-        async with self._lock:
+        async with self._turn():
             await self._check_table(TaskOperation.RECOVER, id)
             await self._runner.recover(self._runs[id])
 
@@ -236,7 +238,7 @@ class ProgramService:
 
         Counts from its next start, or at once if it is watched. Raises ProgramError.
         """
-        async with self._lock:
+        async with self._turn():
             run = self._runs.get(id)
             if run is None and id != DEBUG and await self._store.get(id) is None:
                 raise NotAllowed(f"there is no task {id}")
@@ -252,7 +254,7 @@ class ProgramService:
 
     async def step(self, id: str, *, to_block: bool = False) -> None:
         """Run a suspended task up to its next statement, or block; suspend a running one there. Raises ProgramError."""
-        async with self._lock:
+        async with self._turn():
             await self._check_table(TaskOperation.RECOVER, id)
             run = self._runs.get(id)
             if run is None:
@@ -267,7 +269,7 @@ class ProgramService:
     async def shutdown(self, ids: Collection[str]) -> dict[str, ProgramError]:
         """End programs and cancel what they do, all before waiting for any; return the refused ones by id."""
         refused: dict[str, ProgramError] = {}
-        async with self._lock:
+        async with self._turn():
             states: dict[str, TaskState] = {}
             for id in ids:
                 try:
@@ -292,7 +294,7 @@ class ProgramService:
 
     async def delete(self, id: str) -> None:
         """Delete a task and its log; do nothing if it does not exist."""
-        async with self._lock:
+        async with self._turn():
             await self._check_table(TaskOperation.DELETE, id)
             await self._store.remove(id)
             self._runner.stops.pop(id, None)
@@ -300,18 +302,26 @@ class ProgramService:
     async def end_of(self, owner: str, why: str) -> None:
         """End what runs for ``owner``."""
         for id in [id for id, run in self._runs.items() if run.task.owner == owner]:
-            async with self._lock:
+            async with self._turn():
                 if id in self._runs:
                     await self._runner.end(id, why)
 
-    async def _revive(self) -> None:
-        """Restore interrupted runs, suspended: nothing moves before a user recovers them."""
+    @asynccontextmanager
+    async def _turn(self) -> AsyncIterator[None]:
+        """Hold the lock, once interrupted runs are restored: suspended, until a user recovers them."""
         async with self._lock:
-            for id, header in self._lost.items():
-                task = await self._store.get(id)
-                if task is not None:
-                    await self._runner.revive(task, header)
-            self._lost = {}
+            while self._lost and not self._closed:
+                id = next(iter(self._lost))
+                try:
+                    if (task := await self._store.get(id)) is not None:
+                        await self._runner.revive(task, self._lost[id])
+                finally:
+                    del self._lost[id]
+            yield
+
+    async def _revive(self) -> None:
+        async with self._turn():
+            pass
 
     async def _check_table(self, operation: TaskOperation, id: str) -> TaskState:
         """Return the task's current state if the tables allow ``operation``. Raises NotAllowed."""
@@ -366,7 +376,7 @@ class ProgramService:
 
     async def _fire(self, id: str) -> None:
         """Start a task at its scheduled time."""
-        async with self._lock:
+        async with self._turn():
             task = await self._store.get(id)
             if task is None or self._closed:
                 return

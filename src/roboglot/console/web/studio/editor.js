@@ -43,9 +43,10 @@ export function remake() {
   workspace.addChangeListener(noticed);
   if (state) load(state, false);
   if (view) { workspace.setScale(view.scale); workspace.scroll(view.x, view.y); }
+  light(lit);
 }
 
-effect(() => { void language.value; void look.value; void shade.value; if (workspace) { remake(); light(lit); } });
+effect(() => { void language.value; void look.value; void shade.value; if (workspace) remake(); });
 
 /** @param {any} event */
 function noticed(event) {
