@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import pytest
+from websockets.exceptions import InvalidStatus
 
 from roboglot.model.admission import Admission
 from roboglot.model.components.interaction.speaker import Speaker
@@ -14,7 +15,7 @@ from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.lease import Lease
 from roboglot.model.errors import Forbidden
 from roboglot.operations import Right
-from tests.protocols.foxglove.conftest import Scene, Viewer
+from tests.protocols.foxglove.conftest import ADDRESS, PORT, Scene, Viewer
 
 FORWARD = {"linear": {"x": 0.3, "y": 0, "z": 0}, "angular": {"x": 0, "y": 0, "z": 0}}
 
@@ -156,3 +157,11 @@ async def test_parameters_that_cannot_be_are_refused(scene: Scene) -> None:
         await viewer.say("setParameters", parameters=[{"name": name, "value": value}])
     await viewer.settled()
     assert len(viewer.complaints) == 4
+
+
+async def test_pages_of_other_hosts_stay_outside(scene: Scene) -> None:
+    for page in ("https://app.foxglove.dev", "http://evil.example", "null"):
+        with pytest.raises(InvalidStatus) as refused:
+            await scene.connect(origin=page)
+        assert refused.value.response.status_code == 403
+    assert await scene.connect(origin=f"http://{ADDRESS}:{PORT}")

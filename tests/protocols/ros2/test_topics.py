@@ -141,6 +141,8 @@ async def test_what_cannot_be_done_is_a_line_of_the_log(opened: Opened) -> None:
     await peer.until(lambda: any("control is taken by a person" in line.msg for line in lines))
     await scene.robot[Lease].release()
     await published(scene, "/a/cmd_vel", TWIST, b"\x00\x01")
+    await published(scene, "/a/cmd_vel", TWIST, bytes(200_000))
+    await peer.until(lambda: any("at most 65536 bytes" in line.msg for line in lines))
     await peer.until(lambda: any("cannot be read" in line.msg for line in lines))
     await published(scene, "/a/cmd_vel", TWIST, made(TWIST, linear=vector(math.nan), angular=vector()))
     await published(scene, "/a/goal_pose", STAMPED, made(STAMPED, header=header("moon"), pose=pose(0, 0)))

@@ -6,19 +6,17 @@ from dataclasses import dataclass
 
 from roboglot.config import Port
 
-APP = "https://app.foxglove.dev"  # the vendor's web app
-
 
 @dataclass(frozen=True, slots=True)
 class FoxgloveConfig:
-    """The WebSocket's ``port``. ``origins`` and ``hosts`` are as in [slamware]; the vendor's web app may come in.
+    """The WebSocket's ``port``. ``origins`` and ``hosts`` are as in [slamware]: the vendor's web app has to be named.
 
     ``dead_man``: so long (s) a velocity counts; the Teleop panel sends one a second unless it is set otherwise.
     """
 
     enabled: bool = True
     port: Port = 8765
-    origins: tuple[str, ...] = (APP,)
+    origins: tuple[str, ...] = ()
     hosts: tuple[str, ...] = ()
     dead_man: float = 1.5
 

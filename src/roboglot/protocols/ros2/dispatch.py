@@ -18,21 +18,24 @@ MESSAGE_MAX = 65536  # bytes
 Read = Callable[[bytes, str], Ros]  # CDR and type; raises ValueError
 
 
-async def answer(context: Context, key: str, data: bytes, read: Read) -> tuple[int, str]:
-    """Do what one message asks for; returns the level and the text of why not, empty if it was done."""
+async def answer(context: Context, key: str, data: bytes | None, read: Read) -> tuple[int, str]:
+    """Do what one message asks for; returns the level and the text of why not, empty if it was done.
+
+    ``data`` is None for a message that was too long to be kept.
+    """
     tap, began = context.robot.tap, None
     if tap.watched:
-        began = tap.request(DOOR, key, data[:MESSAGE_MAX])
+        began = tap.request(DOOR, key, data or b"")
     level, why = await _do(context, key, data, read)
     if tap.watched:
         tap.reply(DOOR, key, b"", "refused" if why else "ok", why, began)
     return level, f"{key}: {why}" if why else ""
 
 
-async def _do(context: Context, key: str, data: bytes, read: Read) -> tuple[int, str]:
+async def _do(context: Context, key: str, data: bytes | None, read: Read) -> tuple[int, str]:
     operation = TABLE.get(key)
     assert operation is not None  # nothing else is subscribed to
-    if len(data) > MESSAGE_MAX:
+    if data is None:
         return logging.ERROR, f"a message has at most {MESSAGE_MAX} bytes"
     try:
         message = read(data, TYPES[key])

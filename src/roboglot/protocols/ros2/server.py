@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
+import threading
 import time
 import uuid
 from collections.abc import Coroutine, Sequence
@@ -21,7 +22,7 @@ from roboglot.model.robot import Robot
 from roboglot.protocols.door import Endpoint
 from roboglot.protocols.ros2.config import Ros2Config
 from roboglot.protocols.ros2.context import Context
-from roboglot.protocols.ros2.dispatch import answer
+from roboglot.protocols.ros2.dispatch import MESSAGE_MAX, answer
 from roboglot.protocols.ros2.vocabulary import DOOR, TYPES
 from roboglot.transport.seldom import Seldom
 from roboglot.wire.ros2.zenoh import KEPT, RELIABLE, Node, attachment, topic_key
@@ -55,7 +56,7 @@ class Ros2Door:
         self._numbers = 0
         self._sequence = 0
         self._gid = uuid.uuid4().bytes
-        self._pending = 0
+        self._room = threading.BoundedSemaphore(PENDING_MAX)  # taken in threads of Zenoh's
         self._tasks: set[asyncio.Task[None]] = set()
         self._sampler: Sampler | None = None
         self._battery: Entry | None = None
@@ -156,7 +157,11 @@ class Ros2Door:
         loop = asyncio.get_running_loop()
 
         def hear(sample: Zenoh) -> None:  # in a thread of Zenoh's
-            loop.call_soon_threadsafe(self._take, key, sample.payload.to_bytes())
+            if self._room.acquire(blocking=False):
+                data = sample.payload.to_bytes() if len(sample.payload) <= MESSAGE_MAX else None
+                loop.call_soon_threadsafe(self._take, key, data)
+            else:
+                self._seldom.warning(key, "robot %s: messages of %s are dropped, too many come", self._robot.id, key)
 
         key_of_all = topic_key(self._config.domain, topic, type, "*")
         self._tokens.append(self._session.declare_subscriber(key_of_all, hear))
@@ -164,17 +169,14 @@ class Ros2Door:
     def _topic(self, name: str) -> str:
         return f"/{self._namespace}/{name}" if self._namespace else f"/{name}"
 
-    def _take(self, key: str, data: bytes) -> None:
+    def _take(self, key: str, data: bytes | None) -> None:
+        """Answer a message; None stands for one that is too long."""
         if self._session is None:
+            self._room.release()
             return
-        if self._pending >= PENDING_MAX:
-            self._seldom.warning(key, "robot %s: messages of %s are dropped, too many come", self._robot.id, key)
-            return
-        self._pending += 1
         self._follow(self._answer(key, data))
 
-    async def _answer(self, key: str, data: bytes) -> None:
-
+    async def _answer(self, key: str, data: bytes | None) -> None:
         from roboglot.recording.ros2 import read_cdr
 
         try:
@@ -183,7 +185,7 @@ class Ros2Door:
             if why:
                 self._say(level, why)
         finally:
-            self._pending -= 1
+            self._room.release()
 
     def _report(self, action: Action) -> None:
         async def wait() -> None:
