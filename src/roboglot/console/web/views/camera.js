@@ -1,12 +1,13 @@
 // The camera: live video by WebRTC, motion JPEG where that fails, with what the robot makes out drawn over it.
 import { useEffect, useRef } from "preact/hooks";
 import { signal, useSignal } from "@preact/signals";
-import { Button, html, robotWord, t } from "../base.js";
+import { Button, html, robotWord, say, t } from "../base.js";
 import { current, seen, want } from "../link.js";
 
 const FILM_RATE = 15; // pictures a second
 const FILM_MAX = 600_000; // ms
 const filming = signal(/** @type {(() => void) | null} */ (null));
+const filmed = signal(0); // bytes of the film so far
 const CONNECT_MAX = 5000; // ms until motion JPEG takes the place of the call
 const shown = signal(false);
 const boxes = signal(true);
@@ -87,8 +88,10 @@ function film(screen, robot) {
   const recorder = new MediaRecorder(canvas.captureStream(FILM_RATE)), parts = /** @type {Blob[]} */ ([]);
   const timer = setInterval(draw, 1000 / FILM_RATE);
   const late = setTimeout(() => { if (filming.value) filming.value(); }, FILM_MAX);
-  recorder.ondataavailable = ({ data }) => parts.push(data);
+  filmed.value = 0;
+  recorder.ondataavailable = ({ data }) => { parts.push(data); filmed.value += data.size; };
   recorder.onstop = () => {
+    if (!filmed.value) { say(t("film.empty"), true); return; }
     const link = document.createElement("a");
     link.href = URL.createObjectURL(new Blob(parts, { type: recorder.mimeType }));
     link.download = `${robot}.${recorder.mimeType.includes("mp4") ? "mp4" : "webm"}`;
@@ -101,7 +104,7 @@ function film(screen, robot) {
 
 export function Camera() {
   const robot = current.value;
-  return html`<div class="card"><h3>${t("camera")}</h3><figure class="film">${shown.value ? html`<${Picture} key=${robot} robot=${robot} />` : html`<p class="muted">${t("camera.off")}</p>`}
+  return html`<div class="card"><h3>${t("camera")}</h3><figure class="film" data-filmed=${filmed.value}>${shown.value ? html`<${Picture} key=${robot} robot=${robot} />` : html`<p class="muted">${t("camera.off")}</p>`}
     <figcaption class="buttons"><${Button} label=${t(shown.value ? "camera.close" : "camera.open")} onClick=${() => { shown.value = !shown.value; }} />
     ${shown.value && html`<${Button} label=${t("camera.boxes")} on=${boxes.value} onClick=${() => { boxes.value = !boxes.value; }} />`}
     ${shown.value && html`<${Button} kind=${filming.value ? "danger" : ""} label=${t(filming.value ? "film.stop" : "film.start")} onClick=${(e) => { if (filming.value) filming.value(); else film(e.currentTarget.closest("figure"), robot); }} />`}
