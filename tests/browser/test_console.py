@@ -19,7 +19,8 @@ from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.components.system.lease import Lease
 from roboglot.recording.reader import read_recording
-from tests.browser.served import ADDRESS, Served, until
+from tests.browser.served import ADDRESS, Served
+from tests.browser.served import until as until_page
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 Page = Any
@@ -302,7 +303,7 @@ async def test_the_camera_shows_pictures_and_what_is_in_them(served: Served, ope
             await served.clock.advance(0.1)
             await asyncio.sleep(0.05)
     await page.click("text=Film")
-    await until(page, "document.querySelector('.film').dataset.filmed > 1000")
+    await until_page(page, "document.querySelector('.film').dataset.filmed > 1000")
     async with page.expect_download() as saved:
         await page.click("text=End the film")
     film = await asyncio.to_thread(Path(await (await saved.value).path()).read_bytes)
