@@ -131,6 +131,25 @@ async def test_it_wakes_up_by_itself_at_the_time_that_was_set(yard: Opened) -> N
     assert one.clock.epoch() >= then
 
 
+async def test_an_earlier_wake_up_time_wakes_no_later_sleep(yard: Opened) -> None:
+    one = await yard()
+    control = one.control
+
+    def connection() -> str:
+        return str(control.heard["connection"][-1]["connectionState"])
+
+    text = datetime.fromtimestamp(one.clock.epoch() + 30, UTC).isoformat()
+    control.send("instantActions", instant(action("startHibernation", "nap", wakeUpTime=text)))
+    await one.until(lambda: connection() == "HIBERNATING")
+    control.send("instantActions", instant(action("stopHibernation", "wake")))
+    await one.until(lambda: connection() == "ONLINE")
+    control.send("instantActions", instant(action("startHibernation", "sleep")))
+    await one.until(lambda: connection() == "HIBERNATING")
+    await one.clock.advance(40)
+    control.hear()
+    assert connection() == "HIBERNATING"
+
+
 async def test_a_robot_that_is_switched_off_takes_leave(yard: Opened) -> None:
     one = await yard()
     control = one.control

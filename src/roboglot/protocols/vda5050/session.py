@@ -59,6 +59,7 @@ class Session:
         self.errors: list[Error] = []
         self.paused = False
         self.hibernating = False  # heard by the door: no states, and nothing is taken but stopHibernation
+        self.alarm: asyncio.Future[None] | None = None  # wakes the robot at the time that was given
         self.leaving = False  # the robot switches off: the door takes leave of the broker
         self.load: dict[str, str] = {}  # what fleet control said of the load that was picked
         self.changed = asyncio.Event()
@@ -133,11 +134,12 @@ class Session:
             _forget_oldest(self.instant)
             self.run_beside(self._do_instantly(state))
 
-    def run_beside(self, work: Awaitable[None]) -> None:
+    def run_beside(self, work: Awaitable[None]) -> asyncio.Future[None]:
         """Run ``work`` until it ends or the door closes."""
         task = asyncio.ensure_future(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
+        return task
 
     def _read(self, payload: bytes, kind: type[Any]) -> Any:
         try:

@@ -24,13 +24,15 @@ async def start_hibernation(session: Session, *, wakeUpTime: str = "") -> str:  
         await ended(session.robot[Power].save(source=SOURCE))
     session.hibernating = True
     if seconds is not None:
-        session.run_beside(_wake_in(session, seconds))
+        session.alarm = session.run_beside(_wake_in(session, seconds))
     return ""
 
 
 @TABLE.on("stopHibernation", right=Right.ADMIN)
 async def stop_hibernation(session: Session) -> str:
     """Be ready for orders again."""
+    if session.alarm is not None:
+        session.alarm.cancel()
     await _wake(session)
     return ""
 
@@ -47,8 +49,8 @@ async def shut_down(session: Session) -> str:
 
 async def _wake_in(session: Session, seconds: float) -> None:
     await session.robot.clock.sleep(seconds)
-    if session.hibernating:
-        await _wake(session)
+    session.alarm = None
+    await _wake(session)
 
 
 async def _wake(session: Session) -> None:
