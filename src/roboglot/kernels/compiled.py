@@ -1,8 +1,8 @@
 """How every kernel is compiled: ahead for its one signature, kept on disk, without the interpreter's lock.
 
 No C wrapper is made, which nothing calls and which takes a tenth of the compiler's time. Kernels are written with loops
-rather than array expressions and reductions: those compile ten times as slowly, and run no faster. LLVM optimises at level 2:
-level 3 takes an eighth longer, and the kernels run no faster.
+rather than array expressions and reductions: those compile ten times as slowly, and run no faster. LLVM optimises at
+level 2: level 3 takes an eighth longer, and the kernels run no faster.
 """
 
 from __future__ import annotations
@@ -13,6 +13,6 @@ from typing import Any
 
 os.environ.setdefault("NUMBA_OPT", "2")  # read when Numba is imported
 
-from numba import njit  # noqa: E402
+from numba import njit
 
 kernel: Any = partial(njit, cache=True, nogil=True, no_cfunc_wrapper=True)
