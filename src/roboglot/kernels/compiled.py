@@ -2,7 +2,7 @@
 
 No C wrapper is made, which nothing calls and which takes a tenth of the compiler's time. Kernels are written with loops
 rather than array expressions and reductions: those compile ten times as slowly, and run no faster. LLVM optimises at
-level 2: level 3 takes an eighth longer, and the kernels run no faster.
+level 1: level 3 takes a sixth longer, and the kernels run no faster.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import os
 from functools import partial
 from typing import Any
 
-os.environ.setdefault("NUMBA_OPT", "2")  # read when Numba is imported
+os.environ.setdefault("NUMBA_OPT", "1")  # read when Numba is imported
 
 from numba import njit
 
