@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from roboglot.cli.checks.listeners import holder_of
 from roboglot.cli.doctor import examine_ports
-from roboglot.cli.listeners import holder_of
 from roboglot.config import Config, RobotConfig
 from roboglot.protocols.slamware.config import SlamwareConfig
 

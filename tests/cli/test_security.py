@@ -13,7 +13,7 @@ import pytest
 from roboglot.access.audit import FILE as AUDIT
 from roboglot.access.audit import Audit, Entry
 from roboglot.access.store import FILE, AccessStore, Grant
-from roboglot.cli.security import DAY, UNUSED_DAYS, examine_security
+from roboglot.cli.checks.security import DAY, UNUSED_DAYS, examine_security
 from roboglot.config import AccessConfig, Config, RobotConfig, TlsConfig
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.certificates import ensure_certificates

@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from roboglot.cli.listeners import holder_of
+from roboglot.cli.checks.listeners import holder_of
 from roboglot.config import Config
 from roboglot.protocols import DOORS
 from roboglot.testing.process import NotUp

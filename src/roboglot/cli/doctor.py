@@ -9,7 +9,6 @@ import socket
 import sys
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,19 +16,10 @@ from typing import Annotated
 
 import typer
 
-from roboglot.cli.listeners import holder_of
+from roboglot.cli.checks.finding import Finding
+from roboglot.cli.checks.listeners import holder_of
 from roboglot.config import Config, load_config
 from roboglot.protocols import DOORS, sections
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """One check: whether it is well, what was seen, and what to do if not."""
-
-    name: str
-    well: bool
-    seen: str
-    remedy: str = ""
 
 
 def command(
@@ -45,7 +35,7 @@ def command(
     except ValueError as error:
         sys.exit(f"roboglot doctor: {error}")
     if security:
-        from roboglot.cli.security import examine_security
+        from roboglot.cli.checks.security import examine_security
 
         findings = list(examine_security(settings))
     else:

@@ -14,8 +14,8 @@ import msgspec
 import typer
 
 from roboglot.cli.maps.merge import merged
+from roboglot.cli.maps.ros_map import write_ros_map
 from roboglot.cli.maps.survey import RADIUS, first_pose, surveyed
-from roboglot.media.ros_map import encode_ros_map
 from roboglot.model.maps import OccupancyGrid
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, composite_of, floors_of
 from roboglot.simulation.world.world_files import load_world, read_ros_grid
@@ -108,13 +108,6 @@ def grid_in(data: bytes) -> OccupancyGrid:
     if grid is None or not grid.width:
         raise BadMap("the map is empty")
     return grid
-
-
-def write_ros_map(grid: OccupancyGrid, path: Path) -> None:
-    """Write ``path`` (yaml) and the image beside it (pgm)."""
-    about, image = encode_ros_map(grid, path.stem)
-    path.with_suffix(".pgm").write_bytes(image)
-    path.write_bytes(about)
 
 
 def _give(robot: str, data: bytes, pose: str) -> None:

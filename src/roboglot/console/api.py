@@ -133,7 +133,10 @@ class Api:
             self._desk.view(name, "look at the recording")
         if method == "GET":
             return recordings.look()
-        return await recordings.do(self._desk, _wish(await read_json(receive), RecordingWish))
+        wish = _wish(await read_json(receive), RecordingWish)
+        for robot in self._desk.robots.values():
+            robot.admission.check(CLIENT, "record", Right.ADMIN)
+        return await recordings.do(wish)
 
     async def _serve_program(self, method: str, name: str, what: str, receive: Receive, send: Send) -> None:
         if method == "GET" and what == "program":

@@ -23,7 +23,7 @@ BAR = 40  # characters
 
 def build(log: Path, out: Path, relations: Path | None) -> None:
     """Map ``log`` into the folder ``out``. Raises BadDriveLog, OSError, ValueError."""
-    from roboglot.cli.map import write_ros_map
+    from roboglot.cli.maps.ros_map import write_ros_map
 
     recording = read_drive_log(log)
     out.mkdir(parents=True, exist_ok=True)

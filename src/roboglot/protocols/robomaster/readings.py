@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import astuple
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.gimbal import Gimbal
@@ -13,21 +13,34 @@ from roboglot.model.components.motion.motion_status import MotionStatus
 from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.link import require_heard
-from roboglot.model.geometry import ORIGIN
+from roboglot.model.geometry import ORIGIN, Pose
 from roboglot.model.robot import Robot
 from roboglot.protocols.robomaster.vocabulary import wheels_in_rpm
-from roboglot.wire.robomaster.replies import Number
-
-if TYPE_CHECKING:
-    from roboglot.protocols.robomaster.context import Context
+from roboglot.wire.robomaster.replies import Number, Profile
 
 
-def position(context: Context) -> tuple[float, float, float]:
+class Asked(Protocol):
+    """Which robot is read, and how its answers are given."""
+
+    @property
+    def robot(self) -> Robot:
+        """The one that is read."""
+
+    @property
+    def origin(self) -> Pose:
+        """Of chassis positions, in the odometry's frame."""
+
+    @property
+    def profile(self) -> Profile:
+        """How robots answer, where the manual differs."""
+
+
+def position(asked: Asked) -> tuple[float, float, float]:
     """x m, y m, z degrees since power-on (robots: since ``command``), by odometry (so it drifts); z in (-180, 180]."""
-    require_heard(context.robot)
-    pose = context.robot[Odometry].reading.pose
-    if context.origin is not ORIGIN:
-        pose = pose.relative_to(context.origin)
+    require_heard(asked.robot)
+    pose = asked.robot[Odometry].reading.pose
+    if asked.origin is not ORIGIN:
+        pose = pose.relative_to(asked.origin)
     return pose.x, -pose.y, -math.degrees(pose.yaw)
 
 
@@ -38,12 +51,12 @@ def attitude(robot: Robot) -> tuple[float, float, float]:
     return -math.degrees(orientation.pitch), math.degrees(orientation.roll), -math.degrees(orientation.yaw)
 
 
-def speed(context: Context) -> tuple[float | int, ...]:
+def speed(asked: Asked) -> tuple[float | int, ...]:
     """x m/s, y m/s, z degrees/s as odometry measures them, and the four wheels in whole rpm."""
-    robot = context.robot
+    robot = asked.robot
     require_heard(robot)
     twist = robot[Odometry].reading.twist
-    wheels = wheels_in_rpm(robot[Base].wheel_speeds, context.profile.as_robots)
+    wheels = wheels_in_rpm(robot[Base].wheel_speeds, asked.profile.as_robots)
     return (twist.x, -twist.y, -math.degrees(twist.yaw), *wheels)
 
 
@@ -61,11 +74,11 @@ def gimbal_attitude(robot: Robot) -> tuple[float, float]:
 
 
 # What can be pushed, by module, in the manual's order. The position push carries no angle.
-PUSHED: dict[str, dict[str, Callable[[Context], tuple[Number, ...]]]] = {
+PUSHED: dict[str, dict[str, Callable[[Asked], tuple[Number, ...]]]] = {
     "chassis": {
-        "position": lambda context: position(context)[:2],
-        "attitude": lambda context: attitude(context.robot),
-        "status": lambda context: status(context.robot),
+        "position": lambda asked: position(asked)[:2],
+        "attitude": lambda asked: attitude(asked.robot),
+        "status": lambda asked: status(asked.robot),
     },
-    "gimbal": {"attitude": lambda context: gimbal_attitude(context.robot)},
+    "gimbal": {"attitude": lambda asked: gimbal_attitude(asked.robot)},
 }

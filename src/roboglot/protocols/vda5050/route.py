@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from roboglot.model.actions import Action as RobotAction
 from roboglot.model.actions import ActionStatus as Goal
@@ -14,14 +14,13 @@ from roboglot.model.components.motion.navigation import Navigation, NavigationFe
 from roboglot.model.errors import RobotError
 from roboglot.model.events import ActionChanged
 from roboglot.model.geometry import Point
+from roboglot.model.robot import Robot
+from roboglot.operations import Operation
 from roboglot.protocols.vda5050.errors import Rejected, kind_of
-from roboglot.protocols.vda5050.order_book import ActionStatus
+from roboglot.protocols.vda5050.order_book import ActionState, ActionStatus, OrderBook
 from roboglot.protocols.vda5050.table import operation_of
-from roboglot.wire.vda5050.orders import Action, Node
-from roboglot.wire.vda5050.versions import ErrorKind, Level
-
-if TYPE_CHECKING:
-    from roboglot.protocols.vda5050.session import Session
+from roboglot.wire.vda5050.orders import Action, Edge, Node
+from roboglot.wire.vda5050.versions import ErrorKind, Level, Version
 
 log = logging.getLogger(__name__)
 TOLERANCE = 0.05  # m: as near as the robot goes where the order allows no deviation
@@ -51,10 +50,37 @@ class Leg:
         return [Point(node.node_position.x, node.node_position.y) for node in self.nodes if node.node_position]
 
 
+class Driven(Protocol):
+    """The session that a route belongs to."""
+
+    robot: Robot
+    book: OrderBook
+    version: Version
+    paused: bool
+
+    def touch(self) -> None:
+        """Have the state sent."""
+
+    def check(self, operation: str, right: Right | None) -> None:
+        """Raise Rejected unless fleet control has the right."""
+
+    def refuse(self, rejected: Rejected) -> None:
+        """Report why a message or an action was not taken."""
+
+    def report(self, kind: ErrorKind, level: Level, why: str, references: dict[str, str] | None = None) -> None:
+        """Keep an error, and send it."""
+
+    def speed_ratio(self, edge: Edge | None) -> float:
+        """Return the share of the top speed to drive an edge with."""
+
+    async def perform(self, state: ActionState, operation: Operation[str]) -> None:
+        """Do an action of a node."""
+
+
 class Route:
     """What the robot drives now for one session."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: Driven) -> None:
         self._session = session
         self._task: asyncio.Task[None] | None = None
         self._beside: set[asyncio.Task[None]] = set()

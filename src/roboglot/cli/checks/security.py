@@ -13,8 +13,8 @@ from typing import Any
 from roboglot.access import audit
 from roboglot.access.rights import ALL_ROBOTS, BRINGS, whole, write_rights
 from roboglot.access.store import FILE, AccessStore, Grant, Identity, Kind
-from roboglot.cli.doctor import Finding
-from roboglot.cli.listeners import holder_of
+from roboglot.cli.checks.finding import Finding
+from roboglot.cli.checks.listeners import holder_of
 from roboglot.config import Config, is_loopback
 from roboglot.operations import Right
 from roboglot.protocols import DOORS
