@@ -10,9 +10,11 @@ import logging
 import socket
 import ssl
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
+from roboglot.access.tunnel.busy_poll import BusyPoll
 from roboglot.access.tunnel.frames import Kind
 from roboglot.access.tunnel.link import Link
 from roboglot.access.tunnel.tunnel import Tunnel
@@ -71,7 +73,8 @@ class Connector:
         context.minimum_version = ssl.TLSVersion.TLSv1_3
         context.check_hostname, context.verify_mode = False, ssl.CERT_NONE  # the fingerprint is what is checked
         loop = asyncio.get_running_loop()
-        _, call = await loop.create_connection(lambda: TlsCall(Link, context), self._gateway, self._port)
+        made = partial(Link, stir=BusyPoll().stir)
+        _, call = await loop.create_connection(lambda: TlsCall(made, context), self._gateway, self._port)
         link = cast(Link, await call.over)
         try:
             certificate = link.transport.get_extra_info("ssl_object").getpeercert(binary_form=True)

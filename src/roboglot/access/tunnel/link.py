@@ -18,11 +18,13 @@ _KINDS = {int(kind): kind for kind in Kind}
 class Link(asyncio.Protocol):
     """``first`` waits for a frame; after ``follow`` each is handed on.
 
-    ``made`` is called when it is there.
+    ``made`` is called when it is there, ``stir`` with the size of all that is sent and received.
     """
 
-    def __init__(self, made: Callable[[Link], None] = lambda _link: None) -> None:
-        self._made = made
+    def __init__(
+        self, made: Callable[[Link], None] = lambda _link: None, stir: Callable[[int], None] = lambda _size: None
+    ) -> None:
+        self._made, self._stir = made, stir
         self._take: Take | None = None
         self._crowded: Callable[[bool], None] = lambda _crowded: None
         self._buffer = bytearray()
@@ -39,6 +41,7 @@ class Link(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         """Cut it; what is no frame ends the connection."""
+        self._stir(len(data))
         try:
             self._cut(data)
         except BadFrame as bad:
@@ -78,6 +81,8 @@ class Link(asyncio.Protocol):
         """Send a frame; lost where there is no connection any more."""
         if not self.transport.is_closing():
             self.transport.write(encode(kind, number, payload))
+            if kind is Kind.DATA:
+                self._stir(len(payload))
 
     def end(self, why: str) -> None:
         """Hang up."""

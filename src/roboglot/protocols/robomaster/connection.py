@@ -36,6 +36,7 @@ class ControlConnection(asyncio.Protocol):
     host: str
     driver: Driver
     _name: str  # host and port: who commands
+    _shown: str  # in the log: who it is, where that is known, and its host
 
     def __init__(
         self,
@@ -65,6 +66,8 @@ class ControlConnection(asyncio.Protocol):
         peer = transport.get_extra_info("peername")  # None: it is gone already
         self.host = peer[0] if peer else ""
         self._name = f"{peer[0]}:{peer[1]}" if peer else ""
+        who = self._context.robot.admission.known(self._name) if peer else None
+        self._shown = f"{who} at {self.host}" if who else self.host
         if not peer or len(self._connections) >= CONTROL_CONNECTIONS_MAX:
             log.warning("robomaster: %s turned away, %d connections are open", self.host, len(self._connections))
             transport.abort()
@@ -74,7 +77,7 @@ class ControlConnection(asyncio.Protocol):
         transport.set_write_buffer_limits(high=OUTPUT_MAX)
         probe_for_life(transport)
         self._greeting.known = transport.get_extra_info("sockname") is None  # a serial line: no browser gets there
-        log.info("robomaster: %s connected", self.host)
+        log.info("robomaster: %s connected", self._shown)
 
     def data_received(self, data: bytes) -> None:
         texts = list(self._splitter.feed(turn_away_strangers(self._greeting, self.transport, data)))
@@ -95,7 +98,7 @@ class ControlConnection(asyncio.Protocol):
             self._worker.cancel()
         self._context.stop_speaker(self._name)
         self._context.leave(self)
-        log.info("robomaster: %s disconnected", self.host)
+        log.info("robomaster: %s disconnected", self._shown)
 
     def pause_writing(self) -> None:
         self._writable.clear()
@@ -157,7 +160,7 @@ class ControlConnection(asyncio.Protocol):
 
     def _refusal(self, text: str | None, result: Answer) -> str:
         shown = "(a text)" if text is None else repr(text[:TEXT_SHOWN_MAX])
-        return f"{self.host} asked {shown}: {result.reply.decode()} ({result.why})"
+        return f"{self._shown} asked {shown}: {result.reply.decode()} ({result.why})"
 
     def _join(self) -> None:
         """A command while the robot is in SDK mode keeps it there."""

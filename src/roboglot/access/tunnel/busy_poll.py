@@ -1,0 +1,34 @@
+"""Keeps an event loop awake while a short answer is expected: a process that sleeps is woken tens of µs late."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+
+AWAKE = 200e-6  # s after a message: a robot's answer, and most clients' next question, come within it
+SHORT_MAX = 2048  # bytes of a message that is a question or an answer; streams of more bear the delay
+
+
+class BusyPoll:
+    """``stir`` at every message. At 50 messages a second it costs a hundredth of a core."""
+
+    def __init__(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._until = 0.0
+        self._polling = False
+
+    def stir(self, size: int) -> None:
+        """Stay awake, if the message was short."""
+        if size > SHORT_MAX:
+            return
+        self._until = time.perf_counter() + AWAKE
+        if not self._polling:
+            self._polling = True
+            self._loop.call_soon(self._poll)
+
+    def _poll(self) -> None:
+        """Have the loop look for news without sleeping, again and again."""
+        if time.perf_counter() < self._until:
+            self._loop.call_soon(self._poll)
+        else:
+            self._polling = False
