@@ -1,4 +1,4 @@
-"""Live video of the console: who may see it, for how long."""
+"""Live video and sound of the console: what is heard, who may see it, for how long."""
 
 from __future__ import annotations
 
@@ -6,9 +6,64 @@ import asyncio
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
+from aiortc import RTCConfiguration, RTCPeerConnection, RTCSessionDescription
 
 from roboglot.console.camera import Calls
+from roboglot.model.components.interaction.speaker import Speaker
+from roboglot.model.sound import SAMPLE_RATE, Sound
+from roboglot.wire.ice import offer_loopback
+from tests.console.conftest import Shown
+
+PITCH = 1000  # Hz
+
+
+async def call(shown: Shown, *kinds: str) -> RTCPeerConnection:
+    """A page's end of a call for media of ``kinds``."""
+    offer_loopback()
+    peer = RTCPeerConnection(RTCConfiguration(iceServers=[]))
+    for kind in kinds:
+        peer.addTransceiver(kind, direction="recvonly")
+    await peer.setLocalDescription(await peer.createOffer())
+    status, words = await shown.ask("/api/robots/a/camera/call", {"offer": peer.localDescription.sdp})
+    assert status == 200, words
+    await peer.setRemoteDescription(RTCSessionDescription(words["answer"], "answer"))
+    return peer
+
+
+def pitch_of(samples: Any) -> float:
+    """Hz of the loudest part; 0 for silence."""
+    spectrum = np.abs(np.fft.rfft(samples))
+    return 0.0 if samples.max() < 100 else float(np.fft.rfftfreq(len(samples), 1 / SAMPLE_RATE)[spectrum.argmax()])
+
+
+async def test_a_page_hears_what_the_robot_hears(shown: Shown) -> None:
+    peer = await call(shown, "video", "audio")
+    (receiver,) = (each for each in peer.getReceivers() if each.track.kind == "audio")
+    wave = 8000 * np.sin(2 * np.pi * PITCH / SAMPLE_RATE * np.arange(60 * SAMPLE_RATE))
+    shown.robot[Speaker].play(Sound("tone", wave.astype(np.int16)))
+
+    async def pass_time() -> None:
+        while True:
+            await shown.clock.advance(0.02)
+            await asyncio.sleep(0.005)
+
+    passing, heard = asyncio.ensure_future(pass_time()), 0.0
+    try:
+        async with asyncio.timeout(60):
+            while abs(heard - PITCH) > PITCH / 20:
+                frame = await receiver.track.recv()
+                heard = pitch_of(frame.to_ndarray().reshape(-1, 2)[:, 0].astype(float))
+    finally:
+        passing.cancel()
+        await peer.close()
+
+
+async def test_a_page_that_asks_for_pictures_alone_gets_no_sound(shown: Shown) -> None:
+    peer = await call(shown, "video")
+    assert "m=audio" not in peer.remoteDescription.sdp
+    await peer.close()
 
 
 async def test_a_call_ends_when_its_caller_may_see_no_more(monkeypatch: pytest.MonkeyPatch) -> None:

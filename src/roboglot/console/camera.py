@@ -1,4 +1,4 @@
-"""The robot's camera for pages: photos, motion JPEG, live video by WebRTC, what the robot makes out in the picture."""
+"""The robot's camera for pages: photos, motion JPEG, video with sound by WebRTC, what the robot makes out in it."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from roboglot.console.http import Problem, Receive, Send, answer
 from roboglot.console.settings import CALL_SECONDS, CALLS_MAX, JPEG_QUALITY, OFFER_MAX, REVOKED_SECONDS
+from roboglot.media.audio import AudioStream
 from roboglot.media.stills import jpeg
 from roboglot.media.video import VideoStream, beside
 from roboglot.model import background
@@ -74,14 +75,15 @@ class Calls:
         self._closing: set[asyncio.Task[None]] = set()
 
     async def answer(self, robot: Robot, offer: str) -> str:
-        """Return the SDP that answers a page's ``offer`` of a video. Raises Problem, Busy, ComponentMissing."""
+        """Return the SDP that answers a page's ``offer`` of video and sound. Raises Problem, Busy, ComponentMissing."""
         stream = robot[VideoStream]
         if len(self._calls) >= CALLS_MAX:
             raise Busy(f"{CALLS_MAX} pages show live video already")
         if len(offer) > OFFER_MAX:
             raise Problem(413, f"an offer has at most {OFFER_MAX} characters")
         webrtc: Any = await beside(robot.clock, lambda: importlib.import_module("roboglot.media.webrtc"))
-        call: VideoCall = webrtc.VideoCall(stream, robot.clock, lambda state: self._changed(call, late, state))
+        sound = robot[AudioStream] if AudioStream in robot else None  # noqa: SIM401 - a robot has no get
+        call: VideoCall = webrtc.VideoCall(stream, robot.clock, lambda state: self._changed(call, late, state), sound)
         late: asyncio.TimerHandle = asyncio.get_running_loop().call_later(CALL_SECONDS, self._end, call)
         self._calls.add(call)
         self._look_after(robot, call)

@@ -1,4 +1,4 @@
-"""Live video to one viewer by WebRTC: the stream's own packets, so that one encoder serves all viewers.
+"""Live video and sound to one viewer by WebRTC: the streams' own packets, so that one encoder serves all viewers.
 
 Imports aiortc: import this module only when a picture is requested. Independent of the signalling: texts go in and
 come out. Its time is the network's, not the robot's: what is sent is stamped with the time at which it is to be shown.
@@ -11,7 +11,7 @@ import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from aiortc import (
     MediaStreamTrack,
@@ -26,16 +26,21 @@ from aiortc.mediastreams import MediaStreamError
 from aiortc.sdp import candidate_from_sdp
 from av.packet import Packet
 
+from roboglot.media.audio import AudioStream
 from roboglot.media.h264 import VideoPacket
+from roboglot.media.opus import AudioPacket
 from roboglot.media.video import VideoStream
 from roboglot.model.clock import Clock, RealClock
+from roboglot.model.components.sensing.microphone import BLOCK
 from roboglot.model.errors import RobotError
 from roboglot.model.feed import Viewer
+from roboglot.model.sound import SAMPLE_RATE
 from roboglot.wire.ice import offer_loopback
 
 log = logging.getLogger(__name__)
-TIME_BASE = Fraction(1, 90_000)
+P = TypeVar("P", VideoPacket, AudioPacket)
 KEYFRAME_EVERY = 0.3  # s between two key pictures that one viewer can ask for
+GAP = SAMPLE_RATE // 5  # samples by which sound may come early or late and still be heard without a break
 SECTIONS_MAX = 8  # media sections of an offer: each may cost sockets
 H264, RETRANSMISSION = "video/h264", "video/rtx"
 
@@ -53,39 +58,67 @@ class IceCandidate:
     index: int
 
 
-class _PacketTrack(MediaStreamTrack):
-    """Hands the stream's packets over as they are; looks at the stream from the first ``recv`` on."""
+class _PacketTrack(MediaStreamTrack, Generic[P]):
+    """Hands a stream's packets over as they are; looks at the stream from the first ``recv`` on."""
 
-    kind = "video"
+    base: Fraction  # s, the unit of a packet's time
 
-    def __init__(self, stream: VideoStream, clock: Clock, blind: Callable[[], None]) -> None:
+    def __init__(self, subscribe: Callable[[], Viewer[P]], clock: Clock, ended: Callable[[], None]) -> None:
         super().__init__()
-        self._stream, self._clock, self._blind = stream, clock, blind
-        self._viewer: Viewer[VideoPacket] | None = None
-        self._keyframe_at = float("-inf")
+        self._subscribe: Callable[[], Viewer[P]] = subscribe
+        self._clock, self._ended = clock, ended
+        self._viewer: Viewer[P] | None = None
         self._last = -1
 
     async def recv(self) -> Packet[Any]:
-        """The next picture. Raises MediaStreamError when there are no more."""
+        """The next packet. Raises MediaStreamError when there are no more."""
         try:
             if self._viewer is None:
-                self._viewer = self._stream.subscribe()
-            picture = await anext(self._viewer)
+                self._viewer = self._subscribe()
+            media = await anext(self._viewer)
         except (StopAsyncIteration, RobotError):
             if self.readyState == "live":
-                self._blind()
+                self._ended()
             self.stop()
             raise MediaStreamError from None
-        packet = Packet(picture.data)
-        self._last = packet.pts = max(self._last + 1, round(self._shown_at(picture.stamp) / TIME_BASE))
-        packet.time_base, packet.is_keyframe = TIME_BASE, picture.keyframe
+        packet = self._packet(media)
+        self._last = packet.pts = self._due(round(self._shown_at(media.stamp) / self.base))
+        packet.time_base = self.base
         return packet
+
+    def _packet(self, media: P) -> Packet[Any]:
+        return Packet(media.data)
+
+    def _due(self, now: int) -> int:
+        """When the packet is to be shown, in units of ``base``; ``now`` is when it was made."""
+        return max(self._last + 1, now)
 
     def _shown_at(self, stamp: float) -> float:
         """Outside time in s: a clock that runs faster shows its pictures faster; in lockstep, when they come."""
         if isinstance(self._clock, RealClock):
             return self._clock.real_time_of(stamp)
         return asyncio.get_running_loop().time()
+
+    def stop(self) -> None:
+        super().stop()
+        if self._viewer is not None:
+            self._viewer.close()
+
+
+class _PictureTrack(_PacketTrack[VideoPacket]):
+    """The camera's."""
+
+    kind, base = "video", Fraction(1, 90_000)
+
+    def __init__(self, stream: VideoStream, clock: Clock, blind: Callable[[], None]) -> None:
+        super().__init__(stream.subscribe, clock, blind)
+        self._stream = stream
+        self._keyframe_at = float("-inf")
+
+    def _packet(self, media: VideoPacket) -> Packet[Any]:
+        packet = super()._packet(media)
+        packet.is_keyframe = media.keyframe
+        return packet
 
     def request_keyframe(self) -> None:
         """The viewer lost something."""
@@ -94,20 +127,35 @@ class _PacketTrack(MediaStreamTrack):
             self._keyframe_at = now
             self._stream.request_keyframe()
 
-    def stop(self) -> None:
-        super().stop()
-        if self._viewer is not None:
-            self._viewer.close()
+
+class _SoundTrack(_PacketTrack[AudioPacket]):
+    """The microphone's."""
+
+    kind, base = "audio", Fraction(1, SAMPLE_RATE)
+
+    def __init__(self, stream: AudioStream, clock: Clock) -> None:
+        super().__init__(stream.subscribe, clock, lambda: None)
+
+    def _due(self, now: int) -> int:
+        """Right after the packet before, unless sound was missing in between."""
+        follows = self._last + BLOCK
+        return follows if self._last >= 0 and abs(now - follows) < GAP else max(self._last + 1, now)
 
 
 class VideoCall:
-    """One viewer. ``changed(state)`` receives aiortc's connection states, and "blind" after the last picture."""
+    """One viewer. ``changed(state)`` receives aiortc's connection states, and "blind" after the last picture.
 
-    def __init__(self, stream: VideoStream, clock: Clock, changed: Callable[[str], None]) -> None:
+    ``sound`` is sent, too, to a viewer that asks for it.
+    """
+
+    def __init__(
+        self, stream: VideoStream, clock: Clock, changed: Callable[[str], None], sound: AudioStream | None = None
+    ) -> None:
         offer_loopback()
         # Without STUN servers: no outside host learns our address.
         self._peer = RTCPeerConnection(RTCConfiguration(iceServers=[]))
-        self._track = _PacketTrack(stream, clock, lambda: changed("blind"))
+        self._track = _PictureTrack(stream, clock, lambda: changed("blind"))
+        self._sound = _SoundTrack(sound, clock) if sound is not None else None
         self._peer.add_listener("connectionstatechange", lambda: changed(self._peer.connectionState))
 
     async def answer(self, offer: str) -> str:
@@ -123,6 +171,8 @@ class VideoCall:
         transceiver.setCodecPreferences([codec for codec in codecs if codec.mimeType.lower() in (H264, RETRANSMISSION)])
         # aiortc asks its own encoder for a key picture; we have another one.
         sender._send_keyframe = self._track.request_keyframe  # type: ignore[method-assign]
+        if self._sound is not None and "m=audio" in offer:
+            peer.addTrack(self._sound)
         try:
             await peer.setRemoteDescription(RTCSessionDescription(offer, "offer"))
             if transceiver.mid is None or transceiver._offerDirection not in ("sendonly", "sendrecv"):
@@ -165,4 +215,6 @@ class VideoCall:
     async def close(self) -> None:
         """Hang up."""
         self._track.stop()
+        if self._sound is not None:
+            self._sound.stop()
         await self._peer.close()

@@ -1,4 +1,4 @@
-// The camera: live video by WebRTC, motion JPEG where that fails, with what the robot makes out drawn over it.
+// The camera: live video with sound by WebRTC, motion JPEG where that fails, with what the robot makes out drawn over it.
 import { useEffect, useRef } from "preact/hooks";
 import { signal, useSignal } from "@preact/signals";
 import { Button, html, robotWord, say, t } from "../base.js";
@@ -11,12 +11,19 @@ const filmed = signal(0); // bytes of the film so far
 const CONNECT_MAX = 5000; // ms until motion JPEG takes the place of the call
 const shown = signal(false);
 const boxes = signal(true);
+const hears = signal(false); // whether the call carries sound
+const loud = signal(false);
 
 /** Call the robot's camera; the promise is the peer, or fails. @param {HTMLVideoElement} video @param {string} robot */
 async function call(video, robot) {
   const peer = new RTCPeerConnection();
   peer.addTransceiver("video", { direction: "recvonly" });
-  peer.ontrack = ({ track }) => { video.srcObject = new MediaStream([track]); };
+  peer.addTransceiver("audio", { direction: "recvonly" });
+  video.srcObject = new MediaStream();
+  peer.ontrack = ({ track }) => {
+    /** @type {MediaStream} */ (video.srcObject).addTrack(track);
+    if (track.kind === "audio") track.onunmute = () => { hears.value = true; };
+  };
   try {
     await peer.setLocalDescription();
     await gathered(peer);
@@ -68,10 +75,10 @@ function Picture({ robot }) {
     let peer = null, gone = false;
     call(video.current, robot).then((made) => { if (gone) made.close(); else peer = made; }, () => { if (!gone) plain.value = true; });
     want({ seen: true });
-    return () => { filming.value?.(); gone = true; peer?.close(); want({ seen: false }); };
+    return () => { filming.value?.(); gone = true; hears.value = false; peer?.close(); want({ seen: false }); };
   }, [robot]);
   return html`<div class="screen">${plain.value ? html`<img src=${`/api/robots/${robot}/camera.mjpeg`} alt=${t("camera.alt")} />`
-    : html`<video ref=${video} autoplay playsinline muted aria-label=${t("camera.alt")}></video>`}<${Boxes} /></div>`;
+    : html`<video ref=${video} autoplay playsinline muted=${!loud.value} aria-label=${t("camera.alt")}></video>`}<${Boxes} /></div>`;
 }
 
 /** Film what is on the screen until it is called again; then the file is saved. @param {Element} screen @param {string} robot */
@@ -107,6 +114,7 @@ export function Camera() {
   return html`<div class="card"><h3>${t("camera")}</h3><figure class="film" data-filmed=${filmed.value}>${shown.value ? html`<${Picture} key=${robot} robot=${robot} />` : html`<p class="muted">${t("camera.off")}</p>`}
     <figcaption class="buttons"><${Button} label=${t(shown.value ? "camera.close" : "camera.open")} onClick=${() => { shown.value = !shown.value; }} />
     ${shown.value && html`<${Button} label=${t("camera.boxes")} on=${boxes.value} onClick=${() => { boxes.value = !boxes.value; }} />`}
+    ${shown.value && hears.value && html`<${Button} label=${t("camera.sound")} on=${loud.value} onClick=${() => { loud.value = !loud.value; }} />`}
     ${shown.value && html`<${Button} kind=${filming.value ? "danger" : ""} label=${t(filming.value ? "film.stop" : "film.start")} onClick=${(e) => { if (filming.value) filming.value(); else film(e.currentTarget.closest("figure"), robot); }} />`}
     <a class="button" href=${`/api/robots/${robot}/camera.jpg`} download=${`${robot}.jpg`}>${t("photo")}</a></figcaption></figure></div>`;
 }
