@@ -19,9 +19,10 @@ from roboglot.model.components.mapping.map_library import MapLibrary, StoredMap
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.system.lease import Lease
 from roboglot.model.errors import Unconnected
-from roboglot.model.geometry import Point
+from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.tap import Direction, Exchange
 from roboglot.operations import BadParameters
@@ -175,10 +176,10 @@ async def test_the_clock_of_a_world_is_paused_stepped_and_sped_up(tmp_path: Path
     await desk.change_world("step_clock", {"seconds": 0.05})
     await clock.sleep_until(now + 0.05)
     assert clock.time() == now + 0.05
-    assert desk.world.pace == {"lockstep": False, "speed": 1.0, "paused": True}
+    assert desk.pace == {"lockstep": False, "speed": 1.0, "paused": True, "seed": 1}
     await desk.change_world("resume_clock", {})
     await desk.change_world("set_clock_speed", {"speed": 5})
-    assert desk.world.pace == {"lockstep": False, "speed": 5.0, "paused": False}
+    assert desk.pace == {"lockstep": False, "speed": 5.0, "paused": False, "seed": 1}
     with pytest.raises(BadParameters):
         await desk.change_world("set_clock_speed", {"speed": 0})
     await runtime.close()
@@ -237,3 +238,24 @@ async def test_a_kept_map_is_merged_where_its_walls_fit(shown: Shown) -> None:
     assert (await shown.ask("/api/robots/a/merge_map", {"map": "none"}))[0] == 404
     status, answer = await shown.ask("/api/robots/a/merge_map", {"map": "west", "x": 9000})
     assert (status, "too far apart" in answer["error"]) == (409, True)
+
+
+async def test_chance_begins_anew_from_the_seed_that_is_given(shown: Shown) -> None:
+    async def scanned(seed: int) -> list[float]:
+        status, words = await shown.ask("/api/world/reseed", {"seed": seed})
+        assert status == 200, words
+        await shown.clock.advance(0.2)
+        scan = shown.robot[Lidar].scan
+        assert scan is not None
+        ranges: list[float] = scan.ranges.tolist()
+        return ranges
+
+    shown.runtime.fleet.world.hands.add_obstacle(Pose(2.0, 0.0), (0.5, 4.0, 1.0), 0)
+    await shown.clock.advance(0.2)
+    first = await scanned(7)
+    assert shown.desk.pace["seed"] == 7
+    assert await scanned(8) != first
+    assert await scanned(7) == first
+    status, words = await shown.ask("/api/world/reseed", {"seed": -1})
+    assert status == 400
+    assert "seed" in words["error"]

@@ -32,21 +32,12 @@ assert map_verbs  # registers its verbs
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """What the robots are in: its name, its version of roboglot, its clock, the seed of its chances, their bodies."""
+    """What the robots are in: its name, its version of roboglot, its clock, their bodies."""
 
     name: str
     version: str
     clock: Clock
-    seed: int = 1
     bodies: Mapping[str, str] = field(default_factory=dict)
-
-    @property
-    def pace(self) -> dict[str, Any]:
-        """How time passes: ``speed``, ``paused``, and ``lockstep`` if a program moves the clock."""
-        clock = self.clock
-        if not isinstance(clock, RealClock):
-            return {"lockstep": True, "speed": 1.0, "paused": False}
-        return {"lockstep": False, "speed": clock.speed, "paused": clock.paused}
 
 
 @dataclass(slots=True)
@@ -96,6 +87,14 @@ class Desk:
         if robot.id in self.locked and right is not Right.SEE and not self.may_teach:
             raise Forbidden(f"the teacher has locked robot {robot.id}")
 
+    @property
+    def pace(self) -> dict[str, Any]:
+        """How time passes: ``speed``, ``paused``, ``lockstep`` if a program moves the clock; the chances' ``seed``."""
+        clock, seed = self.world.clock, self.stage.seed
+        if not isinstance(clock, RealClock):
+            return {"lockstep": True, "speed": 1.0, "paused": False, "seed": seed}
+        return {"lockstep": False, "speed": clock.speed, "paused": clock.paused, "seed": seed}
+
     def hello(self) -> dict[str, Any]:
         """What a page needs before anything else."""
         visible = self.visible
@@ -103,8 +102,7 @@ class Desk:
         return {
             "version": self.world.version,
             "world": self.world.name,
-            "seed": self.world.seed,
-            "pace": self.world.pace,
+            "pace": self.pace,
             "robots": [
                 {"name": name, "simulated": name in simulated, "rights": self._rights(view.robot)}
                 for name, view in visible.items()

@@ -119,7 +119,7 @@ class Page:
         visible = self._desk.visible
         motion = {name: view.motion for name, view in visible.items()}
         moment: dict[str, Any] = {"type": "moment", "now": milliseconds(), "time": self._desk.world.clock.time()}
-        moment["pace"] = self._desk.world.pace
+        moment["pace"] = self._desk.pace
         moment["poses"] = motion
         moment["recording"] = self._desk.recordings is not None and self._desk.recordings.on
         whole = len(visible) == len(self._desk.views)  # the world shows all of them

@@ -129,6 +129,15 @@ class StagePerson(ABC):
 class Stage(ABC):
     """One world's hands."""
 
+    @property
+    @abstractmethod
+    def seed(self) -> int:
+        """Where all chance of the world began: noise, outages, where a kidnapped robot finds itself."""
+
+    @abstractmethod
+    def reseed(self, seed: int) -> None:
+        """Have chance begin anew from ``seed``; what bodies were built with (scale errors, biases) stays."""
+
     # -- what is there -------------------------------------------------------------------------------------------------
 
     @property

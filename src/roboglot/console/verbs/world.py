@@ -13,9 +13,16 @@ from roboglot.operations import OperationTable, Right
 
 Floor = Annotated[int, msgspec.Meta(ge=0, le=200)]
 Extent = Annotated[float, msgspec.Meta(gt=0.01, le=20)]
+Seed = Annotated[int, msgspec.Meta(ge=0, le=2**31 - 1)]
 Newtons = Annotated[float, msgspec.Meta(ge=-500, le=500)]  # N s
 
 WORLD_VERBS: OperationTable[str] = OperationTable("console world", Right.ADMIN)
+
+
+@WORLD_VERBS.on("reseed")
+async def reseed(stage: Stage, *, seed: Seed) -> None:
+    """Have noise and outages begin anew from another seed; bodies keep the errors they were built with."""
+    stage.reseed(seed)
 
 
 @WORLD_VERBS.on("place_robot")

@@ -22,7 +22,6 @@ from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.body import Body
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.schedule import Duty
-from roboglot.simulation.world.randomness import stream
 
 if TYPE_CHECKING:
     from roboglot.simulation.world.environment import Environment
@@ -37,7 +36,6 @@ class Fitting:
     robot: Robot
     hull: Hull
     world: Environment
-    seed: int
     tick: float
     fitted: dict[type[Any], Any] = field(default_factory=dict)
 
@@ -48,7 +46,7 @@ class Fitting:
 
     def chance(self, purpose: str) -> np.random.Generator:
         """Return this robot's own stream of random numbers for ``purpose``."""
-        return stream(self.seed, self.robot.id, purpose)
+        return self.world.chances.of(self.robot.id, purpose)
 
     def find(self, kind: type[P]) -> P | None:
         """Return the part of this class that was fitted before (``Part.after``), if there is one."""

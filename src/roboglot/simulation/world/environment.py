@@ -16,6 +16,7 @@ from roboglot.simulation.rendering.studio import Studio
 from roboglot.simulation.sound.sound import Air
 from roboglot.simulation.world.beads import Beads
 from roboglot.simulation.world.description import WorldDescription
+from roboglot.simulation.world.randomness import Chances
 from roboglot.simulation.world.sight import Sight
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ class Environment:
     surroundings: Surroundings
     studio: Studio
     beads: Beads
+    chances: Chances
     north: float
 
     @property

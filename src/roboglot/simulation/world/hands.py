@@ -42,6 +42,13 @@ class Hands(Stage):
         self._physics = population.physics
 
     @property
+    def seed(self) -> int:
+        return self._environment.chances.seed
+
+    def reseed(self, seed: int) -> None:
+        self._environment.chances.reseed(seed)
+
+    @property
     def robots(self) -> Sequence[Placed]:
         return [Placed(name, hull.pose, hull.floor) for name, hull in self._population.hulls.items()]
 

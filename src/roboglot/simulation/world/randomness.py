@@ -7,6 +7,23 @@ import zlib
 import numpy as np
 
 
-def stream(seed: int, *names: str) -> np.random.Generator:
-    """The generator that belongs to these names under this seed."""
+class Chances:
+    """All streams of one world."""
+
+    def __init__(self, seed: int) -> None:
+        self.seed = seed
+        self._streams: dict[tuple[str, ...], np.random.Generator] = {}
+
+    def of(self, *names: str) -> np.random.Generator:
+        """Return the generator that belongs to these names: the same one every time."""
+        return self._streams.setdefault(names, _stream(self.seed, names))
+
+    def reseed(self, seed: int) -> None:
+        """Have every stream go on as if the world had begun with ``seed`` now."""
+        self.seed = seed
+        for names, generator in self._streams.items():
+            generator.bit_generator.state = _stream(seed, names).bit_generator.state
+
+
+def _stream(seed: int, names: tuple[str, ...]) -> np.random.Generator:
     return np.random.Generator(np.random.PCG64([seed, *(zlib.crc32(name.encode()) for name in names)]))

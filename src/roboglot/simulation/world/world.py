@@ -40,7 +40,7 @@ from roboglot.simulation.world.hands import Hands
 from roboglot.simulation.world.pace import Pace
 from roboglot.simulation.world.placing import Places
 from roboglot.simulation.world.population import Population
-from roboglot.simulation.world.randomness import stream
+from roboglot.simulation.world.randomness import Chances
 from roboglot.simulation.world.sight import Sight
 from roboglot.simulation.world.sightlines import SightLines
 from roboglot.simulation.world.truth import Truth
@@ -81,7 +81,7 @@ class World:
         if len(robots) > ROBOTS_MAX:
             raise ValueError(f"{len(robots)} robots are more than {ROBOTS_MAX}")
         self.description = description
-        self._clock, self._seed = clock, seed
+        self._clock = clock
         bodies = {placement.name: load_body(placement.body) for placement in robots}
         if len(bodies) < len(robots):
             raise ValueError("two robots have the same name")
@@ -89,7 +89,7 @@ class World:
         self._walkers = keyed([floor.people for floor in description.floors])
         self._population = Population(self._physics, self._walkers)
         self.building = Building(description, self._physics, self._walkers)
-        self._environment = self._make_environment()
+        self._environment = self._make_environment(seed)
         for index, walker in enumerate(self._walkers):
             self._physics.move_person(index, walker.pose, walker.floor)
         radii = {name: body.hull.radius for name, body in bodies.items()}
@@ -101,14 +101,13 @@ class World:
         self._loading: asyncio.Task[None] | None = None
         self.truth = Truth(self._population, self._environment)
         self.hands = Hands(self._population, self._environment, clock, lambda: self.faults)
-        self._chances: dict[str, np.random.Generator] = {}
         self.faults = Faults(self, description.faults)
         self._ticks = 0
         self._origin = 0.0
         self._timer: Timer | None = None
         self._pace = Pace(lambda: clock.speed if isinstance(clock, RealClock) else 1.0)
 
-    def _make_environment(self) -> Environment:
+    def _make_environment(self, seed: int) -> Environment:
         """Make what the robots' parts share."""
         description, physics, walkers = self.description, self._physics, self._walkers
         hulls, props, things = list(physics.hulls.values()), physics.props, physics.things
@@ -127,17 +126,18 @@ class World:
             surroundings=Surroundings(description, hulls, walkers, props, lines),
             studio=Studio(description, hulls, walkers, props, things, life, self._clock),
             beads=beads,
+            chances=Chances(seed),
             north=math.radians(description.georeference.north if description.georeference else 90.0),
         )
 
     def description_of(self, name: str) -> Description:
         """Return a robot's name plate."""
-        serial = f"RG-{self._seed:04d}-{name}"
+        serial = f"RG-{self._environment.chances.seed:04d}-{name}"
         return self._population.hull(name).body.describe(serial=serial, software_version=_version())
 
     def equip(self, robot: Robot) -> None:
         """Give ``robot`` the simulated components of the body that was placed under its id."""
-        fitting = Fitting(robot, self._population.hull(robot.id), self._environment, self._seed, TICK)
+        fitting = Fitting(robot, self._population.hull(robot.id), self._environment, TICK)
         self._population.simulated[robot.id] = SimulatedRobot(fitting)
         self._population.robots[robot.id] = robot
 
@@ -167,7 +167,7 @@ class World:
 
     def chance(self, purpose: str) -> np.random.Generator:
         """Return random numbers for one purpose, from the world's seed."""
-        return self._chances.setdefault(purpose, stream(self._seed, purpose))
+        return self._environment.chances.of(purpose)
 
     async def prepare(self, *, wait: bool) -> None:
         """Load the compiled kernels; return at once, or with ``wait`` when they are used (a lockstep world waits)."""

@@ -5,6 +5,14 @@ import { changeWorld, clock, hello, pace } from "../link.js";
 const SPEEDS = [0.25, 0.5, 1, 2, 5, 10];
 const STEPS = [0.1, 1, 10]; // s
 
+function Seed() {
+  const { seed } = pace.value;
+  return html`<form class="inline" onSubmit=${(e) => { e.preventDefault(); changeWorld("reseed", { seed: Number(new FormData(e.target).get("seed")) }); }}>
+      <label class="grow">${t("seed")} <input name="seed" type="number" min="0" max="2147483647" step="1" required key=${seed} defaultValue=${seed} /></label>
+      <${Button} type="submit" label=${t("seed.change")} verb="reseed" /></form>
+    <p class="muted">${t("seed.hint")}</p>`;
+}
+
 export function Clock() {
   const { paused, speed, lockstep } = pace.value;
   if (lockstep) return html`<div class="card"><h3>${t("clock")}</h3><p>${t("clock.lockstep")}</p></div>`;
@@ -15,7 +23,7 @@ export function Clock() {
       <h3>${t("clock.speed")}</h3>
       <div class="buttons">${SPEEDS.map((each) => html`<${Button} label=${`× ${each}`} on=${each === speed} verb="set_clock_speed" onClick=${() => changeWorld("set_clock_speed", { speed: each })} />`)}</div>
       <p class="muted">${t("clock.hint")}</p></div>
-    <div class="card"><h3>${t("world.file")}</h3><p>${t("world.named", { world: hello.value.world, seed: hello.value.seed })}</p>
+    <div class="card"><h3>${t("world.file")}</h3><p>${t("world.named", { world: hello.value.world, seed: pace.value.seed })}</p>
       <div class="buttons"><a class="button" href="/api/world.toml" download="world.toml">${t("world.save")}</a></div>
-      <p class="muted">${t("world.hint")}</p></div>`;
+      <p class="muted">${t("world.hint")}</p><${Seed} /></div>`;
 }

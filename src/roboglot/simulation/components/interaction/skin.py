@@ -37,7 +37,7 @@ class SimulatedSkin(ShownSkin):
 
 
 def _fit(fit: Fitting) -> SimulatedSkin:
-    return SimulatedSkin(fit.robot, fit.seed)
+    return SimulatedSkin(fit.robot, fit.world.chances.seed)
 
 
 PART = Part(name="skin", interface=ElectronicSkin, section=SkinSection, fit=_fit)

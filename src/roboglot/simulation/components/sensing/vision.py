@@ -27,7 +27,7 @@ from roboglot.simulation.detectors.cards import see_markers, see_tags
 from roboglot.simulation.detectors.glance import Glance, Surroundings
 from roboglot.simulation.detectors.lines import see_lines
 from roboglot.simulation.rendering.projection import view_of
-from roboglot.simulation.world.randomness import stream
+from roboglot.simulation.world.randomness import Chances
 
 T = TypeVar("T")
 log = logging.getLogger(__name__)
@@ -90,10 +90,10 @@ class SimulatedVision(Vision):
     """A robot's number for a person is the same in all detectors."""
 
     def __init__(
-        self, section: VisionSection, robot: Robot, camera: Camera, hull: Hull, around: Surroundings, seed: int
+        self, section: VisionSection, robot: Robot, camera: Camera, hull: Hull, around: Surroundings, chances: Chances
     ) -> None:
         self._section, self._robot, self._camera, self._hull = section, robot, camera, hull
-        self._around, self._seed = around, seed
+        self._around, self._chances = around, chances
         self._numbers: dict[str, int] = {}
         self._detectors: list[SimulatedDetector[object]] = []
         self.people = self._detector("people", see_people)
@@ -111,7 +111,7 @@ class SimulatedVision(Vision):
             detector.close()
 
     def _detector(self, name: str, see: Callable[[Glance], list[T]]) -> SimulatedDetector[T]:
-        random = stream(self._seed, self._robot.id, "vision", name)
+        random = self._chances.of(self._robot.id, "vision", name)
 
         def look() -> list[T]:
             view, known = view_of(self._camera, self._hull), self._faces()
@@ -130,7 +130,7 @@ class SimulatedVision(Vision):
 
 def _fit(fit: Fitting) -> SimulatedVision:
     section, camera = fit.body[VisionSection], fit.robot[Camera]
-    return SimulatedVision(section, fit.robot, camera, fit.hull, fit.world.surroundings, fit.seed)
+    return SimulatedVision(section, fit.robot, camera, fit.hull, fit.world.surroundings, fit.world.chances)
 
 
 PART = Part(
