@@ -6,6 +6,7 @@ import asyncio
 import json
 import re
 from collections.abc import AsyncIterator, Awaitable, Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.error import HTTPError
@@ -14,11 +15,13 @@ from urllib.request import Request, urlopen
 import pytest
 import pytest_asyncio
 
+from roboglot.config import ConsoleConfig, RobotConfig, load_config, with_addresses
 from roboglot.model.components.mapping.map_library import MapLibrary
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.components.system.lease import Lease
 from roboglot.recording.reader import read_recording
+from roboglot.runtime import Runtime
 from tests.browser.served import ADDRESS, Served
 from tests.browser.served import until as until_page
 
@@ -260,6 +263,26 @@ async def test_languages_and_themes_change_while_it_runs(served: Served, open_co
     assert await page.evaluate("localStorage.language") == "zh"
 
 
+async def test_the_floor_that_is_shown_is_chosen(tmp_path: Path, browser: Any) -> None:
+    base = load_config(None, {"data": str(tmp_path), "world": "office", "lockstep": True})
+    robots = with_addresses((RobotConfig("a", "universal"),))
+    runtime = Runtime(replace(base, robots=robots, doors={}, console=ConsoleConfig(port=0)))
+    assert runtime.console is not None
+    await runtime.start()
+    await runtime.console.ready()
+    page = await browser.new_page()
+    await page.goto(runtime.console.address)
+    await page.wait_for_selector("select.floors")
+    choices = await page.locator("select.floors option").all_inner_texts()
+    assert len(choices) == 4  # the robot's own, and three
+    picture = "document.querySelector('canvas').toDataURL()"
+    here = await page.evaluate(picture)
+    await page.select_option("select.floors", "2")
+    await until_page(page, f"{picture} !== {here!r}")
+    await page.close()
+    await runtime.close()
+
+
 @pytest.mark.parametrize("view", ["live", "wire", "world", "robots", "class"])
 async def test_a_phone_shows_all_of_it_and_can_touch_it(served: Served, open_console: Open, view: str) -> None:
     page = await open_console(view=view, viewport={"width": 360, "height": 740}, has_touch=True, is_mobile=True)
@@ -288,6 +311,9 @@ async def test_a_map_is_saved_by_its_name_and_seen_in_the_grid(served: Served, o
     await page.click("text=Save the map")
     await page.wait_for_selector("text=hall is saved.")
     assert "hall" in await served.robot[MapLibrary].names()
+    await page.click("text=Merge")
+    await page.click("form >> text=Merge")
+    await page.wait_for_selector("text=hall is part of the map in use.")
     await page.click("nav a[href='#/robots']")
     async with asyncio.timeout(PATIENCE / 1000):
         while not await page.evaluate("document.querySelector('.thumbnail')?.naturalWidth > 0"):  # noqa: ASYNC110
