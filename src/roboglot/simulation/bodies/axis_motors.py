@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from roboglot.model.actions import Action
 from roboglot.model.clock import Clock
 
+SETTLED = math.radians(0.1)  # what comes back to its middle rests when this near
 LOOK = 0.02  # s between looks at whether a motion has ended
 
 
@@ -30,6 +31,26 @@ class Axis:
         step = self.acceleration * seconds
         self.rate += max(-step, min(step, rate - self.rate))
         self.shift(self.rate * seconds)
+
+    def trail(self, way: float, pull: float, top: float, seconds: float) -> None:
+        """Be shifted by ``way``, then come back to the middle at ``pull`` (1/s) times the distance, up to ``top``.
+
+        Does what ``shift`` and ``run`` do, in one go: a gimbal does this in every tick of a robot that turns.
+        """
+        position, rate, low, high = self.position + way, self.rate, self.lowest, self.highest
+        if not low <= position <= high:
+            position, rate = (low if position < low else high), 0.0
+        wanted = -pull * position
+        if abs(position) < SETTLED and abs(rate) < pull * SETTLED:
+            self.position = self.rate = 0.0
+            return
+        wanted = top if wanted > top else -top if wanted < -top else wanted
+        step, more = self.acceleration * seconds, wanted - rate
+        rate += step if more > step else -step if more < -step else more
+        position += rate * seconds
+        if not low <= position <= high:
+            position, rate = (low if position < low else high), 0.0
+        self.position, self.rate = position, rate
 
     def approach(self, goal: float, speed: float, seconds: float) -> None:
         """Come nearer to ``goal`` at up to ``speed`` and in time to stop there."""

@@ -113,6 +113,7 @@ class Hull:
         self.touches: list[Touch] = []  # what touches the hull now, docks left out
         self.when_touched: list[Duty] = []  # begin when something touches the hull
         self.edges, self.walls = Nearness(body.hull.radius), Nearness(body.hull.radius)
+        self._looked = 0.0, 0.0, -1, 0.0  # where it looked for them last, the floor, and how far that holds, m
 
     @property
     def geoms(self) -> list[int]:
@@ -149,9 +150,10 @@ class Hull:
     def see(self, positions: list[float], velocities: list[float]) -> None:
         """Take where it is and how it moves from all that the physics has: once after every step."""
         place, way = self._level
-        self.x, self.y, z, self.turned = positions[place]
+        x, y, z, self.turned = positions[place]
         vx, vy, vz, turn = velocities[way]
         rising = vz
+        self.x, self.y, self.elevation = x, y, z
         self._pose, self.before = None, self.motion
         if self._tilts and not self.overturned:
             q, v = self._q, self._v
@@ -162,13 +164,12 @@ class Hull:
             self.belly = positions[self._belly]
             vz += velocities[self._sinking]
         self.motion = vx, vy, vz, turn
-        self.elevation = z
         if not -0.05 <= z - self._counted <= 0.05:
             self._counted = z
             self.floor = max((i for i, height in enumerate(self._elevations) if height <= z + 0.5), default=0)
-        self.edges.look(self.x, self.y, self.floor)
-        if self.walls.look(self.x, self.y, self.floor):
-            self.support.walls(self.walls.near)
+        looked_x, looked_y, floor, free = self._looked
+        if floor != self.floor or abs(x - looked_x) + abs(y - looked_y) > free:
+            self._look_round(x, y)
         support, edge = self.support, self.edges.near
         if support.sprung:
             self.loose = False
@@ -183,6 +184,14 @@ class Hull:
         if self._pose is None:
             self._pose = Pose(self.x, self.y, wrap_angle(self.turned))
         return self._pose
+
+    def _look_round(self, x: float, y: float) -> None:
+        """Notice edges and walls, and how far it may go until it could meet others."""
+        floor, edges, walls = self.floor, self.edges, self.walls
+        edges.look(x, y, floor)
+        if walls.look(x, y, floor):
+            self.support.walls(walls.near)
+        self._looked = x, y, floor, min(edges.left(x, y, floor), walls.left(x, y, floor))
 
     @property
     def rise(self) -> float:
@@ -225,10 +234,12 @@ class Hull:
             roll, pitch = self.tilt
             vx = vx * math.cos(pitch) - GRAVITY * math.tan(pitch) / DRIVE_GAIN
             vy = vy * math.cos(roll) + GRAVITY * math.tan(roll) / DRIVE_GAIN
-        yaw = self.turned + twist.yaw * seconds / 2
-        c, s = math.cos(yaw), math.sin(yaw)
         speeds = self._servos[1]
-        speeds[0], speeds[1], speeds[2] = c * vx - s * vy, s * vx + c * vy, twist.yaw
+        if vx or vy:
+            yaw = self.turned + twist.yaw * seconds / 2
+            c, s = math.cos(yaw), math.sin(yaw)
+            vx, vy = c * vx - s * vy, s * vx + c * vy
+        speeds[0], speeds[1], speeds[2] = vx, vy, twist.yaw
 
     def stand(self, wheels: float) -> None:
         """Take note that this share of the wheels touches the ground: as much force do they pass on."""

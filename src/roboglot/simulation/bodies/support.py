@@ -43,6 +43,12 @@ class Nearness:
         """Look from now on; ``room`` answers how far the next one is from a place, m."""
         self._room, self._floor = room, -1
 
+    def left(self, x: float, y: float, floor: int) -> float:
+        """How far (m) the robot may go from there until ``look`` looks again; below 0: not at all."""
+        if floor != self._floor or self._room is None:
+            return -1.0
+        return self._free - abs(x - self._x) - abs(y - self._y)
+
     def look(self, x: float, y: float, floor: int) -> bool:
         """Note that the robot is there now; True if that changed whether something may be near."""
         if floor == self._floor and abs(x - self._x) + abs(y - self._y) <= self._free:

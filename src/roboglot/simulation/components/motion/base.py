@@ -195,7 +195,7 @@ class SimulatedBase(Base):
                 case WheelSpeeds() as target:
                     self._wheels = self._nearer_wheels(target, seconds)
                     self._twist = self._body_of(self._wheels)
-        if self._twist.speed > self.pace and not self._carried:
+        if self.pace < math.inf and self._twist.speed > self.pace and not self._carried:
             share = self.pace / self._twist.speed
             self._twist = Twist(self._twist.x * share, self._twist.y * share, self._twist.yaw)
             self._wheels = self._wheels_of(self._twist)

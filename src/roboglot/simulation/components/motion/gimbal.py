@@ -29,7 +29,7 @@ from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.errors import InvalidGoal, Refused, Unreachable
 from roboglot.model.geometry import Twist, wrap_angle
 from roboglot.model.robot import Robot
-from roboglot.simulation.bodies.axis_motors import Axis, move
+from roboglot.simulation.bodies.axis_motors import SETTLED, Axis, move
 from roboglot.simulation.bodies.hull import LEVEL, Hull, rotation
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Offset, Positive
@@ -38,7 +38,6 @@ from roboglot.simulation.components.motion.base import SimulatedBase
 Floats = NDArray[np.float64]
 FOLLOWING = 6.0  # 1/s: turn rate of the gimbal back to the chassis' front, per rad that it is off
 STEERING = 4.0  # 1/s: the same for a chassis that follows the gimbal
-SETTLED = math.radians(0.1)  # followers rest when this near
 THERE = 0.002  # rad: near enough to a goal
 
 
@@ -294,9 +293,7 @@ class SimulatedGimbal(Gimbal):
     def _follow_body(self, turn: float, seconds: float) -> float:
         """Hold the yaw against a turn of the body while coming back to its front; return it."""
         axis = self._yaw
-        if turn:
-            axis.shift(-turn)
-        self._follow(axis, seconds)
+        axis.trail(-turn, FOLLOWING, self._top_speed, seconds)
         self._resting = not axis.position and not axis.rate
         return axis.position
 
@@ -318,10 +315,7 @@ class SimulatedGimbal(Gimbal):
 
     def _follow(self, axis: Axis, seconds: float) -> None:
         """Come back to the body's front, the faster the further off."""
-        if abs(axis.position) < SETTLED and abs(axis.rate) < FOLLOWING * SETTLED:
-            axis.position = axis.rate = 0.0
-            return
-        axis.run(max(-self._top_speed, min(self._top_speed, -FOLLOWING * axis.position)), seconds)
+        axis.trail(0.0, FOLLOWING, self._top_speed, seconds)
 
     def _steer(self) -> None:
         """Have the base turn after the gimbal, unless something else than hands drives it."""

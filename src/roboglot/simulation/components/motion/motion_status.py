@@ -7,6 +7,7 @@ import math
 from msgspec import Struct
 
 from roboglot.model.components.motion.motion_status import MotionFlags, MotionStatus
+from roboglot.model.geometry import Twist
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Positive
@@ -18,6 +19,7 @@ STILL_SPEED, STILL_RATE = 0.01, 0.03  # m/s and rad/s
 CLIMBING = 0.01  # m/s up or down
 SLOPE, ROLLED = math.radians(5), math.radians(60)
 SLIP_SPEED, SLIP_RATE = 0.15, 0.4  # m/s and rad/s between wheels and body
+SLIP_SQUARE = SLIP_SPEED**2
 SLIP_TICKS = 5  # in a row until it counts: contacts jitter
 
 
@@ -72,16 +74,21 @@ class SimulatedMotionStatus(MotionStatus):
             self._blows[1] = stamp
         if abs(abs(z) - GRAVITY) > blow:
             self._blows[2] = stamp
-        self._slipping = self._slipping + 1 if self._slips() else 0
-
-    def _slips(self) -> bool:
         wheels, hull = self._base.velocity, self._hull
         vx, vy, _, turn = hull.motion
-        if not (wheels.x or wheels.y or wheels.yaw or vx * vx + vy * vy > SLIP_SPEED**2):
-            return False
+        if wheels.x or wheels.y or wheels.yaw or vx * vx + vy * vy > SLIP_SQUARE:
+            self._slipping = self._slipping + 1 if self._slips(wheels, vx, vy, turn) else 0
+        elif self._slipping:
+            self._slipping = 0
+
+    def _slips(self, wheels: Twist, vx: float, vy: float, turn: float) -> bool:
+        """True if the body does not move (m/s, rad/s, world) as the wheels turn."""
+        if not -SLIP_RATE <= turn - wheels.yaw <= SLIP_RATE:
+            return True
+        hull = self._hull
         c, s = math.cos(hull.turned), math.sin(hull.turned)
         off_x, off_y = c * vx + s * vy - wheels.x, c * vy - s * vx - wheels.y
-        return off_x * off_x + off_y * off_y > SLIP_SPEED**2 or abs(turn - wheels.yaw) > SLIP_RATE
+        return off_x * off_x + off_y * off_y > SLIP_SQUARE
 
 
 def _fit(fit: Fitting) -> SimulatedMotionStatus:

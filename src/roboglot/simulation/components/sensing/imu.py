@@ -100,14 +100,15 @@ class SimulatedImu(Imu):
 
     def sense(self, stamp: float, seconds: float) -> None:
         """Measure one tick."""
-        hull = self._hull
+        hull, scale = self._hull, self._scale
         if not self._noises:
             drawn = self._random.standard_normal((DRAWN, 6)) * self._sigma + self._bias
             self._noises = drawn[::-1].tolist()
         noise = self._noises.pop()
         turned, motion = hull.turned, hull.motion
-        self.rate = (turned - self._turned) / seconds * self._scale + noise[2]
-        self._yaw = wrap_angle(self._yaw + self.rate * seconds)
+        self.rate = rate = (turned - self._turned) / seconds * scale + noise[2]
+        yaw = self._yaw + rate * seconds
+        self._yaw = yaw if -math.pi < yaw <= math.pi else wrap_angle(yaw)
         (ux, uy, uz, _), (vx, vy, vz, turning) = self._motion, motion
         self._turned, self._motion = turned, motion
         ax, ay, az = (vx - ux) / seconds, (vy - uy) / seconds, (vz - uz) / seconds
@@ -120,7 +121,7 @@ class SimulatedImu(Imu):
             return
         c, s = math.cos(turned), math.sin(turned)
         self.felt = c * ax + s * ay + noise[3], c * ay - s * ax + noise[4], az + GRAVITY + noise[5]
-        self._level = stamp, noise[0], noise[1], turning * self._scale + noise[2]
+        self._level = stamp, noise[0], noise[1], turning * scale + noise[2]
         self._reading = None
 
     def _tilted(self, stamp: float, felt: tuple[float, float, float], noise: list[float], seconds: float) -> ImuReading:

@@ -54,6 +54,7 @@ class SimulatedOdometry(Odometry):
     ) -> None:
         self._section, self._base, self._imu, self._random = section, base, imu, random
         self._scale_x, self._scale_y = (1.0 + random.normal(0.0, section.scale_error, 2)).tolist()
+        self._disturbs = bool(section.turn_slip or section.jump_every)
         self._noises: list[float] = []  # two for each tick to come
         self._state = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # stamp; x, y, yaw; twist; way
         self._reading: OdometryReading | None = None  # the same, once it is read
@@ -84,21 +85,26 @@ class SimulatedOdometry(Odometry):
         _, x, y, yaw, _, _, _, way = self._state
         still = not (wheels.x or wheels.y or wheels.yaw)
         # With still wheels a slow rate is the gyro's own error.
-        rate = 0.0 if still and abs(self._imu.rate) < self._section.still_rate else self._imu.rate
+        rate, section = self._imu.rate, self._section
+        if still and abs(rate) < section.still_rate:
+            rate = 0.0
         vx = vy = 0.0
         if wheels.x or wheels.y:
             if not self._noises:
                 self._noises = self._random.standard_normal(2 * DRAWN)[::-1].tolist()
-            vx = wheels.x * (self._scale_x + self._section.noise * self._noises.pop())
-            vy = wheels.y * (self._scale_y + self._section.noise * self._noises.pop())
-            x, y = self._disturbed(x, y, yaw, seconds)
+            vx = wheels.x * (self._scale_x + section.noise * self._noises.pop())
+            vy = wheels.y * (self._scale_y + section.noise * self._noises.pop())
+            if self._disturbs:
+                x, y = self._disturbed(x, y, yaw, seconds)
             middle = yaw + rate * seconds / 2
             c, s = math.cos(middle), math.sin(middle)
             x += (c * vx - s * vy) * seconds
             y += (s * vx + c * vy) * seconds
             way += math.hypot(vx, vy) * seconds
         if rate:
-            yaw = wrap_angle(yaw + rate * seconds)
+            yaw += rate * seconds
+            if not -math.pi < yaw <= math.pi:
+                yaw = wrap_angle(yaw)
         self._state = stamp, x, y, yaw, vx, vy, rate, way
         self._reading = None
 
