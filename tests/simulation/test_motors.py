@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboglot.simulation.bodies.axis_motors import Axis
+from roboglot.simulation.bodies.axis_motors import SETTLED, Axis
 
 TICK = 0.02
 
@@ -57,3 +57,23 @@ def test_running_takes_up_speed_in_time():
     for _ in range(25):
         axis.run(5.0, TICK)
     assert axis.rate == pytest.approx(0.5)
+
+
+@given(
+    position=st.floats(-1.0, 1.0),
+    rate=st.floats(-3.0, 3.0),
+    way=st.floats(-0.5, 0.5),
+    pull=st.floats(0.5, 10.0),
+    top=st.floats(0.1, 3.0),
+)
+def test_trailing_is_a_shift_and_a_run_towards_the_middle(
+    position: float, rate: float, way: float, pull: float, top: float
+) -> None:
+    one, other = (Axis(-1.0, 1.0, 20.0, position, rate) for _ in range(2))
+    one.trail(way, pull, top, 0.02)
+    other.shift(way)
+    if abs(other.position) < SETTLED and abs(other.rate) < pull * SETTLED:
+        other.position = other.rate = 0.0
+    else:
+        other.run(max(-top, min(top, -pull * other.position)), 0.02)
+    assert (one.position, one.rate) == (other.position, other.rate)

@@ -45,19 +45,11 @@ class SimulatedRobot:
 
     def control(self) -> None:
         """Run before the physics of a tick."""
-        self._context.run(self._control)
+        self._context.run(self._controls.run)
 
     def sense(self, stamp: float) -> None:
         """Run after it."""
-        self._context.run(self._sense, stamp)
-
-    def _control(self) -> None:
-        for _, control, seconds in self._controls.due():
-            control(seconds)
-
-    def _sense(self, stamp: float) -> None:
-        for _, sense, seconds in self._senses.due():
-            sense(stamp, seconds)
+        self._context.run(self._senses.run_at, stamp)
 
     def displaced(self) -> None:
         """Notify the parts that the robot was lifted and put elsewhere."""

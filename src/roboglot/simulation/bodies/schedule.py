@@ -53,11 +53,17 @@ class Job:
 
 
 class Schedule:
-    """Calls in the order of ``jobs``. The lists for all ticks of a cycle are made once, and when a duty changes."""
+    """Calls in the order of ``jobs``. The lists for all ticks of a cycle are made once, and when a duty changes.
+
+    They share their entries: what a robot touches in a cycle has to stay small, or a hundred robots crowd the caches.
+    """
+
+    __slots__ = ("_at", "_entries", "_jobs", "_length", "_next", "_pass", "_rounds", "_running", "_seconds", "_start")
 
     def __init__(self, jobs: Sequence[Job], tick: float) -> None:
         self._seconds = tick
         self._jobs = [_every_tick(job) if CYCLE_MAX % job.every else job for job in jobs]
+        self._entries: dict[tuple[int, int], Entry] = {}  # by rank and the ticks since the last call
         self._start = max((job.first for job in self._jobs), default=1)  # from then on all goes round
         self._length = self._start + math.lcm(*(job.every for job in self._jobs))
         self._rounds: list[list[Entry]] = [self._round(tick) for tick in range(1, self._length + 1)]
@@ -75,6 +81,16 @@ class Schedule:
         self._running = self._rounds[at]
         self._pass = iter(self._running)
         return self._pass
+
+    def run(self) -> None:
+        """Run the next tick: give every call that is due the seconds since its last one."""
+        for _, call, seconds in self.due():
+            call(seconds)
+
+    def run_at(self, stamp: float) -> None:
+        """The same for calls that want to know the time as well."""
+        for _, call, seconds in self.due():
+            call(stamp, seconds)
 
     def change(self, rank: int, on: bool) -> None:
         """A part's duty began or ended."""
@@ -102,7 +118,10 @@ class Schedule:
         if not job.due(tick):
             return None
         ticks = job.first if tick == job.first else job.every
-        return rank, job.call, sum([self._seconds] * ticks)  # added up as time is, to the last bit
+        entry = self._entries.get((rank, ticks))
+        if entry is None:  # the seconds are added up as time is, to the last bit
+            entry = self._entries[rank, ticks] = rank, job.call, sum([self._seconds] * ticks)
+        return entry
 
 
 def _rank(entry: Entry) -> int:

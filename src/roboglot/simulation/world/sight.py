@@ -75,28 +75,33 @@ class Sight:
 
         ``bearing``: where the ray in the middle points to, rad in base_link.
         """
-        key = hull.floor, round(height, 3)
-        edges, circles = self._floors[hull.floor].at(height)
-        edges = self._with_props(edges, key, height)
-        terrains = self._terrain[hull.floor]
+        floor = hull.floor
+        key = floor, round(height, 3)
+        circles, kept = self._moving.get(key), self._edges.get(key)
+        if circles is None:
+            circles = self._moving[key] = self._circles_at(floor, height)
+        if kept is None or kept[0] != self._props.revisions[floor]:
+            kept = self._edges_with_props(key, height)
+        edges, terrains = kept[1], self._terrain[floor]
         if terrains and (slopes := [solid for terrain in terrains for solid in _slopes_at(terrain, height)]):
             edges = np.concatenate((edges, _edges_at(slopes, height)))
-        if key not in self._moving:
-            moving = [*self._people_at(hull.floor, height), *self._robots_at(hull.floor, height)]
-            moving += self._things_at(hull.floor, height)
-            self._moving[key] = np.concatenate((circles, np.array(moving))) if moving else circles
-        return self._cast(edges, self._moving[key], _ways(rays), hull.x, hull.y, hull.turned + bearing, reach)
+        return self._cast(edges, circles, _ways(rays), hull.x, hull.y, hull.turned + bearing, reach)
 
-    def _with_props(self, edges: Rows, key: tuple[int, float], height: float) -> Rows:
-        """``edges`` and those of the movable boxes; kept until one of them moves."""
+    def _edges_with_props(self, key: tuple[int, float], height: float) -> tuple[int, Rows]:
+        """The edges of still solids and of movable boxes, and their revision; kept until one of the boxes moves."""
         floor = key[0]
-        revision, kept = self._props.revisions[floor], self._edges.get(key)
-        if kept is None or kept[0] != revision:
-            if len(self._edges) > KEPT_MAX:
-                self._edges.clear()
-            props = _edges_at(self._props.on(floor), height)
-            self._edges[key] = kept = revision, np.concatenate((edges, props)) if len(props) else edges
-        return kept[1]
+        if len(self._edges) > KEPT_MAX:
+            self._edges.clear()
+        (edges, _), props = self._floors[floor].at(height), _edges_at(self._props.on(floor), height)
+        kept = self._props.revisions[floor], np.concatenate((edges, props)) if len(props) else edges
+        self._edges[key] = kept
+        return kept
+
+    def _circles_at(self, floor: int, height: float) -> Rows:
+        """Round things that stand still, and all that moves."""
+        moving = [*self._people_at(floor, height), *self._robots_at(floor, height), *self._things_at(floor, height)]
+        _, circles = self._floors[floor].at(height)
+        return np.concatenate((circles, np.array(moving))) if moving else circles
 
     def _people_at(self, floor: int, height: float) -> list[Four]:
         found = []

@@ -13,7 +13,6 @@ from msgspec import Meta, Struct
 from numpy.typing import NDArray
 
 from roboglot.model.components.sensing.lidar import Lidar
-from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.events import EventStream, ScanTaken
 from roboglot.model.geometry import ORIGIN, Pose
 from roboglot.model.sensing import LaserScan
@@ -55,7 +54,7 @@ class SimulatedLidar(Lidar):
         section: LidarSection,
         hull: Hull,
         sight: Sight,
-        odometry: Odometry | None,
+        odometry: SimulatedOdometry | None,
         events: EventStream,
         random: np.random.Generator,
         tick: float,
@@ -97,7 +96,7 @@ class SimulatedLidar(Lidar):
             section.range_max,
             mount=ORIGIN,
         )
-        pose = self._odometry.reading.pose if self._odometry else ORIGIN
+        pose = self._odometry.pose if self._odometry else ORIGIN
         if late and self._odometry:  # the driver takes odometry of a moment before
             twist = self._odometry.reading.twist
             pose = pose.compose(Pose(-late * twist.x, -late * twist.y, -late * twist.yaw))

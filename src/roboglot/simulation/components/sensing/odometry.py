@@ -66,6 +66,12 @@ class SimulatedOdometry(Odometry):
             self._reading = OdometryReading(stamp, Pose(x, y, yaw), Twist(vx, vy, rate), way)
         return self._reading
 
+    @property
+    def pose(self) -> Pose:
+        """The reading's, without making the rest of it."""
+        _, x, y, yaw, *_ = self._state
+        return Pose(x, y, yaw) if self._reading is None else self._reading.pose
+
     def _disturbed(self, x: float, y: float, yaw: float, seconds: float) -> tuple[float, float]:
         """What slip and a jump of an encoder add to the way."""
         section, off = self._section, 0.0
