@@ -93,8 +93,7 @@ class Hull:
         self._level = slice(self._q, self._q + 4), slice(self._v, self._v + 4)  # x, y, z, yaw and their rates
         self._rates = slice(self._v, self._v + 4 + 2 * self._tilts + bool(body.legs))
         self._servos = data.actuator_force[self._drive], data.ctrl[self._drive]  # views: they show what is now
-        self.floor = 0
-        self._counted = 0.0  # elevation at which the floor was found, m
+        self.floor, self._counted = 0, 0.0  # and the elevation at which the floor was found, m
         self.x = self.y = 0.0  # base_link in world, m
         self.turned = 0.0  # yaw without wrapping, rad
         self._pose: Pose | None = None  # x, y and yaw, once they are read
