@@ -35,6 +35,7 @@ COMMANDS = {
     "compare": "two recordings or robots, and how much of them agrees",
     "fidelity": "how much the doors agree with what was published of real robots",
     "test": "play test scenarios (YAML) on simulated robots, with a JUnit report",
+    "campaign": "scenarios with many seeds, on all cores, into one table and one report",
     "mirror": "live state of any robot in the terminal",
     "map": "ROS maps to a robot, its map to a ROS map, and maps from recorded drives",
     "program": "check, run, save and list block programs, and read their logs",
@@ -52,7 +53,7 @@ FOLDERS = dict.fromkeys(("compare", "export", "fidelity", "record", "replay", "r
 )
 # The extra to install for a command whose modules are missing; else the one that brings the module.
 EXTRAS = {"demo": "demo", "mcp": "mcp", "export": "logs"} | dict.fromkeys(
-    ("up", "coverage", "capabilities", "fidelity", "doctor", "cloud", "map", "test", "lesson"), "up"
+    ("up", "coverage", "capabilities", "fidelity", "doctor", "cloud", "map", "test", "lesson", "campaign"), "up"
 )
 
 

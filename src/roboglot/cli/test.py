@@ -19,6 +19,7 @@ def command(
     failures: Annotated[Path, typer.Option(help="Where failed scenarios leave recordings, maps, messages.")] = Path(
         FOLDER
     ),
+    seed: Annotated[int | None, typer.Option(min=0, help="Play with this seed instead of the files'.")] = None,
     schema: Annotated[bool, typer.Option("--schema", help="Print the JSON schema of scenario files.")] = False,
 ) -> None:
     """Play scenarios (given, when, then) on simulated robots: see docs/testing.md."""
@@ -31,6 +32,8 @@ def command(
         raise typer.BadParameter("scenario files or folders are needed")
     try:
         found = files.find(paths)
+        if seed is not None:
+            found = [files.with_seed(each, seed) for each in found]
     except files.BadScenario as bad:
         print(f"roboglot test: {visible(str(bad))}", file=sys.stderr)
         raise typer.Exit(2) from None

@@ -173,6 +173,12 @@ class Found:
     scenario: Scenario
 
 
+def with_seed(found: Found, seed: int) -> Found:
+    """Return the scenario with another seed."""
+    given = msgspec.structs.replace(found.scenario.given, seed=seed)
+    return dataclasses.replace(found, scenario=msgspec.structs.replace(found.scenario, given=given))
+
+
 def fault_of(value: str | Mapping[str, Any]) -> WantedFault:
     """Return the fault of a file: its name, or a mapping with ``kind``, ``robot`` and options. Raises BadScenario."""
     if isinstance(value, str):

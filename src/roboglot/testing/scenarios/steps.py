@@ -82,6 +82,9 @@ class Steps:
             _end_group(process)
             output, _ = process.communicate()
             raise StepFailed(f"{command!r} has not ended after {step.within:g} s\n{output[-SHOWN_MAX:]}") from None
+        except BaseException:  # Ctrl-C, too, leaves nothing behind
+            _end_group(process)
+            raise
         self._checker.printed += output[-OUTPUT_MAX:].splitlines()
         if process.returncode:
             raise StepFailed(f"{command!r} ended with {process.returncode}\n{output[-SHOWN_MAX:]}")

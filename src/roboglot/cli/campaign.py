@@ -1,0 +1,96 @@
+"""``roboglot campaign``: scenarios with many seeds, on all cores, into one table and one report."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from roboglot.hosting.visible import visible
+
+if TYPE_CHECKING:
+    from roboglot.testing.campaign.table import Table
+    from roboglot.testing.campaign.trials import Result, Trial
+
+SEEDS_MAX = 1_000_000
+OUT = Path("campaign")
+KEPT_MAX = 10  # trials of one scenario that leave recordings, maps, messages
+
+
+def command(
+    paths: Annotated[list[Path], typer.Argument(help="Scenario files, or folders with them.")],
+    seeds: Annotated[int, typer.Option(min=1, max=SEEDS_MAX, help="So many seeds for each scenario.")] = 100,
+    first_seed: Annotated[int, typer.Option(min=0, help="The first of them.")] = 1,
+    workers: Annotated[int, typer.Option(min=1, max=256, help="Trials at once.")] = os.cpu_count() or 1,
+    out: Annotated[Path, typer.Option(help="Of table and report; what is in it is not played again.")] = OUT,
+    longest: Annotated[float, typer.Option(min=1, help="Real seconds after which a trial is ended.")] = 600.0,
+) -> None:
+    """Play scenarios with many seeds. Ctrl-C leaves what is done; the same command goes on."""
+    from roboglot.testing.campaign.table import OtherCampaign, Table
+    from roboglot.testing.campaign.trials import trials_of
+    from roboglot.testing.scenarios import files
+
+    try:
+        found = files.find([path.absolute() for path in paths])
+        folder = Path(os.path.commonpath([each.path.parent for each in found]))
+        table = Table(out.absolute() / "table.csv")
+        trials = list(trials_of(found, folder, range(first_seed, first_seed + seeds)))
+        left = [trial for trial in trials if not table.done(trial)]
+    except (files.BadScenario, OtherCampaign, OSError) as bad:
+        print(f"roboglot campaign: {visible(str(bad))}", file=sys.stderr)
+        raise typer.Exit(2) from None
+    if len(left) < len(trials):
+        print(f"{len(trials) - len(left)} of {len(trials)} trials are in {table.path} already")
+    interrupted = _play(left, table, workers, longest)
+    _write(table, folder, len(trials))
+    if interrupted:
+        raise typer.Exit(130)
+    raise typer.Exit(0 if all(row.outcome == "passed" for row in table.rows) else 1)
+
+
+def _play(left: list[Trial], table: Table, workers: int, longest: float) -> bool:
+    """Play what is left, with a line for each that did not pass; whether it was interrupted."""
+    from roboglot.testing.campaign.local import play_here
+    from roboglot.testing.campaign.trials import Outcome
+
+    kept: Counter[str] = Counter()
+    number = 0
+
+    def leave(trial: Trial) -> Path | None:
+        return table.path.parent / "failures" / f"seed-{trial.seed}" if kept[trial.scenario] < KEPT_MAX else None
+
+    def ended(trial: Trial, result: Result) -> None:
+        nonlocal number
+        number += 1
+        table.add(trial, result)
+        if result.outcome is not Outcome.PASSED:
+            kept[trial.scenario] += 1
+            print(f"{result.outcome:7} {visible(trial.scenario)} seed {trial.seed}: {visible(result.why)}", flush=True)
+        if sys.stderr.isatty():
+            print(f"\r{number} of {len(left)}", end="", file=sys.stderr, flush=True)
+
+    try:
+        play_here(iter(left), workers, longest, leave, ended)
+    except KeyboardInterrupt:
+        print(f"\ninterrupted: {number} of {len(left)} trials were played; the same command goes on", file=sys.stderr)
+        return True
+    return False
+
+
+def _write(table: Table, folder: Path, wanted: int) -> None:
+    """Write the report and, where pyarrow is there, the table for data tools."""
+    from roboglot.testing.campaign.report import report
+    from roboglot.testing.campaign.table import write_parquet
+
+    page = table.path.with_name("report.md")
+    page.write_text(report(table.rows, folder, wanted), encoding="utf-8")
+    written = [str(table.path), str(page)]
+    if write_parquet(table.rows, parquet := table.path.with_suffix(".parquet")):
+        written.append(str(parquet))
+    passed = sum(row.outcome == "passed" for row in table.rows)
+    print(f"{passed} of {len(table.rows)} trials passed: {', '.join(written)}")
+    table.close()

@@ -1,0 +1,108 @@
+"""Plays trials on this machine: each in a process of its own, forked from one that has everything loaded."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+
+import msgspec
+
+from roboglot.shards.warmth import ENVIRONMENT
+from roboglot.testing.campaign.trials import Outcome, Result, Trial, play_trial
+
+END_SECONDS_MAX = 10.0
+ATTEMPTS_MAX = 3  # of a trial whose process dies
+PRELOADED = ["roboglot.testing.campaign.warmed"]
+Leave = Callable[[Trial], Path | None]
+Ended = Callable[[Trial, Result], None]
+
+
+@dataclass(slots=True)
+class _Running:
+    trial: Trial
+    attempt: int
+    process: BaseProcess
+    ear: Connection
+    deadline: float
+
+
+def play_here(trials: Iterator[Trial], workers: int, seconds_max: float, leave: Leave, ended: Ended) -> None:
+    """Play all of ``trials``, ``workers`` at a time; ``ended`` hears of each. Interrupted, it ends those under way."""
+    os.environ.update(ENVIRONMENT)
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(PRELOADED)
+    running: list[_Running] = []
+
+    def start(trial: Trial, attempt: int) -> None:
+        ear, mouth = context.Pipe(duplex=False)
+        process = context.Process(target=_play, args=(trial, leave(trial), mouth), daemon=False)
+        process.start()
+        mouth.close()
+        running.append(_Running(trial, attempt, process, ear, _now() + seconds_max))
+
+    try:
+        while True:
+            while len(running) < workers and (trial := next(trials, None)) is not None:
+                start(trial, 1)
+            if not running:
+                return
+            nearest = min(one.deadline for one in running)
+            wait([one.ear for one in running], max(0.0, nearest - _now()))
+            for one in [each for each in running if each.ear.poll() or each.deadline <= _now()]:
+                running.remove(one)
+                result = _result(one, seconds_max)
+                if result.outcome is Outcome.CRASHED and one.attempt < ATTEMPTS_MAX:
+                    start(one.trial, one.attempt + 1)
+                else:
+                    ended(one.trial, msgspec.structs.replace(result, attempts=one.attempt))
+    finally:
+        for one in running:
+            one.process.terminate()  # all at once
+        for one in running:
+            _end(one.process)
+
+
+def _now() -> float:
+    return time.monotonic()  # noqa: TID251 - a process of another machine's time
+
+
+def _result(one: _Running, seconds_max: float) -> Result:
+    """What its process said before it ended; ends one that is late."""
+    try:
+        if not one.ear.poll():
+            return Result(Outcome.LATE, f"it was ended after {seconds_max:.0f} s", seconds_max)
+        return msgspec.json.decode(one.ear.recv_bytes(), type=Result)
+    except (EOFError, OSError):
+        one.process.join(5.0)
+        return Result(Outcome.CRASHED, f"its process ended with {one.process.exitcode}")
+    finally:
+        one.ear.close()
+        _end(one.process)
+
+
+def _end(process: BaseProcess) -> None:
+    """End the process: kindly, so that it ends what it started, then by force with its whole group."""
+    process.terminate()
+    process.join(END_SECONDS_MAX)
+    if process.pid is not None:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+    process.kill()
+    process.join()
+
+
+def _play(trial: Trial, leave: Path | None, mouth: Connection) -> None:
+    """In the forked process: a group of its own, so that Ctrl-C reaches the campaign alone."""
+    os.setpgid(0, 0)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    mouth.send_bytes(msgspec.json.encode(play_trial(trial, leave)))
+    mouth.close()

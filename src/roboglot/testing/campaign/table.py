@@ -1,0 +1,130 @@
+"""The table of a campaign: a CSV file to which every trial adds a row as soon as it has ended."""
+
+from __future__ import annotations
+
+import csv
+import fcntl
+import io
+import os
+from collections.abc import Sequence
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import NamedTuple
+
+from roboglot.testing.campaign.trials import FINAL, Outcome, Result, Trial
+
+HEAD = ("scenario", "name", "seed", "outcome", "why", "seconds", "attempts", "fingerprint")
+
+
+class OtherCampaign(ValueError):
+    """The folder holds something else than the beginning of this campaign; the message says what."""
+
+
+class Row(NamedTuple):
+    """One trial that has ended."""
+
+    scenario: str
+    name: str
+    seed: int
+    outcome: str
+    why: str
+    seconds: float
+    attempts: int
+    fingerprint: str
+
+
+class Table:
+    """Open from the beginning to ``close``. Raises OtherCampaign for what is no table, or in use."""
+
+    def __init__(self, path: Path) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self.path = path
+        self._file = path.open("a+b")
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            self._file.close()
+            raise OtherCampaign(f"another campaign writes {path}") from None
+        try:
+            self.rows = self._read()
+        except OtherCampaign:
+            self._file.close()
+            raise
+        if not self._file.tell():
+            self._write(HEAD)
+
+    def done(self, trial: Trial) -> bool:
+        """Whether the trial is in the table and need not be played again. Raises OtherCampaign."""
+        row = self._found.get((trial.scenario, trial.seed))
+        if row is not None and row.fingerprint != trial.fingerprint:
+            raise OtherCampaign(
+                f"{self.path} was made with another version of {trial.scenario} or of roboglot: choose another --out"
+            )
+        return row is not None and row.outcome in FINAL
+
+    def add(self, trial: Trial, result: Result) -> Row:
+        """Write how it went; the disk has it when this returns."""
+        row = Row(
+            trial.scenario,
+            trial.name,
+            trial.seed,
+            result.outcome,
+            result.why,
+            round(result.seconds, 3),
+            result.attempts,
+            trial.fingerprint,
+        )
+        self._write(row)
+        self._found[row.scenario, row.seed] = row
+        return row
+
+    @property
+    def rows(self) -> Sequence[Row]:
+        """The last row of each trial."""
+        return list(self._found.values())
+
+    @rows.setter
+    def rows(self, rows: Sequence[Row]) -> None:
+        self._found = {(row.scenario, row.seed): row for row in rows}
+
+    def close(self) -> None:
+        """Let others have the file."""
+        self._file.close()
+
+    def _write(self, values: Sequence[object]) -> None:
+        line = io.StringIO()
+        csv.writer(line, lineterminator="\n").writerow(values)
+        self._file.write(line.getvalue().encode())
+        self._file.flush()
+        os.fsync(self._file.fileno())
+
+    def _read(self) -> Sequence[Row]:
+        """Read what is there; half a line, which a kill left, is cut off."""
+        self._file.seek(0)
+        data = self._file.read()
+        whole = data.rfind(b"\n") + 1
+        self._file.truncate(whole)
+        self._file.seek(whole)
+        lines = list(csv.reader(io.StringIO(data[:whole].decode("utf-8", "replace"))))
+        if lines and tuple(lines[0]) != HEAD:
+            raise OtherCampaign(f"{self.path} is no table of a campaign")
+        try:
+            return [_row(line) for line in lines[1:]]
+        except (ValueError, TypeError) as error:
+            raise OtherCampaign(f"{self.path} is no table of a campaign: {error}") from None
+
+
+def _row(line: Sequence[str]) -> Row:
+    scenario, name, seed, outcome, why, seconds, attempts, fingerprint = line
+    return Row(scenario, name, int(seed), Outcome(outcome), why, float(seconds), int(attempts), fingerprint)
+
+
+def write_parquet(rows: Sequence[Row], path: Path) -> bool:
+    """Write the table for data tools; False where pyarrow is not installed."""
+    if find_spec("pyarrow") is None:
+        return False
+    pyarrow, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
+    plain = [row._replace(outcome=str(row.outcome)) for row in rows]
+    parquet.write_table(pyarrow.table({name: [getattr(row, name) for row in plain] for name in HEAD}), path)
+    return True

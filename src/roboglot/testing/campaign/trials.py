@@ -1,0 +1,76 @@
+"""One scenario with one seed: what is played, how it went, and how a process plays it."""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from importlib.metadata import version
+from pathlib import Path
+
+import msgspec
+
+from roboglot.testing.scenarios.files import Found, read, with_seed
+
+WHY_MAX = 500  # characters of a reason that are kept
+
+
+class Outcome(StrEnum):
+    """How a trial ended."""
+
+    PASSED = "passed"
+    FAILED = "failed"  # something that should be true was not
+    BROKEN = "broken"  # the scenario could not be played at all
+    CRASHED = "crashed"  # its process died, every time
+    LATE = "late"  # it was ended after the longest that a trial may take
+
+
+FINAL = (Outcome.PASSED, Outcome.FAILED, Outcome.BROKEN)  # played again it would end in the same way
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """``scenario``: its path below ``folder``; ``fingerprint``: of its text and of this version of roboglot."""
+
+    folder: str
+    scenario: str
+    name: str
+    seed: int
+    fingerprint: str
+
+
+class Result(msgspec.Struct, frozen=True):
+    """How one went; ``seconds`` are real ones."""
+
+    outcome: Outcome
+    why: str = ""
+    seconds: float = 0.0
+    attempts: int = 1
+
+
+def trials_of(found: Sequence[Found], folder: Path, seeds: range) -> Iterator[Trial]:
+    """Yield every scenario with every seed, seed by seed: a campaign that is stopped early has some of each."""
+    prints = [_fingerprint(each.path) for each in found]
+    for seed in seeds:
+        for each, fingerprint in zip(found, prints, strict=True):
+            name = str(each.path.relative_to(folder))
+            yield Trial(str(folder), name, each.scenario.name, seed, fingerprint)
+
+
+def _fingerprint(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes() + version("roboglot").encode()).hexdigest()[:12]
+
+
+def play_trial(trial: Trial, leave: Path | None) -> Result:
+    """Play it in this process; what a failed one leaves goes below ``leave``, if that is given."""
+    from roboglot.testing.scenarios.runner import play
+
+    found = with_seed(read(Path(trial.folder) / trial.scenario), trial.seed)
+    with tempfile.TemporaryDirectory(prefix="roboglot-trial-") as thrown_away:
+        played = play(found, leave or Path(thrown_away))
+    why = "; ".join(played.failures)[:WHY_MAX]
+    if played.broken:
+        return Result(Outcome.BROKEN, why, played.seconds)
+    return Result(Outcome.FAILED if why else Outcome.PASSED, why, played.seconds)

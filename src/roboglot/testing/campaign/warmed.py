@@ -1,0 +1,8 @@
+"""Loads what a trial needs when it is imported: by the process from which trials are forked."""
+
+from __future__ import annotations
+
+import roboglot.testing.scenarios.runner  # noqa: F401 - for those that are forked from here
+from roboglot.shards.warmth import warm
+
+warm()

@@ -1,0 +1,126 @@
+"""Campaigns: every trial ends in the table once, what dies is tried again, what is stopped goes on."""
+
+from __future__ import annotations
+
+import csv
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from roboglot.testing.campaign.report import interval, report
+from roboglot.testing.campaign.table import OtherCampaign, Row, Table
+from roboglot.testing.campaign.trials import Outcome, Result, Trial
+
+FINE = "given: {world: empty, body: robomaster_ep, lockstep: true}\nthen: [{travelled: {at_most: 1}}]\n"
+STAYS = f"name: it stays\nwhen: [{{wait: 0.1}}]\n{FINE}"
+DIES = f"name: it dies\nwhen: [{{run: kill -9 $PPID}}]\n{FINE}"
+HANGS = f"name: it hangs\nwhen: [{{run: sleep 314.15}}]\n{FINE}"
+
+
+def trial(seed: int, fingerprint: str = "f") -> Trial:
+    return Trial("/nowhere", "a.yaml", "a", seed, fingerprint)
+
+
+def begin(folder: Path, *options: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-u", "-m", "roboglot", "campaign", "scenarios", "--workers", "2", *options]
+    return subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+
+def rows(folder: Path) -> Sequence[dict[str, str]]:
+    path = folder / "campaign/table.csv"
+    return list(csv.DictReader(path.read_text().splitlines())) if path.exists() else []
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "scenarios").mkdir()
+    return tmp_path
+
+
+def test_all_trials_are_in_the_table_and_nothing_is_played_twice(folder: Path) -> None:
+    (folder / "scenarios/stays.yaml").write_text(STAYS)
+    (folder / "scenarios/dies.yaml").write_text(DIES)
+    first = begin(folder, "--seeds", "1")
+    said, _ = first.communicate(timeout=200)
+    assert first.returncode == 1, said
+    found = {row["scenario"]: row for row in rows(folder)}
+    assert found["stays.yaml"]["outcome"] == "passed", said
+    assert (found["dies.yaml"]["outcome"], found["dies.yaml"]["attempts"]) == ("crashed", "3")
+    assert "1 of 2 trials passed" in (folder / "campaign/report.md").read_text()
+    (folder / "scenarios/dies.yaml").unlink()
+    again = begin(folder, "--seeds", "2")
+    said, _ = again.communicate(timeout=200)
+    assert "1 of 2 trials are in" in said
+    assert [row["seed"] for row in rows(folder) if row["scenario"] == "stays.yaml"] == ["1", "2"]
+
+
+def test_an_interrupted_campaign_leaves_a_table_and_no_process(folder: Path) -> None:
+    (folder / "scenarios/a_stays.yaml").write_text(STAYS)
+    (folder / "scenarios/b_hangs.yaml").write_text(HANGS)
+    process = begin(folder, "--seeds", "1")
+    deadline = time.monotonic() + 200
+    while not rows(folder) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    process.send_signal(signal.SIGINT)
+    said, _ = process.communicate(timeout=60)
+    assert process.returncode == 130, said
+    assert "1 of 2 trials were played" in said
+    assert (folder / "campaign/report.md").exists()
+    left = subprocess.run(["pgrep", "-f", "sleep 314.15"], capture_output=True, check=False)
+    assert not left.stdout
+
+
+@given(st.lists(st.integers(0, 50), unique=True), st.binary(max_size=30).filter(lambda tail: b"\n" not in tail))
+def test_rows_survive_what_a_kill_leaves_behind(
+    tmp_path_factory: pytest.TempPathFactory, seeds: list[int], tail: bytes
+) -> None:
+    path = tmp_path_factory.mktemp("table") / "table.csv"
+    table = Table(path)
+    for seed in seeds:
+        table.add(trial(seed), Result(Outcome.FAILED, 'why, "so"\nand more', 1.5))
+    table.close()
+    with path.open("ab") as file:
+        file.write(tail)
+    table = Table(path)
+    assert [row.seed for row in table.rows] == seeds
+    assert all(table.done(trial(seed)) for seed in seeds)
+    table.add(trial(99), Result(Outcome.CRASHED))
+    assert not table.done(trial(99))  # it is tried again
+    table.close()
+
+
+def test_other_tables_and_other_scenarios_are_left_alone(tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    path.write_text("a,b\n1,2\n")
+    with pytest.raises(OtherCampaign, match="no table of a campaign"):
+        Table(path)
+    assert path.read_text() == "a,b\n1,2\n"
+    path.unlink()
+    table = Table(path)
+    table.add(trial(1), Result(Outcome.PASSED))
+    with pytest.raises(OtherCampaign, match="another version"):
+        table.done(trial(1, "g"))
+    with pytest.raises(OtherCampaign, match="another campaign"):
+        Table(path)
+    table.close()
+
+
+@given(st.integers(1, 10_000), st.integers(0, 10_000))
+def test_the_interval_holds_the_share(count: int, passed: int) -> None:
+    passed = min(passed, count)
+    low, high = interval(passed, count)
+    assert 0 <= low <= passed / count <= high <= 1
+
+
+def test_the_report_groups_reasons_that_differ_in_numbers(tmp_path: Path) -> None:
+    failed = [Row("a.yaml", "a", n, Outcome.FAILED, f"then 1: moved 0.{n} m", 1.0, 1, "f") for n in range(3)]
+    page = report([*failed, Row("a.yaml", "a", 9, Outcome.PASSED, "", 2.0, 1, "f")], tmp_path, 4)
+    assert "3 x failed: then 1: moved 0.0 m (seeds 0, 1, 2)" in page
+    assert f"roboglot test {tmp_path / 'a.yaml'} --seed 0" in page
