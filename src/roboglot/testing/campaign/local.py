@@ -36,7 +36,10 @@ class _Running:
 
 
 def play_here(trials: Iterator[Trial], workers: int, seconds_max: float, leave: Leave, ended: Ended) -> None:
-    """Play all of ``trials``, ``workers`` at a time; ``ended`` hears of each. Interrupted, it ends those under way."""
+    """Play all of ``trials``, ``workers`` at a time; ``ended`` hears of each. Call it from the main thread.
+
+    Raises KeyboardInterrupt at SIGINT, once what was under way is ended.
+    """
     os.environ.update(ENVIRONMENT)
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(PRELOADED)
@@ -49,26 +52,41 @@ def play_here(trials: Iterator[Trial], workers: int, seconds_max: float, leave: 
         mouth.close()
         running.append(_Running(trial, attempt, process, ear, _now() + seconds_max))
 
+    with _interruptions() as interrupted:
+        try:
+            while not interrupted.poll():
+                while len(running) < workers and (trial := next(trials, None)) is not None:
+                    start(trial, 1)
+                if not running:
+                    return
+                nearest = min(one.deadline for one in running)
+                wait([interrupted, *(one.ear for one in running)], max(0.0, nearest - _now()))
+                for one in [each for each in running if each.ear.poll() or each.deadline <= _now()]:
+                    running.remove(one)
+                    result = _result(one, seconds_max)
+                    if result.outcome is Outcome.CRASHED and one.attempt < ATTEMPTS_MAX:
+                        start(one.trial, one.attempt + 1)
+                    else:
+                        ended(one.trial, msgspec.structs.replace(result, attempts=one.attempt))
+        finally:
+            for one in running:
+                one.process.terminate()  # all at once
+            for one in running:
+                _end(one.process)
+    raise KeyboardInterrupt
+
+
+@contextlib.contextmanager
+def _interruptions() -> Iterator[Connection]:
+    """Have SIGINT be read from a pipe: raised anywhere, it could lose a process that has just been started."""
+    ear, mouth = multiprocessing.Pipe(duplex=False)
+    before = signal.signal(signal.SIGINT, lambda *_: mouth.send_bytes(b"!"))
     try:
-        while True:
-            while len(running) < workers and (trial := next(trials, None)) is not None:
-                start(trial, 1)
-            if not running:
-                return
-            nearest = min(one.deadline for one in running)
-            wait([one.ear for one in running], max(0.0, nearest - _now()))
-            for one in [each for each in running if each.ear.poll() or each.deadline <= _now()]:
-                running.remove(one)
-                result = _result(one, seconds_max)
-                if result.outcome is Outcome.CRASHED and one.attempt < ATTEMPTS_MAX:
-                    start(one.trial, one.attempt + 1)
-                else:
-                    ended(one.trial, msgspec.structs.replace(result, attempts=one.attempt))
+        yield ear
     finally:
-        for one in running:
-            one.process.terminate()  # all at once
-        for one in running:
-            _end(one.process)
+        signal.signal(signal.SIGINT, before)
+        ear.close()
+        mouth.close()
 
 
 def _now() -> float:
