@@ -12,7 +12,7 @@ const here = dirname(fileURLToPath(import.meta.url));
 const root = join(here, "../..");
 const TARGET = join(root, "src/roboglot/console/web/studio/vendor");
 const AXE = join(root, "tests/browser/vendor");
-const MEDIA = ["click.mp3", "delete.mp3", "disconnect.mp3", "drop.mp3", "delete-icon.svg", "dropdown-arrow.svg", "foldout-icon.svg",
+const MEDIA = ["delete-icon.svg", "dropdown-arrow.svg", "foldout-icon.svg",
   "handclosed.cur", "handdelete.cur", "handopen.cur", "resize-handle.svg", "sprites.svg", "1x1.gif", "quote0.png", "quote1.png", "pilcrow.png"];
 const BANNER = `const styleSheetElement=()=>{const e=document.createElement("link"),s=new CSSStyleSheet();document.adoptedStyleSheets.push(s);`
   + `Object.defineProperty(e,"textContent",{get:()=>"",set:t=>s.replaceSync(t)});return e};`;

@@ -22,7 +22,6 @@ TYPES = {
     ".png": "image/png",
     ".gif": "image/gif",
     ".cur": "image/x-icon",
-    ".mp3": "audio/mpeg",
 }
 _INLINE = re.compile(rb'<script type="importmap">(.*?)</script>', re.DOTALL)
 
