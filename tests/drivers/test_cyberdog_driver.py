@@ -202,8 +202,9 @@ async def test_postures_figures_and_gaits_are_the_dogs(driven: Robot, robot: Rob
 async def test_it_follows_and_docks_by_its_own_skills_also_when_it_is_localized(
     driven: Robot, robot: Robot, until: Until, world: World
 ) -> None:
-    anna = world.hands.person("anna").pose
-    world.hands.place("a", Pose(anna.x - 3.0, anna.y, 0.0))
+    start = world.truth.pose_of("a")  # where it is localized: it is not carried elsewhere
+    anna = start.compose(Pose(3.0))
+    world.hands.person("anna").place(anna.x, anna.y, math.degrees(start.yaw) + 180.0)
     following = driven[Following].follow(distance=1.2, source="test")
     await until(lambda: 0.8 < world.truth.pose_of("a").distance_to(anna) < 1.6)
     following.cancel()
