@@ -171,7 +171,7 @@ async def test_the_page_of_access_lets_in_and_throws_out(tmp_path: Path) -> None
         guard.reload()
         assert '"yaw"' in (await user.type(f"TOKEN={token}; {curl.replace('10.0.0.5', '127.0.0.1')}")).said
 
-            verified = await user.type(".venv/bin/roboglot audit --verify")
+        verified = await user.type(".venv/bin/roboglot audit --verify")
         assert verified.status == 0, verified
         assert "rows, whole" in verified.said
         told = await user.type(".venv/bin/roboglot doctor --security")
