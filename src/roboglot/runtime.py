@@ -232,7 +232,7 @@ class Runtime:
             return {name: doors.endpoints for name, doors in self.doors.items()}
 
         bodies = {robot.name: robot.body for robot in self.config.robots}
-        world = ConsoleWorld(self.config.world, version("roboglot"), self.clock, bodies)
+        world = ConsoleWorld(self.config.world, version("roboglot"), self.clock, self.config.seed, bodies)
         studio = Studio(self._programs, self._rehearsals, self._scene_of, (FOLDER, self.config.data / "lessons"))
 
         def running() -> int:

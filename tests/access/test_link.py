@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roboglot.access.tunnel import tunnel as carrying
+from roboglot.access.tunnel.busy_poll import AWAKE, SHORT_MAX, BusyPoll
 from roboglot.access.tunnel.frames import BadFrame, Kind, encode
 from roboglot.access.tunnel.link import Link
 from roboglot.access.tunnel.tunnel import Tunnel
@@ -144,3 +145,21 @@ async def test_while_the_client_drives_both_ends_show_often_that_they_are_there(
             await asyncio.sleep(0)
         assert own._quick_until > loop.time()
         assert not any(sent), "only the end that knows who drives asks for it"
+
+
+async def test_the_loop_stays_awake_for_a_moment_after_a_short_message(monkeypatch: pytest.MonkeyPatch) -> None:
+    now, looks = 0.0, 0
+
+    def time_passes() -> float:
+        nonlocal now, looks
+        now, looks = now + AWAKE / 10, looks + 1
+        return now
+
+    monkeypatch.setattr("roboglot.access.tunnel.busy_poll.time.perf_counter", time_passes)
+    poll = BusyPoll()
+    poll.stir(SHORT_MAX + 1)
+    assert not looks
+    poll.stir(SHORT_MAX)
+    for _ in range(30):
+        await asyncio.sleep(0)
+    assert 10 <= looks <= 12  # then it sleeps again

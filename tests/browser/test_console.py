@@ -329,9 +329,10 @@ async def test_the_camera_shows_pictures_and_what_is_in_them(served: Served, ope
             await served.clock.advance(0.1)
             await asyncio.sleep(0.05)
     if await page.evaluate("document.querySelector('.screen video') !== null"):  # not over loopback alone
-        while not await page.locator("text=Sound").count():
-            await served.clock.advance(0.1)
-            await asyncio.sleep(0.05)
+        async with asyncio.timeout(2 * PATIENCE / 1000):
+            while not await page.locator("text=Sound").count():
+                await served.clock.advance(0.1)
+                await asyncio.sleep(0.05)
         await page.click("text=Sound")
         await until_page(page, "!document.querySelector('.screen video').muted")
     await page.click("text=Film")

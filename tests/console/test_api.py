@@ -19,6 +19,7 @@ from roboglot.model.components.mapping.map_library import MapLibrary, StoredMap
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.system.lease import Lease
 from roboglot.model.errors import Unconnected
@@ -248,7 +249,7 @@ async def test_chance_begins_anew_from_the_seed_that_is_given(shown: Shown) -> N
         scan = shown.robot[Lidar].scan
         assert scan is not None
         ranges: list[float] = scan.ranges.tolist()
-        return ranges
+        return [*ranges, shown.robot[Imu].reading.angular_velocity.x]  # drawn many ticks at once
 
     shown.runtime.fleet.world.hands.add_obstacle(Pose(2.0, 0.0), (0.5, 4.0, 1.0), 0)
     await shown.clock.advance(0.2)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
@@ -16,12 +18,30 @@ from hypothesis import strategies as st
 
 from roboglot.testing.campaign.report import interval, report
 from roboglot.testing.campaign.table import OtherCampaign, Row, Table
-from roboglot.testing.campaign.trials import Outcome, Result, Trial
+from roboglot.testing.campaign.trials import Outcome, Result, Trial, trials_of
+from roboglot.testing.scenarios.files import find
 
+SLEEP = f"314.{os.getpid()}"
 FINE = "given: {world: empty, body: robomaster_ep, lockstep: true}\nthen: [{travelled: {at_most: 1}}]\n"
 STAYS = f"name: it stays\nwhen: [{{wait: 0.1}}]\n{FINE}"
 DIES = f"name: it dies\nwhen: [{{run: kill -9 $PPID}}]\n{FINE}"
-HANGS = f"name: it hangs\nwhen: [{{run: sleep 314.15}}]\n{FINE}"
+HANGS = f"name: it hangs\nwhen: [{{run: sleep {SLEEP}}}]\n{FINE}"
+
+
+def still_sleeping() -> bool:
+    """Whether a hanging scenario's command is there."""
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        with contextlib.suppress(OSError):
+            if path.read_bytes().split(b"\0")[:2] == [b"sleep", SLEEP.encode()]:
+                return True
+    return False
+
+
+def wait_until(condition: Callable[[], object]) -> None:
+    deadline = time.monotonic() + 200
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
 
 
 def trial(seed: int, fingerprint: str = "f") -> Trial:
@@ -65,16 +85,22 @@ def test_an_interrupted_campaign_leaves_a_table_and_no_process(folder: Path) -> 
     (folder / "scenarios/a_stays.yaml").write_text(STAYS)
     (folder / "scenarios/b_hangs.yaml").write_text(HANGS)
     process = begin(folder, "--seeds", "1")
-    deadline = time.monotonic() + 200
-    while not rows(folder) and time.monotonic() < deadline:
-        time.sleep(0.1)
+    wait_until(lambda: rows(folder) and still_sleeping())
     process.send_signal(signal.SIGINT)
     said, _ = process.communicate(timeout=60)
     assert process.returncode == 130, said
     assert "1 of 2 trials were played" in said
     assert (folder / "campaign/report.md").exists()
-    left = subprocess.run(["pgrep", "-f", "sleep 314.15"], capture_output=True, check=False)
-    assert not left.stdout
+    assert not still_sleeping()
+
+
+def test_a_killed_campaign_leaves_no_process(folder: Path) -> None:
+    (folder / "scenarios/b_hangs.yaml").write_text(HANGS)
+    process = begin(folder, "--seeds", "1")
+    wait_until(still_sleeping)
+    process.kill()
+    process.communicate(timeout=60)
+    wait_until(lambda: not still_sleeping())
 
 
 @given(st.lists(st.integers(0, 50), unique=True), st.binary(max_size=30).filter(lambda tail: b"\n" not in tail))
@@ -84,7 +110,7 @@ def test_rows_survive_what_a_kill_leaves_behind(
     path = tmp_path_factory.mktemp("table") / "table.csv"
     table = Table(path)
     for seed in seeds:
-        table.add(trial(seed), Result(Outcome.FAILED, 'why, "so"\nand more', 1.5))
+        table.add(trial(seed), Result(Outcome.FAILED, 'why, "so" and\nmore', 1.5))
     table.close()
     with path.open("ab") as file:
         file.write(tail)
@@ -96,12 +122,21 @@ def test_rows_survive_what_a_kill_leaves_behind(
     table.close()
 
 
+def test_another_program_is_another_scenario(tmp_path: Path) -> None:
+    (tmp_path / "a.yaml").write_text("name: a\nwhen: [{program: b.py}]\nthen: [{refused: 0}]\n")
+    (tmp_path / "b.py").write_text("pass\n")
+    (before,) = trials_of(find([tmp_path]), tmp_path, range(1))
+    (tmp_path / "b.py").write_text("1 / 0\n")
+    (after,) = trials_of(find([tmp_path]), tmp_path, range(1))
+    assert before.fingerprint != after.fingerprint
+
+
 def test_other_tables_and_other_scenarios_are_left_alone(tmp_path: Path) -> None:
     path = tmp_path / "table.csv"
-    path.write_text("a,b\n1,2\n")
+    path.write_text("a,b\n1,2")  # whose last line has no end
     with pytest.raises(OtherCampaign, match="no table of a campaign"):
         Table(path)
-    assert path.read_text() == "a,b\n1,2\n"
+    assert path.read_text() == "a,b\n1,2"
     path.unlink()
     table = Table(path)
     table.add(trial(1), Result(Outcome.PASSED))

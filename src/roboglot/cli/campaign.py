@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from roboglot.testing.campaign.table import Table
     from roboglot.testing.campaign.trials import Result, Trial
 
-SEEDS_MAX = 1_000_000
+SEEDS_MAX = 100_000
 OUT = Path("campaign")
 KEPT_MAX = 10  # trials of one scenario that leave recordings, maps, messages
 

@@ -185,7 +185,7 @@ class Api:
     def _made_of(self) -> dict[str, Any]:
         """What a copy of the world is made from."""
         world = self._desk.world
-        return {"world": world.name, "seed": self._desk.stage.seed, "bodies": dict(world.bodies)}
+        return {"world": world.name, "seed": world.seed, "bodies": dict(world.bodies)}
 
     def _summary(self, name: str) -> dict[str, Any]:
         view = self._desk.view(name)

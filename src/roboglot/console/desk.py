@@ -32,11 +32,12 @@ assert map_verbs  # registers its verbs
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """What the robots are in: its name, its version of roboglot, its clock, their bodies."""
+    """What the robots are in: name, version of roboglot, clock, the seed that it was built with, their bodies."""
 
     name: str
     version: str
     clock: Clock
+    seed: int = 1
     bodies: Mapping[str, str] = field(default_factory=dict)
 
 

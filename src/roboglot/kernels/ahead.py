@@ -25,6 +25,7 @@ from weakref import WeakKeyDictionary
 
 from roboglot.kernels import MODULES
 
+LLVM_LEVEL = "1"  # of optimisation: level 3 takes a sixth longer, and the kernels run no faster
 WORKERS_MAX = 4  # compilers at once; each takes up to 350 MB
 HERE = Path(__file__).parent
 _turns: WeakKeyDictionary[asyncio.AbstractEventLoop, asyncio.Lock] = WeakKeyDictionary()
@@ -166,8 +167,9 @@ def _compiled(names: Sequence[str]) -> Iterator[str]:
 
 def _start_compiler() -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "roboglot.kernels", "--compiler"]
-    pipe = subprocess.PIPE
-    return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True, bufsize=1)
+    pipe, level = subprocess.PIPE, os.environ.get("NUMBA_OPT", LLVM_LEVEL)
+    environment = os.environ | {"NUMBA_OPT": level}
+    return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True, bufsize=1, env=environment)
 
 
 def _feed(

@@ -1,17 +1,13 @@
 """How every kernel is compiled: ahead for its one signature, kept on disk, without the interpreter's lock.
 
 No C wrapper is made, which nothing calls and which takes a tenth of the compiler's time. Kernels are written with loops
-rather than array expressions and reductions: those compile ten times as slowly, and run no faster. LLVM optimises at
-level 1: level 3 takes a sixth longer, and the kernels run no faster.
+rather than array expressions and reductions: those compile ten times as slowly, and run no faster.
 """
 
 from __future__ import annotations
 
-import os
 from functools import partial
 from typing import Any
-
-os.environ.setdefault("NUMBA_OPT", "1")  # read when Numba is imported
 
 from numba import njit
 

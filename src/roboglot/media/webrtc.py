@@ -171,7 +171,7 @@ class VideoCall:
         transceiver.setCodecPreferences([codec for codec in codecs if codec.mimeType.lower() in (H264, RETRANSMISSION)])
         # aiortc asks its own encoder for a key picture; we have another one.
         sender._send_keyframe = self._track.request_keyframe  # type: ignore[method-assign]
-        if self._sound is not None and "m=audio" in offer:
+        if self._sound is not None and "\nm=audio" in offer:
             peer.addTrack(self._sound)
         try:
             await peer.setRemoteDescription(RTCSessionDescription(offer, "offer"))

@@ -18,7 +18,7 @@ _KINDS = {int(kind): kind for kind in Kind}
 class Link(asyncio.Protocol):
     """``first`` waits for a frame; after ``follow`` each is handed on.
 
-    ``made`` is called when it is there, ``stir`` with the size of all that is sent and received.
+    ``made`` is called when it is there, ``stir`` with the size of what streams send and receive.
     """
 
     def __init__(
@@ -41,7 +41,6 @@ class Link(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         """Cut it; what is no frame ends the connection."""
-        self._stir(len(data))
         try:
             self._cut(data)
         except BadFrame as bad:
@@ -116,6 +115,8 @@ class Link(asyncio.Protocol):
         self._buffer = bytearray(buffer[at:])
 
     def _hand_on(self, kind: Kind, stream: int, payload: bytes) -> None:
+        if kind is Kind.DATA:
+            self._stir(len(payload))
         if self._take is not None:
             self._take(kind, stream, payload)
         elif len(self._early) < EARLY_MAX:

@@ -19,7 +19,7 @@ from roboglot.protocols.robomaster.vocabulary import wheels_in_rpm
 from roboglot.wire.robomaster.replies import Number, Profile
 
 
-class Asked(Protocol):
+class ReadingSource(Protocol):
     """Which robot is read, and how its answers are given."""
 
     @property
@@ -35,12 +35,12 @@ class Asked(Protocol):
         """How robots answer, where the manual differs."""
 
 
-def position(asked: Asked) -> tuple[float, float, float]:
+def position(source: ReadingSource) -> tuple[float, float, float]:
     """x m, y m, z degrees since power-on (robots: since ``command``), by odometry (so it drifts); z in (-180, 180]."""
-    require_heard(asked.robot)
-    pose = asked.robot[Odometry].reading.pose
-    if asked.origin is not ORIGIN:
-        pose = pose.relative_to(asked.origin)
+    require_heard(source.robot)
+    pose = source.robot[Odometry].reading.pose
+    if source.origin is not ORIGIN:
+        pose = pose.relative_to(source.origin)
     return pose.x, -pose.y, -math.degrees(pose.yaw)
 
 
@@ -51,12 +51,12 @@ def attitude(robot: Robot) -> tuple[float, float, float]:
     return -math.degrees(orientation.pitch), math.degrees(orientation.roll), -math.degrees(orientation.yaw)
 
 
-def speed(asked: Asked) -> tuple[float | int, ...]:
+def speed(source: ReadingSource) -> tuple[float | int, ...]:
     """x m/s, y m/s, z degrees/s as odometry measures them, and the four wheels in whole rpm."""
-    robot = asked.robot
+    robot = source.robot
     require_heard(robot)
     twist = robot[Odometry].reading.twist
-    wheels = wheels_in_rpm(robot[Base].wheel_speeds, asked.profile.as_robots)
+    wheels = wheels_in_rpm(robot[Base].wheel_speeds, source.profile.as_robots)
     return (twist.x, -twist.y, -math.degrees(twist.yaw), *wheels)
 
 
@@ -74,11 +74,11 @@ def gimbal_attitude(robot: Robot) -> tuple[float, float]:
 
 
 # What can be pushed, by module, in the manual's order. The position push carries no angle.
-PUSHED: dict[str, dict[str, Callable[[Asked], tuple[Number, ...]]]] = {
+PUSHED: dict[str, dict[str, Callable[[ReadingSource], tuple[Number, ...]]]] = {
     "chassis": {
-        "position": lambda asked: position(asked)[:2],
-        "attitude": lambda asked: attitude(asked.robot),
-        "status": lambda asked: status(asked.robot),
+        "position": lambda source: position(source)[:2],
+        "attitude": lambda source: attitude(source.robot),
+        "status": lambda source: status(source.robot),
     },
-    "gimbal": {"attitude": lambda asked: gimbal_attitude(asked.robot)},
+    "gimbal": {"attitude": lambda source: gimbal_attitude(source.robot)},
 }

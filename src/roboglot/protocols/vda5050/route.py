@@ -50,7 +50,7 @@ class Leg:
         return [Point(node.node_position.x, node.node_position.y) for node in self.nodes if node.node_position]
 
 
-class Driven(Protocol):
+class OrderSession(Protocol):
     """The session that a route belongs to."""
 
     robot: Robot
@@ -80,7 +80,7 @@ class Driven(Protocol):
 class Route:
     """What the robot drives now for one session."""
 
-    def __init__(self, session: Driven) -> None:
+    def __init__(self, session: OrderSession) -> None:
         self._session = session
         self._task: asyncio.Task[None] | None = None
         self._beside: set[asyncio.Task[None]] = set()

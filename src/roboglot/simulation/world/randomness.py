@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Callable
 
 import numpy as np
 
@@ -13,14 +14,21 @@ class Chances:
     def __init__(self, seed: int) -> None:
         self.seed = seed
         self._streams: dict[tuple[str, ...], np.random.Generator] = {}
+        self._drawers: list[Callable[[], None]] = []
 
     def of(self, *names: str) -> np.random.Generator:
         """Return the generator that belongs to these names: the same one every time."""
         return self._streams.setdefault(names, _stream(self.seed, names))
 
+    def on_reseed(self, forget: Callable[[], None]) -> None:
+        """Call ``forget`` at every reseeding: for parts that draw numbers before they need them."""
+        self._drawers.append(forget)
+
     def reseed(self, seed: int) -> None:
         """Have every stream go on as if the world had begun with ``seed`` now."""
         self.seed = seed
+        for forget in self._drawers:
+            forget()
         for names, generator in self._streams.items():
             generator.bit_generator.state = _stream(seed, names).bit_generator.state
 

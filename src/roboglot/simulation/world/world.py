@@ -82,6 +82,7 @@ class World:
             raise ValueError(f"{len(robots)} robots are more than {ROBOTS_MAX}")
         self.description = description
         self._clock = clock
+        self._serial = f"RG-{seed:04d}"
         bodies = {placement.name: load_body(placement.body) for placement in robots}
         if len(bodies) < len(robots):
             raise ValueError("two robots have the same name")
@@ -132,7 +133,7 @@ class World:
 
     def description_of(self, name: str) -> Description:
         """Return a robot's name plate."""
-        serial = f"RG-{self._environment.chances.seed:04d}-{name}"
+        serial = f"{self._serial}-{name}"
         return self._population.hull(name).body.describe(serial=serial, software_version=_version())
 
     def equip(self, robot: Robot) -> None:

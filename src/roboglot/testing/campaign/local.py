@@ -7,6 +7,7 @@ import multiprocessing
 import os
 import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -119,8 +120,17 @@ def _end(process: BaseProcess) -> None:
 
 
 def _play(trial: Trial, leave: Path | None, mouth: Connection) -> None:
-    """In the forked process: a group of its own, so that Ctrl-C reaches the campaign alone."""
+    """In the forked process: a group of its own, so that Ctrl-C reaches the campaign alone; it ends with that."""
     os.setpgid(0, 0)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    threading.Thread(target=_end_with_campaign, daemon=True).start()
     mouth.send_bytes(msgspec.json.encode(play_trial(trial, leave)))
     mouth.close()
+
+
+def _end_with_campaign() -> None:
+    """Wait for the campaign's end, also by ``kill -9``, then have the main thread end what the trial started."""
+    campaign = multiprocessing.parent_process()
+    assert campaign is not None
+    campaign.join()
+    os.kill(os.getpid(), signal.SIGTERM)

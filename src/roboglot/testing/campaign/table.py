@@ -47,7 +47,7 @@ class Table:
             self._file.close()
             raise OtherCampaign(f"another campaign writes {path}") from None
         try:
-            self.rows = self._read()
+            self._found = {(row.scenario, row.seed): row for row in self._read()}
         except OtherCampaign:
             self._file.close()
             raise
@@ -67,10 +67,10 @@ class Table:
         """Write how it went; the disk has it when this returns."""
         row = Row(
             trial.scenario,
-            trial.name,
+            " ".join(trial.name.split()),  # a row is a line: half of one can be told
             trial.seed,
             result.outcome,
-            result.why,
+            " ".join(result.why.split()),
             round(result.seconds, 3),
             result.attempts,
             trial.fingerprint,
@@ -83,10 +83,6 @@ class Table:
     def rows(self) -> Sequence[Row]:
         """The last row of each trial."""
         return list(self._found.values())
-
-    @rows.setter
-    def rows(self, rows: Sequence[Row]) -> None:
-        self._found = {(row.scenario, row.seed): row for row in rows}
 
     def close(self) -> None:
         """Let others have the file."""
@@ -102,17 +98,17 @@ class Table:
     def _read(self) -> Sequence[Row]:
         """Read what is there; half a line, which a kill left, is cut off."""
         self._file.seek(0)
-        data = self._file.read()
+        data, head = self._file.read(), ",".join(HEAD).encode() + b"\n"
+        if not (data.startswith(head) or head.startswith(data)):
+            raise OtherCampaign(f"{self.path} is no table of a campaign")
         whole = data.rfind(b"\n") + 1
+        try:
+            rows = [_row(line) for line in csv.reader(io.StringIO(data[len(head) : whole].decode("utf-8", "replace")))]
+        except (ValueError, TypeError, csv.Error) as error:
+            raise OtherCampaign(f"{self.path} is no table of a campaign: {error}") from None
         self._file.truncate(whole)
         self._file.seek(whole)
-        lines = list(csv.reader(io.StringIO(data[:whole].decode("utf-8", "replace"))))
-        if lines and tuple(lines[0]) != HEAD:
-            raise OtherCampaign(f"{self.path} is no table of a campaign")
-        try:
-            return [_row(line) for line in lines[1:]]
-        except (ValueError, TypeError) as error:
-            raise OtherCampaign(f"{self.path} is no table of a campaign: {error}") from None
+        return rows
 
 
 def _row(line: Sequence[str]) -> Row:

@@ -32,7 +32,7 @@ FINAL = (Outcome.PASSED, Outcome.FAILED, Outcome.BROKEN)  # played again it woul
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """``scenario``: its path below ``folder``; ``fingerprint``: of its text and of this version of roboglot."""
+    """``scenario``: its path below ``folder``; ``fingerprint``: of it, its files and this version of roboglot."""
 
     folder: str
     scenario: str
@@ -52,15 +52,21 @@ class Result(msgspec.Struct, frozen=True):
 
 def trials_of(found: Sequence[Found], folder: Path, seeds: range) -> Iterator[Trial]:
     """Yield every scenario with every seed, seed by seed: a campaign that is stopped early has some of each."""
-    prints = [_fingerprint(each.path) for each in found]
+    prints = [_fingerprint(each) for each in found]
     for seed in seeds:
         for each, fingerprint in zip(found, prints, strict=True):
             name = str(each.path.relative_to(folder))
             yield Trial(str(folder), name, each.scenario.name, seed, fingerprint)
 
 
-def _fingerprint(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes() + version("roboglot").encode()).hexdigest()[:12]
+def _fingerprint(found: Found) -> str:
+    """Tell one state of a scenario from another: its text, its world, recording and programs, and who plays it."""
+    digest = hashlib.sha256(version("roboglot").encode() + found.path.read_bytes())
+    given, folder = found.scenario.given, found.path.parent
+    for name in (given.world, given.recording, *(step.program for step in found.scenario.when)):
+        if name and (folder / name).is_file():
+            digest.update((folder / name).read_bytes())
+    return digest.hexdigest()[:12]
 
 
 def play_trial(trial: Trial, leave: Path | None) -> Result:

@@ -98,6 +98,10 @@ class SimulatedImu(Imu):
         """The robot was lifted and put elsewhere: nothing was felt in between."""
         self._turned, self._motion = self._hull.turned, self._hull.motion
 
+    def forget_noise(self) -> None:
+        """Draw anew: chance begins from another seed."""
+        self._noises.clear()
+
     def sense(self, stamp: float, seconds: float) -> None:
         """Measure one tick."""
         hull, scale = self._hull, self._scale
@@ -155,7 +159,9 @@ def _counts(vector: Vector3, unit: float) -> tuple[int, int, int]:
 
 def _fit(fit: Fitting) -> SimulatedImu:
     field = earth_field(fit.world.north)
-    return SimulatedImu(fit.body[ImuSection], fit.hull, fit.chance("imu"), fit.chance("compass"), field)
+    imu = SimulatedImu(fit.body[ImuSection], fit.hull, fit.chance("imu"), fit.chance("compass"), field)
+    fit.world.chances.on_reseed(imu.forget_noise)
+    return imu
 
 
 PART = Part(

@@ -85,6 +85,10 @@ class SimulatedOdometry(Odometry):
     def noise(self) -> OdometryNoise:
         return OdometryNoise(**structs.asdict(self._section.described))
 
+    def forget_noise(self) -> None:
+        """Draw anew: chance begins from another seed."""
+        self._noises.clear()
+
     def sense(self, stamp: float, seconds: float) -> None:
         """Add one tick's way."""
         wheels = self._base.velocity
@@ -117,7 +121,9 @@ class SimulatedOdometry(Odometry):
 
 def _fit(fit: Fitting) -> SimulatedOdometry:
     base, imu = fit.get(SimulatedBase), fit.get(SimulatedImu)
-    return SimulatedOdometry(fit.body[OdometrySection], base, imu, fit.chance("odometry"))
+    odometry = SimulatedOdometry(fit.body[OdometrySection], base, imu, fit.chance("odometry"))
+    fit.world.chances.on_reseed(odometry.forget_noise)
+    return odometry
 
 
 PART = Part(
