@@ -7,10 +7,10 @@ const STEPS = [0.1, 1, 10]; // s
 
 function Seed() {
   const { seed } = pace.value;
-  return html`<form class="inline" onSubmit=${(e) => { e.preventDefault(); changeWorld("reseed", { seed: Number(new FormData(e.target).get("seed")) }); }}>
-      <label class="grow">${t("seed")} <input name="seed" type="number" min="0" max="2147483647" step="1" required key=${seed} defaultValue=${seed} /></label>
-      <${Button} type="submit" label=${t("seed.change")} verb="reseed" /></form>
-    <p class="muted">${t("seed.hint")}</p>`;
+  return html`<div class="card"><h3>${t("seed")}</h3><p class="muted">${t("seed.hint")}</p>
+    <form class="inline" onSubmit=${(e) => { e.preventDefault(); changeWorld("reseed", { seed: Number(new FormData(e.target).get("seed")) }); }}>
+      <label class="grow"><span class="unseen">${t("seed")}</span><input name="seed" type="number" min="0" max="2147483647" step="1" required key=${seed} defaultValue=${seed} /></label>
+      <${Button} type="submit" label=${t("seed.change")} verb="reseed" /></form></div>`;
 }
 
 export function Clock() {
@@ -25,5 +25,6 @@ export function Clock() {
       <p class="muted">${t("clock.hint")}</p></div>
     <div class="card"><h3>${t("world.file")}</h3><p>${t("world.named", { world: hello.value.world, seed: pace.value.seed })}</p>
       <div class="buttons"><a class="button" href="/api/world.toml" download="world.toml">${t("world.save")}</a></div>
-      <p class="muted">${t("world.hint")}</p><${Seed} /></div>`;
+      <p class="muted">${t("world.hint")}</p></div>
+    <${Seed} />`;
 }
