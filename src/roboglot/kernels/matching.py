@@ -127,13 +127,16 @@ def _linearise(
 
 
 @kernel(
-    "float64[::1](float32[:,:,::1], int16[:,::1], float64[:,::1], float64, float64, float64, float64[::1], float64)"
+    "float64[:,::1](float32[:,:,::1], int16[:,::1], float64[:,::1], float64, float64, float64, float64[::1], float64)"
 )
 def gaps(
     surface: Any, evidence: Any, points: Any, x: float, y: float, yaw: float, sensor: Any, resolution: float
 ) -> Any:
-    """How far (m) each of ``points`` lies off its surface with base_link at the pose; inf: there is none near."""
-    found = np.empty(points.shape[0])
+    """How far (m) each of ``points`` lies off its surface with base_link at the pose, and the surface's weight (n, 2).
+
+    inf and 0: there is none near. The more hits made the surface, the greater is its weight.
+    """
+    found = np.empty((points.shape[0], 2))
     cos, sin = np.cos(yaw), np.sin(yaw)
     for i in range(points.shape[0]):
         beam_x = cos * (points[i, 0] - sensor[0]) - sin * (points[i, 1] - sensor[1])
@@ -143,12 +146,13 @@ def gaps(
         mean_x, mean_y, nx, ny, weight = surface_near(
             surface, evidence, px, py, beam_x / away, beam_y / away, resolution
         )
+        found[i, 1] = weight
         if weight == 0.0:
-            found[i] = np.inf
+            found[i, 0] = np.inf
         elif nx == 0.0 and ny == 0.0:
-            found[i] = np.sqrt((px - mean_x) ** 2 + (py - mean_y) ** 2)
+            found[i, 0] = np.sqrt((px - mean_x) ** 2 + (py - mean_y) ** 2)
         else:
-            found[i] = abs(nx * (px - mean_x) + ny * (py - mean_y))
+            found[i, 0] = abs(nx * (px - mean_x) + ny * (py - mean_y))
     return found
 
 

@@ -182,16 +182,19 @@ def integrate(
         _clear_between(evidence, surface, marks, scan, ends, i, x, y, resolution)
 
 
-@kernel("UniTuple(int64, 3)(int16[:,::1], float64[:,::1], float64, float64, float64, float64)")
-def contradictions(evidence: Any, points: Any, x: float, y: float, slack: float, resolution: float) -> Any:
-    """How many echoes at ``points`` (n, 2; m from the grid's corner), seen from (x, y), the map supports and denies.
+UNKNOWN, FITTING, HIDDEN, FLOATING = 0, 1, 2, 3  # what the map says of an echo
 
-    Returns those on or beside occupied cells, those that a wall should have hidden (the ray passes through it more than
-    ``slack`` m before its end) and those in the midst of floor that was seen free.
+
+@kernel("uint8[::1](int16[:,::1], float64[:,::1], float64, float64, float64, float64)")
+def verdicts(evidence: Any, points: Any, x: float, y: float, slack: float, resolution: float) -> Any:
+    """What the map says of each echo at ``points`` (n, 2; m from the grid's corner), seen from (x, y).
+
+    FITTING: on or beside an occupied cell; HIDDEN: the ray passes through a wall more than ``slack`` m before its end;
+    FLOATING: in the midst of floor that was seen free; else UNKNOWN.
     """
     height, width = evidence.shape
     near = int(np.ceil(slack / resolution))
-    fitting = hidden = floating = 0
+    said = np.zeros(points.shape[0], np.uint8)
     for i in range(points.shape[0]):
         col, row = int(np.floor(points[i, 0] / resolution)), int(np.floor(points[i, 1] / resolution))
         occupied = unknown = False
@@ -204,7 +207,7 @@ def contradictions(evidence: Any, points: Any, x: float, y: float, slack: float,
                 elif evidence[r, c] == 0:
                     unknown = True
         if occupied:
-            fitting += 1
+            said[i] = FITTING
             continue
         dx, dy = points[i, 0] - x, points[i, 1] - y
         length = np.sqrt(dx * dx + dy * dy)
@@ -217,7 +220,7 @@ def contradictions(evidence: Any, points: Any, x: float, y: float, slack: float,
                 pierced = True
                 break
         if pierced:
-            hidden += 1
+            said[i] = HIDDEN
         elif not unknown:
-            floating += 1
-    return fitting, hidden, floating
+            said[i] = FLOATING
+    return said

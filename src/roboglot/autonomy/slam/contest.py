@@ -59,5 +59,5 @@ def _off(grid: EvidenceGrid, scan: ScanPoints, points: NDArray[np.float64], pose
     """How far (m) each of ``points`` lies off the map's surfaces with base_link at ``pose``."""
     corner, sensor = grid.corner, np.array((scan.sensor.x, scan.sensor.y))
     x, y = pose.x - corner.x, pose.y - corner.y
-    off: NDArray[np.float64] = gaps(grid.surface, grid.evidence, points, x, y, pose.yaw, sensor, RESOLUTION)
+    off: NDArray[np.float64] = gaps(grid.surface, grid.evidence, points, x, y, pose.yaw, sensor, RESOLUTION)[:, 0]
     return np.minimum(off, GAP_MAX)

@@ -268,10 +268,9 @@ def _size(correction: Pose, here: Pose) -> tuple[float, float]:
 
 def _is_certain(found: Match, believed: Pose) -> bool:
     """Whether there is but one place where the scan fits, and well."""
-    worst = math.sqrt(float(np.linalg.eigvalsh(found.covariance[:2, :2])[-1]))
     return (
         found.agreement >= AGREEMENT
         and found.known >= KNOWN_SHARE * found.points
-        and worst < SHARP
+        and found.sigma < SHARP
         and abs(wrap_angle(found.pose.yaw - believed.yaw)) < TURN_MAX
     )

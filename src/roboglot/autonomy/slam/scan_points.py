@@ -12,6 +12,7 @@ from roboglot.model.geometry import STILL, Point, Pose, Twist
 from roboglot.model.sensing import LaserScan
 
 RAYS_MAX = 8192
+NEARBY = 12.0  # m
 DESKEW_FROM = 0.01  # m or rad of motion during one turn of the lidar from which its rays are set right
 CARRIED_NEAR = 0.09  # m around what is carried, whose echoes say nothing of the world
 ECHO_SHARE_MIN = 0.1  # fewer echoes than this and the lidar is not believed at all
@@ -45,6 +46,11 @@ class ScanPoints:
         ends, hit = self.ends * np.minimum(1.0, reach / np.maximum(away, reach))[:, None], self.hit.copy()
         hit[far] = 0
         return ScanPoints(ends, hit, self.points, self.sensor)
+
+    def nearby(self, most: int) -> NDArray[np.float64]:
+        """At most so many of the points that a search or a judgement looks at, evenly chosen."""
+        near = self.points[np.hypot(self.points[:, 0], self.points[:, 1]) < NEARBY]
+        return np.ascontiguousarray(near[:: max(1, -(-len(near) // most))])
 
     def thinned(self, most: int) -> ScanPoints:
         """The same with at most so many rays, evenly chosen."""

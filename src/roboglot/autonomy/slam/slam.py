@@ -15,21 +15,19 @@ from numpy.typing import NDArray
 
 from roboglot.autonomy.computing import compute_soon
 from roboglot.autonomy.slam.belief import Belief
+from roboglot.autonomy.slam.certainty import ALL_POINTS, Support, supported
 from roboglot.autonomy.slam.contest import contested
 from roboglot.autonomy.slam.displacement import DisplacementWatch
 from roboglot.autonomy.slam.loops import LoopCloser
 from roboglot.autonomy.slam.matcher import (
-    ALL_POINTS,
     FREE,
     ITERATIONS_MAX,
     MATCH_POINTS_MAX,
     POINTS_MIN,
     Match,
-    Support,
     fit,
     places,
     search,
-    supported,
 )
 from roboglot.autonomy.slam.odometry_noise import LearntBias, LearntNoise
 from roboglot.autonomy.slam.painting import paint

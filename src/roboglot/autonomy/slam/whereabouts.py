@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from roboglot.autonomy.slam.belief import Belief
-from roboglot.autonomy.slam.matcher import Support
+from roboglot.autonomy.slam.certainty import Support
 from roboglot.model.events import (
     EventStream,
     LocalizationLost,

@@ -1,0 +1,153 @@
+"""What the map says of a scan, point by point, and whether that makes a place sure. Needs the kernels.
+
+People and other things that the map does not have hide some of its walls, but no ray of theirs passes through one: the
+points that hang together in the midst of free floor are set aside, and the rest has to fit all the closer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
+from roboglot.autonomy.slam.scan_points import ScanPoints
+from roboglot.kernels.matching import gaps
+from roboglot.kernels.occupancy import FITTING, FLOATING, HIDDEN, verdicts
+from roboglot.model.geometry import Pose
+
+SLACK = 0.15  # m that a point may lie off what the map shows
+JUDGED_POINTS_MAX, ALL_POINTS = 120, 500
+APART, MISSED = 0.3, 3  # m, points between two that still belong to one thing
+THING_SIZE, THING_POINTS = 0.8, 3  # m at most, points at least, of a thing that may stand in the way
+THINGS_MAX, THINGS_SHARE = 3, 0.4  # as many may stand around the robot, hiding so much of what it sees
+INLIER, CLOSE = 0.08, 0.04  # m off the surface
+WELL_KNOWN, SURE_WELL_KNOWN = 4.0, 0.5  # weight of a surface that many hits made; share of points near such ones
+SURE_FITTING, SURE_HIDDEN, SURE_FLOATING = 0.85, 0.02, 0.02  # share of the points, of a place that is sure …
+SURE_AGREEMENT, SURE_CLOSE, SURE_SIGMA = 0.95, 0.925, 0.03  # … of those near a surface; m, in its worst direction
+CROWDED, CROWDED_CLOSE = 0.02, 0.975  # with more than so much set aside, so much of the rest must be close
+CLOSE_PER_HIDDEN = 4.0  # how much more of it for each share of rays that pass through walls
+EXACT, EXACT_HIDDEN = 0.965, 0.004  # share of points close to surfaces from which a place outdoes …
+OUTDONE = 0.08  # … others with so much less
+
+
+@dataclass(frozen=True, slots=True)
+class Support:
+    """Of ``points`` echoes, how many the map explains and how many it denies: behind walls, in free floor."""
+
+    points: int
+    fitting: int
+    hidden: int
+    floating: int
+
+    @property
+    def agreement(self) -> float:
+        """Share of what the map explains of all that it has an opinion on; 1 where it has none."""
+        judged = self.fitting + self.hidden + self.floating
+        return self.fitting / judged if judged else 1.0
+
+    @property
+    def known(self) -> float:
+        """Share of the points that the map has an opinion on."""
+        return (self.fitting + self.hidden + self.floating) / max(1, self.points)
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """A scan at a place, as shares: ``aside`` is what ``things`` hide, the others are of the rest.
+
+    ``agreement``, ``close``: of the points near a ``well_known`` surface those within 8 and 4 cm; ``exact``: of all those
+    that are within 4 cm of any.
+    """
+
+    aside: float
+    things: int
+    fitting: float
+    hidden: float
+    floating: float
+    well_known: float
+    agreement: float
+    close: float
+    exact: float
+
+    def is_sure(self, sigma: float) -> bool:
+        """Whether it is the place, not one that looks like another which the map does not have.
+
+        ``sigma``: m, of the match in its worst direction.
+        """
+        if self.things > THINGS_MAX or self.aside > THINGS_SHARE or sigma > SURE_SIGMA:
+            return False
+        if self.fitting < SURE_FITTING or self.hidden > SURE_HIDDEN or self.floating > SURE_FLOATING:
+            return False
+        if self.well_known < SURE_WELL_KNOWN:
+            return False
+        needed = CROWDED_CLOSE if self.aside > CROWDED else SURE_CLOSE
+        return self.agreement >= SURE_AGREEMENT and self.close >= needed + CLOSE_PER_HIDDEN * self.hidden
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether nothing at all speaks against the place."""
+        return self.exact >= EXACT and self.hidden <= EXACT_HIDDEN
+
+    def is_outdone_by(self, other: Look) -> bool:
+        """Whether ``other`` is exact and this place is not nearly so."""
+        return other.is_exact and self.exact < other.exact - OUTDONE
+
+
+def supported(grid: EvidenceGrid, scan: ScanPoints, pose: Pose) -> Support:
+    """What the map says of ``scan`` if it was taken with base_link at ``pose``."""
+    said = _said(grid, scan, pose, scan.nearby(JUDGED_POINTS_MAX))
+    fitting, hidden, floating = (int(np.count_nonzero(said == kind)) for kind in (FITTING, HIDDEN, FLOATING))
+    return Support(len(said), fitting, hidden, floating)
+
+
+def look_at(grid: EvidenceGrid, scan: ScanPoints, pose: Pose) -> Look:
+    """What all points of ``scan`` say of ``pose``."""
+    points, corner = scan.nearby(ALL_POINTS), grid.corner
+    said = _said(grid, scan, pose, points)
+    sensor = np.array((scan.sensor.x, scan.sensor.y))
+    x, y = pose.x - corner.x, pose.y - corner.y
+    off, weight = gaps(grid.surface, grid.evidence, points, x, y, pose.yaw, sensor, RESOLUTION).T
+    things = _things(points, np.flatnonzero(said == FLOATING))
+    rest = np.ones(len(points), bool)
+    for thing in things:
+        rest[thing] = False
+    count, near = max(1, int(rest.sum())), off[rest & (weight >= WELL_KNOWN)]
+    fitting, floating, close = said == FITTING, said == FLOATING, off < CLOSE
+    return Look(
+        aside=1.0 - count / max(1, len(points)),
+        things=len(things),
+        fitting=float((fitting & rest).sum()) / count,
+        hidden=float((said == HIDDEN).mean()) if len(said) else 0.0,
+        floating=float((floating & rest).sum()) / count,
+        well_known=len(near) / count,
+        agreement=float((near < INLIER).mean()) if len(near) else 0.0,
+        close=float((near < CLOSE).mean()) if len(near) else 0.0,
+        exact=float((close & rest).sum()) / count,
+    )
+
+
+def _said(grid: EvidenceGrid, scan: ScanPoints, pose: Pose, points: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """The map's verdict on each of ``points`` (n, 2; base_link)."""
+    corner, sensor = grid.corner, pose.compose(Pose(scan.sensor.x, scan.sensor.y))
+    ends = scan.in_frame(pose, points)
+    ends -= (corner.x, corner.y)
+    said: NDArray[np.uint8] = verdicts(grid.evidence, ends, sensor.x - corner.x, sensor.y - corner.y, SLACK, RESOLUTION)
+    return said
+
+
+def _things(points: NDArray[np.float64], floating: NDArray[np.intp]) -> list[list[int]]:
+    """Which of the ``floating`` points (numbers) hang together as things of a person's size."""
+    groups: list[list[int]] = []
+    for number in floating.tolist():
+        last = groups[-1][-1] if groups else -1
+        if groups and number - last <= MISSED and np.hypot(*(points[number] - points[last])) < APART:
+            groups[-1].append(number)
+        else:
+            groups.append([number])
+    if len(groups) > 1 and np.hypot(*(points[groups[0][0]] - points[groups[-1][-1]])) < APART:  # behind the robot
+        groups[0] = groups.pop() + groups[0]
+    return [
+        group for group in groups if len(group) >= THING_POINTS and np.hypot(*np.ptp(points[group], 0)) < THING_SIZE
+    ]
