@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboglot.access.tunnel import tunnel as carrying
+from roboglot.access.tunnel import heartbeat
 from roboglot.access.tunnel.busy_poll import AWAKE, SHORT_MAX, BusyPoll
 from roboglot.access.tunnel.frames import BadFrame, Kind, encode
 from roboglot.access.tunnel.link import Link
@@ -126,7 +126,7 @@ async def test_a_reader_that_rests_holds_up_the_sender_alone() -> None:
 async def test_while_the_client_drives_both_ends_show_often_that_they_are_there(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(carrying, "PING_PERIOD", 1000.0)
+    monkeypatch.setattr(heartbeat, "PING_PERIOD", 1000.0)
     loop = asyncio.get_running_loop()
     drives = False
     asked = asyncio.Event()
@@ -139,11 +139,11 @@ async def test_while_the_client_drives_both_ends_show_often_that_they_are_there(
         sent: list[bytes] = []
         monkeypatch.setattr(own._link, "send", lambda *frame: sent.append(frame[-1]))
         await asked.wait()
-        assert loop.time() >= own._quick_until
+        assert loop.time() >= own._heart.quick_until
         drives = True
         while len(sent) < 3:  # noqa: ASYNC110 - this end answers in kind
             await asyncio.sleep(0)
-        assert own._quick_until > loop.time()
+        assert own._heart.quick_until > loop.time()
         assert not any(sent), "only the end that knows who drives asks for it"
 
 

@@ -15,6 +15,7 @@ import pytest
 
 from roboglot.access import audit
 from roboglot.access.store import FILE, AccessStore, Grant
+from roboglot.access.tunnel import heartbeat
 from roboglot.access.tunnel import tunnel as carrying
 from roboglot.access.tunnel.connector import Connector, KnownGateways, NotTrusted, Refused
 from roboglot.access.tunnel.frames import Kind, encode, read_frame
@@ -34,7 +35,7 @@ async def gateway(data: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[
     """A robot behind a gateway, and a token that drives it."""
     monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
     for limit in ("QUIET_AFTER", "LOST_AFTER"):
-        monkeypatch.setattr(carrying, limit, 20.0)  # a busy machine is no lost tunnel
+        monkeypatch.setattr(heartbeat, limit, 20.0)  # a busy machine is no lost tunnel
     store = AccessStore(data / FILE)
     token = store.add_machine("cell", [Grant("a", frozenset({Right.DRIVE}))])
     store.close()
@@ -125,8 +126,8 @@ async def test_losing_the_tunnel_is_losing_the_client(gateway: tuple[Runtime, st
 
 
 async def test_a_silent_end_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(carrying, "QUIET_AFTER", 0.01)
-    monkeypatch.setattr(carrying, "LOST_AFTER", 0.3)
+    monkeypatch.setattr(heartbeat, "QUIET_AFTER", 0.01)
+    monkeypatch.setattr(heartbeat, "LOST_AFTER", 0.3)
     writers: list[asyncio.StreamWriter] = []
     server = await asyncio.start_server(lambda _reader, writer: writers.append(writer), "127.0.0.1", 0)
     _, link = await asyncio.get_running_loop().create_connection(Link, *server.sockets[0].getsockname())

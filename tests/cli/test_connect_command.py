@@ -52,6 +52,7 @@ def test_robots_of_a_gateway_are_on_addresses_of_a_range(tmp_path: Path) -> None
                 assert connect.stdout is not None
                 assert connect.stderr is not None
                 ready = sorted(connect.stdout.readline() for _ in range(2))
+                assert all(ready), connect.stderr.read()
                 assert ready[0].startswith("ready: robot a on 127.0.97.33, ports 1448, ")
                 assert ready[1].startswith("ready: robot b on 127.0.97.34, ports ")
                 said = [connect.stderr.readline() for _ in range(2)]

@@ -28,7 +28,9 @@ class Metered(asyncio.Protocol):
     def data_received(self, data: bytes) -> None:
         """Count, and pass on."""
         assert self._valve is not None
-        self._valve.count(len(data))
+        self._valve.uncounted += len(data)
+        if self._valve.uncounted >= STEP:
+            self._valve.count()
         self.inner.data_received(data)
 
     def eof_received(self) -> bool | None:
@@ -58,15 +60,13 @@ class Valve:
         self._transport, self._meter, self._spend = transport, meter, spend
         self.is_closing = transport.is_closing  # asked for every message
         self._paused = False  # by the inner protocol
-        self._uncounted = 0  # bytes
+        self.uncounted = 0
+        """Bytes; whoever adds to them has them counted from STEP on."""
         self._waiting: asyncio.TimerHandle | None = None
 
-    def count(self, size: int) -> None:
+    def count(self) -> None:
         """Read later if it is too much."""
-        self._uncounted += size
-        if self._uncounted < STEP:
-            return
-        size, self._uncounted = self._uncounted, 0
+        size, self.uncounted = self.uncounted, 0
         wait = self._spend(size)
         if wait > PAUSE_MIN and self._waiting is None and not self._transport.is_closing():
             self._transport.pause_reading()
@@ -80,7 +80,9 @@ class Valve:
 
     def write(self, data: bytes | bytearray | memoryview) -> None:
         """Count and send."""
-        self.count(len(data))
+        self.uncounted += len(data)
+        if self.uncounted >= STEP:
+            self.count()
         self._transport.write(data)
 
     def writelines(self, pieces: list[bytes]) -> None:

@@ -156,7 +156,9 @@ class PipeEnd(asyncio.Transport):
         """Take what the other end wrote."""
         free = self._reading and not self._taking
         if free and not self._inbox and len(data) <= PIECE:
-            self._take(bytes(data))
+            self._taking = True  # what it answers may make the other end write, and that waits
+            self._call(self._protocol.data_received, bytes(data))  # type: ignore[attr-defined]
+            self._taking = False
             if self._inbox and self._reading:
                 self._loop.call_soon(self._drain)
             return
@@ -195,7 +197,9 @@ class PipeEnd(asyncio.Transport):
         while self._inbox and self._reading and not self._lost:
             data = bytes(self._inbox[:PIECE])
             del self._inbox[:PIECE]
-            self._take(data)
+            self._taking = True
+            self._call(self._protocol.data_received, data)  # type: ignore[attr-defined]
+            self._taking = False
         if self._lost:
             return
         self._other.make_room(len(self._inbox))
@@ -206,11 +210,6 @@ class PipeEnd(asyncio.Transport):
             self._heard_end = True
             if not self._call(self._protocol.eof_received):  # type: ignore[attr-defined]
                 self.close()
-
-    def _take(self, data: bytes) -> None:
-        self._taking = True  # what it answers may make the other end write, and that waits
-        self._call(self._protocol.data_received, data)  # type: ignore[attr-defined]
-        self._taking = False
 
     def _call(self, method: Callable[..., Any], *values: Any) -> Any:
         """Call the protocol; its errors end the connection, as everywhere in asyncio, and no one else's work."""

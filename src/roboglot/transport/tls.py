@@ -57,6 +57,8 @@ class TlsEnd(asyncio.Protocol):
         self._incoming: ssl.MemoryBIO
         self._outgoing: ssl.MemoryBIO
         self._tunnel: ssl.SSLObject | None = None
+        self._gone: Callable[[], bool]
+        self._encrypted: Callable[[bytes | bytearray | memoryview], int]
         self._received = 0
         self._host = ""
         self._patience: asyncio.TimerHandle | None = None
@@ -64,6 +66,7 @@ class TlsEnd(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Wait for the first byte."""
         self._transport = cast(asyncio.Transport, transport)
+        self._gone = self._transport.is_closing  # asked for every message
         self._host = (transport.get_extra_info("peername") or ("",))[0]
         self._patience = asyncio.get_running_loop().call_later(HANDSHAKE_SECONDS_MAX, self._transport.abort)
 
@@ -99,9 +102,8 @@ class TlsEnd(asyncio.Protocol):
 
     def send(self, data: bytes | bytearray | memoryview) -> None:
         """Encrypt and send."""
-        assert self._tunnel is not None
-        if data and not self._transport.is_closing():
-            self._tunnel.write(data)
+        if data and not self._gone():
+            self._encrypted(data)
             self._transport.write(self._outgoing.read())
 
     def say_goodbye(self) -> None:
@@ -119,6 +121,7 @@ class TlsEnd(asyncio.Protocol):
     def _encrypt(self, context: ssl.SSLContext, *, server_side: bool) -> None:
         self._incoming, self._outgoing = ssl.MemoryBIO(), ssl.MemoryBIO()
         self._tunnel = context.wrap_bio(self._incoming, self._outgoing, server_side=server_side)
+        self._encrypted = self._tunnel.write
 
     def _shake_hands(self, size: int) -> bool:
         assert self._tunnel is not None
@@ -144,9 +147,10 @@ class TlsEnd(asyncio.Protocol):
     def _read(self) -> None:
         """Hand on what came. An attempt to read what is not there costs more than a message, so none is made."""
         assert self._tunnel is not None
+        incoming = self._incoming
         try:
-            while (self._incoming.pending or self._tunnel.pending()) and not self._transport.is_closing():
-                data = self._tunnel.read(RECORD_MAX)
+            while incoming.pending and not self._gone():
+                data = self._tunnel.read(RECORD_MAX)  # one record, and all of it
                 if not data:
                     self._end()
                     return
@@ -159,7 +163,8 @@ class TlsEnd(asyncio.Protocol):
                 log.info("%s: TLS broke: %s", self._host, error.reason)
             self._end()
             return
-        self._flush()
+        if self._outgoing.pending:
+            self._flush()
 
     def _end(self) -> None:
         self._flush()
@@ -240,10 +245,7 @@ class _Encrypted:
 
     def __init__(self, end: TlsEnd, transport: asyncio.Transport) -> None:
         self._end, self._transport = end, transport
-        self.is_closing = transport.is_closing  # asked for every message
-
-    def write(self, data: bytes | bytearray | memoryview) -> None:
-        self._end.send(data)
+        self.write, self.is_closing = end.send, transport.is_closing  # wanted for every message
 
     def writelines(self, pieces: list[bytes]) -> None:
         self._end.send(b"".join(pieces))

@@ -3,32 +3,38 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import time
+from collections.abc import Callable
 
 AWAKE = 200e-6  # s after a message: a robot's answer, and most clients' next question, come within it
 SHORT_MAX = 2048  # bytes of a message that is a question or an answer; streams of more bear the delay
+_make_way: Callable[[], object] = getattr(os, "sched_yield", lambda: None)
 
 
 class BusyPoll:
-    """``stir`` at every message. At 50 messages a second it costs a hundredth of a core."""
+    """``stir`` at every message. At 50 messages a second it costs a hundredth of a core, which others may have."""
 
     def __init__(self) -> None:
         self._loop = asyncio.get_running_loop()
         self._until = 0.0
-        self._polling = False
+        self._stirred = self._polling = False
 
     def stir(self, size: int) -> None:
         """Stay awake, if the message was short."""
-        if size > SHORT_MAX:
-            return
-        self._until = time.perf_counter() + AWAKE
-        if not self._polling:
-            self._polling = True
-            self._loop.call_soon(self._poll)
+        if size <= SHORT_MAX:
+            self._stirred = True
+            if not self._polling:
+                self._polling = True
+                self._loop.call_soon(self._poll)
 
     def _poll(self) -> None:
         """Have the loop look for news without sleeping, again and again."""
-        if time.perf_counter() < self._until:
+        now = time.perf_counter()
+        if self._stirred:
+            self._until, self._stirred = now + AWAKE, False
+        if now < self._until:
+            _make_way()  # to client or robot, if the kernel woke it on this core
             self._loop.call_soon(self._poll)
         else:
             self._polling = False

@@ -21,6 +21,7 @@ from typing import cast
 from weakref import WeakValueDictionary
 
 from roboglot.access.guard import Guard, Tunnelled
+from roboglot.access.tunnel.busy_poll import BusyPoll
 from roboglot.access.tunnel.frames import BadFrame, Kind
 from roboglot.access.tunnel.link import Link
 from roboglot.access.tunnel.tunnel import Tunnel, TunnelLost
@@ -72,9 +73,10 @@ class Gateway:
     async def start(self) -> None:
         """Listen. Raises OSError, ssl.SSLError."""
         tls = Tls(server_context(*self._tls, ssl.TLSVersion.TLSv1_3), plain=False)
+        stir = BusyPoll().stir
 
         def encrypted() -> asyncio.Protocol:
-            return TlsPort(lambda: Link(self._begin), tls, self._guard.may_shake_hands)
+            return TlsPort(lambda: Link(self._begin, stir), tls, self._guard.may_shake_hands)
 
         loop = asyncio.get_running_loop()
         self._server = await loop.create_server(

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import cast
 
-from roboglot.access.tunnel.frames import HEAD, BadFrame, Frame, Kind, encode
+from roboglot.access.tunnel.frames import HEAD, BadFrame, Frame, Kind
 
 EARLY_MAX = 16  # frames before someone takes them
 
@@ -78,8 +78,9 @@ class Link(asyncio.Protocol):
 
     def send(self, kind: Kind, number: int = 0, payload: bytes = b"") -> None:
         """Send a frame; lost where there is no connection any more."""
-        if not self.transport.is_closing():
-            self.transport.write(encode(kind, number, payload))
+        transport = self.transport
+        if not transport.is_closing():
+            transport.write(HEAD.pack(kind, number, len(payload)) + payload)
             if kind is Kind.DATA:
                 self._stir(len(payload))
 
@@ -91,11 +92,11 @@ class Link(asyncio.Protocol):
         self.transport.abort()
 
     def _cut(self, data: bytes) -> None:
-        if not self._buffer and len(data) >= HEAD.size:  # mostly it is one frame
+        if self._take is not None and not self._buffer and len(data) >= HEAD.size:  # mostly it is one frame
             number, stream, length = HEAD.unpack_from(data)
-            kind = _KINDS.get(number)
-            if kind is not None and len(data) == HEAD.size + length:
-                self._hand_on(kind, stream, data[HEAD.size :])
+            if number == Kind.DATA and len(data) == HEAD.size + length:
+                self._stir(length)
+                self._take(Kind.DATA, stream, data[HEAD.size :])
                 return
         buffer: bytes | bytearray = data
         if self._buffer:

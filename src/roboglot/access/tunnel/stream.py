@@ -55,7 +55,8 @@ class Stream(asyncio.Protocol):
             for start in range(0, len(data), PIECE):
                 self._link.send(Kind.DATA, self._number, data[start : start + PIECE])
         self._credit -= len(data)
-        self._throttle()
+        if self._credit <= 0:
+            self._throttle()
 
     def eof_received(self) -> bool:
         """The local client sends no more, and may go on reading."""
@@ -77,19 +78,26 @@ class Stream(asyncio.Protocol):
     def resume_writing(self) -> None:
         """It reads again."""
         self._clogged = False
-        self._pay()
+        self._owed += self.undelivered
+        self.undelivered = 0
+        if self._owed >= CREDIT_STEP:
+            self._pay()
 
     # -- the other end -------------------------------------------------------------------------------------------------
 
     def deliver(self, data: bytes) -> None:
         """To the local client, or for it as soon as it is connected."""
-        self.undelivered += len(data)
         if self._transport is None:
+            self.undelivered += len(data)
             self._early += data
             return
         self._transport.write(data)
+        self.undelivered += len(data)
         if not self._clogged:
-            self._pay()
+            self._owed += self.undelivered
+            self.undelivered = 0
+            if self._owed >= CREDIT_STEP:
+                self._pay()
 
     def deliver_end(self) -> None:
         """The far client sends no more."""
@@ -128,12 +136,9 @@ class Stream(asyncio.Protocol):
             self._transport.write_eof()
 
     def _pay(self) -> None:
-        """Credit what was taken, in steps."""
-        self._owed += self.undelivered
-        self.undelivered = 0
-        if self._owed >= CREDIT_STEP:
-            self._link.send(Kind.CREDIT, self._number, CREDIT.pack(self._owed))
-            self._owed = 0
+        """Credit what was taken."""
+        self._link.send(Kind.CREDIT, self._number, CREDIT.pack(self._owed))
+        self._owed = 0
 
     def _throttle(self) -> None:
         """Read from the local client while the other end, and the tunnel, have room."""

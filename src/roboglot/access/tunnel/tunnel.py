@@ -7,6 +7,7 @@ import logging
 from collections.abc import Awaitable, Callable
 
 from roboglot.access.tunnel.frames import CREDIT, PORT, BadFrame, Kind
+from roboglot.access.tunnel.heartbeat import Heartbeat
 from roboglot.access.tunnel.link import Link
 from roboglot.access.tunnel.stream import RECEIVED_MAX, WINDOW, Stream
 
@@ -15,13 +16,6 @@ log = logging.getLogger(__name__)
 STREAMS_MAX = 64
 UNSENT_MAX = 1024 * 1024  # bytes that wait for the tunnel; datagrams beyond are lost, as datagrams are
 DATAGRAM_MAX = 32 * 1024  # bytes
-PING_PERIOD = 0.1  # s
-QUICK_PERIOD = 0.025  # s, while the client drives: a packet that is lost twice still comes within QUIET_AFTER
-QUICK_SECONDS = 0.5  # that this end goes on with it after the other did
-QUIET_AFTER = 0.35  # s of silence after which the client is as good as gone: what it drives by hand stops
-QUIET_LOOKS = 2  # in a row that see it
-LOST_AFTER = 5.0  # s of silence that the tunnel and its connections bear: lines that lose packets come back
-
 QUICK = b"!"  # of a PING: answer in kind
 
 Opened = Callable[[int, Callable[[], asyncio.Protocol]], Awaitable[object]]
@@ -55,12 +49,12 @@ class Tunnel:
         self._streams: dict[int, Stream] = {}
         self._opening: set[asyncio.Task[None]] = set()
         self._over = False
-        self._heard = self._quick_until = 0.0
         self._loop = asyncio.get_running_loop()
+        self._heart = Heartbeat(self._loop.time())
 
     async def run(self) -> None:
         """Carry until the tunnel is lost; then every stream ends. Raises TunnelLost."""
-        self._heard = self._loop.time()
+        self._heart.hear(self._loop.time())
         beat = asyncio.ensure_future(self._beat())
         try:
             self._link.follow(self._take, self._crowd)
@@ -104,22 +98,19 @@ class Tunnel:
             stream.hold(crowded)
 
     async def _beat(self) -> None:
-        said, looks = 0.0, 0
         while True:
-            now, drives = self._loop.time(), self._drives()
-            if drives or now < self._quick_until or now - said >= PING_PERIOD:
-                said = now
+            drives = self._drives()
+            look = self._heart.look(self._loop.time(), drives)
+            if look.beat:
                 self._link.send(Kind.PING, 0, QUICK if drives else b"")
-            silent = now - self._heard
-            looks = looks + 1 if silent >= QUIET_AFTER else 0
-            if looks == QUIET_LOOKS:  # a single one may only mean that this end was held up
+            if look.quiet:
                 self._quiet()
-            if silent >= LOST_AFTER:
+            if look.lost:
                 self._link.end("the other end is silent")
-            await asyncio.sleep(QUICK_PERIOD)
+            await asyncio.sleep(look.pause)
 
     def _take(self, kind: Kind, number: int, payload: bytes) -> None:
-        self._heard = self._loop.time()
+        self._heart.heard = self._loop.time()
         stream = self._streams.get(number)
         if stream is not None and kind is Kind.DATA:
             stream.deliver(payload)
@@ -134,7 +125,7 @@ class Tunnel:
                 raise BadFrame("too many streams")
             self._open(number, PORT.unpack(payload)[0])
         elif kind is Kind.PING and payload == QUICK:
-            self._quick_until = self._heard + QUICK_SECONDS
+            self._heart.hear(self._heart.heard, quick=True)
         elif kind is Kind.DATAGRAM and len(payload) >= PORT.size:
             self._datagram(PORT.unpack_from(payload)[0], payload[PORT.size :])
 

@@ -1,0 +1,100 @@
+"""What an end of a tunnel makes of the other's silence, on counted beats: no clock, no socket, no waiting."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from roboglot.access.tunnel.heartbeat import (
+    HELD_UP,
+    IDLE_PERIOD,
+    LOST_AFTER,
+    QUICK_PERIOD,
+    QUIET_AFTER,
+    Heartbeat,
+)
+from roboglot.config import RobotConfig
+from roboglot.fleet import build_fleet
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.geometry import Twist
+from roboglot.storage.database import Database
+
+STANDS_WITHIN = 0.5  # s after the line went dead
+MARGIN = 0.03  # s for a loop that is busy
+LATE = 0.001  # s that a timer may fire late
+
+
+def looks(heart: Heartbeat, now: float, until: float, drives: bool = True) -> tuple[float | None, int]:
+    """Look from ``now`` as a loop does. When the client was taken for gone, and the beats that were sent."""
+    quiet, beats = None, 0
+    while now < until:
+        look = heart.look(now, drives)
+        beats += look.beat
+        if look.quiet:
+            assert quiet is None, "said once"
+            quiet = now
+        now += look.pause + LATE
+    return quiet, beats
+
+
+@given(st.floats(0.0, 1.0), st.booleans())
+def test_silence_is_noticed_at_its_time_and_not_before(last_heard: float, drives: bool) -> None:
+    heart, now = Heartbeat(0.0), 0.0
+    while now < last_heard:
+        now += heart.look(now, drives).pause + LATE
+        heart.hear(now)
+    quiet, _ = looks(heart, now, now + 1.0, drives)
+    assert quiet is not None
+    assert QUIET_AFTER <= quiet - heart.heard + 1e-9 <= QUIET_AFTER + 6 * LATE
+
+
+def test_beats_come_often_while_someone_drives_and_seldom_else() -> None:
+    assert looks(Heartbeat(0.0), 0.0, 1.0, drives=True)[1] >= 1 / (QUICK_PERIOD + 2 * LATE)
+    assert looks(Heartbeat(0.0), 0.0, 1.0, drives=False)[1] <= 11
+    asked = Heartbeat(0.0)
+    asked.hear(0.0, quick=True)
+    assert looks(asked, 0.0, 0.4, drives=False)[1] >= 0.4 / (QUICK_PERIOD + 2 * LATE)
+
+
+def test_an_end_that_was_held_up_reads_what_came_before_it_judges() -> None:
+    heart = Heartbeat(0.0)
+    assert not heart.look(IDLE_PERIOD, drives=True).quiet
+    woken = IDLE_PERIOD + HELD_UP + 0.5  # the machine rested, and the other end's with it
+    look = heart.look(woken, drives=True)
+    assert not look.quiet
+    for _ in range(5):  # turns of the loop at once decide nothing
+        assert not heart.look(woken, drives=True).quiet
+    assert not heart.look(woken + QUICK_PERIOD, drives=True).quiet  # now it may; the loop reads its sockets first
+    heart.hear(woken + QUICK_PERIOD)
+    assert looks(heart, woken + QUICK_PERIOD, woken + 0.2)[0] is None
+
+
+def test_a_silence_that_ends_is_no_loss_and_a_long_one_is() -> None:
+    heart = Heartbeat(0.0)
+    assert looks(heart, 0.0, 1.0)[0] is not None
+    heart.hear(1.0)
+    assert looks(heart, 1.0, 1.2)[0] is None
+    heart.look(LOST_AFTER + 1.0, drives=True)
+    assert heart.look(LOST_AFTER + 1.0, drives=True).lost
+
+
+@pytest.mark.parametrize("body", ["universal", "robomaster_ep"])
+async def test_silence_and_brakes_together_stay_below_half_a_second(body: str) -> None:
+    clock, database = LockstepClock(), Database(":memory:")
+    fleet = build_fleet("empty", [RobotConfig("a", body)], clock=clock, seed=1, database=database)
+    await fleet.start(wait=True)
+    robot = fleet.robots["a"]
+    action = robot[Driving].drive(Twist(x=0.3), source="by hand")
+    await clock.advance(1.0)
+    assert robot[Base].velocity.x == pytest.approx(0.3, abs=0.02)
+    action.cancel("its client is out of reach")
+    spent = 0.0
+    while abs(robot[Base].velocity.x) > 0.02:
+        await clock.advance(0.01)
+        spent += 0.01
+    assert QUIET_AFTER + spent <= STANDS_WITHIN - MARGIN
+    await fleet.close()
+    database.close()
