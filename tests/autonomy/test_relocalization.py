@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
 from roboglot.model.actions import ActionStatus
 from roboglot.model.components.mapping.localization import Localization, Region
 from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.errors import InvalidGoal, NotLocalized
 from roboglot.model.events import LocalizationLost, LocalizationRecovered, PoseJumped
 from roboglot.model.geometry import Pose
 
 if TYPE_CHECKING:
     from tests.autonomy.conftest import Tour
+
+LONG_CORRIDOR = str(Path(__file__).parents[2] / "benchmarks" / "worlds" / "corridor.toml")
 
 
 async def carried(tour: Tour, x: float, y: float, deg: float) -> None:
@@ -86,3 +92,49 @@ async def test_no_region_is_refused(tour: Tour) -> None:
     for region in (Region(1.0, 0.0, 0.0, 1.0), Region(0.0, 0.0, math.nan, 1.0), Region(0.0, 0.0, math.inf, 1.0)):
         with pytest.raises(InvalidGoal):
             tour.robot[Localization].relocalize(region)
+
+
+@pytest.mark.world("office")
+async def test_people_around_the_robot_do_not_hide_its_place(tour: Tour) -> None:
+    from roboglot.autonomy.slam.matcher import places
+    from roboglot.autonomy.slam.scan_points import ScanReader
+
+    await tour.go((12.0, 9.8))
+    await tour.go((12.0, 6.5))
+    estimator, scan = tour.robot[Localization].estimator, tour.robot[Lidar].scan  # type: ignore[attr-defined]
+    ranges, angles = scan.ranges.copy(), scan.angles
+    for bearing, width, away in ((0.0, 0.6, 0.5), (2.0, 0.2, 1.2)):  # one stands right in front, one further off
+        ranges[abs(angles - bearing) < width] = away
+    hidden = ScanReader().read(replace(scan, ranges=ranges))
+    (found,) = places(estimator._belief.map, hidden, None)
+    assert found.pose.distance_to(tour.truth.relative_to(tour.start)) < 0.05
+
+
+@pytest.mark.world(LONG_CORRIDOR)
+async def test_a_robot_that_may_move_looks_around_until_one_place_is_left(tour: Tour) -> None:
+    await tour.go((tour.start.x + 25.0, tour.start.y))
+    await carried(tour, tour.start.x + 12.0, tour.start.y, 90.0)
+    standing = await tour.end_of(tour.robot[Localization].relocalize())
+    assert isinstance(standing.error, NotLocalized)
+    assert "look" in standing.reason
+    driving = await tour.end_of(tour.robot[Localization].relocalize(may_move=True))
+    assert driving.status is ActionStatus.SUCCEEDED, driving.reason
+    assert tour.error[0] < 0.1
+    assert not tour.bumps
+
+
+def test_places_are_ruled_out_by_where_they_should_be_by_now() -> None:
+    from roboglot.autonomy.slam.look_around import Hypotheses
+    from roboglot.autonomy.slam.matcher import Match
+
+    def at(x: float, y: float) -> Match:
+        return Match(Pose(x, y), np.eye(3), 0.0, 100, 100, 100)
+
+    known = Hypotheses()
+    assert known.narrow([at(0.0, 0.0), at(10.0, 0.0), at(20.0, 0.0)], Pose()) is None
+    assert known.narrow([at(1.0, 0.0), at(11.0, 0.0), at(25.0, 0.0)], Pose(1.0)) is None  # 20 is out, 25 never was in
+    last = known.narrow([at(2.0, 0.0), at(26.0, 0.0)], Pose(2.0))
+    assert last is not None
+    assert last.pose == Pose(2.0)
+    assert known.narrow([at(7.0, 7.0), at(9.0, 9.0)], Pose(3.0)) is None  # all were wrong: begin anew
+    assert len(known.places) == 2

@@ -57,8 +57,8 @@ class Support:
 class Look:
     """A scan at a place, as shares: ``aside`` is what ``things`` hide, the others are of the rest.
 
-    ``agreement``, ``close``: of the points near a ``well_known`` surface those within 8 and 4 cm; ``exact``: of all those
-    that are within 4 cm of any.
+    ``agreement``, ``close``: of the points near a ``well_known`` surface those within 8 and 4 cm of it; ``exact``: of
+    all points those within 4 cm of any.
     """
 
     aside: float

@@ -11,14 +11,16 @@ from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.mapping.localization import LOCALIZATION, Localization, Region
 from roboglot.model.errors import InvalidGoal, NotLocalized, NotReady
 from roboglot.model.events import LostReason, PoseJumped
-from roboglot.model.geometry import Pose, wrap_angle
+from roboglot.model.geometry import ORIGIN, Pose, wrap_angle
 from roboglot.model.robot import Robot
 
 if TYPE_CHECKING:
+    from roboglot.autonomy.slam.matcher import Match
     from roboglot.autonomy.slam.slam import Slam
 
 POSITION_MAX = 10_000.0  # m from the origin
 SEARCH_SECONDS = 10.0  # that it looks for a place that fits
+AROUND_SECONDS = 60.0  # … and drives around, if it may
 SEARCH_PERIOD = 0.5  # s between two scans that are tried
 
 
@@ -61,35 +63,70 @@ class LidarLocalization(Localization):
         self._belief.take_pose(given)
         self._robot.events.publish(PoseJumped(stamp=self._robot.clock.time(), pose=given, given=True))
 
-    def relocalize(self, region: Region | None = None, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+    def relocalize(
+        self,
+        region: Region | None = None,
+        *,
+        may_move: bool = False,
+        source: str = "",
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
         if region is not None and not (
             -POSITION_MAX <= region.min_x < region.max_x <= POSITION_MAX
             and -POSITION_MAX <= region.min_y < region.max_y <= POSITION_MAX
         ):
             raise InvalidGoal(f"no region of this map: {region}")
 
-        async def run(_action: Action) -> None:
-            deadline = self._robot.clock.time() + SEARCH_SECONDS
-            while (count := await self._find(region)) != 1:
-                if count > 1:  # another scan from the same place says no more
-                    raise NotLocalized(f"{count} places look like what the lidar sees: drive to where they differ")
-                if self._robot.clock.time() > deadline:
-                    if not self.started:
-                        raise NotReady("localization is warming up: no scan has been compared with the map yet")
-                    raise NotLocalized("what the lidar sees fits nowhere")
-                await self._robot.clock.sleep(SEARCH_PERIOD)
+        async def search(_action: Action) -> None:
+            await (self._search_driving(region, source) if may_move else self._search_standing(region))
 
         return self._robot.actions.start(
-            "relocalize", run, resources={LOCALIZATION}, goal=region, source=source, on_busy=on_busy
+            "relocalize", search, resources={LOCALIZATION}, goal=region, source=source, on_busy=on_busy
         )
 
-    async def _find(self, region: Region | None) -> int:
-        """Try the newest scan: how many places look like it; the only one is believed."""
+    async def _search_standing(self, region: Region | None) -> None:
+        deadline = self._robot.clock.time() + SEARCH_SECONDS
+        while True:
+            found, odometry = await self._look(region)
+            if len(found) == 1:
+                return self._believe(found[0], odometry)
+            if found:  # another scan from the same place says no more
+                raise NotLocalized(f"{len(found)} places look like what the lidar sees: drive to where they differ")
+            if self._robot.clock.time() > deadline:
+                if not self.started:
+                    raise NotReady("localization is warming up: no scan has been compared with the map yet")
+                raise NotLocalized("what the lidar sees fits nowhere")
+            await self._robot.clock.sleep(SEARCH_PERIOD)
+
+    async def _search_driving(self, region: Region | None, source: str) -> None:
+        """Look, and drive on while more than one place, or none, explains what was seen."""
+        deadline = self._robot.clock.time() + AROUND_SECONDS
+        while self.estimator is None:
+            if self._robot.clock.time() > deadline:
+                raise NotReady("localization is warming up: no scan has been compared with the map yet")
+            await self._robot.clock.sleep(SEARCH_PERIOD)
+        from roboglot.autonomy.slam.look_around import Hypotheses, go_on  # needs the kernels, which are loaded now
+
+        hypotheses = Hypotheses()
+        while self._robot.clock.time() <= deadline:
+            found, odometry = await self._look(region)
+            place = hypotheses.narrow(found, odometry)
+            if place is not None:
+                return self._believe(place, odometry)
+            if not await go_on(self._robot, self._belief.reader, source):
+                await self._robot.clock.sleep(SEARCH_PERIOD)
+        count = len(hypotheses.places)
+        why = f"{count} places still look alike" if count else "what the lidar sees fits nowhere"
+        raise NotLocalized(f"{why} after {AROUND_SECONDS:g} s of looking around")
+
+    async def _look(self, region: Region | None) -> tuple[list[Match], Pose]:
+        """Where the newest scan may have been taken, and odometry then."""
         if self.estimator is None or (search := self.estimator.placing(region)) is None:
-            return 0
+            return [], ORIGIN
         odometry, work = search
-        found = await computed(self._robot.clock, work)
-        if len(found) == 1:
-            self.estimator.believe(found[0], odometry)
-            self._robot.events.publish(PoseJumped(stamp=self._robot.clock.time(), pose=self._belief.pose))
-        return len(found)
+        return await computed(self._robot.clock, work), odometry
+
+    def _believe(self, place: Match, odometry: Pose) -> None:
+        assert self.estimator is not None
+        self.estimator.believe(place, odometry)
+        self._robot.events.publish(PoseJumped(stamp=self._robot.clock.time(), pose=self._belief.pose))

@@ -56,9 +56,9 @@ async def set_pose(robot: Robot, *, x: Meters, y: Meters, yaw: Radians = 0.0) ->
 
 
 @VERBS.on("relocalize", right=Right.EDIT)
-async def relocalize(robot: Robot) -> Started:
-    """Find the robot anywhere in its map."""
-    return started(robot[Localization].relocalize(source=SOURCE))
+async def relocalize(robot: Robot, *, may_move: bool = False) -> Started:
+    """Find the robot anywhere in its map; if it may move, it drives around to tell places that look alike."""
+    return started(robot[Localization].relocalize(may_move=may_move, source=SOURCE))
 
 
 @VERBS.on("mapping", right=Right.EDIT)

@@ -191,7 +191,14 @@ class CyberDogLocalization(Localization):
     def set_pose(self, pose: Pose) -> None:
         raise Refused("this robot finds its place by itself")
 
-    def relocalize(self, region: Region | None = None, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+    def relocalize(
+        self,
+        region: Region | None = None,
+        *,
+        may_move: bool = False,
+        source: str = "",
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
         if region is not None:
             raise Refused("this robot searches the whole map")
         client = self._skills.client

@@ -19,7 +19,12 @@ from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid
 from roboglot.wire.slamware import geometry
-from roboglot.wire.slamware.motion import ActionInfo, RecoverLocalizationOptions
+from roboglot.wire.slamware.motion import (
+    ActionInfo,
+    RecoverLocalizationOptions,
+    RecoverMovement,
+    RelocalizationOptions,
+)
 from roboglot.wire.slamware.slam import NewOrigin, Switch
 from roboglot.wire.slamware.stcm import CompositeMap
 from roboglot.wire.slamware.stcm_layers import grid_layer
@@ -69,17 +74,26 @@ class SlamwareLocalization(Localization):
             raise InvalidGoal(f"not a place on this map: {pose}")
         self._supervisor.send("setting the pose", self._client.set_pose(pose3d(pose)))
 
-    def relocalize(self, region: Region | None = None, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+    def relocalize(
+        self,
+        region: Region | None = None,
+        *,
+        may_move: bool = False,
+        source: str = "",
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
         area = None
         if region is not None:
             width, height = region.max_x - region.min_x, region.max_y - region.min_y
             if not (width > 0 and height > 0):
                 raise InvalidGoal(f"no region of this map: {region}")
             area = geometry.Rectangle(region.min_x, region.min_y, width, height)
+        movement = RecoverMovement.ROTATE_ONLY if may_move else RecoverMovement.NO_MOVE
+        options = RelocalizationOptions(recover_movement_type=movement)
         return self._runner.start(
             "relocalize",
             "RecoverLocalizationAction",
-            RecoverLocalizationOptions(area),
+            RecoverLocalizationOptions(area, options),
             _nothing,
             goal=region,
             source=source,

@@ -63,9 +63,17 @@ class Localization(Component):
         """Set the robot's pose in the map."""
 
     @abstractmethod
-    def relocalize(self, region: Region | None = None, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
-        """Find the robot anywhere in the map, or with its centre in ``region``, by what the lidar sees; it stays put.
+    def relocalize(
+        self,
+        region: Region | None = None,
+        *,
+        may_move: bool = False,
+        source: str = "",
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
+        """Find the robot anywhere in the map, or with its centre in ``region``, by what the lidar sees.
 
-        Aborts with NotLocalized when no place, or more than one, fits within some seconds; driving on may help to
-        distinguish them; with NotReady when it cannot be tried yet. InvalidGoal for an empty region.
+        It stays put unless it ``may_move``: then it may drive around to tell places that look alike from each other.
+        Aborts with NotLocalized when no place, or more than one, fits within some seconds; with NotReady when it cannot
+        be tried yet. InvalidGoal for an empty region.
         """

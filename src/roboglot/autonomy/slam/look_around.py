@@ -1,0 +1,105 @@
+"""Which of several places that look alike it is: drive on a little, look again, and keep those that still fit.
+
+A lidar that sees all around learns nothing by turning, so the robot goes where the scan shows room.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from roboglot.autonomy.slam.matcher import PLACES_MAX, Match
+from roboglot.autonomy.slam.scan_points import ScanPoints, ScanReader
+from roboglot.model.actions import Action, ActionStatus
+from roboglot.model.components.energy.battery import DockContact
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.geometry import ORIGIN, Pose, wrap_angle
+from roboglot.model.robot import Robot
+from roboglot.model.sensing import LaserScan
+
+DIRECTIONS = 24  # that it may go in
+BESIDE, BEFORE, STOP_BEFORE = 0.08, 0.2, 0.12  # m beside and before the hull that stay free
+STEP_MIN, STEP_MAX = 0.3, 1.0  # m that it goes at a time
+PERIOD = 0.1  # s between two looks ahead
+SPEED = 0.25  # m/s
+AHEAD = math.radians(120.0)  # it does not go back where it came from, unless nothing else is open
+SAME, SAME_YAW = 0.25, math.radians(8.0)  # between where a place should be by odometry now and where it is found
+
+
+@dataclass(slots=True)
+class Hypotheses:
+    """The places that have explained every scan so far, as of ``odometry``; none before the first look."""
+
+    places: Sequence[Match] = ()
+    odometry: Pose = ORIGIN
+    complete: bool = False  # whether there can be no others
+
+    def narrow(self, found: Sequence[Match], odometry: Pose) -> Match | None:
+        """Keep those that ``found`` has, too; the place, when only one is left."""
+        step = odometry.relative_to(self.odometry)
+        expected = [place.pose.compose(step) for place in self.places]
+        left = [match for match in found if any(_is_same(match.pose, pose) for pose in expected)]
+        known, self.odometry = self.complete, odometry
+        if not known or not left:  # the first look, or all were wrong
+            left, known = list(found), False
+        self.places, self.complete = left, known or 0 < len(found) < PLACES_MAX
+        return left[0] if len(left) == 1 and (known or len(found) == 1) else None
+
+
+async def go_on(robot: Robot, reader: ScanReader, source: str) -> bool:
+    """Drive to where the newest scan shows room; False if there is none, or the robot cannot or must not drive."""
+    scan, radius = robot[Lidar].scan, robot.description.radius
+    if Driving not in robot or scan is None or (DockContact in robot and robot[DockContact].docked):
+        return False
+    way = open_way(reader.read(scan), radius)
+    if way is None:
+        return False
+    turn = robot[Driving].move_by(Pose(yaw=way.yaw), source=source)
+    if not await _watched(robot, turn, lambda _: True):
+        return False
+    move = robot[Driving].move_by(Pose(way.x), speed=SPEED, source=source)
+    return await _watched(robot, move, lambda seen: room(reader.read(seen), 0.0, radius) > STOP_BEFORE)
+
+
+async def _watched(robot: Robot, move: Action, goes: Callable[[LaserScan], bool]) -> bool:
+    """Wait for ``move``, cancelled when a scan says that it must not go on; whether it came to its end."""
+    try:
+        while not move.status.ended:
+            await robot.clock.sleep(PERIOD)
+            scan = robot[Lidar].scan
+            if scan is None or not goes(scan):
+                move.cancel("something is in the way")
+                break
+    finally:
+        if not move.status.ended:
+            move.cancel("it looks no further")
+    await move.done()
+    return move.status is ActionStatus.SUCCEEDED
+
+
+def room(scan: ScanPoints, yaw: float, radius: float) -> float:
+    """How far (m) the hull can go towards ``yaw`` (base_link) before what ``scan`` shows; inf if nothing is there."""
+    along = scan.points @ np.array([math.cos(yaw), math.sin(yaw)])
+    aside = np.abs(scan.points @ np.array([-math.sin(yaw), math.cos(yaw)]))
+    ahead = along[(aside < radius + BESIDE) & (along > 0.0)]
+    return float(ahead.min()) - radius if len(ahead) else math.inf
+
+
+def open_way(scan: ScanPoints, radius: float) -> Pose | None:
+    """A turn and a way (base_link) of which ``scan`` shows that the hull has room; the longest, rather ahead."""
+    best, way = 0.0, None
+    for number in range(DIRECTIONS):
+        yaw = wrap_angle(math.tau * number / DIRECTIONS)
+        free = min(STEP_MAX, room(scan, yaw, radius) - BEFORE)
+        worth = free * (1.0 if abs(yaw) <= AHEAD else 0.5) - 0.01 * abs(yaw)
+        if free >= STEP_MIN and worth > best:
+            best, way = worth, Pose(free, 0.0, yaw)
+    return way
+
+
+def _is_same(one: Pose, other: Pose) -> bool:
+    return one.distance_to(other) < SAME and abs(wrap_angle(one.yaw - other.yaw)) < SAME_YAW
