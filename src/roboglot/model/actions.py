@@ -10,31 +10,17 @@ import itertools
 import logging
 from collections import deque
 from collections.abc import Awaitable, Callable, Iterable
-from enum import Enum, IntEnum
+from enum import Enum
 
-from roboglot.model.client_context import client, connection, identity
+from roboglot.model.action import Action, ActionStatus
 from roboglot.model.clock import Clock
 from roboglot.model.errors import Busy, NotFound, RobotError, forget_stack
 from roboglot.model.events import ActionChanged, EventStream
 
+__all__ = ["Action", "ActionStatus", "Actions", "OnBusy"]
+
 log = logging.getLogger(__name__)
 HISTORY_MAX = 20
-
-
-class ActionStatus(IntEnum):
-    """ROS 2 action_msgs/GoalStatus."""
-
-    ACCEPTED = 1
-    EXECUTING = 2
-    CANCELING = 3
-    SUCCEEDED = 4
-    CANCELED = 5
-    ABORTED = 6
-
-    @property
-    def ended(self) -> bool:
-        """True if nothing more will happen."""
-        return self >= ActionStatus.SUCCEEDED
 
 
 class OnBusy(Enum):
@@ -42,112 +28,6 @@ class OnBusy(Enum):
 
     REPLACE = "replace"
     REFUSE = "refuse"
-
-
-class Action:
-    """One goal under way or ended. Made by ``Actions.start``."""
-
-    def __init__(
-        self, owner: Actions, id: int, name: str, goal: object, resources: frozenset[str], source: str
-    ) -> None:
-        self.id = id
-        self.name = name
-        self.goal = goal
-        self.resources = resources
-        self.source = source  # who asked for it, e.g. the door's name; for the log and for what ends with its client
-        self.client = client()  # the very one, as its door names it
-        self.connection = connection()  # over which it was asked; empty: over none that is known
-        self.identity = identity()  # who it showed to be, where that is asked
-        self.status = ActionStatus.ACCEPTED
-        self.feedback: object = None
-        self.error: RobotError | None = None
-        self.paused = False
-        self.hands_over = False  # what takes its place goes on from its motion: it need not stand still first
-        self.started_at = self.ended_at = owner.clock.time()
-        self._failure: RobotError | None = None  # why it is being aborted from outside
-        self._owner = owner
-        self._changed = asyncio.Event()
-        self._ended = asyncio.Event()
-        self._task: asyncio.Task[None] | None = None
-        self._going_on = asyncio.Event()
-        self._going_on.set()
-
-    @property
-    def reason(self) -> str:
-        """Why it ended short of success, in plain words; empty on success."""
-        return str(self.error) if self.error else ""
-
-    async def done(self) -> ActionStatus:
-        """Wait for the end and say how it ended (never raises for the action's own failure)."""
-        await self._ended.wait()
-        return self.status
-
-    async def succeeded(self) -> None:
-        """Wait for the end; raise the action's error, or ``Busy`` if it was cancelled."""
-        if await self.done() is not ActionStatus.SUCCEEDED:
-            raise self.error.again() if self.error else Busy(f"{self.name} was cancelled")
-
-    def cancel(self, reason: str = "") -> None:
-        """Ask it to stop; it ends CANCELED as soon as it has braked. Nothing happens if it has ended."""
-        if self.status.ended or self.status is ActionStatus.CANCELING:
-            return
-        self.error = Busy(reason) if reason else None
-        self._move_to(ActionStatus.CANCELING)
-        if self._task:
-            self._task.cancel()
-
-    def abort(self, error: RobotError) -> None:
-        """Stop it as ``cancel`` does, but end it ABORTED with ``error``: for what protects the robot.
-
-        Nothing happens if it has ended or is being cancelled.
-        """
-        if self.status.ended or self.status is ActionStatus.CANCELING:
-            return
-        self.error = self._failure = error
-        self._move_to(ActionStatus.CANCELING)
-        if self._task:
-            self._task.cancel()
-
-    def pause(self) -> None:
-        """Hold where it is until ``resume``."""
-        if not self.status.ended and not self.paused:
-            self.paused = True
-            self._going_on.clear()
-            self._owner.announce(self)
-
-    def resume(self) -> None:
-        """Go on after ``pause``."""
-        if self.paused:
-            self.paused = False
-            self._going_on.set()
-            self._owner.announce(self)
-
-    def may_go_on(self, source: str) -> bool:
-        """True if a new wish of ``source`` can be met by this action: the same client asks, and it still runs."""
-        going = self.status in (ActionStatus.ACCEPTED, ActionStatus.EXECUTING)
-        return going and (self.source, self.client) == (source, client())
-
-    def report(self, feedback: object) -> None:
-        """For the action's own code: publish progress; the same feedback twice in a row is published once."""
-        if feedback != self.feedback:
-            self.feedback = feedback
-            self._owner.announce(self)
-
-    async def hold(self, brake: Callable[[], object]) -> bool:
-        """For the action's own loop: if paused, brake and wait for ``resume``. True if it had been paused."""
-        if self._going_on.is_set():
-            return False
-        brake()
-        await self._going_on.wait()
-        return True
-
-    def _move_to(self, status: ActionStatus) -> None:
-        self.status = status
-        if status.ended:
-            self.ended_at = self._owner.clock.time()
-            self.paused = False
-            self._ended.set()
-        self._owner.announce(self)
 
 
 class Actions:

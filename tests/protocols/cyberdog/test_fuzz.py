@@ -14,9 +14,10 @@ import pytest
 from roboglot.model.components.energy.power import Power
 from roboglot.model.components.system.firmware import Firmware
 from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.dispatch import answer
 from roboglot.protocols.cyberdog.server import CyberDogDoor
-from roboglot.protocols.cyberdog.table import TABLE, Call
+from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.testing import Forward
 from roboglot.wire.cyberdog.text import NotJson, write
 from tests.protocols.cyberdog.phone import PATIENCE, Client, examples

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.dispatch import KNOWN, answer
-from roboglot.protocols.cyberdog.table import Call
 from roboglot.testing.process import ServedRobot, served
 from roboglot.wire.cyberdog.channel import MESSAGE_MAX
 from roboglot.wire.cyberdog.text import NotJson, read_params, write

@@ -18,7 +18,7 @@ from roboglot.model.components.system.settings import Settings
 from roboglot.model.components.system.system_log import SystemLog
 from roboglot.model.events import FirmwareChanged, Rebooted, Rebooting, ShuttingDown
 from roboglot.model.geometry import Pose
-from roboglot.protocols.cyberdog.chapters.system.ota import Updates
+from roboglot.protocols.cyberdog.chapters.system.updates import Updates
 from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.protocols.cyberdog.table import Push

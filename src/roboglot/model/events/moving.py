@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from roboglot.model.events.stream import Event
 
 if TYPE_CHECKING:
-    from roboglot.model.actions import Action
+    from roboglot.model.action import Action
     from roboglot.model.geometry import Point
 
 

@@ -9,9 +9,9 @@ from roboglot.model.events.stream import Event
 
 if TYPE_CHECKING:
     from roboglot.model.components.system.bluetooth import BluetoothDevice
+    from roboglot.model.components.system.fault import Fault
     from roboglot.model.components.system.firmware import FirmwareProgress
-    from roboglot.model.components.system.health import Fault
-    from roboglot.model.components.system.link import LinkState
+    from roboglot.model.components.system.link_state import LinkState
     from roboglot.model.components.system.network import NetworkState
 
 

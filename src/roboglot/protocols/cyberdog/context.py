@@ -6,19 +6,19 @@ from dataclasses import dataclass, field
 
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.app_link import AppLink
-from roboglot.protocols.cyberdog.chapters.camera.camera import Transfers
 from roboglot.protocols.cyberdog.chapters.camera.camera_files import CameraFiles
-from roboglot.protocols.cyberdog.chapters.camera.video import Transmission
+from roboglot.protocols.cyberdog.chapters.camera.transfers import Transfers
+from roboglot.protocols.cyberdog.chapters.camera.transmission import Transmission
 from roboglot.protocols.cyberdog.chapters.mapping.reports import MapReports
 from roboglot.protocols.cyberdog.chapters.mapping.survey import Survey
 from roboglot.protocols.cyberdog.chapters.mapping.task_state import Tasks
 from roboglot.protocols.cyberdog.chapters.motion.gait import Gaits
-from roboglot.protocols.cyberdog.chapters.people.faces import Faces
+from roboglot.protocols.cyberdog.chapters.people.face_recognition import Faces
 from roboglot.protocols.cyberdog.chapters.people.pursuit import Pursuit, ThingPursuit
 from roboglot.protocols.cyberdog.chapters.people.voice import Voice
 from roboglot.protocols.cyberdog.chapters.system.bracelet import Bracelet
-from roboglot.protocols.cyberdog.chapters.system.ota import Updates
 from roboglot.protocols.cyberdog.chapters.system.update_jobs import UpdateJobs
+from roboglot.protocols.cyberdog.chapters.system.updates import Updates
 from roboglot.protocols.cyberdog.frame_queue import FrameQueue
 from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.wire.visual.relay import FrameRelay

@@ -5,10 +5,11 @@ from __future__ import annotations
 import contextlib
 import logging
 
-from roboglot.model.components.system.network import lateness
 from roboglot.model.errors import ComponentMissing, RobotError
+from roboglot.model.lateness import lateness
 from roboglot.model.stand_in import StandIn
 from roboglot.operations import BadParameters, Right
+from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.chapters import programming  # noqa: F401
 from roboglot.protocols.cyberdog.chapters.camera import camera, video  # noqa: F401
 from roboglot.protocols.cyberdog.chapters.mapping import labels, tasks  # noqa: F401
@@ -22,11 +23,10 @@ from roboglot.protocols.cyberdog.chapters.system import (  # noqa: F401
     settings,
     skin,
     status,
-    update_jobs,
     upkeep,
 )
 from roboglot.protocols.cyberdog.errors import codes_of
-from roboglot.protocols.cyberdog.table import TABLE, Call, unread
+from roboglot.protocols.cyberdog.table import TABLE, unread
 from roboglot.wire.contracts import contract
 from roboglot.wire.cyberdog.codes import SILENT_WITHOUT_SERVICE, TEXT_ONLY, UNPUBLISHED, InBandError
 from roboglot.wire.cyberdog.text import NotJson, fitting, misfits, read_params, write

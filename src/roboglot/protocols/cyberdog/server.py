@@ -22,30 +22,32 @@ from roboglot.model.errors import RobotError
 from roboglot.model.events import BatteryChanged, LocalizationLost, LocalizationRecovered, MapReplaced
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.app_link import AppLink, AppRoute, host_of
+from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.certificates import Certificates, CertificateStore
-from roboglot.protocols.cyberdog.chapters.camera.camera import Transfers, get_file
+from roboglot.protocols.cyberdog.chapters.camera.camera import get_file
 from roboglot.protocols.cyberdog.chapters.camera.camera_files import CameraFiles
-from roboglot.protocols.cyberdog.chapters.camera.video import Transmission
+from roboglot.protocols.cyberdog.chapters.camera.transfers import Transfers
+from roboglot.protocols.cyberdog.chapters.camera.transmission import Transmission
 from roboglot.protocols.cyberdog.chapters.mapping.reports import MapReports
 from roboglot.protocols.cyberdog.chapters.mapping.task_state import Tasks
 from roboglot.protocols.cyberdog.chapters.motion.gait import SOURCE, Gaits
 from roboglot.protocols.cyberdog.chapters.motion.stairs import call_off
 from roboglot.protocols.cyberdog.chapters.people.audio import ASK_VOICEPRINTS, TRAINED, activated
-from roboglot.protocols.cyberdog.chapters.people.faces import Faces
+from roboglot.protocols.cyberdog.chapters.people.face_recognition import Faces
 from roboglot.protocols.cyberdog.chapters.people.voice import Voice
 from roboglot.protocols.cyberdog.chapters.programming import queue_to
 from roboglot.protocols.cyberdog.chapters.system.bracelet import Bracelet
-from roboglot.protocols.cyberdog.chapters.system.ota import Updates
 from roboglot.protocols.cyberdog.chapters.system.status import status_of, ticks
 from roboglot.protocols.cyberdog.chapters.system.stored_settings import APP, kept
 from roboglot.protocols.cyberdog.chapters.system.update_jobs import UpdateJobs
+from roboglot.protocols.cyberdog.chapters.system.updates import Updates
 from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.dispatch import answer, error
 from roboglot.protocols.cyberdog.handshakes import Handshakes
 from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.protocols.cyberdog.reflection import add_reflection
-from roboglot.protocols.cyberdog.table import TABLE, Call
+from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.protocols.door import Endpoint
 from roboglot.transport.limiter import pay
 from roboglot.wire.cyberdog.channel import MESSAGE_MAX, ROBOT_NAME, server_options

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import asyncio
 
-from roboglot.protocols.cyberdog.table import Call
-from roboglot.wire.cyberdog.codes import Accepted, InBandError
-
 UNREAD_MAX = 64  # messages that a slow reader may leave unread before the oldest is dropped
 Reader = asyncio.Queue[object]  # None ends it
 
@@ -53,24 +50,3 @@ class Stream:
         if self._reader.full():
             self._reader.get_nowait()
         self._reader.put_nowait(message)
-
-
-async def follow(call: Call, stream: Stream, seconds: float) -> object:
-    """Answer everything from acceptance to the result; cut short when another call joins or the app is lost.
-
-    After ``seconds`` without the end the last answer is a time-out.
-    """
-    reader = stream.attach()
-
-    async def pass_on() -> None:
-        await call.reply({"accepted": int(Accepted.YES)})
-        while (message := await reader.get()) is not None:
-            await call.reply(message)
-
-    try:
-        await call.context.robot.clock.wait_for(pass_on(), seconds)
-    except TimeoutError:
-        return {"error_code": int(InBandError.TIMEOUT)}
-    finally:
-        stream.detach(reader)
-    return None

@@ -2,39 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeVar
 
 from roboglot.operations import OperationTable
 from roboglot.wire.contracts import contract
 from roboglot.wire.cyberdog.codes import UNPUBLISHED
 
-if TYPE_CHECKING:
-    from roboglot.protocols.cyberdog.context import Context
-
-Answer = TypeVar("Answer")
 TABLE: OperationTable[int] = OperationTable("cyberdog")
-
-
-@dataclass(slots=True)  # not frozen: one is made for every request, and frozen ones take four times as long
-class Call:
-    """One request under way.
-
-    A handler returns what is answered (a dict as JSON, a str as it is, None for nothing more); what takes longer
-    answers by ``reply`` as often as it likes first.
-    """
-
-    code: int
-    text: str  # params as it came
-    context: Context
-    reply: Callable[[object], Awaitable[None]]
-    why: str = ""  # it was refused, in plain words
-
-    def refused(self, answer: Answer, why: str) -> Answer:
-        """Return ``answer``, which says no; ``why`` is for the log and who watches the exchange."""
-        self.why = why
-        return answer
 
 
 @dataclass(frozen=True, slots=True)

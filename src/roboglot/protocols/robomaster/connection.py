@@ -9,7 +9,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import cast
 
-from roboglot.model.components.system.network import late
+from roboglot.model.lateness import late
 from roboglot.protocols.robomaster.context import Context, speak_as
 from roboglot.protocols.robomaster.dispatch import Answer, answer
 from roboglot.protocols.robomaster.keepalive import hung_up, probe_for_life

@@ -18,8 +18,8 @@ import msgspec
 
 from roboglot.model.admission import NO_PROOF, Forbidden, LockedOut, Proof, ProofKind, Unknown
 from roboglot.model.client_context import ask_for
-from roboglot.model.components.system.network import late
 from roboglot.model.errors import NotFound, RobotError
+from roboglot.model.lateness import late
 from roboglot.model.stand_in import StandIn
 from roboglot.operations import BadParameters, Operation, Right
 from roboglot.protocols.browsers import Browsers, of_rows

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 
-from roboglot.model.components.system.network import lateness
+from roboglot.model.lateness import lateness
 from roboglot.model.robot import Robot
 from roboglot.wire.visual.relay import FrontEnd
 from roboglot.wire.visual.replies import responses

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Pose
@@ -11,19 +10,17 @@ from roboglot.simulation.building.blueprint import dock_solid
 from roboglot.simulation.building.floor_edges import Footing, Walls
 from roboglot.simulation.building.lift import LiftCar
 from roboglot.simulation.building.lift_passengers import Passengers
+from roboglot.simulation.building.mechanics import Mechanics
 from roboglot.simulation.building.shelves import ShelfStand
 from roboglot.simulation.people.people import Walker
 from roboglot.simulation.world.description import WorldDescription
 from roboglot.simulation.world.placing import docks_of
 
-if TYPE_CHECKING:
-    from roboglot.simulation.world.physics import Physics
-
 
 class Building:
     """``docks``: per floor, their fronts, +x away from the dock. ``lift`` is None where there is none."""
 
-    def __init__(self, world: WorldDescription, physics: Physics, walkers: Sequence[Walker]) -> None:
+    def __init__(self, world: WorldDescription, physics: Mechanics, walkers: Sequence[Walker]) -> None:
         self._props = physics.props
         self.docks = docks_of(world)
         for floor, docks in enumerate(self.docks):

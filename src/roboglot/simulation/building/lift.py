@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from roboglot.model.components.logistics.lift_client import LiftDoor, LiftState
 from roboglot.model.errors import InvalidGoal, Refused
@@ -15,10 +14,8 @@ from roboglot.model.events import Event, LiftArrived, LiftDoorClosed, LiftDoorOp
 from roboglot.model.geometry import Pose
 from roboglot.simulation.building.blueprint import door_panels
 from roboglot.simulation.building.lift_passengers import Passengers
+from roboglot.simulation.building.mechanics import Mechanics
 from roboglot.simulation.world.description import WorldDescription
-
-if TYPE_CHECKING:
-    from roboglot.simulation.world.physics import Physics
 
 HOLD_MAX = 120.0  # s that one may keep the door open
 CALLS_MAX = 20
@@ -32,7 +29,7 @@ Listener = Callable[[Event], None]
 class LiftCar:
     """One car in one shaft. ``step`` lets time pass; events go to all ``listeners``."""
 
-    def __init__(self, world: WorldDescription, physics: Physics, passengers: Passengers) -> None:
+    def __init__(self, world: WorldDescription, physics: Mechanics, passengers: Passengers) -> None:
         assert world.lift is not None
         self.section, self._physics, self.passengers = world.lift, physics, passengers
         self._heights = [floor.height for floor in world.floors]

@@ -3,21 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from roboglot.model.geometry import Pose
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.building.blueprint import SHAFT_WALL, Kind, Solid
 from roboglot.simulation.building.props import PASSENGERS_MAX, Props
 from roboglot.simulation.people.people import Walker
-
-if TYPE_CHECKING:
-    from roboglot.simulation.building.lift import LiftCar
+from roboglot.simulation.world.description import Lift
 
 PERSON_MASS = 75.0  # kg
 PERSON_SIZE = (0.35, 0.45, 1.72)  # m
 SPOTS = ((-0.25, -0.3), (0.25, 0.3), (-0.25, 0.3), (0.25, -0.3))  # where they stand, of the car's half extent times 1.3
 SILL = 0.05  # m before and behind the door that must be free too
+
+
+class Car(Protocol):
+    """The lift's car, as who rides in it sees it."""
+
+    @property
+    def section(self) -> Lift:
+        """Its sizes."""
+
+    @property
+    def frame(self) -> Pose:
+        """The middle of its floor, +x towards its door, world frame."""
+
+    @property
+    def elevation(self) -> float:
+        """Of its floor, m."""
+
+    @property
+    def floor(self) -> int:
+        """The floor of the building that it is nearest to."""
 
 
 class Passengers:
@@ -27,7 +45,7 @@ class Passengers:
         self._hulls, self._walkers, self._props = list(hulls), walkers, props
         self._count = 0
 
-    def board(self, lift: LiftCar, count: int) -> None:
+    def board(self, lift: Car, count: int) -> None:
         """Have so many people stand in the car, facing its door. Raises ValueError."""
         if not 0 <= count <= PASSENGERS_MAX:
             raise ValueError(f"0 to {PASSENGERS_MAX} people can be put into the lift, not {count}")
@@ -36,7 +54,7 @@ class Passengers:
         self._count = count
         self.carry(lift)
 
-    def carry(self, lift: LiftCar) -> None:
+    def carry(self, lift: Car) -> None:
         """They ride with the car."""
         deep, wide = lift.section.size
         above = lift.elevation - self._props.elevation(lift.floor)
@@ -44,7 +62,7 @@ class Passengers:
             pose = lift.frame.compose(Pose(x * deep, y * wide))
             self._props.put(f"passenger {index}", lift.floor, Solid(Kind.PERSON, pose, PERSON_SIZE, above))
 
-    def load(self, lift: LiftCar) -> float:
+    def load(self, lift: Car) -> float:
         """What the car carries, kg."""
         deep, wide = lift.section.size
         load = 0.0
@@ -56,7 +74,7 @@ class Passengers:
                 load += PERSON_MASS
         return load
 
-    def in_doorway(self, lift: LiftCar, floor: int) -> bool:
+    def in_doorway(self, lift: Car, floor: int) -> bool:
         """True if anything is where the door of that floor wants to shut."""
         section = lift.section
         for pose, radius in self._everything(floor):
@@ -84,6 +102,6 @@ class Passengers:
         yield from (s.pose for s in self._props.on(floor) if s.kind in (Kind.FURNITURE, Kind.PERSON))
 
     @staticmethod
-    def _within(lift: LiftCar, pose: Pose, half_x: float, half_y: float) -> bool:
+    def _within(lift: Car, pose: Pose, half_x: float, half_y: float) -> bool:
         seen = pose.relative_to(lift.frame)
         return abs(seen.x) <= half_x and abs(seen.y) <= half_y

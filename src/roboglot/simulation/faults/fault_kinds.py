@@ -6,9 +6,11 @@ The functions' keyword parameters are the fault's options.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
 
 from roboglot.model.components.component import Component
 from roboglot.model.components.energy.battery import Battery
@@ -25,7 +27,10 @@ from roboglot.model.components.sensing.range_sensor import RangeSensors
 from roboglot.model.components.system.disk import Disk
 from roboglot.model.components.system.network import Network
 from roboglot.model.geometry import Pose
+from roboglot.model.robot import Robot
+from roboglot.model.stage import Stage
 from roboglot.simulation.building.blueprint import SHAFT_WALL
+from roboglot.simulation.building.building import Building
 from roboglot.simulation.building.lift import LiftCar
 from roboglot.simulation.components.energy.battery import SimulatedBattery
 from roboglot.simulation.components.logistics.cargo import SimulatedCargo
@@ -40,9 +45,8 @@ from roboglot.simulation.components.sensing.lidar import SimulatedLidar
 from roboglot.simulation.components.sensing.range_sensor import SimulatedRangeSensors
 from roboglot.simulation.components.system.disk import SimulatedDisk
 from roboglot.simulation.components.system.network import SimulatedNetwork
-
-if TYPE_CHECKING:
-    from roboglot.simulation.world.world import World
+from roboglot.simulation.world.description import WorldDescription
+from roboglot.simulation.world.truth import Truth
 
 Undo = Callable[[], object]
 C = TypeVar("C", bound=Component)
@@ -51,11 +55,45 @@ KIDNAP_TRIES = 400
 KIDNAP_DISTANCE = 4.0  # m at least
 
 
+class FragileWorld(Protocol):
+    """What faults use of a world."""
+
+    @property
+    def description(self) -> WorldDescription:
+        """As its file says."""
+
+    @property
+    def building(self) -> Building:
+        """Docks, shelves, the lift."""
+
+    @property
+    def hands(self) -> Stage:
+        """What moves and places things."""
+
+    @property
+    def truth(self) -> Truth:
+        """What really is the case."""
+
+    @property
+    def robots(self) -> Mapping[str, Robot]:
+        """All robots by name."""
+
+    @property
+    def time(self) -> float:
+        """Robot time of the last tick, s."""
+
+    def robot(self, name: str) -> Robot:
+        """Return one robot. Raises NotFound."""
+
+    def chance(self, purpose: str) -> np.random.Generator:
+        """Return random numbers for one purpose."""
+
+
 @dataclass(frozen=True, slots=True)
 class Target:
     """The world, and the robot that it happens to (None: the building)."""
 
-    world: World
+    world: FragileWorld
     name: str | None
 
     def part(self, interface: type[Component], simulated: type[C]) -> C:

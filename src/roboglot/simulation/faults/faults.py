@@ -16,12 +16,11 @@ from typing import TYPE_CHECKING, Any
 from roboglot.model.client_context import concerning
 from roboglot.model.errors import ComponentMissing, NotFound, RobotError
 from roboglot.model.stage import ActiveFault, FaultKind
-from roboglot.simulation.faults.fault_kinds import KINDS, Kind, Target, Undo
+from roboglot.simulation.faults.fault_kinds import KINDS, FragileWorld, Kind, Target, Undo
 from roboglot.simulation.world.spelling import nearest
 
 if TYPE_CHECKING:
     from roboglot.simulation.world.description import PlannedFault
-    from roboglot.simulation.world.world import World
 
 log = logging.getLogger(__name__)
 FAULTS_MAX = 100
@@ -30,7 +29,7 @@ FAULTS_MAX = 100
 class Faults:
     """All faults of one world. A kind acts on a robot once at a time; obstacles may be many."""
 
-    def __init__(self, world: World, planned: Sequence[PlannedFault]) -> None:
+    def __init__(self, world: FragileWorld, planned: Sequence[PlannedFault]) -> None:
         self._world = world
         self._numbers, self._order = itertools.count(1), itertools.count()
         self._active: dict[int, tuple[ActiveFault, Undo]] = {}

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.model.geometry import Point
+from roboglot.model.geometry import Point, Pose
 from roboglot.simulation.building.blueprint import Kind, solids_of
 from roboglot.simulation.world.description import AccessPoint, Mobile, WorldDescription
-
-if TYPE_CHECKING:
-    from roboglot.simulation.components.logistics.traffic_radio import SimulatedTrafficRadio
 
 EXPONENT = 2.2  # indoors, in sight
 WALL_LOSS = 4.0  # dB
@@ -23,6 +20,18 @@ SILENCE = -200.0
 
 FIRST_HOST = 100  # of the addresses that are given out
 HOSTS_MAX = 154
+
+
+class Claimant(Protocol):
+    """A robot's traffic radio, as the others hear it."""
+
+    @property
+    def claims(self) -> frozenset[str]:
+        """The places that it claims."""
+
+    @property
+    def pose(self) -> Pose:
+        """Where it is, world frame."""
 
 
 class Radio:
@@ -36,7 +45,7 @@ class Radio:
         self._walls = walls_of(world)
         self._aerials = [(Point(*point.at), point.power, away, point.ssid) for away, point in self.points]
         self._ends = np.array([(point.x, point.y) for point, *_ in self._aerials]).reshape(-1, 2)
-        self.traffic: list[SimulatedTrafficRadio] = []  # those of the robots
+        self.traffic: list[Claimant] = []  # those of the robots
         self._leases: dict[str, list[str]] = {}
 
     def network(self, ssid: str) -> AccessPoint | None:

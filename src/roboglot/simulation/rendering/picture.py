@@ -11,7 +11,7 @@ from roboglot.kernels.planes import COEFFICIENTS, FIRST
 from roboglot.kernels.raster import draw
 from roboglot.kernels.raster_shading import shade
 from roboglot.simulation.rendering.interior import GROUND_TILE
-from roboglot.simulation.rendering.stage import Eye, Scene
+from roboglot.simulation.rendering.views import Eye, Scene
 
 POLYGONS_MAX = 12_000  # drawn in one picture
 LOWEST = 0.05  # m that the eye stays above the floor and below the ceiling

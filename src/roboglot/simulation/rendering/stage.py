@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from roboglot.model.geometry import ORIGIN, wrap_angle
 from roboglot.model.robot import Robot
@@ -35,12 +34,12 @@ from roboglot.simulation.rendering.interior import (
     symbols_of,
 )
 from roboglot.simulation.rendering.shapes import (
-    Floats,
     Mesh,
     joined,
     paint_row,
 )
 from roboglot.simulation.rendering.textures import Masks
+from roboglot.simulation.rendering.views import REACH, Eye, Figure, Ground, Instant, Scene
 from roboglot.simulation.world.beads import Beads
 from roboglot.simulation.world.description import WorldDescription
 
@@ -48,67 +47,6 @@ FAR_AWAY = 60.0  # m beyond which people are not drawn
 FLOOR_LIGHT = 0.95
 LEVEL = (0.0, 0.0)
 SLACK = 0.1  # rad beside what an eye sees: one that nods or leans a little sees more near its picture's corners
-REACH = 0.5  # m that shadows and arms reach beyond the radius
-
-
-@dataclass(frozen=True, slots=True)
-class Eye:
-    """Where a camera is (world, m) and how it looks: ``rotation``'s rows are right, down and ahead in world.
-
-    ``fov``: horizontal, rad.
-    """
-
-    x: float
-    y: float
-    z: float
-    rotation: NDArray[np.float64]
-    fov: float
-
-    @property
-    def yaw(self) -> float:
-        """Where it looks from above, rad."""
-        return math.atan2(self.rotation[2, 1], self.rotation[2, 0])
-
-    @property
-    def level(self) -> bool:
-        """True if it looks neither steeply up or down nor askew."""
-        return abs(float(self.rotation[2, 2])) < 0.5 and abs(float(self.rotation[0, 2])) < 0.2
-
-    @property
-    def spread(self) -> float:
-        """How much of what is around it may be seen, rad: looking steeply, all; else the middle ``fov`` and some."""
-        return min(math.tau, 1.25 * self.fov) if self.level else math.tau
-
-
-@dataclass(frozen=True, slots=True)
-class Ground:
-    """Floor and ceiling: a paint per room, then the ceiling's; heights in world."""
-
-    paints: NDArray[np.float32]
-    textures: NDArray[np.int32]
-    floor: float
-    ceiling: float
-
-
-@dataclass(frozen=True, slots=True)
-class Figure:
-    """A person or thing that may move: how to make its mesh around the origin, where it is, its shadow's radius."""
-
-    make: Callable[[], Mesh]
-    x: float
-    y: float
-    z: float
-    rotation: Floats
-    radius: float
-    reach: float = REACH  # m that it reaches beyond the radius without a shadow
-
-
-@dataclass(frozen=True, slots=True)
-class Instant:
-    """What moves on a floor, frozen."""
-
-    floor: int
-    figures: tuple[Figure, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,17 +56,6 @@ class Life:
     robots: Mapping[str, Robot]
     beads: Beads
     lift: LiftCar | None
-
-
-@dataclass(frozen=True, slots=True)
-class Scene:
-    """One instant of one floor, complete in itself: it can be drawn in another thread."""
-
-    meshes: tuple[Mesh, ...]
-    ground: Ground
-    plan: Plan
-    shadows: NDArray[np.uint8]
-    masks: NDArray[np.uint32]
 
 
 class Stage:

@@ -30,6 +30,7 @@ from roboglot.simulation.people.people import Walker, keyed
 from roboglot.simulation.people.routine import Clap, Say
 from roboglot.simulation.radio.gadgets import Gadgets
 from roboglot.simulation.radio.radio import Radio
+from roboglot.simulation.rendering.opening import stage_of
 from roboglot.simulation.rendering.studio import Studio
 from roboglot.simulation.sound.sound import Air, Source, Speech
 from roboglot.simulation.sound.voice import hummed
@@ -125,7 +126,7 @@ class World:
             sight=Sight(description, hulls, walkers, props, things),
             rays=physics.rays,
             surroundings=Surroundings(description, hulls, walkers, props, lines),
-            studio=Studio(description, hulls, walkers, props, things, life, self._clock),
+            studio=Studio(stage_of(description, hulls, walkers, props, things, life), self._clock),
             beads=beads,
             chances=Chances(seed),
             north=math.radians(description.georeference.north if description.georeference else 90.0),

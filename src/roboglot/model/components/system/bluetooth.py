@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from roboglot.model.actions import Action
+from roboglot.model.action import Action
 from roboglot.model.components.component import Component
 
 BLUETOOTH = "bluetooth"  # the resource that scanning, connecting and updating hold

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from roboglot.model.actions import Action
+from roboglot.model.action import Action
 from roboglot.model.components.component import Component
 
 FIRMWARE = "firmware"  # the resource that updates and reboots hold

@@ -3,37 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from enum import IntEnum
 
 from roboglot.model.clock import Clock
 from roboglot.model.components.component import Component
+from roboglot.model.components.system.fault import Fault, FaultLevel
 from roboglot.model.errors import NotFound
 from roboglot.model.events import EventStream, FaultCleared, FaultRaised
+
+__all__ = ["FAULTS_MAX", "MOTOR_ALARM", "REMINDER", "Fault", "FaultLevel", "Health"]
 
 MOTOR_ALARM = "motor alarm"  # the name of the fault that a motor does not turn
 REMINDER = 10.0  # s after which a dismissed fault comes back if its cause persists
 FAULTS_MAX = 100
-
-
-class FaultLevel(IntEnum):
-    """How bad it is."""
-
-    WARNING = 1
-    ERROR = 2
-    FATAL = 3
-
-
-@dataclass(frozen=True, slots=True)
-class Fault:
-    """``name`` is stable ("battery low"), ``component`` the part's name, ``id`` counts up, ``since`` is robot time."""
-
-    id: int
-    name: str
-    component: str
-    level: FaultLevel
-    message: str
-    since: float
 
 
 class Health(Component):

@@ -4,27 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Awaitable, Callable
-from enum import StrEnum
 
 from roboglot.model.clock import Clock
 from roboglot.model.components.component import Component
 from roboglot.model.components.system.health import FaultLevel, Health
+from roboglot.model.components.system.link_state import LinkState
 from roboglot.model.errors import Busy, Refused, Unconnected
 from roboglot.model.events import EventStream, LinkChanged
 from roboglot.model.robot import Robot
 
+__all__ = ["FAULT", "OTHERS", "STALE_AFTER", "US", "Link", "LinkState", "require_heard"]
+
 FAULT = "link lost"
 US, OTHERS = "us", "another client"
 STALE_AFTER = 0.5  # s without news after which what is known counts as old
-
-
-class LinkState(StrEnum):
-    """How it is."""
-
-    CONNECTING = "connecting"  # for the first time
-    UP = "up"
-    LOST = "lost"  # it was up; tried again with growing pauses
-    CLOSED = "closed"  # for good
 
 
 class Link(Component):

@@ -6,13 +6,9 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING
 
-from roboglot.model.actions import Action
+from roboglot.model.action import Action
 from roboglot.model.components.component import Component
-
-if TYPE_CHECKING:
-    from roboglot.model.robot import Robot
 
 WIFI = "wifi"  # the resource that joining a network holds
 SSID_MAX = 32  # bytes
@@ -153,14 +149,3 @@ class Network(Component):
     @abstractmethod
     async def set_apn(self, apn: str) -> None:
         """The mobile operator's access point name. Raises ComponentMissing without a modem, InvalidGoal."""
-
-
-def lateness(robot: Robot) -> float:
-    """s by which what this robot says comes late now; 0 without a network card."""
-    return robot[Network].delay if Network in robot else 0.0
-
-
-async def late(robot: Robot) -> None:
-    """Wait as long as the robot's answers are late now; for code that answers clients."""
-    if delay := lateness(robot):
-        await robot.clock.sleep(delay)

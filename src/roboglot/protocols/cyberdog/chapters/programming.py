@@ -5,8 +5,9 @@ from __future__ import annotations
 from roboglot.model.clock import Clock
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.app_link import AppLink
+from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.frame_queue import FrameQueue
-from roboglot.protocols.cyberdog.table import TABLE, Call, push, unread
+from roboglot.protocols.cyberdog.table import TABLE, push, unread
 from roboglot.wire.cyberdog.channel import PUSH_MAX
 from roboglot.wire.cyberdog.codes import Code
 

@@ -9,8 +9,10 @@ from msgspec import Meta, Struct
 
 from roboglot.model.components.logistics.traffic_radio import CLAIM_MAX, CLAIMS_MAX, TrafficRadio
 from roboglot.model.errors import InvalidGoal
+from roboglot.model.geometry import Pose
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.radio.radio import Claimant
 
 
 class TrafficRadioSection(Struct, frozen=True, forbid_unknown_fields=True):
@@ -22,10 +24,15 @@ class TrafficRadioSection(Struct, frozen=True, forbid_unknown_fields=True):
 class SimulatedTrafficRadio(TrafficRadio):
     """``air``: all radios of the world."""
 
-    def __init__(self, section: TrafficRadioSection, hull: Hull, air: list[SimulatedTrafficRadio]) -> None:
+    def __init__(self, section: TrafficRadioSection, hull: Hull, air: list[Claimant]) -> None:
         self._section, self._hull, self._air = section, hull, air
         self._claims: frozenset[str] = frozenset()
         air.append(self)
+
+    @property
+    def pose(self) -> Pose:
+        """Where it is, world frame."""
+        return self._hull.pose
 
     @property
     def claims(self) -> frozenset[str]:
@@ -39,9 +46,7 @@ class SimulatedTrafficRadio(TrafficRadio):
     def others(self, name: str) -> int:
         here, reach = self._hull.pose, self._section.range
         return sum(
-            name in radio.claims and radio._hull.pose.distance_to(here) <= reach
-            for radio in self._air
-            if radio is not self
+            name in radio.claims and radio.pose.distance_to(here) <= reach for radio in self._air if radio is not self
         )
 
 

@@ -25,10 +25,10 @@ from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import NotNegative
 from roboglot.simulation.components.motion.gimbal import GimbalSection
 from roboglot.simulation.rendering.studio import Studio
+from roboglot.simulation.rendering.views import Eye, Instant, Scenery
 
 if TYPE_CHECKING:
     from roboglot.simulation.rendering.picture import Renderer
-    from roboglot.simulation.rendering.stage import Eye, Instant, Stage
 
 log = logging.getLogger(__name__)
 QUEUE_MAX = 2  # pictures that a viewer may be behind
@@ -52,7 +52,7 @@ class CameraSection(Struct, frozen=True, forbid_unknown_fields=True):
 class _Shot:
     """All that a picture is made from."""
 
-    stage: Stage
+    stage: Scenery
     renderer: Renderer
     stamp: float
     instant: Instant
@@ -162,10 +162,8 @@ class SimulatedCamera(Camera):
         """Take no more pictures."""
         self._feed.close()
 
-    def _shoot(self, stage: Stage, renderer: Renderer) -> _Shot:
+    def _shoot(self, stage: Scenery, renderer: Renderer) -> _Shot:
         """Freeze what there is to see now."""
-        from roboglot.simulation.rendering.stage import Eye
-
         hull, mount = self._hull, self.mount
         pitch, yaw = hull.gaze
         axes = rotation((0.0, self._section.pitch + pitch), yaw).T[[1, 2, 0]] * ((-1.0,), (-1.0,), (1.0,))

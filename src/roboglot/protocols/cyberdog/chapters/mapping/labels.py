@@ -13,9 +13,10 @@ from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Point
 from roboglot.operations import BadParameters, Right
+from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.profile import Profile
-from roboglot.protocols.cyberdog.table import TABLE, Call
+from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.protocols.cyberdog.vocabulary import grid_of, label_of, no_grid
 from roboglot.wire.cyberdog.channel import MESSAGE_MAX
 from roboglot.wire.cyberdog.codes import Code

@@ -19,6 +19,7 @@ from roboglot.model.components.sensing.ultra_wideband import UltraWideband
 from roboglot.model.components.sensing.vision import Vision
 from roboglot.model.errors import InvalidGoal
 from roboglot.operations import BadParameters, Right
+from roboglot.protocols.cyberdog.call import Call, follow
 from roboglot.protocols.cyberdog.chapters.mapping.docking import dock
 from roboglot.protocols.cyberdog.chapters.mapping.mapping import build_map, keep_map
 from roboglot.protocols.cyberdog.chapters.mapping.navigation import Goal, navigate, relocalize
@@ -33,8 +34,7 @@ from roboglot.protocols.cyberdog.chapters.people.following import (
 )
 from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.profile import Profile
-from roboglot.protocols.cyberdog.stream import follow
-from roboglot.protocols.cyberdog.table import TABLE, Call
+from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.wire.cyberdog.codes import (
     Accepted,
     Code,

@@ -7,10 +7,11 @@ from typing import Any
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.geometry import STILL
 from roboglot.operations import Right
+from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.chapters.motion.gait import Executed, Wish
 from roboglot.protocols.cyberdog.chapters.motion.motion_table import POSES, SERVO_POSES, WALKS
 from roboglot.protocols.cyberdog.profile import Profile
-from roboglot.protocols.cyberdog.table import TABLE, Call, push
+from roboglot.protocols.cyberdog.table import TABLE, push
 from roboglot.protocols.cyberdog.vocabulary import ALL_FEET, body_of, feet_of, lift_of, twist_of
 from roboglot.wire.cyberdog.codes import Code, InBandError
 from roboglot.wire.cyberdog.motions import CommandType, Motion, MotionCode

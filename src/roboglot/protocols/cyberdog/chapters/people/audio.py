@@ -13,8 +13,9 @@ from roboglot.model.components.sensing.hearing import Hearing
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.robot import Robot
 from roboglot.operations import BadParameters, Right
+from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.chapters.system.stored_settings import ACCOUNT, VOICEPRINTS, kept
-from roboglot.protocols.cyberdog.table import TABLE, Call, push
+from roboglot.protocols.cyberdog.table import TABLE, push
 from roboglot.wire.cyberdog.codes import Code
 
 TRAINED = push(Code.VOICE_TRAINED)

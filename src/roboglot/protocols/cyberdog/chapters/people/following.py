@@ -15,11 +15,12 @@ from roboglot.model.components.motion.following import Following, FollowSide
 from roboglot.model.errors import NotFound, RobotError
 from roboglot.model.events import ActionChanged
 from roboglot.operations import BadParameters, Right
+from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.chapters.mapping.task_state import Task
 from roboglot.protocols.cyberdog.chapters.motion.gait import SOURCE
 from roboglot.protocols.cyberdog.chapters.people.pursuit import Pursuit, ThingPursuit
 from roboglot.protocols.cyberdog.context import Context
-from roboglot.protocols.cyberdog.table import TABLE, Call
+from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.wire.cyberdog.codes import Code, Feedback, TaskResult
 
 AUTOMATIC = 200  # ``relative_pos`` that leaves it to the robot

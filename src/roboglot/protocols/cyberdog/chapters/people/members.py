@@ -10,9 +10,10 @@ from typing import Any
 from roboglot.model.components.interaction.members import Member, Members
 from roboglot.model.errors import NotFound, RobotError
 from roboglot.operations import Right
+from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.profile import Profile
-from roboglot.protocols.cyberdog.table import TABLE, Call
+from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.wire.cyberdog.codes import AccountCode, Code, PrintState
 
 

@@ -19,8 +19,9 @@ from roboglot.model.components.system.bluetooth import (
 from roboglot.model.errors import NotFound, Refused
 from roboglot.model.robot import Robot
 from roboglot.operations import BadParameters, Right
+from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.chapters.motion.gait import SOURCE
-from roboglot.protocols.cyberdog.table import TABLE, Call
+from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.wire.cyberdog.codes import Code, InBandError
 
 CONNECT_MAX = 18.0  # s

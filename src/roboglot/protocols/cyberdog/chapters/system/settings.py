@@ -15,6 +15,7 @@ from roboglot.model.components.sensing.hearing import Hearing
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import ComponentMissing
 from roboglot.operations import Right
+from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.chapters.system.stored_settings import (
     MICROPHONE,
     NICKNAME,
@@ -22,7 +23,7 @@ from roboglot.protocols.cyberdog.chapters.system.stored_settings import (
     VOICE_CONTROL,
     WAKE_WORD,
 )
-from roboglot.protocols.cyberdog.table import TABLE, Call
+from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.wire.cyberdog.codes import Code
 from roboglot.wire.cyberdog.text import Int32
 

@@ -8,7 +8,8 @@ from typing import Any
 from roboglot.model.components.interaction.skin import ElectronicSkin, Shade, SkinPattern
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.operations import Right
-from roboglot.protocols.cyberdog.table import TABLE, Call
+from roboglot.protocols.cyberdog.call import Call
+from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.wire.cyberdog.codes import Code, SkinMode
 from roboglot.wire.cyberdog.text import Int32
 

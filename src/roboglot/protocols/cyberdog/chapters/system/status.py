@@ -15,12 +15,13 @@ from roboglot.model.components.system.firmware import Firmware
 from roboglot.model.components.system.network import Network
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
+from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.chapters.people.audio import activated
 from roboglot.protocols.cyberdog.chapters.system.self_check import self_check
 from roboglot.protocols.cyberdog.chapters.system.stored_settings import DEFAULT_NAME, nickname
 from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.profile import Profile
-from roboglot.protocols.cyberdog.table import TABLE, Call
+from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.protocols.cyberdog.vocabulary import percent, wifi_strength
 from roboglot.wire.cyberdog.codes import Code, SelfCheck
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb

@@ -1,6 +1,6 @@
-"""Chapter "ota", the newer form that the text leaves out: one goal at a time (5010), its stream joined again (5011).
+"""Goals of the newer form of "ota" that the text leaves out: one at a time (5010), its stream joined again (5011).
 
-What feedback and result say is published nowhere: the JSON here is our own. The work is that of ``ota.py``.
+What feedback and result say is published nowhere: the JSON here is our own. The work is that of ``updates.py``.
 """
 
 from __future__ import annotations
@@ -9,9 +9,7 @@ import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any
-
-import msgspec
+from typing import Any
 
 from roboglot.model.components.system.disk import Disk
 from roboglot.model.components.system.firmware import (
@@ -23,8 +21,8 @@ from roboglot.model.components.system.firmware import (
 from roboglot.model.errors import Busy, InvalidGoal, NotFound, RobotError
 from roboglot.model.events import FirmwareChanged
 from roboglot.model.robot import Robot
-from roboglot.operations import BadParameters, Right
-from roboglot.protocols.cyberdog.chapters.system.ota import (
+from roboglot.operations import BadParameters
+from roboglot.protocols.cyberdog.chapters.system.updates import (
     ARGUMENTS,
     BUSY,
     FAILED,
@@ -35,14 +33,9 @@ from roboglot.protocols.cyberdog.chapters.system.ota import (
     Updates,
     package_of,
 )
-from roboglot.protocols.cyberdog.stream import Stream, follow
-from roboglot.protocols.cyberdog.table import TABLE, Call
-from roboglot.wire.cyberdog.codes import Accepted, Code
+from roboglot.protocols.cyberdog.stream import Stream
 
 log = logging.getLogger(__name__)
-STREAM_MAX = 10_800.0  # s that one stream is kept open for its result
-ID_MAX = 128  # characters of a goal's id
-Id = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)] | Annotated[str, msgspec.Meta(max_length=ID_MAX)]
 CODES: tuple[tuple[type[Exception], int], ...] = (  # the first row whose class fits counts
     (BadParameters, ARGUMENTS),
     (InvalidGoal, ARGUMENTS),
@@ -202,24 +195,3 @@ OPERATIONS: Mapping[str, Callable[[UpdateJobs, Goal], Awaitable[dict[str, Any]]]
 
 def _progress(progress: FirmwareProgress) -> dict[str, Any]:
     return {"state": progress.state, "progress": round(100 * progress.share)}
-
-
-@TABLE.on(Code.START_UPDATE, right=Right.ADMIN, needs=(Firmware,))
-async def start_update(call: Call, *, operate: str = "", id: Id = "", data: object = None) -> object:
-    """Answers ``accepted``, feedback, result; the work goes on if the stream breaks."""
-    call.context.robot[Firmware]
-    if operate not in OPERATIONS:
-        return call.refused({"accepted": int(Accepted.NO)}, f"operate is one of {', '.join(OPERATIONS)}")
-    if call.context.jobs.stream is not None:
-        return call.refused({"accepted": int(Accepted.NO)}, "another goal is under way")
-    return await follow(call, call.context.jobs.start(Goal(operate, id, data)), STREAM_MAX)
-
-
-@TABLE.on(Code.JOIN_UPDATE, right=Right.SEE, needs=(Firmware,))
-async def join_update(call: Call) -> object:
-    """Take the stream of the goal under way over, from its latest feedback on."""
-    call.context.robot[Firmware]
-    stream = call.context.jobs.stream
-    if stream is None:
-        return call.refused({"accepted": int(Accepted.NOTHING_TO_JOIN)}, "no goal is under way")
-    return await follow(call, stream, STREAM_MAX)

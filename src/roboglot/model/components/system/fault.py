@@ -1,0 +1,26 @@
+"""One fault of a robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+
+class FaultLevel(IntEnum):
+    """How bad it is."""
+
+    WARNING = 1
+    ERROR = 2
+    FATAL = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """``name`` is stable ("battery low"), ``component`` the part's name, ``id`` counts up, ``since`` is robot time."""
+
+    id: int
+    name: str
+    component: str
+    level: FaultLevel
+    message: str
+    since: float

@@ -1,0 +1,14 @@
+"""How the link to a real robot is."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class LinkState(StrEnum):
+    """How it is."""
+
+    CONNECTING = "connecting"  # for the first time
+    UP = "up"
+    LOST = "lost"  # it was up; tried again with growing pauses
+    CLOSED = "closed"  # for good

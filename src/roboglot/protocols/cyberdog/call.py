@@ -1,0 +1,54 @@
+"""One request under way, and answers that go on as a stream."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+from roboglot.protocols.cyberdog.context import Context
+from roboglot.protocols.cyberdog.stream import Stream
+from roboglot.wire.cyberdog.codes import Accepted, InBandError
+
+Answer = TypeVar("Answer")
+
+
+@dataclass(slots=True)  # not frozen: one is made for every request, and frozen ones take four times as long
+class Call:
+    """One request under way.
+
+    A handler returns what is answered (a dict as JSON, a str as it is, None for nothing more); what takes longer
+    answers by ``reply`` as often as it likes first.
+    """
+
+    code: int
+    text: str  # params as it came
+    context: Context
+    reply: Callable[[object], Awaitable[None]]
+    why: str = ""  # it was refused, in plain words
+
+    def refused(self, answer: Answer, why: str) -> Answer:
+        """Return ``answer``, which says no; ``why`` is for the log and who watches the exchange."""
+        self.why = why
+        return answer
+
+
+async def follow(call: Call, stream: Stream, seconds: float) -> object:
+    """Answer everything from acceptance to the result; cut short when another call joins or the app is lost.
+
+    After ``seconds`` without the end the last answer is a time-out.
+    """
+    reader = stream.attach()
+
+    async def pass_on() -> None:
+        await call.reply({"accepted": int(Accepted.YES)})
+        while (message := await reader.get()) is not None:
+            await call.reply(message)
+
+    try:
+        await call.context.robot.clock.wait_for(pass_on(), seconds)
+    except TimeoutError:
+        return {"error_code": int(InBandError.TIMEOUT)}
+    finally:
+        stream.detach(reader)
+    return None

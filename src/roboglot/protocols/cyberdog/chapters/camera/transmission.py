@@ -1,0 +1,214 @@
+"""Chapter "image transmission": the camera live by WebRTC (4001): signalling as requests and pushes, a peer per uid.
+
+The peers' time is the network's: a way to the app takes as long as it takes, whatever the robot's clock does.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import importlib
+import logging
+from collections.abc import Coroutine
+from typing import TYPE_CHECKING, Any
+
+from roboglot.media.fitting import FittedPictures
+from roboglot.media.video import VideoStream, beside
+from roboglot.model.client_context import connection
+from roboglot.model.components.sensing.camera import Camera
+from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog.app_link import AppLink
+from roboglot.protocols.cyberdog.table import push
+from roboglot.wire.cyberdog.codes import Code
+from roboglot.wire.cyberdog.signalling import (
+    Alignment,
+    Candidate,
+    Description,
+    End,
+    Failure,
+    Screen,
+    Signal,
+    VideoError,
+    fields_of,
+)
+
+if TYPE_CHECKING:
+    from roboglot.media.webrtc import VideoCall
+
+log = logging.getLogger(__name__)
+SIGNAL = push(Code.VIDEO, depth=20)
+PATIENCE = 10.0  # s, outside time, until a way to the app must be found
+PEERS_MAX = 16  # apps that look, or begin to, at once
+EARLY_MAX = 32  # candidates of one app that came before its offer
+SCREEN_WIDTH = 640  # of pictures for a screen that was told
+PLACES = {Alignment.TOP: 0.0, Alignment.MIDDLE: 0.5, Alignment.BOTTOM: 1.0}
+
+
+class Transmission:
+    """Every app that looks, by its uid."""
+
+    def __init__(self, robot: Robot, app: AppLink) -> None:
+        self._robot, self._app = robot, app
+        self._peers: dict[str, _Peer] = {}
+        self._streams: dict[tuple[int, Alignment], VideoStream] = {}
+        self._running: set[asyncio.Task[None]] = set()
+
+    @property
+    def viewers(self) -> int:
+        """How many apps look, or begin to."""
+        return sum(peer.offered for peer in self._peers.values())
+
+    def take(self, signal: Signal) -> None:
+        """A message of the app. Never waits; answers are pushed."""
+        match signal:
+            case End(uid):
+                if peer := self._peers.pop(uid, None):
+                    self._begin(self._end(peer))
+            case Description(uid, "offer") if peer := self._peer(uid):
+                if not peer.offered:  # only the first counts
+                    peer.offered = True
+                    self._begin(self._connect(peer, signal))
+            case Candidate(uid, candidate, mid, index) if peer := self._peer(uid):
+                peer.put(candidate, mid, index)
+            case _:
+                log.info("nothing to do with %s", type(signal).__name__)
+
+    async def close(self) -> None:
+        """Hang up on everybody."""
+        peers, self._peers = list(self._peers.values()), {}
+        for task in self._running:
+            task.cancel()
+        await asyncio.gather(*self._running, *(peer.close() for peer in peers), return_exceptions=True)
+
+    def _peer(self, uid: str) -> _Peer | None:
+        """That app's; a new one if there is room."""
+        if uid not in self._peers:
+            if len(self._peers) >= PEERS_MAX:
+                log.warning("more than %d apps want pictures: %r gets none", PEERS_MAX, uid)
+                return None
+            peer = self._peers[uid] = _Peer(uid)
+            peer.give_up = asyncio.get_running_loop().call_later(PATIENCE, self._late, peer)
+        return self._peers[uid]
+
+    def _late(self, peer: _Peer) -> None:
+        self._fail(peer, VideoError.NO_CONNECTION, "ICE connection timeout")
+
+    def _fail(self, peer: _Peer, code: VideoError, message: str) -> None:
+        """Tell it, and let the peer go."""
+        if self._forget(peer):
+            if peer.offered:
+                self._tell(Failure(peer.uid, code, message))
+            self._begin(peer.close())
+
+    def _forget(self, peer: _Peer) -> bool:
+        """Whether it was still there."""
+        peer.give_up.cancel()
+        if self._peers.get(peer.uid) is not peer:
+            return False
+        del self._peers[peer.uid]
+        return True
+
+    async def _connect(self, peer: _Peer, offer: Description) -> None:
+        if not self._robot.admission.carries_datagrams(connection()):
+            self._fail(peer, VideoError.NO_CONNECTION, "roboglot connect carries no WebRTC: take photos, or films")
+            return
+        webrtc: Any = await beside(self._robot.clock, lambda: importlib.import_module("roboglot.media.webrtc"))
+        stream = self._stream(offer.screen)
+        call: VideoCall = webrtc.VideoCall(stream, self._robot.clock, lambda state: self._changed(peer, state))
+        peer.call = call
+        try:
+            answer = await call.answer(offer.sdp)
+        except webrtc.BadOffer as bad:
+            log.info("offer of %r: %s", peer.uid, bad)
+            self._fail(peer, VideoError.NO_CONNECTION, f"the offer cannot be answered: {bad}")
+            return
+        if self._peers.get(peer.uid) is not peer:  # it gave up meanwhile
+            await call.close()
+            return
+        self._tell(Description(peer.uid, "answer", answer))
+        for ours in call.candidates():
+            self._tell(Candidate(peer.uid, ours.text, ours.mid, ours.index))
+        await peer.pass_on(webrtc.BadOffer)
+
+    def _changed(self, peer: _Peer, state: str) -> None:
+        """The connection's state, as aiortc has it."""
+        log.info("pictures for %r: %s", peer.uid, state)
+        match state:
+            case "connected":
+                peer.give_up.cancel()
+            case "blind":
+                self._fail(peer, VideoError.NO_CAMERA, "the camera gives no pictures")
+            case "failed":
+                self._fail(peer, VideoError.NO_CONNECTION, "ICE connection failed")
+            case "closed" if self._forget(peer):
+                self._begin(peer.close())
+
+    def _stream(self, screen: Screen | None) -> VideoStream:
+        """As the camera has it, or for a screen of that shape; one encoder for all screens of one shape."""
+        if screen is None:
+            return self._robot[VideoStream]
+        height = 2 * max(1, round(SCREEN_WIDTH * screen.height / screen.width / 2))
+        key = (height, screen.alignment)
+        if key not in self._streams:
+            if len(self._streams) >= PEERS_MAX:
+                self._streams = {}  # those who look at one keep it
+            clock, camera = self._robot.clock, self._robot[Camera]
+            pictures = FittedPictures(camera, clock, SCREEN_WIDTH, height, PLACES[screen.alignment])
+            self._streams[key] = VideoStream(pictures, clock)
+        return self._streams[key]
+
+    async def _end(self, peer: _Peer) -> None:
+        peer.give_up.cancel()
+        await peer.close()
+        self._tell(End(peer.uid, done=True))
+
+    def _tell(self, signal: Signal) -> None:
+        self._app.push(SIGNAL, fields_of(signal))
+
+    def _begin(self, work: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.get_running_loop().create_task(work, name="image transmission")
+        self._running.add(task)
+        task.add_done_callback(self._done)
+
+    def _done(self, task: asyncio.Task[None]) -> None:
+        self._running.discard(task)
+        if not task.cancelled() and (error := task.exception()):
+            log.error("image transmission broke", exc_info=error)
+
+
+class _Peer:
+    """One app: its call, and the candidates that came before there was one."""
+
+    def __init__(self, uid: str) -> None:
+        self.uid = uid
+        self.offered = False
+        self.call: VideoCall | None = None
+        self.give_up: asyncio.TimerHandle
+        self._waiting: list[tuple[str, str | None, int | None]] = []
+        self._more = asyncio.Event()
+
+    def put(self, candidate: str, mid: str | None, index: int | None) -> None:
+        """One address of the app."""
+        if len(self._waiting) < EARLY_MAX:
+            self._waiting.append((candidate, mid, index))
+            self._more.set()
+
+    async def pass_on(self, bad: type[Exception]) -> None:
+        """Candidates as they come, to the call; ends when it is closed."""
+        total = 0
+        while self.call is not None and total < EARLY_MAX:
+            while self._waiting and self.call is not None:
+                candidate, mid, index = self._waiting.pop(0)
+                total += 1
+                try:
+                    await self.call.add_candidate(candidate, mid, index)
+                except bad as error:
+                    log.info("candidate of %r: %s", self.uid, error)
+            self._more.clear()
+            await self._more.wait()
+
+    async def close(self) -> None:
+        """Hang up."""
+        call, self.call = self.call, None
+        self._more.set()
+        if call is not None:
+            await call.close()

@@ -1,0 +1,120 @@
+"""Enters and recognises members' faces, and pushes how that went (7003, 7004)."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Coroutine
+from enum import IntEnum
+from typing import Any
+
+from roboglot.model.components.interaction.members import Members
+from roboglot.model.components.sensing.vision import Vision
+from roboglot.model.errors import RobotError
+from roboglot.model.perception import Emotion, FaceSeen
+from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog.app_link import AppLink
+from roboglot.protocols.cyberdog.table import push
+from roboglot.wire.cyberdog.codes import Code
+
+log = logging.getLogger(__name__)
+ENTERED = push(Code.FACE_ENTERED)
+RECOGNISED = push(Code.FACE_RECOGNISED)
+ENTERING_MAX = 30.0  # s until a face must have been seen
+AGAIN = 1.0  # s between two reports of the same person
+EMOTIONS = tuple(Emotion)
+
+
+class FaceResult(IntEnum):
+    """``result`` of this chapter's answers and pushes."""
+
+    DONE = 0
+    UNDEFINED = 5901
+    STATE = 5903
+    INNER = 5904
+    TIMEOUT = 5907
+    ARGUMENTS = 5910
+    BUSY = 5911
+    KNOWN = 5921
+
+
+class Faces:
+    """Enters one face or recognises, not both at once. Lives as long as the door is open."""
+
+    def __init__(self, robot: Robot, app: AppLink) -> None:
+        self.entering = ""  # the member whose face is awaited
+        self.entered = ""  # the member whose face came last
+        self._robot, self._app = robot, app
+        self._looking: asyncio.Task[None] | None = None
+
+    @property
+    def busy(self) -> bool:
+        """Whether it enters or recognises."""
+        return self._looking is not None and not self._looking.done()
+
+    def enter(self, name: str) -> None:
+        """Take the next face for that member's; push 7003 tells the outcome."""
+        self.entering = name
+        self._begin(self._enter(name))
+
+    def recognise(self, name: str, id: int, seconds: float) -> None:
+        """Push 7004 for each member (only ``name``, if given) seen within ``seconds``; 5907 if none was."""
+        self._begin(self._recognise(name, id, seconds))
+
+    def stop(self) -> None:
+        """Look no more, tell nothing."""
+        if self._looking:
+            self._looking.cancel()
+        self._looking, self.entering = None, ""
+
+    def _begin(self, work: Coroutine[Any, Any, None]) -> None:
+        self._looking = asyncio.get_running_loop().create_task(work, name="faces")
+
+    async def _enter(self, name: str) -> None:
+        members = self._robot[Members]
+        try:
+            face = await self._robot.clock.wait_for(self._next_face(), ENTERING_MAX)
+            if face.name not in ("", name):
+                result = FaceResult.KNOWN
+            else:
+                await members.set_face(name, face.print)
+                self.entered, result = name, FaceResult.DONE
+        except TimeoutError:
+            result = FaceResult.TIMEOUT
+        except RobotError as error:
+            log.info("face of %r: %s", name, error)
+            result = FaceResult.INNER
+        self.entering = ""
+        self._app.push(ENTERED, {"result": int(result), "username": name})
+
+    async def _next_face(self) -> FaceSeen:
+        with self._robot[Vision].faces.subscribe() as sightings:
+            async for sighting in sightings:
+                if sighting.seen:
+                    return sighting.seen[0]
+        raise RobotError("the camera is gone")
+
+    async def _recognise(self, name: str, id: int, seconds: float) -> None:
+        reported: dict[str, float] = {}
+        try:
+            await self._robot.clock.wait_for(self._tell(name, id, reported), seconds)
+        except TimeoutError:
+            if not reported:
+                self._app.push(RECOGNISED, _recognised(FaceResult.TIMEOUT, name, id, 0.0, 0.0))
+        except RobotError as error:
+            log.info("face recognition: %s", error)
+
+    async def _tell(self, wanted: str, id: int, reported: dict[str, float]) -> None:
+        with self._robot[Vision].faces.subscribe() as sightings:
+            async for sighting in sightings:
+                for face in sighting.seen:
+                    again = sighting.stamp - reported.get(face.name, -AGAIN) < AGAIN
+                    if not face.name or again or wanted not in ("", face.name):
+                        continue
+                    reported[face.name] = sighting.stamp
+                    emotion = float(EMOTIONS.index(face.emotion))
+                    self._app.push(RECOGNISED, _recognised(FaceResult.DONE, face.name, id, face.age, emotion))
+
+
+def _recognised(result: FaceResult, name: str, id: int, age: float, emotion: float) -> dict[str, Any]:
+    return {"username": name, "result": int(result), "id": id, "age": age, "emotion": emotion}

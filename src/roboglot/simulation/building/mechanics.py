@@ -1,0 +1,33 @@
+"""What the building asks of the physics."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.building.props import Props
+from roboglot.simulation.building.terrain import Ground
+
+
+class Mechanics(Protocol):
+    """A world's physics, as far as what belongs to the building moves in it."""
+
+    @property
+    def props(self) -> Props:
+        """What can be put somewhere."""
+
+    @property
+    def hulls(self) -> Mapping[str, Hull]:
+        """Robots' hulls by name."""
+
+    @property
+    def ground(self) -> Ground:
+        """How even the floors are."""
+
+    @property
+    def car_lift(self) -> float:
+        """How far the lift's car is above where it was parked, m."""
+
+    def drive_car(self, lift: float) -> None:
+        """Have the lift's car driven to this height above where it was parked, m."""

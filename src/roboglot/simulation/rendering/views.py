@@ -1,0 +1,99 @@
+"""Values between the world and its pictures: an eye, what moves before it at an instant, a scene that can be drawn."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from roboglot.simulation.bodies.hull import Hull
+    from roboglot.simulation.rendering.floor_plan import Plan
+    from roboglot.simulation.rendering.shapes import Floats, Mesh
+
+REACH = 0.5  # m that shadows and arms reach beyond the radius
+
+
+@dataclass(frozen=True, slots=True)
+class Eye:
+    """Where a camera is (world, m) and how it looks: ``rotation``'s rows are right, down and ahead in world.
+
+    ``fov``: horizontal, rad.
+    """
+
+    x: float
+    y: float
+    z: float
+    rotation: NDArray[np.float64]
+    fov: float
+
+    @property
+    def yaw(self) -> float:
+        """Where it looks from above, rad."""
+        return math.atan2(self.rotation[2, 1], self.rotation[2, 0])
+
+    @property
+    def level(self) -> bool:
+        """True if it looks neither steeply up or down nor askew."""
+        return abs(float(self.rotation[2, 2])) < 0.5 and abs(float(self.rotation[0, 2])) < 0.2
+
+    @property
+    def spread(self) -> float:
+        """How much of what is around it may be seen, rad: looking steeply, all; else the middle ``fov`` and some."""
+        return min(math.tau, 1.25 * self.fov) if self.level else math.tau
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """Floor and ceiling: a paint per room, then the ceiling's; heights in world."""
+
+    paints: NDArray[np.float32]
+    textures: NDArray[np.int32]
+    floor: float
+    ceiling: float
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A person or thing that may move: how to make its mesh around the origin, where it is, its shadow's radius."""
+
+    make: Callable[[], Mesh]
+    x: float
+    y: float
+    z: float
+    rotation: Floats
+    radius: float
+    reach: float = REACH  # m that it reaches beyond the radius without a shadow
+
+
+@dataclass(frozen=True, slots=True)
+class Instant:
+    """What moves on a floor, frozen."""
+
+    floor: int
+    figures: tuple[Figure, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """One instant of one floor, complete in itself: it can be drawn in another thread."""
+
+    meshes: tuple[Mesh, ...]
+    ground: Ground
+    plan: Plan
+    shadows: NDArray[np.uint8]
+    masks: NDArray[np.uint32]
+
+
+class Scenery(Protocol):
+    """All that cameras may see of one world."""
+
+    def instant(self, number: int, viewer: Hull, eye: Eye, /) -> Instant:
+        """Freeze what is before the eye on a floor now, the viewer itself left out."""
+
+    def scene(self, instant: Instant, /) -> Scene:
+        """Make all there is to draw; may run in any thread."""
