@@ -15,8 +15,7 @@ from roboglot.protocols import DOORS
 from roboglot.protocols.door import DoorType
 
 FILES = ("server", "context", "table", "dispatch", "errors", "vocabulary", "config")
-VENDORS = [door for door in DOORS if door.name != "vda5050"]  # a standard without operations: a state and orders
-DOOR = pytest.mark.parametrize("door", VENDORS, ids=lambda door: door.name)
+DOOR = pytest.mark.parametrize("door", DOORS, ids=lambda door: door.name)
 
 
 def module(door: DoorType, name: str) -> ModuleType:

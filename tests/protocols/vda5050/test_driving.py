@@ -179,7 +179,7 @@ async def test_a_message_that_breaks_the_door_ends_nothing(yard: Opened, monkeyp
         raise ZeroDivisionError("a defect")
 
     with monkeypatch.context() as patch:
-        patch.setattr(door._session, "check", broken)
+        patch.setattr(door._context, "check", broken)
         one.control.send("order", order("one", [(0, 0), (0.5, 0)]))
         await one.until(lambda: any("broke" in e["errorDescription"] for e in one.control.state["errors"]))
     one.control.send("order", order("two", [(0, 0), (0.5, 0)]))
@@ -211,7 +211,7 @@ async def test_an_order_whose_driving_breaks_is_reported(yard: Opened, monkeypat
     def broken(*_: object) -> None:
         raise ZeroDivisionError("a defect")
 
-    monkeypatch.setattr("roboglot.protocols.vda5050.session.Session.speed_ratio", broken)
+    monkeypatch.setattr("roboglot.protocols.vda5050.context.Context.speed_ratio", broken)
     one.control.send("order", order("one", [(0, 0), (0.5, 0)]))
     await one.until(lambda: one.control.errors == ["NODE_UNREACHABLE"])
     assert one.control.state["errors"][0]["errorLevel"] == "CRITICAL"

@@ -30,8 +30,7 @@ def _messages() -> Implementation:
 
 
 def _table() -> OperationTable[Any]:
-    from roboglot.protocols.vda5050 import table
-    from roboglot.protocols.vda5050.chapters import actions, loads, messages, power, sensing  # noqa: F401 - these fill the table
+    from roboglot.protocols.vda5050 import dispatch, table  # noqa: F401 - the former fills the latter
 
     return table.TABLE
 

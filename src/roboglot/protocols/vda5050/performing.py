@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from roboglot.model.errors import RobotError
 from roboglot.operations import BadParameters, Operation
+from roboglot.protocols.vda5050.error_book import ErrorBook
 from roboglot.protocols.vda5050.errors import Rejected
 from roboglot.protocols.vda5050.order_book import ActionState, ActionStatus
 from roboglot.wire.vda5050.versions import ErrorKind, Level
@@ -21,25 +22,18 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 
-class Client(Protocol):
-    """Whose actions are done: a session with fleet control."""
+class Performing(Protocol):
+    """Whose actions are done: the context of a robot."""
 
     robot: Robot
     version: Version
+    errors: ErrorBook
 
     def touch(self) -> None:
         """Have the state sent."""
 
     def check(self, operation: str, right: Right | None) -> None:
         """Raise Rejected unless the client has the right."""
-
-    def report(
-        self, kind: ErrorKind, level: Level, why: str, references: dict[str, str] | None = None, *, order: bool = True
-    ) -> None:
-        """Keep an error, and send it."""
-
-    def forget_errors_of(self, action_id: str) -> None:
-        """Drop the errors about one action."""
 
 
 async def ended(action: RobotAction) -> None:
@@ -51,20 +45,20 @@ async def ended(action: RobotAction) -> None:
 
 
 class Performer:
-    """Does one session's actions."""
+    """Does one context's actions."""
 
-    def __init__(self, session: Client) -> None:
-        self._session = session
+    def __init__(self, context: Performing) -> None:
+        self._context = context
         self._asked: dict[str, asyncio.Future[bool]] = {}  # actions in RETRIABLE: True for another try
 
     async def perform(self, state: ActionState, operation: Operation[str], *, instant: bool = False) -> None:
         """Do ``state``'s action until it has ended; one that may be retried waits after a failure for what comes."""
-        may_wait = state.action.retriable and self._session.version.new_words
+        may_wait = state.action.retriable and self._context.version.new_words
         await self._try(state, operation, instant)
         while may_wait and state.status is ActionStatus.FAILED:
             if not await self._wanted_again(state):
                 return
-            self._session.forget_errors_of(state.action.action_id)
+            self._context.errors.forget_action(state.action.action_id)
             await self._try(state, operation, instant)
 
     def answer(self, action_id: str, *, again: bool) -> None:
@@ -79,23 +73,23 @@ class Performer:
         key = state.action.action_id
         asked = self._asked[key] = asyncio.get_running_loop().create_future()
         state.status = ActionStatus.RETRIABLE
-        self._session.touch()
+        self._context.touch()
         try:
             return bool(await asked)
         finally:
             self._asked.pop(key, None)
             state.status = ActionStatus.FAILED
-            self._session.touch()
+            self._context.touch()
 
     async def _try(self, state: ActionState, operation: Operation[str], instant: bool) -> None:
-        session, action = self._session, state.action
+        context, action = self._context, state.action
         state.status = ActionStatus.RUNNING
-        session.touch()
+        context.touch()
         try:
-            session.check(operation.key, operation.right)
-            if lacking := [kind.__name__ for kind in operation.needs if kind not in session.robot]:
+            context.check(operation.key, operation.right)
+            if lacking := [kind.__name__ for kind in operation.needs if kind not in context.robot]:
                 raise Rejected(ErrorKind.INSTANT_ACTION, f"this robot has no {lacking[0]}")
-            state.result = await operation.call(session, action.values) or ""
+            state.result = await operation.call(context, action.values) or ""
             state.status = ActionStatus.FINISHED
         except asyncio.CancelledError:
             state.status, state.result = ActionStatus.FAILED, "it was cancelled"
@@ -104,15 +98,15 @@ class Performer:
             state.status, state.result = ActionStatus.FAILED, str(rejected)
             references = {**rejected.references, "actionId": action.action_id}
             own = instant and rejected.kind is ErrorKind.INSTANT_ACTION  # those go with the next instant actions
-            session.report(rejected.kind, rejected.level, str(rejected), references, order=not own)
+            context.errors.report(rejected.kind, rejected.level, str(rejected), references, order=not own)
         except (RobotError, BadParameters, ValueError) as error:
             state.status, state.result = ActionStatus.FAILED, str(error)
             kind = ErrorKind.INSTANT_ACTION if instant else ErrorKind.ACTION_FAILED
-            session.report(kind, Level.WARNING, str(error), {"actionId": action.action_id}, order=not instant)
+            context.errors.report(kind, Level.WARNING, str(error), {"actionId": action.action_id}, order=not instant)
         except Exception as error:
-            log.exception("robot %s: the action %s broke", session.robot.id, action.action_type)
+            log.exception("robot %s: the action %s broke", context.robot.id, action.action_type)
             state.status, state.result = ActionStatus.FAILED, f"it broke: {error}"
             why = f"{action.action_type} broke: {error}"
-            session.report(ErrorKind.ACTION_FAILED, Level.WARNING, why, {"actionId": action.action_id})
+            context.errors.report(ErrorKind.ACTION_FAILED, Level.WARNING, why, {"actionId": action.action_id})
         finally:
-            session.touch()
+            context.touch()

@@ -16,6 +16,7 @@ from roboglot.model.events import ActionChanged
 from roboglot.model.geometry import Point
 from roboglot.model.robot import Robot
 from roboglot.operations import Operation
+from roboglot.protocols.vda5050.error_book import ErrorBook
 from roboglot.protocols.vda5050.errors import Rejected, kind_of
 from roboglot.protocols.vda5050.order_book import ActionState, ActionStatus, OrderBook
 from roboglot.protocols.vda5050.table import operation_of
@@ -50,12 +51,13 @@ class Leg:
         return [Point(node.node_position.x, node.node_position.y) for node in self.nodes if node.node_position]
 
 
-class OrderSession(Protocol):
-    """The session that a route belongs to."""
+class Driven(Protocol):
+    """The context that a route belongs to."""
 
     robot: Robot
     book: OrderBook
     version: Version
+    errors: ErrorBook
     paused: bool
 
     def touch(self) -> None:
@@ -63,12 +65,6 @@ class OrderSession(Protocol):
 
     def check(self, operation: str, right: Right | None) -> None:
         """Raise Rejected unless fleet control has the right."""
-
-    def refuse(self, rejected: Rejected) -> None:
-        """Report why a message or an action was not taken."""
-
-    def report(self, kind: ErrorKind, level: Level, why: str, references: dict[str, str] | None = None) -> None:
-        """Keep an error, and send it."""
 
     def speed_ratio(self, edge: Edge | None) -> float:
         """Return the share of the top speed to drive an edge with."""
@@ -78,10 +74,10 @@ class OrderSession(Protocol):
 
 
 class Route:
-    """What the robot drives now for one session."""
+    """What the robot drives now for one context."""
 
-    def __init__(self, session: OrderSession) -> None:
-        self._session = session
+    def __init__(self, context: Driven) -> None:
+        self._context = context
         self._task: asyncio.Task[None] | None = None
         self._beside: set[asyncio.Task[None]] = set()
         self._driving: RobotAction | None = None
@@ -124,10 +120,10 @@ class Route:
         try:
             await self._run(first)
         except Exception as error:
-            session = self._session
-            log.exception("robot %s: driving order %s broke", session.robot.id, session.book.order_id)
-            references = {"orderId": session.book.order_id}
-            session.report(ErrorKind.UNREACHABLE, Level.CRITICAL, f"driving broke: {error}", references)
+            context = self._context
+            log.exception("robot %s: driving order %s broke", context.robot.id, context.book.order_id)
+            references = {"orderId": context.book.order_id}
+            context.errors.report(ErrorKind.UNREACHABLE, Level.CRITICAL, f"driving broke: {error}", references)
 
     async def _run(self, first: Node | None) -> None:
         """Do the first node's actions, then leg after leg until nothing released is left."""
@@ -135,7 +131,7 @@ class Route:
             await self._act(first.actions)
         while True:
             self._more.clear()
-            if self._session.paused:
+            if self._context.paused:
                 await self._more.wait()
                 continue
             leg = self._next_leg()
@@ -144,13 +140,13 @@ class Route:
             if not await self._drive(leg):
                 return
             await self._act(leg.nodes[-1].actions)
-        self._session.touch()
+        self._context.touch()
 
     def _next_leg(self) -> Leg | None:
         """Return the nodes up to the next where the robot has something to do, wants a heading or another speed."""
         leg = Leg()
-        for edge, node in self._session.book.base:
-            speed = self._session.speed_ratio(edge)
+        for edge, node in self._context.book.base:
+            speed = self._context.speed_ratio(edge)
             if leg.nodes and speed != leg.speed:
                 break
             leg.nodes.append(node)
@@ -161,12 +157,12 @@ class Route:
 
     async def _drive(self, leg: Leg) -> bool:
         """Drive it and pass its nodes; False, with an error, where the order cannot go on."""
-        session = self._session
+        context = self._context
         try:
-            session.check("order", Right.DRIVE)
-            action = session.robot[Navigation].navigate_to(leg.points, leg.options, source="vda5050")
+            context.check("order", Right.DRIVE)
+            action = context.robot[Navigation].navigate_to(leg.points, leg.options, source="vda5050")
         except Rejected as rejected:
-            session.refuse(rejected)
+            context.errors.refuse(rejected)
             return False
         except RobotError as error:
             self._give_up(leg.nodes[0], error)
@@ -174,7 +170,7 @@ class Route:
         self._driving = action
         passed = 0
         try:
-            with session.robot.events.subscribe(ActionChanged) as changes:
+            with context.robot.events.subscribe(ActionChanged) as changes:
                 while not action.status.ended:
                     passed = self._pass(leg, passed, _reached(action, len(leg.nodes)))
                     await changes.next()
@@ -192,15 +188,15 @@ class Route:
 
     def _pass(self, leg: Leg, before: int, now: int) -> int:
         for node in leg.nodes[before:now]:
-            self._session.book.pass_node(node)
-            self._session.touch()
+            self._context.book.pass_node(node)
+            self._context.touch()
         return max(before, now)
 
     def _give_up(self, node: Node, error: RobotError) -> None:
         """The order cannot go on; it is kept until fleet control cancels it."""
-        book = self._session.book
+        book = self._context.book
         references = {"orderId": book.order_id, "orderUpdateId": str(book.update_id), "nodeId": node.node_id}
-        self._session.report(kind_of(error), Level.CRITICAL, str(error), references)
+        self._context.errors.report(kind_of(error), Level.CRITICAL, str(error), references)
 
     async def _act(self, actions: tuple[Action, ...]) -> None:
         """Do the actions of a node in order; returns when the robot may drive on."""
@@ -219,14 +215,14 @@ class Route:
         await asyncio.gather(*(task for action, task in parallel if action.blocking_type in STANDS))
 
     async def _perform(self, action: Action) -> None:
-        state = self._session.book.actions.get(action.action_id)
-        operation = operation_of(action.action_type, self._session.version.level)
+        state = self._context.book.actions.get(action.action_id)
+        operation = operation_of(action.action_type, self._context.version.level)
         if state is None or state.status is not ActionStatus.WAITING:
             return
         if operation is None:
-            self._session.report(ErrorKind.ORDER_ACTION, Level.WARNING, f"there is no {action.action_type}")
+            self._context.errors.report(ErrorKind.ORDER_ACTION, Level.WARNING, f"there is no {action.action_type}")
             return
-        await self._session.perform(state, operation)
+        await self._context.perform(state, operation)
 
 
 def _reached(action: RobotAction, count: int) -> int:

@@ -16,17 +16,14 @@ from roboglot.model.admission import Unknown
 from roboglot.model.client_context import ask_for
 from roboglot.model.components.energy.power import Power, PowerMode
 from roboglot.model.robot import Robot
-from roboglot.operations import Right
 from roboglot.protocols.door import Endpoint
 from roboglot.protocols.vda5050 import vocabulary
-from roboglot.protocols.vda5050.chapters import actions, loads, messages, power, sensing  # noqa: F401 - fill the table
 from roboglot.protocols.vda5050.config import Vda5050Config
-from roboglot.protocols.vda5050.errors import Rejected
-from roboglot.protocols.vda5050.session import Error, Session
-from roboglot.protocols.vda5050.table import TABLE
+from roboglot.protocols.vda5050.context import Context
+from roboglot.protocols.vda5050.dispatch import answer
+from roboglot.protocols.vda5050.error_book import Error
 from roboglot.transport.seldom import Seldom
-from roboglot.wire.vda5050.orders import MESSAGE_MAX
-from roboglot.wire.vda5050.versions import VERSIONS, ErrorKind
+from roboglot.wire.vda5050.versions import VERSIONS
 
 log = logging.getLogger(__name__)
 RETRY = 2.0  # s between two tries to reach the broker
@@ -54,7 +51,7 @@ class Vda5050Door:
         self._robot, self._config = robot, config
         self._version = VERSIONS[config.version]
         self._serial = config.serials.get(robot.id) or _level(robot.description.serial or robot.id)
-        self._session = Session(robot, self._version, config.map, self._send_factsheet)
+        self._context = Context(robot, self._version, config.map, self._send_factsheet)
         self._headers: dict[str, int] = {}
         self._task: asyncio.Task[None] | None = None
         self._client: Any = None
@@ -85,7 +82,7 @@ class Vda5050Door:
 
     async def close(self) -> None:
         """Say OFFLINE, and stop what fleet control began."""
-        await self._session.close()
+        await self._context.close()
         if self._client is not None:
             with contextlib.suppress(Exception):
                 async with asyncio.timeout(CLOSING):  # noqa: TID251 - the broker's time, not the robot's
@@ -119,7 +116,7 @@ class Vda5050Door:
 
         config = self._config
         broken = "CONNECTION_BROKEN" if self._version.new_words else "CONNECTIONBROKEN"
-        context = ssl.create_default_context(cafile=config.ca or None) if config.tls else None
+        tls = ssl.create_default_context(cafile=config.ca or None) if config.tls else None
         will = aiomqtt.Will(
             self._topic("connection"), self._message("connection", {"connectionState": broken}), 1, True
         )
@@ -131,7 +128,7 @@ class Vda5050Door:
             will=will,
             keepalive=KEEPALIVE,
             timeout=LINK_SECONDS,
-            tls_context=context,
+            tls_context=tls,
             max_queued_incoming_messages=QUEUE_MAX,
         ) as client:
             self._client = client
@@ -153,7 +150,7 @@ class Vda5050Door:
 
     async def _listen(self, client: Any) -> None:
         async for message in client.messages:
-            await self._take(str(message.topic).rpartition("/")[2], message.payload)
+            await answer(self._context, str(message.topic).rpartition("/")[2], message.payload)
 
     async def _introduce(self, address: str) -> None:
         """From here on, what is done is done for the fleet control behind this broker."""
@@ -162,52 +159,29 @@ class Vda5050Door:
             who = await self._robot.admission.admit(address)
         ask_for(f"{self.name} {address.rpartition(':')[0]}", address, who)
 
-    async def _take(self, name: str, payload: Any) -> None:
-        """Do what one message asks for; a refusal is an error in the state."""
-        data = bytes(payload) if isinstance(payload, bytes | bytearray) else str(payload or "").encode()
-        tap, began, status, why = self._robot.tap, None, "accepted", ""
-        if tap.watched:
-            began = tap.request(self.name, name, data[:MESSAGE_MAX])
-        operation = TABLE.get(name)
-        try:
-            if operation is None:
-                raise Rejected(ErrorKind.UNSUPPORTED, f"this robot uses no zones and asks for none: {name} is not read")
-            self._session.check(name, operation.right or Right.ADMIN)
-            await operation.call(self._session, {"payload": data})
-        except Rejected as rejected:
-            status, why = self._version.error(rejected.kind), str(rejected)
-            self._session.refuse(rejected)
-        except Exception as error:  # one message must not end the link to fleet control
-            log.exception("robot %s: %s broke", self._robot.id, name)
-            broken = Rejected(ErrorKind.NOT_AVAILABLE, f"{name} broke: {error}")
-            status, why = self._version.error(broken.kind), str(broken)
-            self._session.refuse(broken)
-        if tap.watched:
-            tap.reply(self.name, name, b"", status, why, began)
-
     async def _report(self) -> None:
         """Send the state whenever it changed, and now and then."""
         async for now in self._robot.clock.every(LOOK_PERIOD):
-            if self._rests and self._session.hibernating:
+            if self._rests and self._context.hibernating:
                 continue
             async with self._surviving("state"):
                 await self._report_at(now)
-            if self._session.leaving or self._is_off:
-                self._session.leaving = False
+            if self._context.leaving or self._is_off:
+                self._context.leaving = False
                 await self._send_connection("OFFLINE")
                 raise SwitchedOff
 
     async def _report_at(self, now: float) -> None:
-        session = self._session
+        context = self._context
         if self._rests:
             self._rests = False
             await self._send_connection("ONLINE")
         state = self._state()
-        if session.changed.is_set() or self._sent != _coarse(state) or now - self._sent_at >= STATE_PERIOD:
-            session.changed.clear()
+        if context.changed.is_set() or self._sent != _coarse(state) or now - self._sent_at >= STATE_PERIOD:
+            context.changed.clear()
             self._sent, self._sent_at = _coarse(state), now
             await self._send("state", state)
-        if session.hibernating:
+        if context.hibernating:
             self._rests = True
             await self._send_connection("HIBERNATING")
 
@@ -240,17 +214,17 @@ class Vda5050Door:
 
     def _state(self) -> dict[str, Any]:
         """Return all that the robot says about itself."""
-        robot, session, version = self._robot, self._session, self._version
-        own = vocabulary.action_states(session.book.actions.values(), version)
-        instant = vocabulary.action_states(session.instant.values(), version)
+        robot, context, version = self._robot, self._context, self._version
+        own = vocabulary.action_states(context.book.actions.values(), version)
+        instant = vocabulary.action_states(context.instant.values(), version)
         return {
-            **vocabulary.progress(session.book),
+            **vocabulary.progress(context.book),
             **vocabulary.position(robot, version, self._config.map),
             **vocabulary.velocity(robot),
-            **vocabulary.loads(robot, session.load),
+            **vocabulary.loads(robot, context.load),
             "driving": vocabulary.is_driving(robot),
-            "paused": session.paused,
-            "newBaseRequest": session.needs_base,
+            "paused": context.paused,
+            "newBaseRequest": context.needs_base,
             **(
                 {"actionStates": own, "instantActionStates": instant}
                 if version.new_words
@@ -258,7 +232,7 @@ class Vda5050Door:
             ),
             **vocabulary.power(robot, version),
             "operatingMode": vocabulary.operating_mode(robot),
-            "errors": [self._error(error) for error in (*session.errors, *session.faults())],
+            "errors": [self._error(error) for error in context.errors],
             "information": [],
             **vocabulary.safety(robot, version),
         }

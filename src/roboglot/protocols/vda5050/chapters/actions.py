@@ -7,72 +7,72 @@ from roboglot.model.components.motion.docking import Docking
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Pose
 from roboglot.operations import Right
+from roboglot.protocols.vda5050.context import SOURCE, Context
 from roboglot.protocols.vda5050.performing import ended
-from roboglot.protocols.vda5050.session import SOURCE, Session
 from roboglot.protocols.vda5050.table import TABLE
 from roboglot.wire.vda5050.orders import Angle, Id, Metres, Text, Texts
 
 
 @TABLE.on("startPause", right=Right.DRIVE)
-async def start_pause(session: Session) -> str:
+async def start_pause(context: Context) -> str:
     """Stop driving until stopPause; the order is kept."""
-    session.pause(True)
+    context.pause(True)
     return ""
 
 
 @TABLE.on("stopPause", right=Right.DRIVE)
-async def stop_pause(session: Session) -> str:
+async def stop_pause(context: Context) -> str:
     """Go on after startPause."""
-    session.pause(False)
+    context.pause(False)
     return ""
 
 
 @TABLE.on("cancelOrder", right=Right.DRIVE)
-async def cancel_order(session: Session, *, orderId: str = "") -> str:  # noqa: N803 - the standard's word
+async def cancel_order(context: Context, *, orderId: str = "") -> str:  # noqa: N803 - the standard's word
     """Stop, and forget what is left of the order; done when the robot stands."""
-    await session.cancel_order(orderId)
+    await context.cancel_order(orderId)
     return ""
 
 
 @TABLE.on("stateRequest", right=Right.SEE)
-async def request_state(session: Session) -> str:
+async def request_state(context: Context) -> str:
     """Send the state now."""
-    session.touch()
+    context.touch()
     return ""
 
 
 @TABLE.on("factsheetRequest", right=Right.SEE)
-async def request_factsheet(session: Session) -> str:
+async def request_factsheet(context: Context) -> str:
     """Send the factsheet now."""
-    await session.send_factsheet()
+    await context.send_factsheet()
     return ""
 
 
 @TABLE.on("clearInstantActions", right=Right.DRIVE)
-async def clear_instant_actions(session: Session) -> str:
+async def clear_instant_actions(context: Context) -> str:
     """Leave instant actions that ended out of the state from now on."""
-    session.clear_instant_actions()
+    context.clear_instant_actions()
     return ""
 
 
 @TABLE.on("trigger", right=Right.DRIVE)
-async def trigger(session: Session) -> str:
+async def trigger(context: Context) -> str:
     """Let an action go on that waits for a trigger."""
-    session.release_trigger()
+    context.release_trigger()
     return ""
 
 
 @TABLE.on("waitForTrigger", right=Right.DRIVE)
-async def wait_for_trigger(session: Session, *, triggerType: Text | Texts = "") -> str:  # noqa: N803
+async def wait_for_trigger(context: Context, *, triggerType: Text | Texts = "") -> str:  # noqa: N803
     """Wait until the trigger action comes, or the order is cancelled; triggerType is only repeated in the result."""
-    await session.wait_for_trigger()
+    await context.wait_for_trigger()
     kinds = [triggerType] if isinstance(triggerType, str) else triggerType
     return " ".join(("triggered", *kinds)).strip()
 
 
 @TABLE.on("initPosition", "initializePosition", right=Right.EDIT, needs=(Localization,))
 async def initialize_position(
-    session: Session,
+    context: Context,
     *,
     x: Metres,
     y: Metres,
@@ -81,36 +81,36 @@ async def initialize_position(
     lastNodeId: Id = "",  # noqa: N803
 ) -> str:
     """Set where the robot is in its map."""
-    if mapId != session.map_id:
-        raise InvalidGoal(f"there is no map {mapId!r}; the robot's map is {session.map_id!r}")
-    session.robot[Localization].set_pose(Pose(x, y, theta))
-    session.set_last_node(lastNodeId)
+    if mapId != context.map_id:
+        raise InvalidGoal(f"there is no map {mapId!r}; the robot's map is {context.map_id!r}")
+    context.robot[Localization].set_pose(Pose(x, y, theta))
+    context.set_last_node(lastNodeId)
     return ""
 
 
 @TABLE.on("startCharging", right=Right.DRIVE, needs=(Docking,))
-async def start_charging(session: Session) -> str:
+async def start_charging(context: Context) -> str:
     """Drive to the dock and onto its contacts."""
-    await ended(session.robot[Docking].dock(source=SOURCE))
+    await ended(context.robot[Docking].dock(source=SOURCE))
     return "charging"
 
 
 @TABLE.on("stopCharging", right=Right.DRIVE, needs=(Docking,))
-async def stop_charging(session: Session) -> str:
+async def stop_charging(context: Context) -> str:
     """Leave the dock."""
-    await ended(session.robot[Docking].undock(source=SOURCE))
+    await ended(context.robot[Docking].undock(source=SOURCE))
     return ""
 
 
 @TABLE.on("retry", right=Right.DRIVE)
-async def retry(session: Session, *, actionId: Id) -> str:  # noqa: N803
+async def retry(context: Context, *, actionId: Id) -> str:  # noqa: N803
     """Try an action again that failed and is RETRIABLE."""
-    session.answer_retry(actionId, again=True)
+    context.answer_retry(actionId, again=True)
     return ""
 
 
 @TABLE.on("skipRetry", right=Right.DRIVE)
-async def skip_retry(session: Session, *, actionId: Id) -> str:  # noqa: N803
+async def skip_retry(context: Context, *, actionId: Id) -> str:  # noqa: N803
     """Let an action fail that is RETRIABLE."""
-    session.answer_retry(actionId, again=False)
+    context.answer_retry(actionId, again=False)
     return ""

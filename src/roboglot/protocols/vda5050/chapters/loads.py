@@ -7,8 +7,8 @@ from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.tag_docking import Mark, MarkGoal, TagDocking
 from roboglot.model.errors import NotFound, Refused
 from roboglot.operations import Right
+from roboglot.protocols.vda5050.context import SOURCE, Context
 from roboglot.protocols.vda5050.performing import ended
-from roboglot.protocols.vda5050.session import SOURCE, Session
 from roboglot.protocols.vda5050.table import TABLE
 from roboglot.protocols.vda5050.vocabulary import JACK_POSITION, SHELF
 from roboglot.wire.vda5050.orders import NotNegative, Text
@@ -16,7 +16,7 @@ from roboglot.wire.vda5050.orders import NotNegative, Text
 
 @TABLE.on("pick", right=Right.DRIVE, needs=(Jack, TagDocking, Localization))
 async def pick(
-    session: Session,
+    context: Context,
     *,
     lhd: Text = "",
     stationType: Text = "",  # noqa: N803 - the standard's words
@@ -28,7 +28,7 @@ async def pick(
     side: Text = "",
 ) -> str:
     """Lift what stands over the robot; at stationType "shelf" the robot finds the shelf's legs and drives under it."""
-    robot, jack = session.robot, session.robot[Jack]
+    robot, jack = context.robot, context.robot[Jack]
     _check(lhd, stationType, height, depth, side)
     if jack.loaded:
         raise Refused("the robot carries a load already")
@@ -40,13 +40,13 @@ async def pick(
     if not jack.loaded:
         await ended(jack.lower_platform(source=SOURCE))
         raise NotFound("there is no load over the platform")
-    session.load = {key: said for key, said in (("loadId", loadId), ("loadType", loadType)) if said}
+    context.load = {key: said for key, said in (("loadId", loadId), ("loadType", loadType)) if said}
     return "the load is on the jack"
 
 
 @TABLE.on("drop", right=Right.DRIVE, needs=(Jack, TagDocking))
 async def drop(
-    session: Session,
+    context: Context,
     *,
     lhd: Text = "",
     stationType: Text = "",  # noqa: N803
@@ -58,16 +58,16 @@ async def drop(
     side: Text = "",
 ) -> str:
     """Set the load down; at stationType "shelf" the robot drives out from under it, too."""
-    robot, jack = session.robot, session.robot[Jack]
+    robot, jack = context.robot, context.robot[Jack]
     _check(lhd, stationType, height, depth, side)
     if not jack.loaded:
         raise Refused("the robot carries no load")
-    if loadId and loadId != session.load.get("loadId", loadId):
-        raise Refused(f"the load on the jack is {session.load['loadId']}, not {loadId}")
+    if loadId and loadId != context.load.get("loadId", loadId):
+        raise Refused(f"the load on the jack is {context.load['loadId']}, not {loadId}")
     await ended(jack.lower_platform(source=SOURCE))
     if jack.loaded:
         raise Refused("the load is still on the platform")
-    session.load = {}
+    context.load = {}
     if stationType == SHELF:
         await ended(robot[TagDocking].back_off(Mark.SHELF, source=SOURCE))
     return "the load stands on the floor"

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from roboglot.model.components.motion.navigation import Navigation
 from roboglot.operations import Right
-from roboglot.protocols.vda5050.session import Session
+from roboglot.protocols.vda5050.context import Context
 from roboglot.protocols.vda5050.table import TABLE
 
 
 @TABLE.on("order", right=Right.DRIVE, needs=(Navigation,))
-async def take_order(session: Session, *, payload: bytes) -> None:
+async def take_order(context: Context, *, payload: bytes) -> None:
     """Take an order or an update and drive it."""
-    session.take_order(payload)
+    context.take_order(payload)
 
 
 @TABLE.on("instantActions", right=Right.SEE)
-async def take_instant_actions(session: Session, *, payload: bytes) -> None:
+async def take_instant_actions(context: Context, *, payload: bytes) -> None:
     """Do actions at once; each asks for its own right."""
-    session.take_instant_actions(payload)
+    context.take_instant_actions(payload)

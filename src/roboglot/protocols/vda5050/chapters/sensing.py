@@ -15,8 +15,8 @@ from roboglot.model.components.system.file_store import FileStore
 from roboglot.model.components.system.system_log import SystemLog
 from roboglot.model.errors import NotFound
 from roboglot.operations import Right
+from roboglot.protocols.vda5050.context import SOURCE, Context
 from roboglot.protocols.vda5050.performing import ended
-from roboglot.protocols.vda5050.session import SOURCE, Session
 from roboglot.protocols.vda5050.table import TABLE
 from roboglot.wire.vda5050.orders import Text
 
@@ -57,10 +57,10 @@ def _detectors(vision: Vision) -> dict[Thing, Detector[Any]]:
 
 
 @TABLE.on("detectObject", right=Right.DRIVE, needs=(Vision,))
-async def detect_object(session: Session, *, objectType: Thing = Thing.TAG) -> str:  # noqa: N803 - the standard's word
+async def detect_object(context: Context, *, objectType: Thing = Thing.TAG) -> str:  # noqa: N803 - the standard's word
     """Look for an object ahead: person, face, robot, tag or marker; the result says which one and where."""
-    clock = session.robot.clock
-    detector = _detectors(session.robot[Vision])[objectType]
+    clock = context.robot.clock
+    detector = _detectors(context.robot[Vision])[objectType]
     with detector.subscribe():
         end = clock.time() + LOOKING
         async for now in clock.every(LOOK):
@@ -74,13 +74,13 @@ async def detect_object(session: Session, *, objectType: Thing = Thing.TAG) -> s
 
 @TABLE.on("finePositioning", right=Right.DRIVE, needs=(TagDocking, Localization))
 async def fine_positioning(
-    session: Session,
+    context: Context,
     *,
     stationType: Mark = Mark.PRINTED,  # noqa: N803
     stationName: Text = "",  # noqa: N803
 ) -> str:
     """Drive precisely before a mark ahead: printed (stationName: its text), board, reflectors or shelf."""
-    robot = session.robot
+    robot = context.robot
     texts = frozenset({stationName}) if stationName and stationType is Mark.PRINTED else frozenset[str]()
     goal = MarkGoal(mark=stationType, start=robot[Localization].pose, texts=texts)
     await ended(robot[TagDocking].dock_at(goal, source=SOURCE))
@@ -89,9 +89,9 @@ async def fine_positioning(
 
 
 @TABLE.on("logReport", right=Right.EDIT, needs=(SystemLog, FileStore))
-async def report_log(session: Session, *, reason: Text) -> str:
+async def report_log(context: Context, *, reason: Text) -> str:
     """Keep the robot's log as a file, with the reason above it; the result is its name."""
-    robot = session.robot
+    robot = context.robot
     now = datetime.fromtimestamp(robot.clock.epoch(), UTC)
     name = f"{REPORTS}{now:%Y%m%dT%H%M%S%f}.txt"
     lines = [f"robot {robot.id}, {now.isoformat()}: {reason}", *robot[SystemLog].lines]

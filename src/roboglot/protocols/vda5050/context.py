@@ -1,4 +1,4 @@
-"""Fleet control's session with one robot: takes its messages, has the robot drive orders, keeps errors and actions.
+"""What this door keeps about one robot: its order, actions and errors; takes messages, and has orders driven.
 
 Says nothing that is not so: a node is passed when the navigation says that the robot was there, an action is finished
 when it has ended.
@@ -9,45 +9,32 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
 from typing import Any
 
 from roboglot.model.admission import Forbidden, Right
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.base import Base
-from roboglot.model.components.system.health import FaultLevel, Health
 from roboglot.model.geometry import Point
 from roboglot.model.robot import Robot
-from roboglot.operations import BadParameters, Operation
+from roboglot.operations import Operation
+from roboglot.protocols.vda5050.error_book import ErrorBook
 from roboglot.protocols.vda5050.errors import Rejected
 from roboglot.protocols.vda5050.order_book import ACTIONS_KEPT_MAX, ActionState, ActionStatus, OrderBook
+from roboglot.protocols.vda5050.order_check import check_order
 from roboglot.protocols.vda5050.performing import Performer
 from roboglot.protocols.vda5050.route import Route
-from roboglot.protocols.vda5050.table import AT_NODES, INSTANT, operation_of
+from roboglot.protocols.vda5050.table import INSTANT, operation_of
 from roboglot.protocols.vda5050.vocabulary import DOOR
-from roboglot.wire.vda5050.orders import Action, Edge, InstantActions, Malformed, Node, Order, read
+from roboglot.wire.vda5050.orders import Edge, InstantActions, Malformed, Node, Order, read
 from roboglot.wire.vda5050.versions import ErrorKind, Level, Version
 
 log = logging.getLogger(__name__)
 SOURCE = DOOR
 START_REACH = 0.5  # m from the first node of an order that still count as there
-ERRORS_MAX = 32
-LEVELS = {FaultLevel.WARNING: Level.WARNING, FaultLevel.ERROR: Level.URGENT, FaultLevel.FATAL: Level.FATAL}
 
 
-@dataclass(frozen=True, slots=True)
-class Error:
-    """Something wrong, until it is mended: ``order`` ones go with the next order that is taken."""
-
-    kind: ErrorKind
-    level: Level
-    why: str
-    references: tuple[tuple[str, str], ...] = ()
-    order: bool = True
-
-
-class Session:
-    """One robot and its fleet control."""
+class Context:
+    """The context of every handler: one robot and its fleet control."""
 
     def __init__(
         self, robot: Robot, version: Version, map_id: str, send_factsheet: Callable[[], Awaitable[None]]
@@ -56,13 +43,13 @@ class Session:
         self.send_factsheet = send_factsheet
         self.book = OrderBook()
         self.instant: dict[str, ActionState] = {}
-        self.errors: list[Error] = []
         self.paused = False
         self.hibernating = False  # heard by the door: no states, and nothing is taken but stopHibernation
         self.alarm: asyncio.Future[None] | None = None  # wakes the robot at the time that was given
         self.leaving = False  # the robot switches off: the door takes leave of the broker
         self.load: dict[str, str] = {}  # what fleet control said of the load that was picked
         self.changed = asyncio.Event()
+        self.errors = ErrorBook(robot, version, self.changed)
         self._trigger = asyncio.Event()
         self._tasks: set[asyncio.Future[None]] = set()
         self._route = Route(self)
@@ -79,31 +66,17 @@ class Session:
         except Forbidden as refused:
             raise Rejected(ErrorKind.FORBIDDEN, str(refused)) from None
 
-    def refuse(self, rejected: Rejected, *, order: bool = True) -> None:
-        """Report why a message or an action was not taken."""
-        self.report(rejected.kind, rejected.level, str(rejected), rejected.references, order=order)
-
-    def report(
-        self, kind: ErrorKind, level: Level, why: str, references: dict[str, str] | None = None, *, order: bool = True
-    ) -> None:
-        """Keep an error, and send it."""
-        error = Error(kind, level, why, tuple((references or {}).items()), order)
-        if error not in self.errors:
-            self.errors = [*self.errors, error][-ERRORS_MAX:]
-            log.info("robot %s: fleet control hears %s: %s", self.robot.id, self.version.error(kind), why)
-        self.touch()
-
     def take_order(self, payload: bytes) -> None:
         """Take an order or an update and drive it. Raises Rejected."""
         if self.hibernating:
             log.info("robot %s: hibernates, and takes no order", self.robot.id)
             return
         order = self._read(payload, Order)
-        self._check_usable(order)
+        check_order(order, self.robot, self.version, self.map_id)
         new = order.order_id != self.book.order_id
         if not self.book.take(order, self.near):
             return
-        self.errors = [error for error in self.errors if not error.order]
+        self.errors.forget_order()
         if new:
             self._trigger.clear()
             self.book.pass_node(order.nodes[0])
@@ -123,7 +96,7 @@ class Session:
     def take_instant_actions(self, payload: bytes) -> None:
         """Begin each of the actions; those that cannot be are FAILED, with an error. Raises Rejected."""
         message = self._read(payload, InstantActions)
-        self.errors = [error for error in self.errors if error.kind is not ErrorKind.INSTANT_ACTION]
+        self.errors.forget_kind(ErrorKind.INSTANT_ACTION)
         for action in message.actions:
             if action.action_id in self.instant:
                 continue  # sent again
@@ -157,7 +130,9 @@ class Session:
         if operation is None:
             state.status, state.result = ActionStatus.FAILED, "no such instant action"
             why = f"this robot has no instant action {name}"
-            self.report(ErrorKind.INSTANT_ACTION, Level.WARNING, why, {"actionId": state.action.action_id}, order=False)
+            self.errors.report(
+                ErrorKind.INSTANT_ACTION, Level.WARNING, why, {"actionId": state.action.action_id}, order=False
+            )
             return
         await self.perform(state, operation, instant=True)
 
@@ -168,63 +143,6 @@ class Session:
     def answer_retry(self, action_id: str, *, again: bool) -> None:
         """Try an action in RETRIABLE again, or let it fail. Raises Rejected where none waits."""
         self._performer.answer(action_id, again=again)
-
-    def forget_errors_of(self, action_id: str) -> None:
-        """Drop the errors about one action: it is tried again."""
-        about = ("actionId", action_id)
-        self.errors = [error for error in self.errors if about not in error.references]
-
-    def _check_usable(self, order: Order) -> None:
-        """Raise Rejected for what this robot cannot use or do."""
-        if order.zone_set_id:
-            raise _unsupported("this robot uses no zones", {"zoneSetId": order.zone_set_id})
-        for node in order.nodes:
-            place = node.node_position
-            if place is None:
-                raise _unsupported("nodePosition is required", {"nodeId": node.node_id})
-            if place.map_id != self.map_id:
-                why = f"there is no map {place.map_id!r}; the robot's map is {self.map_id!r}"
-                raise Rejected(ErrorKind.UNKNOWN_MAP, why, {"mapId": place.map_id, "nodeId": node.node_id})
-            for action in node.actions:
-                self._check_action(action)
-        for edge in order.edges:
-            self._check_edge(edge)
-
-    def _check_action(self, action: Action) -> None:
-        operation = operation_of(action.action_type, self.version.level)
-        if operation is None or action.action_type not in AT_NODES:
-            raise Rejected(
-                ErrorKind.ORDER_ACTION,
-                f"this robot cannot do {action.action_type} at a node",
-                {"actionId": action.action_id, "actionType": action.action_type},
-            )
-        if lacking := [kind.__name__ for kind in operation.needs if kind not in self.robot]:
-            raise Rejected(ErrorKind.ORDER_ACTION, f"this robot has no {lacking[0]}", {"actionId": action.action_id})
-        try:
-            operation.parse(action.values)
-        except BadParameters as bad:
-            raise Rejected(ErrorKind.ORDER_ACTION, str(bad), {"actionId": action.action_id}) from None
-
-    def _check_edge(self, edge: Edge) -> None:
-        unusable = {
-            "trajectory": edge.trajectory,
-            "corridor": edge.corridor,
-            "orientation": edge.orientation,
-            "direction": edge.direction or None,
-            "rotationAllowed": True if edge.rotation_allowed is False else None,
-        }
-        if named := [name for name, value in unusable.items() if value is not None]:
-            raise _unsupported(f"this robot plans its own way: {named[0]} cannot be used", {"edgeId": edge.edge_id})
-        if edge.actions:
-            first = edge.actions[0]
-            raise Rejected(
-                ErrorKind.ORDER_ACTION, f"this robot does {first.action_type} on no edge", {"actionId": first.action_id}
-            )
-        if edge.height is not None and edge.height < self.robot.description.height:
-            high = self.robot.description.height
-            raise _unsupported(f"the robot is {high} m high, the edge allows {edge.height}", {"edgeId": edge.edge_id})
-        if edge.speed is not None and edge.speed <= 0:
-            raise _unsupported("nothing moves at no speed", {"edgeId": edge.edge_id})
 
     def speed_ratio(self, edge: Edge | None) -> float:
         """Return the share of the robot's top speed that an edge allows."""
@@ -238,15 +156,6 @@ class Session:
         """Return whether the robot is at, or on its way to, the last released node of an order that goes on."""
         nodes = self.book.nodes
         return bool(nodes) and sum(node.released for node in nodes) <= 1 and not nodes[-1].released
-
-    def faults(self) -> list[Error]:
-        """Return what is wrong with the robot itself now."""
-        if Health not in self.robot:
-            return []
-        return [
-            Error(ErrorKind.FAULT, LEVELS[fault.level], fault.message, (("fault", fault.name),), order=False)
-            for fault in self.robot[Health].faults[:ERRORS_MAX]
-        ]
 
     def pause(self, on: bool) -> None:
         """Stop driving, or go on."""
@@ -268,7 +177,7 @@ class Session:
             self.book.drop_rest()
         finally:
             self.book.canceling = False
-        self.errors = [error for error in self.errors if not error.order]
+        self.errors.forget_order()
         self.paused = False
 
     def clear_instant_actions(self) -> None:
@@ -301,10 +210,6 @@ class Session:
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
-
-
-def _unsupported(why: str, references: dict[str, object]) -> Rejected:
-    return Rejected(ErrorKind.UNSUPPORTED, why, references, Level.CRITICAL)
 
 
 def _point(node: Node) -> Point:

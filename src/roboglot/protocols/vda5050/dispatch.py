@@ -1,0 +1,46 @@
+"""From a message of fleet control to what it has the robot do; a refusal becomes an error in the state."""
+
+from __future__ import annotations
+
+import logging
+
+from roboglot.operations import Right
+from roboglot.protocols.vda5050.chapters import actions, loads, messages, power, sensing  # noqa: F401 - fill the table
+from roboglot.protocols.vda5050.context import Context
+from roboglot.protocols.vda5050.errors import Rejected
+from roboglot.protocols.vda5050.table import TABLE
+from roboglot.protocols.vda5050.vocabulary import DOOR
+from roboglot.wire.vda5050.orders import MESSAGE_MAX
+from roboglot.wire.vda5050.versions import ErrorKind
+
+log = logging.getLogger(__name__)
+
+
+async def answer(context: Context, name: str, payload: object) -> None:
+    """Do what one message of the topic ``name`` asks for."""
+    data = bytes(payload) if isinstance(payload, bytes | bytearray) else str(payload or "").encode()
+    tap, began = context.robot.tap, None
+    if tap.watched:
+        began = tap.request(DOOR, name, data[:MESSAGE_MAX])
+    rejected = await _refusal(context, name, data)
+    if rejected is not None:
+        context.errors.refuse(rejected)
+    if tap.watched:
+        status, why = (context.version.error(rejected.kind), str(rejected)) if rejected else ("accepted", "")
+        tap.reply(DOOR, name, b"", status, why, began)
+
+
+async def _refusal(context: Context, name: str, data: bytes) -> Rejected | None:
+    """Run the handler of a message; return why it was not taken, if it was not."""
+    operation = TABLE.get(name)
+    try:
+        if operation is None:
+            raise Rejected(ErrorKind.UNSUPPORTED, f"this robot uses no zones and asks for none: {name} is not read")
+        context.check(name, operation.right or Right.ADMIN)
+        await operation.call(context, {"payload": data})
+    except Rejected as rejected:
+        return rejected
+    except Exception as error:  # one message must not end the link to fleet control
+        log.exception("robot %s: %s broke", context.robot.id, name)
+        return Rejected(ErrorKind.NOT_AVAILABLE, f"{name} broke: {error}")
+    return None
