@@ -1,4 +1,4 @@
-"""Draws the pictures of docs/simulation.md from simulated worlds: .venv/bin/python scripts/pictures.py [folder]"""
+"""Draws the pictures of docs/worlds/simulation.md: .venv/bin/python scripts/pictures.py [folder]"""
 
 from __future__ import annotations
 

@@ -61,25 +61,26 @@ async def test_cameras_and_sounds(
 ) -> None:
     names = {kind.__name__: kind for kind in (Camera, VideoStream, Recorder, AudioStream, Speaker, Point)}
     monkeypatch.chdir(tmp_path)
-    await run(snippet("camera.md", "capture()"), clock, robot=robot, world=world, claps=claps, Path=Path, **names)
+    names |= {"claps": claps, "Path": Path}
+    await run(snippet("worlds/camera.md", "capture()"), clock, robot=robot, world=world, **names)
     assert (tmp_path / "tour.mp4").exists()
 
 
 @pytest.mark.world("playground")
 async def test_what_robots_see(robot: Robot, clock: LockstepClock) -> None:
     kinds = {kind.__name__: kind for kind in (Vision, Hearing, Reflectors)}
-    await run(snippet("perception.md", "Vision].markers"), clock, robot=robot, **kinds)
+    await run(snippet("worlds/perception.md", "Vision].markers"), clock, robot=robot, **kinds)
 
 
 @pytest.mark.world("playground")
 async def test_people_do_as_asked(robot: Robot, world: World, clock: LockstepClock) -> None:
     names = {kind.__name__: kind for kind in (Gesture, Sport, Emotion)}
-    await run(snippet("perception.md", "hands.person"), clock, world=world, **names)
+    await run(snippet("worlds/perception.md", "hands.person"), clock, world=world, **names)
 
 
 @pytest.mark.world("office", body="hermes")
 async def test_hands_on_a_delivery_robot(robot: Robot, world: World, clock: LockstepClock) -> None:
-    code = snippet("worlds.md", "cargo.put").replace('robot("b")', 'robot("a")')
+    code = snippet("worlds/worlds.md", "cargo.put").replace('robot("b")', 'robot("a")')
     await run(code, clock, world=world, Cargo=Cargo, EmergencyStop=EmergencyStop, Pose=Pose)
     assert robot[EmergencyStop].pressed
 
@@ -87,7 +88,7 @@ async def test_hands_on_a_delivery_robot(robot: Robot, world: World, clock: Lock
 async def test_an_engine_by_hand() -> None:
     names = {kind.__name__: kind for kind in (Prelude, Engine, Output, Call, Finished, Failed)}
     printed: list[Any] = []
-    code = compile(snippet("programs.md", "Engine()"), "page", "exec", ast.PyCF_ALLOW_TOP_LEVEL_AWAIT)
+    code = compile(snippet("programs/programs.md", "Engine()"), "page", "exec", ast.PyCF_ALLOW_TOP_LEVEL_AWAIT)
     await eval(code, {"print": lambda *words, **_: printed.extend(words), **names})
     assert printed[0] == "turned\n"
     assert isinstance(printed[-1], Finished)

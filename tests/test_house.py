@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-FILES_MAX = 25  # modules in a folder of src
+FILES_MAX = 25  # modules in a folder of src, pages, benchmarks
 LINES_MAX = 400  # of a module
 ANY_MAX = 1050  # lines; it stood at 1,003 when this was written and may only shrink
 HOPS_MAX = 8  # files that a request enters
@@ -40,13 +40,14 @@ def functions(path: Path) -> Iterator[tuple[str, int]]:
 
 def test_no_folder_is_crowded() -> None:
     """A folder that grows beyond this becomes two, each with a purpose."""
-    crowds = Counter(path.parent.relative_to(ROOT) for path in SOURCES)
+    others = [*(ROOT / "docs").rglob("*.md"), *(ROOT / "benchmarks").rglob("*.py")]
+    crowds = Counter(path.parent.relative_to(ROOT) for path in [*SOURCES, *others])
     assert {str(folder): n for folder, n in crowds.items() if n > FILES_MAX} == {}
 
 
 def test_no_file_is_long() -> None:
     """A file does one thing."""
-    files = [*SOURCES, *(ROOT / "tests").rglob("*.py"), *(ROOT / "benchmarks").glob("*.py")]
+    files = [*SOURCES, *(ROOT / "tests").rglob("*.py"), *(ROOT / "benchmarks").rglob("*.py")]
     counted = {str(path.relative_to(ROOT)): len(path.read_text().splitlines()) for path in files}
     assert {name: lines for name, lines in counted.items() if lines > LINES_MAX} == {}
 

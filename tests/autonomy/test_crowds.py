@@ -1,4 +1,4 @@
-"""Robots among robots: what stands is not shoved, and no robot lies. 200 crowds are in benchmarks/crowd.py."""
+"""Robots among robots: what stands is not shoved, and no robot lies. 200 crowds are in benchmarks/robots/crowd.py."""
 
 from __future__ import annotations
 

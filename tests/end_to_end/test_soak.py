@@ -1,6 +1,6 @@
 """A long life in short, through the doors: closed connections and finished programs keep nothing.
 
-``benchmarks/soak.py`` is the long one, with every kind of action.
+``benchmarks/robots/soak.py`` is the long one, with every kind of action.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""docs/language.md and its Chinese twin: every program on the page does what the page shows."""
+"""docs/programs/language.md and its Chinese twin: every program on the page does what the page shows."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from roboglot.programs.engine.events import Failed
 from roboglot.programs.tasks.task_run import _in_words
 from tests.programs.staging import PRELUDE, Stage
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = Path(__file__).parents[2] / "docs" / "programs"
 SHOWN = re.compile(r"^```(python|broken)\n(.*?)^```\n\n^```output\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 PROGRAM = re.compile(r"^```(?:python|broken)$", re.MULTILINE)
 

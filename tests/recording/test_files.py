@@ -82,7 +82,7 @@ def kill_writers(tmp_path: Path) -> None:
         found = numbers(path)
         assert found == list(range(1, len(found) + 1))
         last = max(message.at for message in read_messages(path))
-        assert moment - last < 10 * NANO  # a second on a quiet machine: benchmarks/recording.py
+        assert moment - last < 10 * NANO  # a second on a quiet machine: benchmarks/doors/recording.py
         assert mend(path, tmp_path / f"{number}-whole.mcap") == len(found)
         with (tmp_path / f"{number}-whole.mcap").open("rb") as file:
             assert len(list(make_reader(file).iter_messages())) == len(found)

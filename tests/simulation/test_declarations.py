@@ -111,7 +111,7 @@ def test_bodies(write):
 
 
 def test_the_example_in_the_documentation(request, write):
-    page = (request.config.rootpath / "docs/worlds.md").read_text()
+    page = (request.config.rootpath / "docs/worlds/worlds.md").read_text()
     example = page.split("```toml\n")[1].split("```")[0]
     assert load_world(write(example)).floors[0].docks
     with pytest.raises(BadFile) as caught:

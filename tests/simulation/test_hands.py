@@ -15,7 +15,7 @@ from roboglot.model.errors import NotFound
 from roboglot.model.events import ArmorHit
 from roboglot.model.geometry import Pose, Twist, Vector3
 
-DOCS = Path(__file__).parents[2] / "docs" / "worlds.md"
+DOCS = Path(__file__).parents[2] / "docs" / "worlds" / "worlds.md"
 
 
 @pytest.mark.world("obstacle_course")

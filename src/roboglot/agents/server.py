@@ -137,7 +137,7 @@ class Tools:
         robot: Robot = DEFAULT,
         wait: Wait = 60.0,
     ) -> dict[str, Any]:
-        """Run a block program (the restricted Python of docs/language.md); its state and the lines it printed."""
+        """Run a block program (restricted Python, docs/programs/language.md); its state and the lines it printed."""
         run = await _asked(self._console.post("robots", robot, "program", values={"source": source}))
         async for _ in _beats(wait):
             run = await _asked(self._console.get("robots", robot, "program"))

@@ -16,7 +16,7 @@ _HEAD = """# Functions of robot programs
 For who writes block programs and looks a function up.
 
 Made from the declarations by `python -m roboglot.programs.functions.reference docs/reference/programs.md`.
-How the language looks is in [programs](../programs.md), what the functions do with the robot in
+How the language looks is in [programs](../programs/programs.md), what the functions do with the robot in
 [visual programming](../protocols/visual.md).
 Names without parentheses are read, not called. Every example is played by the tests on a simulated dog.
 """

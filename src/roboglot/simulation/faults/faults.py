@@ -1,7 +1,7 @@
 """Fault injection: makes things go wrong on purpose, through the same physics that would make them go wrong by chance.
 
 ``world.faults.inject("low_battery", robot="a", charge=0.08)`` by hand, ``[[faults]]`` in the world's file by time.
-docs/faults.md lists the kinds, their options and how each shows.
+docs/worlds/faults.md lists the kinds, their options and how each shows.
 """
 
 from __future__ import annotations

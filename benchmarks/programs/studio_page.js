@@ -1,4 +1,4 @@
-// What benchmarks/studio.py has the page do and measure.
+// What benchmarks/programs/studio.py has the page do and measure.
 window.bench = (() => {
   const many = (count) => {
     let block = null;

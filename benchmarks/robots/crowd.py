@@ -15,7 +15,7 @@ from pathlib import Path
 
 from _claim import Claims
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[2]))
 from tests.crowd import SHOVED, Outcome, crowd
 
 

@@ -1,6 +1,6 @@
 """What pages cost: robots with lidars, viewers over real sockets; processor time of the program, share of a core.
 
-.venv/bin/python -m benchmarks.console [robots] [viewers] [seconds]
+.venv/bin/python -m benchmarks.doors.console [robots] [viewers] [seconds]
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Claims: one robot with all its autonomy in lockstep, lidar at 10 Hz: >= 300x real time standing, >= 150x on its way.
 
-The 100x of the physics and sensors alone is in benchmarks/fleet.py. Here every scan is matched as well, people walk,
+The 100x of the physics and sensors alone is in fleet.py. Here every scan is matched as well, people walk,
 and on the way (it drives all that time) the robot maps, watches its path and plans. Counted by the processor time of
 the process; how fast it went by the clock on the wall, whatever else ran, is only told.
 """

@@ -33,7 +33,7 @@ WAIT_MAX, RUN_MAX = 60.0, 300.0  # s: for one thing, for all
 SECONDS = 6.0
 AT_ONCE = 64  # requests under way
 GEAR = 8013  # a request that reads one value
-EXAMPLE = Path(__file__).parents[1] / "examples" / "cyberdog_video.py"
+EXAMPLE = Path(__file__).parents[2] / "examples" / "cyberdog_video.py"
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 OPTIONS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--mute-audio", "--no-first-run")
 

@@ -1,7 +1,7 @@
 """Claim: 1,000 robots that drive, with lidar at 10 Hz, at >= 1 x real time on two cores: ten worlds of a hundred.
 
 Ten processes are forked from one that has loaded everything. Physics and sensors, without autonomy and doors, as in
-benchmarks/fleet.py. What counts is processor time: how fast two cores that do nothing else would be. The clock on the
+fleet.py. What counts is processor time: how fast two cores that do nothing else would be. The clock on the
 wall is printed beside it, with what the machine was busy with.
 
     scripts/bench thousand [--worlds 10] [--robots-each 100] [--seconds 10]

@@ -26,7 +26,7 @@ from roboglot.operations import Right
 from roboglot.protocols.cyberdog.certificates import export_app
 from roboglot.testing.process import served
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 from tests.access.floods import FLOODS, FRIEND, GATEWAY  # noqa: E402
 
