@@ -1,6 +1,6 @@
 """Claim: 100 universal robots that drive in the office at >= 8x real time on one core, lidar at 10 Hz; 10 at >= 90x.
 
-Counts processor time of this one thread, without autonomy; benchmarks/robots/lockstep.py measures one robot with it. All
+Counts processor time of this one thread, without autonomy; lockstep.py measures one robot with it. All
 drive circles all the time; how far the slowest came is printed. A loop of plain Python, timed in between, shows how
 much the machine's speed changes meanwhile: by a half where another thread uses the same core.
 """

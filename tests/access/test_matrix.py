@@ -24,6 +24,7 @@ from roboglot.protocols.cyberdog.table import TABLE as DOG
 from roboglot.protocols.foxglove.table import TABLE as VIEWER
 from roboglot.protocols.robomaster.table import TABLE as TEXT
 from roboglot.protocols.slamware.table import TABLE as REST
+from roboglot.protocols.vda5050.dispatch import answer
 from roboglot.protocols.vda5050.order_book import ActionState
 from roboglot.protocols.vda5050.server import Vda5050Door
 from roboglot.protocols.vda5050.table import TABLE as FLEET
@@ -154,7 +155,7 @@ async def test_fleet_control_does_what_its_right_allows(runtime: Runtime, reache
         """The actions that were refused for want of a right."""
         await door._introduce(f"{caller.address}:1883")
         for name in messages:
-            await door._take(name, b"{}")
+            await answer(door._context, name, b"{}")
         states = {key: ActionState(Action(key, key)) for key in keys - messages}
         for key, state in states.items():
             await door._context._performer.perform(state, FLEET._operations[key], instant=True)

@@ -18,7 +18,7 @@ from roboglot.media.recorder import Recorder
 from roboglot.media.stills import jpeg
 from roboglot.model.components.sensing.camera import Camera
 from roboglot.model.components.system.disk import Disk
-from roboglot.protocols.cyberdog.chapters.camera import camera, camera_files
+from roboglot.protocols.cyberdog.chapters.camera import camera_files, transfers
 from roboglot.protocols.cyberdog.chapters.camera.camera_files import CameraFiles
 from tests.protocols.cyberdog.phone import ADDRESS, App, Client, until
 
@@ -50,7 +50,7 @@ async def test_a_photo_comes_whole_and_is_gone_from_the_robot(client: Client, ro
 
 
 async def test_large_files_come_in_chunks(client, robot, folder, monkeypatch) -> None:
-    monkeypatch.setattr(camera, "CHUNK", 10_000)
+    monkeypatch.setattr(transfers, "CHUNK", 10_000)
     chunks = await client.file(4002, {"command": 1})
     assert len(chunks) > 2
     assert len({(chunk.file_name, chunk.file_size) for chunk in chunks}) == 1
@@ -103,12 +103,12 @@ async def test_what_was_not_fetched_is_offered_and_fetched(client, app: App, rob
 
 
 async def test_a_broken_transfer_loses_nothing(client, robot, folder, monkeypatch) -> None:
-    monkeypatch.setattr(camera, "CHUNK", 100)
+    monkeypatch.setattr(transfers, "CHUNK", 100)
     call = client.fetch(4002, {"command": 1})
     assert (await call.read()).error_code == 0
     call.cancel()
     (name,) = [path.name for path in folder.iterdir()]
-    monkeypatch.setattr(camera, "CHUNK", 4_000_000)
+    monkeypatch.setattr(transfers, "CHUNK", 4_000_000)
     (chunk,) = await client.file(4004, {"file_name": name})
     assert len(chunk.buffer) == chunk.file_size
 
@@ -220,7 +220,7 @@ async def test_a_disk_that_fills_up_is_told_and_takes_no_picture(client, app, ro
 
 
 async def test_more_than_six_at_once_are_refused(client, robot, folder, monkeypatch) -> None:
-    monkeypatch.setattr(camera, "CHUNK", 10)
+    monkeypatch.setattr(transfers, "CHUNK", 10)
     calls = [client.fetch(4002, {"command": 1}) for _ in range(6)]
     await asyncio.gather(*(call.read() for call in calls))
     assert [chunk.error_code for chunk in await client.file(4002, {"command": 1})] == [10]

@@ -13,7 +13,7 @@ from aiortc import RTCConfiguration, RTCPeerConnection, RTCSessionDescription
 from aiortc.sdp import candidate_from_sdp
 
 from roboglot.media.video import VideoStream
-from roboglot.protocols.cyberdog.chapters.camera import video as door_video
+from roboglot.protocols.cyberdog.chapters.camera import transmission as door_video
 from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.wire.ice import offer_loopback
 from tests.protocols.cyberdog.phone import PATIENCE, App, Client, until
