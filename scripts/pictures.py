@@ -200,7 +200,7 @@ PICTURES = (
     ("office", "universal", scan),
     ("office", "universal", mapped),
     ("playground", "universal", sights),
-    (str(ROOT / "tests/autonomy/marks.toml"), "hermes", shelf),
+    (str(ROOT / "tests/autonomy/worlds/marks.toml"), "hermes", shelf),
 )
 
 

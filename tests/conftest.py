@@ -32,6 +32,7 @@ PROCESSES = (
     "cli",
     "cloud",
     "console",
+    "docs",
     "drivers",
     "end_to_end",
     "shards",

@@ -26,7 +26,7 @@ from roboglot.model.robot import Robot
 from roboglot.storage.database import Database
 
 BODIES = ("universal", "hermes", "cyberdog2", "robomaster_ep")
-CORRIDOR = str(Path(__file__).parent / "autonomy" / "one_corridor.toml")
+CORRIDOR = str(Path(__file__).parent / "autonomy" / "worlds" / "one_corridor.toml")
 SHOVED = 0.05  # m by which nothing that stands may be displaced
 ASTRAY = 0.3  # m off its own belief at which a robot must not be sure of itself
 SURE = 0.5  # quality from which it is sure

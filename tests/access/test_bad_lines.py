@@ -28,7 +28,7 @@ from roboglot.runtime import Runtime
 from roboglot.testing.bad_line import BadLine
 from tests.access.line import bad_line
 from tests.access.matrix import ADDRESS, frame_states
-from tests.protocols.robomaster.test_robomasterpy import TOUR, check, listen
+from tests.protocols.robomaster.clients.test_robomasterpy import TOUR, check, listen
 
 HERE = "127.0.96.2"
 

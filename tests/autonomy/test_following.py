@@ -15,7 +15,7 @@ from roboglot.model.errors import InvalidGoal, NotFound
 if TYPE_CHECKING:
     from tests.autonomy.conftest import Tour
 
-WALKER = str(Path(__file__).parent / "walker.toml")
+WALKER = str(Path(__file__).parent / "worlds" / "walker.toml")
 
 
 @pytest.mark.parametrize("side", list(FollowSide))
@@ -45,7 +45,7 @@ async def test_without_anybody_it_gives_up(tour: Tour) -> None:
         tour.robot[Following].follow(distance=0.1)
 
 
-BRACELET = str(Path(__file__).parent / "bracelet.toml")
+BRACELET = str(Path(__file__).parent / "worlds" / "bracelet.toml")
 
 
 async def followed(tour: Tour, action: object, seconds: float) -> list[float]:

@@ -16,8 +16,8 @@ from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.geometry import Point, Pose, wrap_angle
 from roboglot.model.maps import PointOfInterest
 
-STRIPS_WORLD = str(Path(__file__).with_name("strips.toml"))
-PASSAGE = str(Path(__file__).with_name("passage.toml"))
+STRIPS_WORLD = str(Path(__file__).with_name("worlds") / "strips.toml")
+PASSAGE = str(Path(__file__).with_name("worlds") / "passage.toml")
 BARE = [(24.0, 0.0), (29.0, 2.4), (35.0, 0.0)]
 STRIPS = [(0.0, 5.0), (0.0, 6.1), (8.0, 6.6), (3.2, 8.0)]
 

@@ -11,7 +11,7 @@ from roboglot.model.components.motion.tag_docking import Mark, MarkGoal, TagDock
 from roboglot.model.errors import Blocked, InvalidGoal, NotFound
 from roboglot.model.geometry import Point, Pose, wrap_angle
 
-WORLD = str(Path(__file__).with_name("marks.toml"))
+WORLD = str(Path(__file__).with_name("worlds") / "marks.toml")
 
 
 def start(tour, x, y, degrees):

@@ -10,7 +10,7 @@ import pytest
 
 from tests.browser.served import until
 from tests.browser.test_studio import COUNTING, Open, loaded, studio
-from tests.programs.test_language_guide import shown
+from tests.programs.language.test_language_guide import shown
 
 __all__ = ["studio"]  # the fixture
 pytestmark = pytest.mark.asyncio(loop_scope="session")

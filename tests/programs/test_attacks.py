@@ -29,7 +29,7 @@ from roboglot.programs.engine.events import (
 )
 from tests.programs.playing import PRELUDE, Played, open_descriptors, play, process_state
 
-ATTACKS = sorted((Path(__file__).parent / "attacks").glob("*.py"))
+ATTACKS = sorted((Path(__file__).parent / "attacks").rglob("*.py"))
 LIMITS = Limits(memory=32 * 1024 * 1024, cpu=1, output=300_000)
 AT_ONCE = 8
 

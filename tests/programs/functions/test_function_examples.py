@@ -29,7 +29,9 @@ from tests.programs.functions.effects import EFFECTS, Seen
 from tests.programs.staging import Act, Stage
 
 EXAMPLES = examples()
-FIGURE = 2.0  # s that a figure takes here; its real time, up to two minutes, is tests/simulation/test_performing.py's
+FIGURE = (
+    2.0  # s that a figure takes here; its real time, up to two minutes, is tests/simulation/bodies/test_performing.py's
+)
 MOTIONS = [f"cyberdog.motion.{name}" for name, _, _ in RESULT_MOTIONS]
 WITH_PEOPLE = [
     name for name in EXAMPLES if name.split(".")[1] in ("follow", "gesture", "personnel", "skeleton", "train")

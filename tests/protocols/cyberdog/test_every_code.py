@@ -17,7 +17,7 @@ READS = frozenset({"of"})  # what was pushed to the app
 def numbers(names: frozenset[str]) -> set[int]:
     """Whole numbers that the tests of this folder hand to functions of these names."""
     found: set[int] = set()
-    for path in Path(__file__).parent.glob("test_*.py"):
+    for path in Path(__file__).parent.rglob("test_*.py"):
         if path.stem.removeprefix("test_cyberdog_") in SWEEPS:
             continue
         for function in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):

@@ -11,7 +11,7 @@ from roboglot.model.components.system.file_store import FileStore
 from tests.protocols.vda5050.conftest import Opened, Yard
 from tests.protocols.vda5050.orders import action, instant, order
 
-MARKS = str(Path(__file__).parents[2] / "autonomy" / "marks.toml")
+MARKS = str(Path(__file__).parents[2] / "autonomy" / "worlds" / "marks.toml")
 
 
 def robot_at(x: float, y: float, body: str = "hermes") -> dict[str, object]:

@@ -1,0 +1,1 @@
+"""Going somewhere: planning, driving, doors, floors, crowds."""

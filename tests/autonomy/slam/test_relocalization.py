@@ -1,0 +1,140 @@
+"""Finding the place in a known map: judged by the world."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from roboglot.model.actions import ActionStatus
+from roboglot.model.components.mapping.localization import Localization, Region
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.errors import InvalidGoal, NotLocalized
+from roboglot.model.events import LocalizationLost, LocalizationRecovered, PoseJumped
+from roboglot.model.geometry import Pose
+
+if TYPE_CHECKING:
+    from tests.autonomy.conftest import Tour
+
+LONG_CORRIDOR = str(Path(__file__).parents[3] / "benchmarks" / "worlds" / "corridor.toml")
+
+
+async def carried(tour: Tour, x: float, y: float, deg: float) -> None:
+    """Somebody carries the robot there while its lidar's scans are not looked at."""
+    tour.robot[Mapping].enable(False)
+    tour.robot[Localization].enable(False)
+    tour.world.hands.place("a", Pose(x, y, math.radians(deg)))
+    await tour.clock.advance(0.3)
+
+
+@pytest.mark.world("office")
+async def test_a_robot_carried_elsewhere_finds_itself(tour: Tour) -> None:
+    await tour.go((12.0, 9.8))
+    await tour.go((12.0, 6.5))
+    jumps: list[PoseJumped] = []
+    tour.robot.events.listen(PoseJumped, jumps.append)
+    for x, y, deg in ((20.0, 10.2, 170.0), (13.0, 6.6, -60.0), (9.5, 9.7, 30.0)):
+        await carried(tour, x, y, deg)
+        assert tour.error[0] > 1.0
+        action = await tour.end_of(tour.robot[Localization].relocalize())
+        tour.robot[Localization].enable(True)
+        assert action.status is ActionStatus.SUCCEEDED, action.reason
+        assert tour.error[0] < 0.05
+        assert tour.error[1] < 1.0
+        assert tour.robot[Localization].quality > 0.8
+        assert jumps[-1].pose.distance_to(tour.robot[Localization].pose) < 0.01
+
+
+@pytest.mark.world("office")
+async def test_a_kidnapped_robot_says_so_and_recovers(tour: Tour) -> None:
+    await tour.go((12.0, 9.8))
+    await tour.go((12.0, 6.5))
+    news: list[LocalizationLost | LocalizationRecovered] = []
+    tour.robot.events.listen(LocalizationLost, news.append)
+    tour.robot.events.listen(LocalizationRecovered, news.append)
+    for x, y, deg in ((20.0, 10.2, 170.0), (13.0, 6.6, -60.0), (9.5, 9.7, 30.0)):
+        walls = int((tour.robot[Mapping].grid.log_odds > 0).sum())
+        tour.world.hands.place("a", Pose(x, y, math.radians(deg)))
+        await tour.clock.advance(5.0)
+        lost, found = news[0], news[-1]  # it may lose a place again that it believed too soon
+        assert isinstance(lost, LocalizationLost)
+        assert isinstance(found, LocalizationRecovered)
+        assert 0.0 <= found.seconds <= found.stamp - lost.stamp + 1e-6
+        assert tour.robot[Localization].lost is None
+        assert tour.error[0] < 0.05
+        assert int((tour.robot[Mapping].grid.log_odds > 0).sum()) < walls + 150  # a scan at a wrong place draws 250
+        news.clear()
+
+
+@pytest.mark.world("office")
+async def test_in_a_region_it_looks_only_there(tour: Tour) -> None:
+    await tour.go((12.0, 9.8))
+    await carried(tour, 20.0, 10.2, 170.0)
+    here, there = tour.on_map(20.0, 10.2), tour.on_map(12.0, 6.5)
+    for region, status in (
+        (Region(there.x - 1, there.y - 1, there.x + 1, there.y + 1), ActionStatus.ABORTED),
+        (Region(here.x - 1, here.y - 1, here.x + 1, here.y + 1), ActionStatus.SUCCEEDED),
+    ):
+        action = await tour.end_of(tour.robot[Localization].relocalize(region))
+        assert action.status is status, action.reason
+        if status is ActionStatus.ABORTED:
+            assert isinstance(action.error, NotLocalized)
+            assert tour.error[0] > 1.0
+    assert tour.error[0] < 0.05
+
+
+async def test_no_region_is_refused(tour: Tour) -> None:
+    for region in (Region(1.0, 0.0, 0.0, 1.0), Region(0.0, 0.0, math.nan, 1.0), Region(0.0, 0.0, math.inf, 1.0)):
+        with pytest.raises(InvalidGoal):
+            tour.robot[Localization].relocalize(region)
+
+
+@pytest.mark.world("office")
+async def test_people_around_the_robot_do_not_hide_its_place(tour: Tour) -> None:
+    from roboglot.autonomy.slam.matcher import places
+    from roboglot.autonomy.slam.scan_points import ScanReader
+
+    await tour.go((12.0, 9.8))
+    await tour.go((12.0, 6.5))
+    estimator, scan = tour.robot[Localization].estimator, tour.robot[Lidar].scan  # type: ignore[attr-defined]
+    ranges, angles = scan.ranges.copy(), scan.angles
+    for bearing, width, away in ((0.0, 0.6, 0.5), (2.0, 0.2, 1.2)):  # one stands right in front, one further off
+        ranges[abs(angles - bearing) < width] = away
+    hidden = ScanReader().read(replace(scan, ranges=ranges))
+    (found,) = places(estimator._belief.map, hidden, None)
+    assert found.pose.distance_to(tour.truth.relative_to(tour.start)) < 0.05
+
+
+@pytest.mark.world(LONG_CORRIDOR)
+async def test_a_robot_that_may_move_looks_around_until_one_place_is_left(tour: Tour) -> None:
+    await tour.go((tour.start.x + 25.0, tour.start.y))
+    await carried(tour, tour.start.x + 12.0, tour.start.y, 90.0)
+    standing = await tour.end_of(tour.robot[Localization].relocalize())
+    assert isinstance(standing.error, NotLocalized)
+    assert "look" in standing.reason
+    driving = await tour.end_of(tour.robot[Localization].relocalize(may_move=True))
+    assert driving.status is ActionStatus.SUCCEEDED, driving.reason
+    assert tour.error[0] < 0.1
+    assert not tour.bumps
+
+
+def test_places_are_ruled_out_by_where_they_should_be_by_now() -> None:
+    from roboglot.autonomy.slam.look_around import Hypotheses
+    from roboglot.autonomy.slam.matcher import Match
+
+    def at(x: float, y: float) -> Match:
+        return Match(Pose(x, y), np.eye(3), 0.0, 100, 100, 100)
+
+    known = Hypotheses()
+    assert known.narrow([at(0.0, 0.0), at(10.0, 0.0), at(20.0, 0.0)], Pose()) is None
+    assert known.narrow([at(1.0, 0.0), at(11.0, 0.0), at(25.0, 0.0)], Pose(1.0)) is None  # 20 is out, 25 never was in
+    last = known.narrow([at(2.0, 0.0), at(26.0, 0.0)], Pose(2.0))
+    assert last is not None
+    assert last.pose == Pose(2.0)
+    assert known.narrow([at(7.0, 7.0), at(9.0, 9.0)], Pose(3.0)) is None  # all were wrong: begin anew
+    assert len(known.places) == 2

@@ -1,0 +1,1 @@
+"""Runs: the worker, its limits, what survives."""

@@ -1,0 +1,1 @@
+"""The checker, modules and the language guide."""

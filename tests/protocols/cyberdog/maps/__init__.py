@@ -1,0 +1,1 @@
+"""Maps and the tasks on them."""

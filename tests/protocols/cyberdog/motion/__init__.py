@@ -1,0 +1,1 @@
+"""Moving, dancing, climbing, following."""

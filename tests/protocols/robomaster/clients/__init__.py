@@ -1,0 +1,1 @@
+"""Clients of others, and the transcripts of the documentation."""

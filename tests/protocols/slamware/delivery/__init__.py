@@ -1,0 +1,1 @@
+"""Chapter "delivery", and days of it."""

@@ -1,0 +1,62 @@
+"""The map of several floors that ships: it is the one of the office, and a robot rides by it."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import httpx
+import pytest
+
+from roboglot.cli.maps.survey import surveyed
+from roboglot.config import RobotConfig
+from roboglot.fleet import Fleet, build_fleet
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.robot import Robot
+from roboglot.simulation.world.world import World
+from roboglot.simulation.world.world_files import load_world
+from roboglot.storage.database import Database
+from roboglot.testing import Forward
+
+SHIPPED = Path(__file__).parents[4] / "examples" / "maps" / "office.stcm"
+MULTI, ACTIONS = "/api/multi-floor/map/v1", "/api/core/motion/v1/actions"
+
+
+@pytest.fixture
+async def fleet(clock: LockstepClock) -> AsyncIterator[Fleet]:
+    database = Database(":memory:")
+    built = build_fleet("office", [RobotConfig(name="a", body="hermes")], clock=clock, seed=1, database=database)
+    await built.start(wait=True)
+    yield built
+    await built.close()
+    database.close()
+
+
+def test_the_shipped_map_is_of_the_shipped_office() -> None:
+    assert SHIPPED.read_bytes() == surveyed(load_world("office")), "roboglot map survey examples/maps/office.stcm"
+
+
+async def test_a_robot_rides_by_the_shipped_map(
+    robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward
+) -> None:
+    await forward(seconds=1)
+    assert (await client.post(f"{MULTI}/stcm", content=SHIPPED.read_bytes())).status_code == 200
+    here = world.truth.pose_of("a")
+    pose = {"x": here.x, "y": here.y, "yaw": here.yaw}
+    assert (await client.post(f"{MULTI}/stcm/:reload", json={"pose": pose})).status_code == 200
+    assert [floor["floor"] for floor in (await client.get(f"{MULTI}/floors")).json()] == ["ground", "first", "second"]
+    options = {"target": {"poi_name": "first lift"}}
+    body = {"action_name": "slamtec.agent.actions.MultiFloorMoveAction", "options": options}
+    id = (await client.post(ACTIONS, json=body)).json()["action_id"]
+    for _ in range(600):
+        state = (await client.get(f"{ACTIONS}/{id}")).json()["state"]
+        if state["status"] == 4:
+            break
+        await forward(seconds=0.5)
+    assert (state["result"], state["reason"]) == (0, "")
+    there = world.truth.pose_of("a")
+    assert world.truth.floor_of("a") == 1
+    assert there.distance_to(robot[Localization].pose) < 0.15  # the map's frame is the world's
+    assert abs(there.x - 2.95) < 0.3
+    assert abs(there.y - 10.0) < 0.3

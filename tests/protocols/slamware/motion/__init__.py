@@ -1,0 +1,1 @@
+"""Chapter "motion": actions, tags, tracks."""

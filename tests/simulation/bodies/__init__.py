@@ -1,0 +1,1 @@
+"""Bodies: legs, motions, hulls."""

@@ -1,0 +1,1 @@
+"""Floors, stairs, lifts, shelves and start places."""
