@@ -81,3 +81,19 @@ async def test_on_a_hard_day_goals_are_reached_within_twice_the_tolerance(body: 
         assert start.compose(robot[Localization].pose).distance_to(truth) < 0.2
     await fleet.close()
     database.close()
+
+
+async def test_black_furniture_answers_from_near_and_what_touches_the_lidar_is_unknown() -> None:
+    clock, database = LockstepClock(), Database(":memory:")
+    fleet = build_fleet("office", [RobotConfig(body="hermes+hard")], clock=clock, seed=2, database=database)
+    await fleet.start(wait=True)
+    sight, hull = fleet.world._environment.sight, fleet.world._population.hulls["a"]
+    black = sight.dark(hull, 0.3, 360, 30.0, 1.0)
+    assert np.isfinite(black).any()
+    assert (black >= sight.turn(hull, 0.3, 360, 30.0) - 1e-6).all()
+    assert np.isfinite(sight.dark(hull, 0.3, 360, 30.0, 0.2)).sum() < np.isfinite(black).sum()
+    near = sight.blur(np.array([0.01, 1.0, np.inf]), np.zeros(3, np.float32), 0.0, 0.1, 20.0)
+    assert np.isnan(near[0])
+    assert near[1:].tolist() == [1.0, np.inf]
+    await fleet.close()
+    database.close()

@@ -93,10 +93,13 @@ def sweep(edges: Any, circles: Any, directions: Any, x: float, y: float, yaw: fl
 
 @kernel("float32[::1](float64[::1], float32[::1], float64, float64, float64)")
 def blur(exact: Any, noise: Any, sigma: float, low: float, high: float) -> Any:
-    """Distances with ``noise`` (standard normal, one for each) of ``sigma`` m; inf below ``low`` or beyond ``high``."""
+    """Distances with ``noise`` (standard normal) of ``sigma`` m; NaN below ``low``, inf beyond ``high``."""
     ranges = np.empty_like(noise)
     spread, nearest, farthest = np.float32(sigma), np.float32(low), np.float32(high)
     for ray in range(len(noise)):
         told = np.float32(exact[ray] + np.float64(noise[ray] * spread))
-        ranges[ray] = told if nearest <= told <= farthest else np.float32(np.inf)
+        if told < nearest:
+            ranges[ray] = np.float32(np.nan)
+        else:
+            ranges[ray] = told if told <= farthest else np.float32(np.inf)
     return ranges

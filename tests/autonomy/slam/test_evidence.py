@@ -120,3 +120,14 @@ def test_a_route_of_one_place_ends_there() -> None:
     route = route_through([(1.0, 2.0), (1.0, 2.0)])
     assert route.length == 0.0
     assert route.advance(Pose(1.2, 2.0), 0) == (0.0, pytest.approx(0.2))
+
+
+def test_a_full_map_says_so_once(caplog: pytest.LogCaptureFixture) -> None:
+    grid = EvidenceGrid()
+    grid.make_room(0.0, 0.0, 99.0, 1.0)
+    assert not grid.full
+    for _ in range(2):
+        grid.make_room(0.0, 0.0, 120.0, 1.0)
+    assert grid.full
+    assert len(caplog.records) == 1
+    assert "100 m along a side" in caplog.text

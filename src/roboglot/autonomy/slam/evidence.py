@@ -6,6 +6,7 @@ corner of cell (0, 0) with the smallest x and y.
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Callable
 from typing import TypeVar, cast
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from roboglot.model.geometry import Point
 from roboglot.model.maps import OccupancyGrid
 
+log = logging.getLogger(__name__)
 T = TypeVar("T")
 
 RESOLUTION = 0.05  # m
@@ -35,6 +37,7 @@ class EvidenceGrid:
         self.first_row = 0
         self.scans = 0
         self.frozen = False  # whether there are cells that no scan may change
+        self.full = False  # whether something was left out because a side has GRID_MAX cells
         self._drawn = OccupancyGrid(np.zeros((0, 0), np.int8), RESOLUTION, Point())
         self._drawn_scans = 0
         self._kept: dict[str, tuple[int, object]] = {}
@@ -60,6 +63,9 @@ class EvidenceGrid:
         empty = height == 0
         rows = _grown(self.first_row, self.first_row + height, row0, row1, empty)
         columns = _grown(self.first_column, self.first_column + width, column0, column1, empty)
+        if not self.full and not (_holds(rows, row0, row1) and _holds(columns, column0, column1)):
+            self.full = True
+            log.warning("map leaves out what lies farther away: it has %g m along a side", GRID_MAX * RESOLUTION)
         if (rows, columns) == (
             (self.first_row, self.first_row + height),
             (self.first_column, self.first_column + width),
@@ -83,7 +89,7 @@ class EvidenceGrid:
         moved = EvidenceGrid()
         moved.evidence, moved.surface, moved.marks = self.evidence, self.surface, self.marks
         moved.first_column, moved.first_row = self.first_column - column, self.first_row - row
-        moved.scans = self.scans
+        moved.scans, moved.full = self.scans, self.full
         return moved
 
     def copy(self) -> EvidenceGrid:
@@ -119,6 +125,10 @@ class EvidenceGrid:
             origin = Point((self.first_column + first[0]) * RESOLUTION, (self.first_row + first[1]) * RESOLUTION)
             self._drawn, self._drawn_scans = OccupancyGrid(drawn, RESOLUTION, origin), self.scans
         return self._drawn
+
+
+def _holds(interval: tuple[int, int], begin: int, end: int) -> bool:
+    return interval[0] <= begin and end <= interval[1]
 
 
 def _grown(begin: int, end: int, wanted_begin: int, wanted_end: int, empty: bool) -> tuple[int, int]:

@@ -28,7 +28,7 @@ def _clean_imu(section: ImuSection) -> ImuSection:
 
 
 def _clean_lidar(section: LidarSection) -> LidarSection:
-    return replace(section, noise=0.0, dropouts=0.0, sector_every=0.0, jitter=0.0)
+    return replace(section, noise=0.0, dropouts=0.0, sector_every=0.0, jitter=0.0, dark=0.0)
 
 
 def _hard_odometry(section: OdometrySection) -> OdometrySection:
@@ -43,8 +43,8 @@ def _hard_imu(section: ImuSection) -> ImuSection:
 
 
 def _hard_lidar(section: LidarSection) -> LidarSection:
-    """Rays that meet black or glossy things, packets that are lost, stamps that are late."""
-    return replace(section, noise=max(0.02, section.noise), dropouts=0.03, sector_every=4.0, jitter=0.03)
+    """Rays that meet glossy things, black furniture, packets that are lost, stamps that are late."""
+    return replace(section, noise=max(0.02, section.noise), dropouts=0.03, sector_every=4.0, jitter=0.03, dark=0.2)
 
 
 PRESETS: Mapping[str, Mapping[type[Struct], Callable[..., Struct]]] = {

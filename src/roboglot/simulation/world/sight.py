@@ -52,6 +52,7 @@ class Sight:
             solids = solids_of(floor, world.lift, lift_here=True)
             self._floors.append(_Still([solid for solid in solids if solid.kind is not Kind.DOCK]))
         self._terrain = [floor.relief for floor in world.floors]
+        self._dark: dict[tuple[int, float, float], tuple[Rows, Rows]] = {}  # by floor, height and share
         self._moving: dict[tuple[int, float], Rows] = {}  # what stands round and moves, by floor and height
         self._cast, self.blur = _sweep, blur
         self._edges: dict[tuple[int, float], tuple[int, Rows]] = {}  # by floor and height, with the props' revision
@@ -86,6 +87,16 @@ class Sight:
         if terrains and (slopes := [solid for terrain in terrains for solid in _slopes_at(terrain, height)]):
             edges = np.concatenate((edges, _edges_at(slopes, height)))
         return self._cast(edges, circles, _ways(rays), hull.x, hull.y, hull.turned + bearing, reach)
+
+    def dark(self, hull: Hull, height: float, rays: int, reach: float, share: float) -> Distances:
+        """The same as ``turn`` if nothing but the black ones of the still furniture stood there: ``share`` of it."""
+        key = hull.floor, round(height, 3), share
+        kept = self._dark.get(key)
+        if kept is None:
+            every = max(1, round(1.0 / share))
+            solids = [solid for solid in self._floors[hull.floor].solids if solid.kind is Kind.FURNITURE][::every]
+            kept = self._dark[key] = _edges_at(solids, height), _circles_at(solids, height)
+        return self._cast(*kept, _ways(rays), hull.x, hull.y, hull.turned, reach)
 
     def _edges_with_props(self, key: tuple[int, float], height: float) -> tuple[int, Rows]:
         """The edges of still solids and of movable boxes, and their revision; kept until one of the boxes moves."""
@@ -151,7 +162,7 @@ class _Still:
     """The still solids of a floor, sliced; slices are kept, since heights change little."""
 
     def __init__(self, solids: list[Solid]) -> None:
-        self._solids = solids
+        self.solids = solids
         heights = {solid.base for solid in solids} | {solid.base + solid.size[2] for solid in solids}
         self._steps = sorted(heights)
         self._slices: dict[int, tuple[Rows, Rows]] = {}
@@ -160,7 +171,7 @@ class _Still:
         """Edges and circles at ``height`` above the floor."""
         band = bisect_right(self._steps, height)
         if band not in self._slices:
-            self._slices[band] = _edges_at(self._solids, height), _circles_at(self._solids, height)
+            self._slices[band] = _edges_at(self.solids, height), _circles_at(self.solids, height)
         return self._slices[band]
 
 

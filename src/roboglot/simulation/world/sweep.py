@@ -42,10 +42,11 @@ def sweep(edges: Edges, circles: Circles, x: float, y: float, yaw: float, rays: 
 
 
 def blur(exact: Distances, noise: NDArray[np.float32], sigma: float, low: float, high: float) -> NDArray[np.float32]:
-    """Distances with ``noise`` (standard normal, one for each) of ``sigma`` m; inf below ``low`` or beyond ``high``."""
+    """Distances with ``noise`` (standard normal) of ``sigma`` m; NaN below ``low``, inf beyond ``high``."""
     ranges = noise * np.float32(sigma)
     np.add(ranges, exact, out=ranges, casting="same_kind")
-    ranges[(ranges < np.float32(low)) | (ranges > np.float32(high))] = np.inf
+    near, far = ranges < np.float32(low), ranges > np.float32(high)
+    ranges[near], ranges[far] = np.nan, np.inf
     return ranges
 
 

@@ -24,6 +24,7 @@ from roboglot.simulation.world.sight import Sight
 
 CLIMBED = 0.01  # m above its floor at which a robot's standing higher counts
 
+SAME = 1e-6  # m
 RAYS_MAX = 2000
 PACKETS = 12  # of a turn
 
@@ -33,6 +34,7 @@ class LidarSection(Struct, frozen=True, forbid_unknown_fields=True):
 
     ``dropouts``: share of rays that measure nothing (NaN); every ``sector_every`` s on average a packet of a twelfth of
     a turn is lost (0: never); ``jitter``: standard deviation (s) of the stamp, which odometry is looked up by.
+    ``dark``: share of the furniture that is black and answers only from less than ``dark_reach`` m (NaN beyond).
     """
 
     rays: Annotated[int, Meta(ge=4, le=RAYS_MAX)]
@@ -44,6 +46,8 @@ class LidarSection(Struct, frozen=True, forbid_unknown_fields=True):
     dropouts: Annotated[float, Meta(ge=0, lt=1)] = 0.0
     sector_every: NotNegative = 0.0
     jitter: Annotated[float, Meta(ge=0, le=0.1)] = 0.0
+    dark: Annotated[float, Meta(ge=0, le=1)] = 0.0
+    dark_reach: Positive = 2.5
 
 
 class SimulatedLidar(Lidar):
@@ -83,6 +87,9 @@ class SimulatedLidar(Lidar):
         exact = self._sight.turn(hull, height, section.rays, section.range_max)
         noise = self._random.standard_normal(section.rays, dtype=np.float32)
         ranges = self._sight.blur(exact, noise, section.noise, section.range_min, section.range_max)
+        if section.dark:
+            black = self._sight.dark(hull, height, section.rays, section.range_max, section.dark)
+            ranges[(black > section.dark_reach) & (black <= exact + SAME) & np.isfinite(black)] = np.nan
         if section.dropouts or section.sector_every:
             self._drop(ranges)
         ranges.setflags(write=False)
