@@ -124,6 +124,6 @@ class _Lazy(ModuleType):
         return value
 
 
-def lazy(module: str) -> Any:
+def lazy(module: str) -> object:
     """Return a module that is imported when it is first used; then MissingExtra if its extra is not installed."""
     return _Lazy(module)

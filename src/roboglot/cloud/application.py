@@ -115,7 +115,7 @@ class BackEnd:
         elif ids != [DEBUG]:
             await self._store.record(account, robot, document)
 
-    async def _inquire(self, account: str, kind: str, known: list[str]) -> list[dict[str, Any]]:
+    async def _inquire(self, account: str, kind: str, known: list[str]) -> list[dict[str, object]]:
         """Favourites that the robot does not have, or what happened on the account's robots."""
         if kind in KINDS:
             found = [json.loads(document) for document in await self._store.favourites(account, kind, known)]
@@ -125,7 +125,7 @@ class BackEnd:
         rows = await self._store.records(account, RECORDS_SHOWN)
         return [_record(robot, json.loads(document)) for robot, document in rows]
 
-    async def _favourite(self, account: str, _robot: str, wish: dict[str, Any]) -> None:
+    async def _favourite(self, account: str, _robot: str, wish: dict[str, object]) -> None:
         """``{"type", "id", "favourite": true or false}``."""
         kind, id = _text(wish, "type"), _text(wish, "id")
         favourite = wish.get("favourite", True)
@@ -137,7 +137,7 @@ class BackEnd:
             raise Answer(CloudCode.NOT_FOUND, f"no robot of this account has saved the {kind} {id}")
 
 
-async def _json_of(receive: Receive) -> dict[str, Any]:
+async def _json_of(receive: Receive) -> dict[str, object]:
     """The body of a request. Raises Answer."""
     body = bytearray()
     while True:
@@ -163,7 +163,7 @@ def _text(frame: dict[str, Any], name: str) -> str:
     return value
 
 
-def _ids(frame: dict[str, Any]) -> list[str]:
+def _ids(frame: dict[str, object]) -> list[str]:
     ids = frame.get("target_id", [])
     most = TARGETS_MAX if frame.get("operate") != "inquiry" else 20 * TARGETS_MAX
     if not isinstance(ids, list) or len(ids) > most:

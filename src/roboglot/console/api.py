@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Mapping as Values
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import msgspec
 
@@ -126,7 +126,7 @@ class Api:
             case _:
                 raise _nothing_here()
 
-    async def _serve_recording(self, method: str, receive: Receive) -> dict[str, Any]:
+    async def _serve_recording(self, method: str, receive: Receive) -> dict[str, object]:
         if (recordings := self._desk.recordings) is None:
             raise NotFound("nothing is recorded here")
         for name in self._desk.views:
@@ -182,17 +182,17 @@ class Api:
             case _:
                 raise _nothing_here()
 
-    def _made_of(self) -> dict[str, Any]:
+    def _made_of(self) -> dict[str, object]:
         """What a copy of the world is made from."""
         world = self._desk.world
         return {"world": world.name, "seed": world.seed, "bodies": dict(world.bodies)}
 
-    def _summary(self, name: str) -> dict[str, Any]:
+    def _summary(self, name: str) -> dict[str, object]:
         view = self._desk.view(name)
         x, y, yaw, *speed = view.motion
         return {"name": name, "pose": [x, y, yaw], "velocity": speed}
 
-    def _exchange(self, name: str, number: str) -> dict[str, Any]:
+    def _exchange(self, name: str, number: str) -> dict[str, object]:
         exchange = self._desk.view(name).wire.get(_whole(number))
         kept = exchange._asdict() | {"payload": readable(exchange.payload), "forms": FORMS.get(exchange.door, ())}
         return {key: str(value) if key == "direction" else value for key, value in kept.items()}
@@ -201,7 +201,7 @@ class Api:
         exchange = self._desk.view(name).wire.get(_whole(number))
         return copy(exchange, form, self._endpoint(name, exchange.door))
 
-    async def _sent_again(self, name: str, number: str) -> Any:
+    async def _sent_again(self, name: str, number: str) -> object:
         view = self._desk.view(name)
         # The door sees a client on this machine, not the person at the page: only ADMIN may do all that it may.
         view.robot.admission.check(CLIENT, "send a request again", Right.ADMIN)

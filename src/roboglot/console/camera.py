@@ -149,7 +149,7 @@ class Sightings:
         self._viewers = []
 
     @property
-    def boxes(self) -> list[list[Any]]:
+    def boxes(self) -> list[list[object]]:
         """[kind, label, x, y, width, height] of each, as shares of the picture; x, y: the middle."""
         if not self._viewers:
             return []

@@ -89,14 +89,14 @@ class Desk:
             raise Forbidden(f"the teacher has locked robot {robot.id}")
 
     @property
-    def pace(self) -> dict[str, Any]:
+    def pace(self) -> dict[str, object]:
         """How time passes: ``speed``, ``paused``, ``lockstep`` if a program moves the clock; the chances' ``seed``."""
         clock, seed = self.world.clock, self.stage.seed
         if not isinstance(clock, RealClock):
             return {"lockstep": True, "speed": 1.0, "paused": False, "seed": seed}
         return {"lockstep": False, "speed": clock.speed, "paused": clock.paused, "seed": seed}
 
-    def hello(self) -> dict[str, Any]:
+    def hello(self) -> dict[str, object]:
         """What a page needs before anything else."""
         visible = self.visible
         simulated = {placed.name for placed in self.stage.robots}
@@ -150,7 +150,7 @@ class Desk:
             robot.admission.check(CLIENT, "save the world", Right.SEE)
         return self.stage.world_file()
 
-    async def change_world(self, verb: str, values: Mapping[str, object]) -> Any:
+    async def change_world(self, verb: str, values: Mapping[str, object]) -> object:
         """Change the simulated world. Raises NotFound, BadParameters, ValueError in plain words."""
         operation = WORLD_VERBS.get(verb) or CLOCK_VERBS.get(verb)
         if operation is None:

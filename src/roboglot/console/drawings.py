@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from roboglot.console import words
 from roboglot.model.components.mapping.annotations import Annotations, MapAnnotations
 from roboglot.model.components.mapping.localization import Localization
@@ -15,7 +13,7 @@ from roboglot.model.stage import Stage
 NAMES = ("display_name", "name", "title")  # of a place, as the doors keep it in its metadata
 
 
-def drawings_of(robot: Robot) -> dict[str, Any]:
+def drawings_of(robot: Robot) -> dict[str, object]:
     """Places, walls, tracks, areas and docks of the map in use."""
     places = robot[Places].all() if Places in robot else ()
     drawn = robot[MapAnnotations].current if MapAnnotations in robot else Annotations()
@@ -32,7 +30,7 @@ def name_of(id: str, metadata: dict[str, str]) -> str:
     return next((metadata[key] for key in NAMES if metadata.get(key)), id)
 
 
-def plans_of(stage: Stage) -> list[dict[str, Any]]:
+def plans_of(stage: Stage) -> list[dict[str, object]]:
     """The building's floors, in the world's frame."""
     return [
         {
@@ -45,7 +43,7 @@ def plans_of(stage: Stage) -> list[dict[str, Any]]:
     ]
 
 
-def truth_of(stage: Stage) -> dict[str, Any]:
+def truth_of(stage: Stage) -> dict[str, object]:
     """Where everything really is, in the world's frame, and what is broken on purpose."""
     return {
         "robots": {r.name: [*words.pose(r.pose), r.floor] for r in stage.robots},

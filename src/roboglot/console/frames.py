@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import struct
 import zlib
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -22,7 +21,7 @@ SCAN_MAX_METERS = 65.0
 UNKNOWN, FREE, OCCUPIED = 0, 1, 2
 
 
-def framed(head: dict[str, Any], payload: bytes) -> bytes:
+def framed(head: dict[str, object], payload: bytes) -> bytes:
     """Return one message."""
     text = msgspec.json.encode(head)
     return struct.pack("<H", len(text)) + text + payload

@@ -58,7 +58,7 @@ def _read(path: str, summary: str) -> dict[str, Any]:
     return {"summary": summary, "parameters": [NAME | {"name": name} for name in names], "responses": _answers()}
 
 
-def _verb(operation: Operation[str], parameters: list[dict[str, Any]]) -> dict[str, Any]:
+def _verb(operation: Operation[str], parameters: list[dict[str, object]]) -> dict[str, object]:
     (schema,), components = msgspec.json.schema_components([operation.parameters])
     schema = components.get(str(schema.get("$ref", "")).rpartition("/")[2], schema)
     return {
@@ -70,7 +70,7 @@ def _verb(operation: Operation[str], parameters: list[dict[str, Any]]) -> dict[s
     }
 
 
-def _inlined(schema: Any, components: dict[str, Any]) -> Any:
+def _inlined(schema: object, components: dict[str, object]) -> object:
     """The schema without references."""
     if isinstance(schema, dict):
         if "$ref" in schema:
@@ -79,7 +79,7 @@ def _inlined(schema: Any, components: dict[str, Any]) -> Any:
     return [_inlined(entry, components) for entry in schema] if isinstance(schema, list) else schema
 
 
-def _answers() -> dict[str, Any]:
+def _answers() -> dict[str, object]:
     return {
         "200": {"description": "Done, or accepted"},
         "default": {"description": "Not done; `error` says why in plain words"},

@@ -66,7 +66,7 @@ def state_of(robot: Robot) -> dict[str, Any]:
     }
 
 
-def _about(robot: Robot) -> dict[str, Any]:
+def _about(robot: Robot) -> dict[str, object]:
     plate = robot.description
     firmware = robot[Firmware].version if Firmware in robot else plate.software_version
     limits = robot[Base].limits if Base in robot else None
@@ -82,7 +82,7 @@ def _about(robot: Robot) -> dict[str, Any]:
     }
 
 
-def _control(robot: Robot) -> dict[str, Any]:
+def _control(robot: Robot) -> dict[str, object]:
     lease, link = robot[Lease], ""
     if Link in robot:
         state, reason = robot[Link].state, robot[Link].reason
@@ -97,7 +97,7 @@ def _control(robot: Robot) -> dict[str, Any]:
     }
 
 
-def _faults(robot: Robot) -> list[dict[str, Any]]:
+def _faults(robot: Robot) -> list[dict[str, object]]:
     faults = robot[Health].faults if Health in robot else []
     return [
         {"id": f.id, "name": f.name, "component": f.component, "level": f.level.name, "message": f.message}
@@ -133,7 +133,7 @@ def _place(robot: Robot) -> dict[str, Any]:
     }
 
 
-def _safety(robot: Robot) -> dict[str, Any]:
+def _safety(robot: Robot) -> dict[str, object]:
     known = EmergencyStop in robot
     return {
         "emergency_stop": known and robot[EmergencyStop].engaged,

@@ -109,7 +109,7 @@ class Rehearse(Protocol):
         *,
         modules: Mapping[str, str] | None = None,
         speed: float = 10.0,
-        notice: Callable[[dict[str, Any]], None] | None = None,
+        notice: Callable[[dict[str, object]], None] | None = None,
     ) -> Played:
         """Play to the end. Raises ValueError for a scene that cannot be, RuntimeError where too many wait."""
 

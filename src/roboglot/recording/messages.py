@@ -104,7 +104,7 @@ def decode_exchange(data: bytes) -> Exchange:
     )
 
 
-def encode_plain(value: Any) -> bytes:
+def encode_plain(value: object) -> bytes:
     """Return any value of the model as JSON, in its own words."""
     return _encode(plain(value))
 
@@ -122,7 +122,7 @@ def plain(value: Any, depth: int = 0) -> Any:
     return _plain_inside(value, depth + 1)
 
 
-def _plain_inside(value: Any, depth: int) -> Any:
+def _plain_inside(value: object, depth: int) -> object:
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {f.name: plain(getattr(value, f.name), depth) for f in dataclasses.fields(value)}
     if isinstance(value, Mapping):
@@ -141,7 +141,7 @@ def _plain_inside(value: Any, depth: int) -> Any:
 _TEXT, _NUMBER = {"type": "string"}, {"type": "number"}
 
 
-def _schema(title: str, **properties: Mapping[str, Any]) -> bytes:
+def _schema(title: str, **properties: Mapping[str, object]) -> bytes:
     return json.dumps({"title": title, "type": "object", "properties": properties}).encode()
 
 

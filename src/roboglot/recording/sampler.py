@@ -163,7 +163,7 @@ class Sampler:
                 self._before["map"] = mapping.revision
                 self._send("map", "grid", (f"{self._robot.id}/map", grid), at, wall)
 
-    def _send_changed(self, topic: str, kind: str, value: Any, at: int, wall: int) -> None:
+    def _send_changed(self, topic: str, kind: str, value: object, at: int, wall: int) -> None:
         if self._before.get(topic) != value:
             self._before[topic] = value
             self._send(topic, kind, value, at, wall)

@@ -33,7 +33,7 @@ PERIOD = 1.0  # s between two beats
 WEIGHED = 10  # beats between two looks at the memory, which cost 3 ms
 
 
-def settings_of(values: dict[str, Any]) -> Config:
+def settings_of(values: dict[str, object]) -> Config:
     """Return the configuration of a shard from its plan's values. Raises ValueError in plain words."""
     return config_of(values, doors=sections())
 

@@ -68,7 +68,7 @@ class Blocking:
     def __exit__(self, *failure: object) -> None:
         self._loop.run(_exit, self._target, *failure)
 
-    def __iter__(self) -> Iterator[Any]:
+    def __iter__(self) -> Iterator[object]:
         while True:
             try:
                 yield self.next()
@@ -87,7 +87,7 @@ class Blocking:
 
         return self._loop.run(end, within=within)
 
-    def _wrapped(self, value: Any) -> Any:
+    def _wrapped(self, value: object) -> object:
         return Blocking(value, self._loop) if _is_kept(value) else value
 
 

@@ -369,7 +369,7 @@ def _can_record() -> bool:
 
 
 @contextlib.contextmanager
-def serving(**values: Any) -> Iterator[RobotServer]:
+def serving(**values: object) -> Iterator[RobotServer]:
     """Start a robot for a ``with``: ``with serving(world="empty", speed=8) as server``."""
     from roboglot.testing.wanted import wanted_of
 

@@ -131,7 +131,7 @@ class PipeEnd(asyncio.Transport):
         """Return whose end this is."""
         return self._protocol
 
-    def get_extra_info(self, name: str, default: Any = None) -> Any:
+    def get_extra_info(self, name: str, default: object = None) -> object:
         """As of a socket, but there is none."""
         return self._other.ended if name == "hung_up" else super().get_extra_info(name, default)
 
@@ -211,7 +211,7 @@ class PipeEnd(asyncio.Transport):
             if not self._call(self._protocol.eof_received):  # type: ignore[attr-defined]
                 self.close()
 
-    def _call(self, method: Callable[..., Any], *values: Any) -> Any:
+    def _call(self, method: Callable[..., Any], *values: object) -> object:
         """Call the protocol; its errors end the connection, as everywhere in asyncio, and no one else's work."""
         try:
             return self._context.copy().run(method, *values)

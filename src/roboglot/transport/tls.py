@@ -266,7 +266,7 @@ class _Encrypted:
     def get_protocol(self) -> asyncio.BaseProtocol | None:
         return self._end.inner
 
-    def get_extra_info(self, name: str, default: Any = None) -> Any:
+    def get_extra_info(self, name: str, default: object = None) -> object:
         match name:
             case "sslcontext":
                 return self._end.tunnel.context if self._end.tunnel else default

@@ -84,7 +84,7 @@ class Connector:
         finally:
             link.end("it was closed here")
 
-    async def _greet(self, link: Link) -> dict[str, Any]:
+    async def _greet(self, link: Link) -> dict[str, object]:
         link.send(Kind.HELLO, 0, json.dumps({"robot": self._robot, "token": self._token}).encode())
         async with asyncio.timeout(GREETING_SECONDS_MAX):
             frame = await link.first()

@@ -106,7 +106,7 @@ class OrderBook:
             self._orders.pop(id, None)
 
 
-def _revived(document: Any) -> Order:
+def _revived(document: object) -> Order:
     """As it goes on after the robot went down."""
     order = msgspec.convert(document, Order)
     if order.status is OrderStatus.RUNNING:

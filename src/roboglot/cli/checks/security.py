@@ -8,7 +8,6 @@ import time
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 from roboglot.access import audit
 from roboglot.access.rights import ALL_ROBOTS, BRINGS, whole, write_rights
@@ -187,7 +186,7 @@ def _used(path: Path, since: float) -> tuple[Mapping[str, set[Right]], float | N
     return used, oldest
 
 
-def _key(key: Any) -> Any:
+def _key(key: object) -> object:
     return int(key) if isinstance(key, int) else key
 
 

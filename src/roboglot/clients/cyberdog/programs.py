@@ -21,7 +21,7 @@ class Programs(Calls):
     frames: Feed[Any]  # pushes of 2001
     _numbers = itertools.count(1)
 
-    async def send_frame(self, frame: Mapping[str, Any]) -> None:
+    async def send_frame(self, frame: Mapping[str, object]) -> None:
         """2002: send a frame unchanged; robots answer only by pushes (2001)."""
         try:
             await self.text(Code.PROGRAM_TO_ROBOT, frame)

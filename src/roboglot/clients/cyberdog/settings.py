@@ -90,7 +90,7 @@ class Settings(Calls):
         """1024."""
         await self._member(Code.RENAME_MEMBER, {"pre_name": name, "new_name": new})
 
-    async def _member(self, code: Code, params: dict[str, Any]) -> None:
+    async def _member(self, code: Code, params: dict[str, object]) -> None:
         check(code, await self.ask(code, dict[str, Any], params), AccountCode)
 
     async def audio_identity(self) -> Identity:

@@ -60,7 +60,7 @@ class Upkeep(Calls):
         """5001."""
         return await self.ask(Code.UPDATE_STATUS, UpdateStatus)
 
-    async def download_update(self, modules: Sequence[Mapping[str, Any]]) -> None:
+    async def download_update(self, modules: Sequence[Mapping[str, object]]) -> None:
         """5003: as the maker's server describes them; UpdateProgress is pushed."""
         await self.do(Code.DOWNLOAD_UPDATE, {"modules": modules})
 
@@ -83,11 +83,11 @@ class Upkeep(Calls):
         """
         return await self._goal(Code.START_UPDATE, {"operate": operate, "data": data}, on_feedback)
 
-    async def join_update(self, on_feedback: OnUpdate | None = None) -> Mapping[str, Any]:
+    async def join_update(self, on_feedback: OnUpdate | None = None) -> Mapping[str, object]:
         """5011: the goal under way, from its latest feedback on. Raises CyberDogRefused (3) when there is none."""
         return await self._goal(Code.JOIN_UPDATE, {}, on_feedback)
 
-    async def _goal(self, code: Code, params: dict[str, Any], on_feedback: OnUpdate | None) -> Mapping[str, Any]:
+    async def _goal(self, code: Code, params: dict[str, object], on_feedback: OnUpdate | None) -> Mapping[str, object]:
         async with aclosing(self.parts(code, dict[str, Any], params)) as answers:
             async for answer in answers:
                 if answer.get("accepted", Accepted.YES) != Accepted.YES:

@@ -129,7 +129,7 @@ def without_none(value: Any) -> Any:
             return value
 
 
-def _decoder(key: str, kind: Any) -> Callable[[Answer], Any]:
+def _decoder(key: str, kind: object) -> Callable[[Answer], object]:
     """Return the decoder from an answer to a value of ``kind``, which raises BadAnswer."""
     if kind in (None, NoneType):
         return lambda _: None

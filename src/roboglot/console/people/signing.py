@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import time
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgspec
 
@@ -59,7 +59,7 @@ class Signing:
         await answer_json(send, answer, 200, [set_cookie(name, token, secure=secure)])
         return True
 
-    async def _sign_in(self, address: str, shown: Shown) -> tuple[str, dict[str, Any]]:
+    async def _sign_in(self, address: str, shown: Shown) -> tuple[str, dict[str, object]]:
         if shown.code:
             return await self._join(address, shown)
         admission = admission_of(self._desk)
@@ -76,7 +76,7 @@ class Signing:
             raise Problem(401, str(unknown)) from None
         return self._sessions.open(proof, who), {"name": who}
 
-    async def _join(self, address: str, shown: Shown) -> tuple[str, dict[str, Any]]:
+    async def _join(self, address: str, shown: Shown) -> tuple[str, dict[str, object]]:
         host = address.rpartition(":")[0]
         if not self._tries.take(host):
             raise Problem(429, "too many wrong codes from your address: wait a minute")

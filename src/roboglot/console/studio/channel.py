@@ -265,7 +265,7 @@ def _plain(problem: Problem) -> dict[str, Any]:
     }
 
 
-def _entry(task: str, entry: LogEntry) -> dict[str, Any]:
+def _entry(task: str, entry: LogEntry) -> dict[str, object]:
     found: dict[str, Any] = {"task": task, "stamp": entry.at, "level": entry.level, "text": entry.text}
     if entry.level == "error":
         found |= explain(entry.text)

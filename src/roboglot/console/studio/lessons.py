@@ -7,7 +7,7 @@ import logging
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgspec
 
@@ -155,7 +155,7 @@ def load(folders: Sequence[Path]) -> dict[str, Lesson]:
     return found
 
 
-def shown(lessons: Mapping[str, Lesson]) -> list[dict[str, Any]]:
+def shown(lessons: Mapping[str, Lesson]) -> list[dict[str, object]]:
     """What pages may know of them: not the solutions."""
     hidden = {"solution", "wrong"}
     return [

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import re
-from typing import Any
 
 from roboglot.programs.functions.records import RECORDS
 
@@ -41,7 +40,7 @@ _SENTENCES: tuple[tuple[str, str, str, str], ...] = (
 _ROBOT = ("The robot could not do this.", "机器人做不到这一步。")
 
 
-def explain(text: str) -> dict[str, Any]:
+def explain(text: str) -> dict[str, object]:
     """Line (0: none) and module of an error in a task's log, and ``en`` and ``zh`` sentences, empty for no error."""
     kind, colon, message = text.partition(": ")
     if not colon or not kind.isidentifier():

@@ -41,7 +41,7 @@ class Plan(msgspec.Struct):
     steps: Annotated[list[GoTo | Drive], msgspec.Meta(min_length=1, max_length=STEPS_MAX)]
 
 
-async def rehearse(desk: Desk, name: str, values: Mapping[str, object]) -> dict[str, Any]:
+async def rehearse(desk: Desk, name: str, values: Mapping[str, object]) -> dict[str, object]:
     """Try a plan from where the robot is now; it does not move. Raises NotFound, Forbidden, Busy, ValueError."""
     robot = desk.view(name, "rehearse").robot
     robot.admission.check(CLIENT, "rehearse", Right.DRIVE)

@@ -72,7 +72,7 @@ class Trial:
         finally:
             self._playing = None
 
-    def _notice(self, news: dict[str, Any]) -> None:
+    def _notice(self, news: dict[str, object]) -> None:
         self._tell({"type": "trial", **news})
 
     def _answer(

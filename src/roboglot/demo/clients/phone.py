@@ -110,7 +110,7 @@ class Phone(service.GrpcAppServicer):  # type: ignore[misc]
                     blocks.append(frame["block"]["id"])
         return blocks
 
-    async def _frame(self, frame: dict[str, Any]) -> None:
+    async def _frame(self, frame: dict[str, object]) -> None:
         """Send a frame and wait for the feedback that carries its id."""
         await self.ask(FRAME_DOWN, frame)
         async with asyncio.timeout(PATIENCE):

@@ -160,7 +160,7 @@ class Calls:
         self._position.clear_step()
         self._loop.call_later(max(0.0, self._rate.delay()), self._put, halted)
 
-    def _replay(self, call: CallMessage, args: tuple[Any, ...], kwargs: dict[str, Any]) -> bool:
+    def _replay(self, call: CallMessage, args: tuple[object, ...], kwargs: dict[str, object]) -> bool:
         """Answer a call as in the earlier life; return True if it was cut off there and needs a new answer."""
         known = self._history.popleft()
         if known.name != call.name:

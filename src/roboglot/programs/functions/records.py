@@ -6,23 +6,22 @@ Only shapes; what fills them is in the groups' files.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from roboglot.programs.functions.enums import GESTURES
 from roboglot.programs.worker.prelude import RecordType
 from roboglot.programs.worker.values import Record
 
 
-def _fields(names: str, default: object) -> dict[str, Any]:
+def _fields(names: str, default: object) -> dict[str, object]:
     """Fields with a common default; ``names`` are parted by blanks."""
     return dict.fromkeys(names.split(), default)
 
 
 _XYZ = {"x": 0.0, "y": 0.0, "z": 0.0}
 _LEVEL = Record("Pose", {"orientation": Record("Quaternion", {"w": 0.0})})
-_MOTION: Mapping[str, Any] = {"motion_id": 0, "result": False, "code": 0}
+_MOTION: Mapping[str, object] = {"motion_id": 0, "result": False, "code": 0}
 # Results of a State and a ``response`` with these fields.
-_RESPONSES: dict[str, dict[str, Any]] = {
+_RESPONSES: dict[str, dict[str, object]] = {
     "MotionSequenceServiceResponse": {"result": False, "code": 0, "describe": ""},
     "LedSeviceResponse": {"code": 0},
     "AudioPlaySeviceResponse": {"status": 100},

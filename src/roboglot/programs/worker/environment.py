@@ -76,7 +76,7 @@ def _printer(write: Callable[[str], None]) -> Callable[..., None]:
     return print
 
 
-def _exit(code: Any = None) -> None:
+def _exit(code: object = None) -> None:
     raise SystemExit(code)
 
 
@@ -89,14 +89,14 @@ def _checked(name: object) -> str:
     return plain
 
 
-def _getattr(value: Any, name: str, *default: Any) -> Any:
+def _getattr(value: object, name: str, *default: object) -> object:
     plain = _checked(name)
     if plain in METHODS:
         return (_format_of if plain == "format" else _has_key_of)(value)
     return getattr(value, plain, *default)
 
 
-def _hasattr(value: Any, name: str) -> bool:
+def _hasattr(value: object, name: str) -> bool:
     try:
         _getattr(value, name)
     except AttributeError:
@@ -104,11 +104,11 @@ def _hasattr(value: Any, name: str) -> bool:
     return True
 
 
-def _setattr(value: Any, name: str, new: Any) -> None:
+def _setattr(value: object, name: str, new: object) -> None:
     setattr(value, _checked(name), new)
 
 
-def _delattr(value: Any, name: str) -> None:
+def _delattr(value: object, name: str) -> None:
     delattr(value, _checked(name))
 
 
@@ -125,7 +125,7 @@ def _type(value: Any, *more: Any) -> Any:
 class _Formatter(string.Formatter):
     """``str.format`` whose fields follow the language's rules about attributes."""
 
-    def get_field(self, field_name: str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> Any:
+    def get_field(self, field_name: str, args: Sequence[object], kwargs: Mapping[str, object]) -> object:
         for part in field_name.replace("[", ".[").split(".")[1:]:
             if not part.startswith("["):
                 _checked(part)

@@ -126,7 +126,7 @@ class Link:
                 texts.append("".join(_pieces(pack(value, self.records.split), 0)))
         return ",".join(texts)
 
-    def _json_named(self, values: dict[str, Any]) -> str:
+    def _json_named(self, values: dict[str, object]) -> str:
         return "".join(_pieces({key: pack(value, self.records.split) for key, value in values.items()}, 0))[1:-1]
 
 

@@ -28,17 +28,17 @@ def build_modules(call: HostCall, seed: int, utc_offset: int) -> dict[str, Modul
     }
 
 
-def _module(name: str, members: dict[str, Any]) -> ModuleType:
+def _module(name: str, members: dict[str, object]) -> ModuleType:
     module = ModuleType(name)
     module.__dict__.update(members)
     return module
 
 
-def _public(module: object) -> dict[str, Any]:
+def _public(module: object) -> dict[str, object]:
     return {name: getattr(module, name) for name in dir(module) if not name.startswith("_")}
 
 
-def _random_members(seed: int) -> dict[str, Any]:
+def _random_members(seed: int) -> dict[str, object]:
     generator = random.Random(seed)
 
     def reseed(a: Any = None) -> None:
@@ -49,7 +49,7 @@ def _random_members(seed: int) -> dict[str, Any]:
     return {**members, "seed": reseed, "Random": random.Random}
 
 
-def _time_members(call: HostCall, utc_offset: int) -> dict[str, Any]:
+def _time_members(call: HostCall, utc_offset: int) -> dict[str, object]:
     _set_zone(utc_offset)
 
     def sleep(seconds: float, /) -> None:

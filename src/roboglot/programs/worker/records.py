@@ -18,7 +18,7 @@ class Vector(list[Any]):
 
     __slots__ = ()
 
-    def push_back(self, item: Any) -> None:
+    def push_back(self, item: object) -> None:
         """Append a copy: programs fill one object again and again."""
         self.append(copy.deepcopy(item))
 
@@ -26,7 +26,7 @@ class Vector(list[Any]):
         """Drop the last item."""
         self.pop()
 
-    def front(self) -> Any:
+    def front(self) -> object:
         """The first item."""
         return self[0]
 
@@ -118,7 +118,7 @@ class Records:
             return None
         return type(value).__name__, {name: getattr(value, name) for name in type(value).__slots__}
 
-    def enrich(self, value: Any) -> Any:
+    def enrich(self, value: object) -> object:
         """Lists and dictionaries from outside, with the vendor's operations; records from the host's form."""
         match value:
             case Record(type=name, fields=fields):
@@ -133,7 +133,7 @@ class Records:
         defaults = kind.fields
         enrich = self.enrich
 
-        def initialise(self: ProgramRecord, **fields: Any) -> None:
+        def initialise(self: ProgramRecord, **fields: object) -> None:
             for field in defaults:
                 given = fields.pop(field, _MISSING)
                 # The default is made anew each time: nothing is shared between two records.
@@ -150,5 +150,5 @@ class Records:
 _MISSING = object()
 
 
-def _reader(target: str) -> Callable[[Any], Any]:
+def _reader(target: str) -> Callable[[object], object]:
     return (lambda record: getattr(record, target)) if target else (lambda record: record)

@@ -48,7 +48,7 @@ def _function(name: str, call: HostCall) -> Callable[..., Any]:
     return function
 
 
-def _object(name: str, members: dict[str, Any], call: HostCall) -> _Namespace:
+def _object(name: str, members: dict[str, object], call: HostCall) -> _Namespace:
     built = {
         key: _object(f"{name}.{key}", value, call) if isinstance(value, dict) else value
         for key, value in members.items()
@@ -77,7 +77,7 @@ class _Namespace:
             return self.__call(member.name)
         return member
 
-    def __setattr__(self, part: str, value: Any) -> None:
+    def __setattr__(self, part: str, value: object) -> None:
         raise AttributeError(f"'{self.__name}.{part}' cannot be changed")
 
     def __delattr__(self, part: str) -> None:

@@ -42,7 +42,7 @@ Split = Callable[[object], "tuple[str, Mapping[str, Any]] | None"]
 Join = Callable[[str, "dict[str, Any]"], Any]
 
 
-def split_record(value: object) -> tuple[str, Mapping[str, Any]] | None:
+def split_record(value: object) -> tuple[str, Mapping[str, object]] | None:
     """The host's ``split`` for ``pack``."""
     return (value.type, value.fields) if isinstance(value, Record) else None
 
@@ -73,7 +73,7 @@ def pack(value: object, split: Split = split_record, depth: int = 0) -> Any:
     raise TypeError(f"a value of type '{type(value).__name__}' cannot be passed to the robot")
 
 
-def _pack_mapping(value: Mapping[Any, Any], split: Split, depth: int) -> Any:
+def _pack_mapping(value: Mapping[object, object], split: Split, depth: int) -> object:
     if all(type(key) is str for key in value) and "$" not in value:
         return {key: pack(item, split, depth + 1) for key, item in value.items()}
     if len(value) > PAIRS_MAX:
@@ -84,7 +84,7 @@ def _pack_mapping(value: Mapping[Any, Any], split: Split, depth: int) -> Any:
     }
 
 
-def _pack_int(value: int) -> Any:
+def _pack_int(value: int) -> object:
     if value.bit_length() <= _INT_BITS:
         return value
     if value.bit_length() > _INT_BITS_MAX:
@@ -142,14 +142,14 @@ def unpacking(packed: object, join: Join = Record, depth: int = 0) -> Generator[
     return (yield from _unpacking_fields(packed, join, depth))
 
 
-def _unpacking_fields(packed: dict[Any, Any], join: Join, depth: int) -> Generator[None, None, dict[str, Any]]:
+def _unpacking_fields(packed: dict[object, object], join: Join, depth: int) -> Generator[None, None, dict[str, Any]]:
     fields = {}
     for key, item in packed.items():
         fields[str(key)] = item if type(item) in _PLAIN else (yield from unpacking(item, join, depth + 1))
     return fields
 
 
-def _unpacking_tagged(packed: dict[Any, Any], join: Join, depth: int) -> Generator[None, None, Any]:
+def _unpacking_tagged(packed: dict[object, object], join: Join, depth: int) -> Generator[None, None, Any]:
     match packed:
         case {"$": "record", "t": str(name), "v": dict(fields)}:
             return join(name, (yield from _unpacking_fields(fields, join, depth)))
@@ -162,7 +162,7 @@ def _unpacking_tagged(packed: dict[Any, Any], join: Join, depth: int) -> Generat
     raise ValueError(f"not a tagged value: {packed['$']!r:.40}")
 
 
-def _unpacking_pairs(pairs: list[Any], join: Join, depth: int) -> Generator[None, None, dict[Any, Any]]:
+def _unpacking_pairs(pairs: list[object], join: Join, depth: int) -> Generator[None, None, dict[Any, Any]]:
     result = {}
     for pair in pairs:
         match pair:

@@ -34,7 +34,7 @@ class _Short(reprlib.Repr):
         self.maxlist = self.maxtuple = self.maxdict = self.maxset = self.maxfrozenset = 8
         self.maxlevel, self.maxstring, self.maxlong = 4, 80, 60
 
-    def repr1(self, x: Any, level: int) -> str:
+    def repr1(self, x: object, level: int) -> str:
         return super().repr1(x, level) if type(x) in _PLAIN else f"<{type(x).__name__[:NAME_MAX]}>"
 
 
@@ -55,7 +55,7 @@ class Variables:
     def before(self, call: Callable[..., Any]) -> Callable[..., Any]:
         """The same call, with a report before it if the last one is old."""
 
-        def reporting(name: str, /, *args: Any, **kwargs: Any) -> Any:
+        def reporting(name: str, /, *args: object, **kwargs: object) -> object:
             if name.endswith(MARKS) or time.monotonic() >= self._due:
                 self.report()
             return call(name, *args, **kwargs)
@@ -78,7 +78,7 @@ class Variables:
             self._said = found
             self._send({"t": "variables", "variables": found})
 
-    def _texts(self, scope: Mapping[str, Any]) -> dict[str, str]:
+    def _texts(self, scope: Mapping[str, object]) -> dict[str, str]:
         texts = {}
         for name, value in list(scope.items()):
             if name not in self._own and name[:1] not in "_$" and not isinstance(value, _HIDDEN):

@@ -302,7 +302,7 @@ class _Service(GrpcAppServicer):  # type: ignore[misc]
         await rpc.abort(grpc.StatusCode.UNIMPLEMENTED, "the robot sends heartbeats, it takes none")
 
 
-def _as_client(store: CertificateStore) -> Any:
+def _as_client(store: CertificateStore) -> object:
     """How the robot proves itself to the app it dials."""
     proof = store.newest()
     return grpc.ssl_channel_credentials(proof.callers, proof.key, proof.certificate)

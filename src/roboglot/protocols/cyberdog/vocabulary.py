@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -56,7 +55,7 @@ def points_of(points: Iterable[Point]) -> list[dict[str, float]]:
     return [{"px": point.x, "py": point.y} for point in points]
 
 
-def grid_of(grid: OccupancyGrid) -> dict[str, Any]:
+def grid_of(grid: OccupancyGrid) -> dict[str, object]:
     """The map structure: -1 unknown, 0 free, 100 occupied, rows from the smallest y; clients test for just these."""
     cells = np.where(grid.log_odds > 0, 100, np.where(grid.log_odds < 0, 0, -1))
     origin = pose_of(Pose(grid.origin.x, grid.origin.y))
@@ -64,7 +63,7 @@ def grid_of(grid: OccupancyGrid) -> dict[str, Any]:
     return {**size, **origin, "data": cells.ravel().tolist()}
 
 
-def no_grid() -> dict[str, Any]:
+def no_grid() -> dict[str, object]:
     """The map structure of an answer that has no map."""
     return {**dict.fromkeys(("resolution", "width", "height", *pose_of(Pose())), 0), "data": []}
 
@@ -79,7 +78,7 @@ def laser_of(scan: LaserScan, pose: Pose) -> list[dict[str, float]]:
     return [{"px": x, "py": y} for x, y in zip(xs.round(3).tolist(), ys.round(3).tolist(), strict=True)]
 
 
-def label_of(label: Label) -> dict[str, Any]:
+def label_of(label: Label) -> dict[str, object]:
     """A label as 6002 and 6003 have it."""
     return {"labelName": label.name, "physicX": label.point.x, "physicY": label.point.y}
 

@@ -369,7 +369,7 @@ def not_allowed(methods: Iterable[str]) -> HttpError:
     return HttpError(405, "Method Not Allowed", words, ((b"allow", words.encode()),))
 
 
-def whole_numbers(value: Any) -> Any:
+def whole_numbers(value: object) -> object:
     """``value`` of JSON with 2.0 as 2: JSON has one kind of number, and the schemas call both an integer."""
     match value:
         case float() if value.is_integer() and abs(value) < WHOLE_MAX:

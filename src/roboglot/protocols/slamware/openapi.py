@@ -106,7 +106,7 @@ class _Schemas:
             described["parameters"] = parameters
         return described
 
-    def _responses(self, answer: Any) -> Schema:
+    def _responses(self, answer: object) -> Schema:
         refused = {"description": "Refused; the text is in the reason phrase too.", "content": {"text/plain": {}}}
         if answer is NoContent:
             return {"204": {"description": "OK"}, "default": refused}
@@ -128,12 +128,12 @@ class _Schemas:
         return dict(self._made[self._types.index(kind)])
 
 
-def _members(kind: Any) -> tuple[Any, ...]:
+def _members(kind: object) -> tuple[object, ...]:
     """The members of a union of structs, or the one type."""
     return typing.get_args(kind) if isinstance(kind, types.UnionType) else (kind,)
 
 
-def _is_json(kind: Any) -> bool:
+def _is_json(kind: object) -> bool:
     return kind not in (None, type(None), bytes, Text, NoContent)
 
 
@@ -141,7 +141,7 @@ def _anything(_: type) -> Schema:
     return {"description": "anything"}
 
 
-def _without_tuples(schema: Any) -> Any:
+def _without_tuples(schema: object) -> object:
     """``schema`` with tuples of one type as lists of a fixed length: many tools know no ``prefixItems``."""
     match schema:
         case {"prefixItems": [first, *others], **rest} if all(other == first for other in others):

@@ -212,7 +212,7 @@ class Vda5050Door:
     def _is_off(self) -> bool:
         return Power in self._robot and self._robot[Power].mode is PowerMode.OFF
 
-    def _state(self) -> dict[str, Any]:
+    def _state(self) -> dict[str, object]:
         """Return all that the robot says about itself."""
         robot, context, version = self._robot, self._context, self._version
         own = vocabulary.action_states(context.book.actions.values(), version)
@@ -237,7 +237,7 @@ class Vda5050Door:
             **vocabulary.safety(robot, version),
         }
 
-    def _error(self, error: Error) -> dict[str, Any]:
+    def _error(self, error: Error) -> dict[str, object]:
         references = [{"referenceKey": key, "referenceValue": value} for key, value in error.references]
         return {
             "errorType": self._version.error(error.kind),

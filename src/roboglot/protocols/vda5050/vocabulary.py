@@ -81,7 +81,7 @@ def operating_mode(robot: Robot) -> str:
     return "MANUAL" if taken or others else "AUTOMATIC"
 
 
-def power(robot: Robot, version: Version) -> dict[str, Any]:
+def power(robot: Robot, version: Version) -> dict[str, object]:
     """Return the battery's state; a robot without one is always full."""
     state = robot[Battery].state if Battery in robot else None
     charge = round(100 * state.percentage, 1) if state else 100.0
@@ -107,7 +107,7 @@ def loads(robot: Robot, known: Mapping[str, str]) -> dict[str, Any]:
     return {"loads": [{**known, "loadPosition": JACK_POSITION}] if robot[Jack].loaded else []}
 
 
-def progress(book: OrderBook) -> dict[str, Any]:
+def progress(book: OrderBook) -> dict[str, object]:
     """Return what is left of the order."""
     return {
         "orderId": book.order_id,
@@ -119,11 +119,11 @@ def progress(book: OrderBook) -> dict[str, Any]:
     }
 
 
-def _node(node: Node) -> dict[str, Any]:
+def _node(node: Node) -> dict[str, object]:
     return {"nodeId": node.node_id, "sequenceId": node.sequence_id, "released": node.released}
 
 
-def _edge(edge: Edge) -> dict[str, Any]:
+def _edge(edge: Edge) -> dict[str, object]:
     return {"edgeId": edge.edge_id, "sequenceId": edge.sequence_id, "released": edge.released}
 
 
@@ -137,7 +137,7 @@ def action_states(states: Iterable[ActionState], version: Version) -> list[dict[
     ]
 
 
-def factsheet(robot: Robot, version: Version, state_period: float, visualization_period: float) -> dict[str, Any]:
+def factsheet(robot: Robot, version: Version, state_period: float, visualization_period: float) -> dict[str, object]:
     """Return what fleet control may know of the robot beforehand."""
     new, plate = version.new_words, robot.description
     limits = robot[Base].limits if Base in robot else None
@@ -218,7 +218,7 @@ def _actions(robot: Robot, version: Version) -> list[str]:
     ]
 
 
-def _described(name: str, new: bool) -> dict[str, Any]:
+def _described(name: str, new: bool) -> dict[str, object]:
     operation = TABLE.get(name)
     assert operation is not None
     scopes = ["INSTANT"] * (name in INSTANT) + ["NODE"] * (name in AT_NODES)

@@ -6,7 +6,6 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any
 
 from roboglot.model.tap import Direction, Exchange
 from roboglot.recording.comparing.masks import Mask
@@ -197,6 +196,6 @@ def _first_places(exchanges: Sequence[Exchange]) -> dict[tuple[str, str, str], i
     return found
 
 
-def _short(value: Any) -> str:
+def _short(value: object) -> str:
     text = value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
     return text if len(text) <= VALUE_MAX else text[: VALUE_MAX - 1] + "…"

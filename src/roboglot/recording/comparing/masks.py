@@ -57,7 +57,7 @@ class Mask(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     seconds: Annotated[float, msgspec.Meta(ge=0)] = 0.5
     seconds_share: Annotated[float, msgspec.Meta(ge=0, le=1)] = 0.25
 
-    def agree(self, operation: str, path: str, one: Any, other: Any) -> bool:
+    def agree(self, operation: str, path: str, one: object, other: object) -> bool:
         """Return whether two values are as good as the same."""
         if (rule := self._rule(operation, path)) is not None:
             return _agree(rule.compare, one, other, rule.tolerance, rule.share)

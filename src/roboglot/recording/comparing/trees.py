@@ -29,7 +29,7 @@ def tree(payload: bytes) -> Any:
     return [_value(word) for word in _sequence.sub("", text).rstrip(" ;\r\n").split()]
 
 
-def _value(word: str) -> Any:
+def _value(word: str) -> object:
     return float(word) if _number.fullmatch(word) else word
 
 

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 from roboglot.model.clock import RealClock
 from roboglot.model.tap import Direction, Exchange
@@ -249,7 +249,7 @@ class _Pushes(asyncio.DatagramProtocol):
     def __init__(self, push: Callable[[bytes], None]) -> None:
         self._push = push
 
-    def datagram_received(self, data: bytes, _addr: Any) -> None:
+    def datagram_received(self, data: bytes, _addr: object) -> None:
         self._push(data)
 
 

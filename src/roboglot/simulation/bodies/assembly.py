@@ -62,7 +62,7 @@ class SimulatedRobot:
             detach()
 
 
-def _job(part: Part[Any], component: Any, method: Callable[..., None] | None, *, periodic: bool = False) -> Job:
+def _job(part: Part[Any], component: object, method: Callable[..., None] | None, *, periodic: bool = False) -> Job:
     assert method is not None
     duty = part.duty(component) if part.duty is not None else None
     if not periodic:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -307,7 +307,7 @@ def jack_jammed(target: Target) -> Undo:
     return _switch(target.part(Jack, SimulatedJack), "jammed", True)
 
 
-def _switch(part: Any, attribute: str, value: object) -> Undo:
+def _switch(part: object, attribute: str, value: object) -> Undo:
     """Set it now, and what it was later."""
     before = getattr(part, attribute)
     setattr(part, attribute, value)

@@ -11,7 +11,7 @@ import inspect
 import itertools
 import logging
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from roboglot.model.client_context import concerning
 from roboglot.model.errors import ComponentMissing, NotFound, RobotError
@@ -48,7 +48,7 @@ class Faults:
         return [fault for fault, _ in self._active.values()]
 
     def inject(
-        self, kind: str, robot: str | None = None, *, duration: float | None = None, **options: Any
+        self, kind: str, robot: str | None = None, *, duration: float | None = None, **options: object
     ) -> list[ActiveFault]:
         """Let ``kind`` begin: on one robot, on all that have the part (None), or in the building.
 
@@ -95,7 +95,7 @@ class Faults:
             return [Target(world, None)]
         return [Target(world, name) for name in ([robot] if robot is not None else world.robots)]
 
-    def _begin(self, kind: str, target: Target, options: Mapping[str, Any]) -> ActiveFault:
+    def _begin(self, kind: str, target: Target, options: Mapping[str, object]) -> ActiveFault:
         name = target.name
         same = any(fault.kind == kind and fault.robot == name for fault in self.active)
         if same and not KINDS[kind].many:

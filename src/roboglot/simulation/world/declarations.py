@@ -10,7 +10,7 @@ import re
 from collections.abc import Hashable
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import TypeVar, cast
 
 import msgspec
 
@@ -42,7 +42,7 @@ def read_toml(path: Path, structure: type[T]) -> T:
 
 
 @lru_cache(maxsize=DECODED_MAX)
-def _decoded(text: str, structure: Any) -> object:
+def _decoded(text: str, structure: object) -> object:
     """The same text gives the same (frozen) structure: a hundred robots of a kind read their body once."""
     return msgspec.toml.decode(text, type=structure, strict=False)
 

@@ -99,7 +99,7 @@ def _entries(values: Mapping[str, Any]) -> Iterator[str]:
             yield f"{key} = {_inline(value)}"
 
 
-def _inline(value: Any) -> str:
+def _inline(value: object) -> str:
     """Return ``value`` on one line; JSON's strings, numbers and booleans are TOML's, too."""
     if isinstance(value, dict):
         inner = ", ".join(f"{_key(key)} = {_inline(entry)}" for key, entry in value.items())
@@ -132,7 +132,7 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def _default(field: msgspec.structs.FieldInfo) -> Any:
+def _default(field: msgspec.structs.FieldInfo) -> object:
     if field.default_factory is not msgspec.NODEFAULT:
         return field.default_factory()
     return field.default

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
-from typing import Any
 
 import msgspec
 
@@ -124,7 +123,7 @@ def read_signal(fields: Mapping[str, object]) -> Signal:
     return End(uid, fields.get("is_closed") is True)
 
 
-def fields_of(signal: Signal) -> dict[str, Any]:
+def fields_of(signal: Signal) -> dict[str, object]:
     """Result of ``read_signal``."""
     match signal:
         case Description(uid, kind, sdp, screen):

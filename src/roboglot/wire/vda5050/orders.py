@@ -109,8 +109,8 @@ class Edge(Part, frozen=True, rename="camel", kw_only=True):
     orientation: Any = None
     direction: Any = None
     rotation_allowed: bool | None = None
-    trajectory: Any = None
-    corridor: Any = None
+    trajectory: object = None
+    corridor: object = None
 
     @property
     def speed(self) -> float | None:

@@ -70,7 +70,7 @@ def inquiry(kind: str, id: str, known: Sequence[str]) -> str:
     return json.dumps({"type": kind, "id": id, "operate": "inquiry", "target_id": list(known)} | empty)
 
 
-def save_frame(item: Mapping[str, Any], kind: str) -> str:
+def save_frame(item: Mapping[str, object], kind: str) -> str:
     """The frame with which a front end would save an item; its id is the program's (or the first of its targets)."""
     targets = item.get("target_id")
     id = targets[0] if isinstance(targets, list) and targets else item.get("id")

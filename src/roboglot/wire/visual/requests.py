@@ -99,7 +99,7 @@ def parse_request(text: str) -> Request:
     return Request(kind, frame_id, operate, targets, describe, style, mode, condition, body)
 
 
-def _decode(text: str) -> dict[str, Any]:
+def _decode(text: str) -> dict[str, object]:
     if len(text) > FRAME_MAX:
         raise BadFrame(FeedbackState.NOT_JSON, f"a frame has at most {FRAME_MAX} characters", {})
     try:

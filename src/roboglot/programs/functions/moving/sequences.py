@@ -45,7 +45,7 @@ FEET = {
 
 
 @ABILITIES.on("cyberdog.motion.run_sequence", needs=(Legs,))
-async def run_sequence(session: Session, sequence: Any) -> Record:
+async def run_sequence(session: Session, sequence: object) -> Record:
     """Step as the gait list says and go as the pace list says, then stand straight; a pace's duration is in ms.
 
     The gaits, in units of 30 ms, begin again as long as there are paces; without any it trots. Feet on the floor stay

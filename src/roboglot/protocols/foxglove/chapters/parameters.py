@@ -64,7 +64,7 @@ def _checked(names: list[str]) -> list[str]:
     return names
 
 
-def _present(robot: Robot, names: list[str]) -> list[dict[str, Any]]:
+def _present(robot: Robot, names: list[str]) -> list[dict[str, object]]:
     return parameters(robot, names) if names else []
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import msgspec
 
@@ -69,7 +68,7 @@ async def get_labels(
     *,
     mapName: str = "",  # noqa: N803 - the wire's name
     map_id: int = 0,
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """The stored map and its labels; as long as none is stored, and none is asked for by name, the one in memory.
 
     A map found is pushed (6001), too.

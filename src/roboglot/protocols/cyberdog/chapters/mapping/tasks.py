@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping
 from functools import partial
-from typing import Any
 
 from roboglot.model.components.component import Component
 from roboglot.model.components.mapping.localization import Localization
@@ -139,7 +138,7 @@ async def join_task(call: Call, *, type: Int32) -> object:
 
 
 @TABLE.on(Code.STOP_TASK, right=Right.DRIVE, needs=(MapLibrary, MappingComponent))
-async def stop_task(call: Call, *, type: Int32, map_name: object = "") -> dict[str, Any]:
+async def stop_task(call: Call, *, type: Int32, map_name: object = "") -> dict[str, object]:
     """Stop the task of that type (nothing to do if it does not run); 0 stops every task, localisation too.
 
     A map that was being built is saved as ``map_name``. Without a name 5 throws it away; 0 keeps it in memory.

@@ -6,7 +6,6 @@ This door does not talk to the maker's cloud: of a token, only whose it is and u
 from __future__ import annotations
 
 import uuid
-from typing import Any
 
 from roboglot.model.components.interaction.members import Members
 from roboglot.model.components.sensing.hearing import Hearing
@@ -58,14 +57,14 @@ async def audio_token(
 
 def activated(robot: Robot, uid: str | None = None) -> bool:
     """Whether the voice board has an account (``uid``'s, if given) whose token still holds."""
-    account: Any = kept(robot, ACCOUNT, None)
+    account: object = kept(robot, ACCOUNT, None)
     if Hearing not in robot or not isinstance(account, dict) or account["until"] <= robot.clock.epoch():
         return False
     return uid is None or account["uid"] == uid
 
 
 @TABLE.on(Code.TRAIN_VOICE, right=Right.EDIT, needs=(Members,))
-async def train_voice(call: Call, *, nick_name: str, voiceprint_id: str = "") -> dict[str, Any]:
+async def train_voice(call: Call, *, nick_name: str, voiceprint_id: str = "") -> dict[str, object]:
     """Learn the next speaker's voice as that member's; push 3013 reports the outcome within 30 s."""
     call.context.robot[Hearing]
     call.context.voice.train(nick_name, voiceprint_id[:ID_MAX])
@@ -73,7 +72,7 @@ async def train_voice(call: Call, *, nick_name: str, voiceprint_id: str = "") ->
 
 
 @TABLE.on(Code.CANCEL_VOICE, right=Right.EDIT, needs=(Hearing,))
-async def cancel_voice(call: Call) -> dict[str, Any]:
+async def cancel_voice(call: Call) -> dict[str, object]:
     """Stop learning a voice."""
     call.context.robot[Hearing]
     call.context.voice.stop_training()

@@ -116,5 +116,5 @@ class Faces:
                     self._app.push(RECOGNISED, _recognised(FaceResult.DONE, face.name, id, face.age, emotion))
 
 
-def _recognised(result: FaceResult, name: str, id: int, age: float, emotion: float) -> dict[str, Any]:
+def _recognised(result: FaceResult, name: str, id: int, age: float, emotion: float) -> dict[str, object]:
     return {"username": name, "result": int(result), "id": id, "age": age, "emotion": emotion}

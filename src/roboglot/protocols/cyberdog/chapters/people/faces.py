@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgspec
 
@@ -23,7 +23,7 @@ Seconds = Annotated[int, msgspec.Meta(ge=0, le=2**31 - 1)]
 @TABLE.on(Code.ENTER_FACE, right=Right.EDIT, needs=(Members, Vision))
 async def enter_face(
     call: Call, *, command: Int32, username: str = "", oriname: str = "", ishost: bool = False
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """0 enter, 1 cancel that, 2 confirm (the robot did already), 3 rename, 4 delete a face, 5 who has one."""
     robot, faces = call.context.robot, call.context.faces
     robot[Vision], robot[Members]

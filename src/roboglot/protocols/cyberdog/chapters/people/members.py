@@ -5,8 +5,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from roboglot.model.components.interaction.members import Member, Members
 from roboglot.model.errors import NotFound, RobotError
 from roboglot.operations import Right
@@ -29,7 +27,7 @@ async def add_member(call: Call, *, member: str) -> dict[str, int | bool]:
 
 
 @TABLE.on(Code.FIND_MEMBERS, right=Right.SEE, needs=(Members,))
-async def find_members(call: Call, *, account: str = "") -> dict[str, Any]:
+async def find_members(call: Call, *, account: str = "") -> dict[str, object]:
     """All members, or the named one with ``code``: 0, or 121 and nothing else."""
     members = call.context.robot[Members]
     if not account:
@@ -66,7 +64,7 @@ async def rename_member(call: Call, *, pre_name: str, new_name: str) -> dict[str
 
 
 @TABLE.on(Code.SYNCHRONISE_MEMBERS, right=Right.SEE, needs=(Members,))
-async def synchronise_members(call: Call) -> dict[str, Any]:
+async def synchronise_members(call: Call) -> dict[str, object]:
     """The text has the number and nothing else: answered with all members, as 1021 does, for the app to copy."""
     accounts = [_account(call.context, member) for member in call.context.robot[Members].all()]
     return {"code": int(AccountCode.DONE), "accounts": accounts}
@@ -77,7 +75,7 @@ def _done(context: Context, code: AccountCode) -> dict[str, int | bool]:
     return {"success": int(code) if context.profile is Profile.ROBOT else code is AccountCode.DONE}
 
 
-def _account(context: Context, member: Member) -> dict[str, Any]:
+def _account(context: Context, member: Member) -> dict[str, object]:
     return {
         "id": member.id,
         "name": member.name,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Any
 
 from roboglot.model.components.motion.following import Following
 from roboglot.model.components.sensing.camera import Camera
@@ -52,7 +51,7 @@ class Pursuit:
         self.chosen.set_result(number)
         return True
 
-    def _boxes(self) -> dict[str, Any]:
+    def _boxes(self) -> dict[str, object]:
         number = self.chosen.result() if self.chosen.done() and not self.chosen.cancelled() else None
         tracked = next((person.box for person in self._seen if person.number == number), Box(0, 0, 0, 0))
         people = [{"roi": _region(person.box), "reid": str(person.number)} for person in self._seen]

@@ -88,21 +88,21 @@ async def connect(call: Call, *, selected_device: object = None) -> dict[str, in
 
 
 @TABLE.on(Code.BLUETOOTH_CONNECTED, right=Right.SEE, needs=(Bluetooth,))
-async def connected(call: Call) -> dict[str, Any]:
+async def connected(call: Call) -> dict[str, object]:
     """None or one."""
     device = call.context.robot[Bluetooth].connected
     return _listed([device] if device else [])
 
 
 @TABLE.on(Code.BLUETOOTH_FIRMWARE, right=Right.SEE, needs=(Bluetooth,))
-async def firmware_version(call: Call) -> dict[str, Any]:
+async def firmware_version(call: Call) -> dict[str, object]:
     """Of the connected device."""
     device = call.context.robot[Bluetooth].connected
     return {"success": device is not None, "message": device.firmware if device else ""}
 
 
 @TABLE.on(Code.BLUETOOTH_BATTERY, right=Right.SEE, needs=(Bluetooth,))
-async def battery_level(call: Call) -> dict[str, Any]:
+async def battery_level(call: Call) -> dict[str, object]:
     """0 to 1; the key is spelt as in the text, the value a number as there."""
     device = call.context.robot[Bluetooth].connected
     return {"connected": device is not None, "persentage": (device.battery or 0.0) if device else 0.0}
@@ -119,7 +119,7 @@ async def forget(call: Call, *, mac: str = "") -> dict[str, bool]:
 
 
 @TABLE.on(Code.UPDATE_BLUETOOTH, right=Right.ADMIN, needs=(Bluetooth,))
-async def update_device(call: Call) -> dict[str, Any]:
+async def update_device(call: Call) -> dict[str, object]:
     """Begin to bring the newer firmware to the connected device; push 8010 reports the progress."""
     radio = call.context.robot[Bluetooth]
     if radio.connected is None:
@@ -147,11 +147,11 @@ async def gear(call: Call) -> dict[str, int]:
     return {"data": int(call.context.robot[RemoteControl].gear)}
 
 
-def _listed(devices: Iterable[BluetoothDevice]) -> dict[str, Any]:
+def _listed(devices: Iterable[BluetoothDevice]) -> dict[str, object]:
     return {"device_info_list": [_device(device) for device in devices]}
 
 
-def _device(device: BluetoothDevice) -> dict[str, Any]:
+def _device(device: BluetoothDevice) -> dict[str, object]:
     return {
         "mac": device.address,
         "name": device.name,

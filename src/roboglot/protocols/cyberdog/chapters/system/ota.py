@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgspec
 
@@ -33,20 +33,20 @@ NO_TIME = -2  # s
 
 
 @TABLE.on(Code.UPDATE_STATUS, right=Right.SEE, needs=(Firmware,))
-async def update_status(call: Call) -> dict[str, Any]:
+async def update_status(call: Call) -> dict[str, object]:
     """Idle, download or update."""
     state = call.context.robot[Firmware].progress.state
     return {"status": WORDS.get(state, "idle"), "code": FAILED if state is FirmwareState.FAILED else GOOD}
 
 
 @TABLE.on(Code.UPDATE_VERSION, right=Right.SEE, needs=(Firmware,))
-async def update_version(call: Call) -> dict[str, Any]:
+async def update_version(call: Call) -> dict[str, object]:
     """What runs now (not in the text)."""
     return {"version": call.context.robot[Firmware].version, "code": GOOD}
 
 
 @TABLE.on(Code.DOWNLOAD_UPDATE, right=Right.ADMIN, needs=(Firmware,))
-async def download_update(call: Call, *, modules: object) -> dict[str, Any]:
+async def download_update(call: Call, *, modules: object) -> dict[str, object]:
     """Fetch the files of some modules; push 5005 reports the progress."""
     firmware = call.context.robot[Firmware]
     try:
@@ -60,7 +60,7 @@ async def download_update(call: Call, *, modules: object) -> dict[str, Any]:
 
 
 @TABLE.on(Code.INSTALL_UPDATE, right=Right.ADMIN, needs=(Firmware,))
-async def install_update(call: Call, *, md5: str) -> dict[str, Any]:
+async def install_update(call: Call, *, md5: str) -> dict[str, object]:
     """Install what was downloaded and restart; the text spells the key "reponse", clients read either."""
     call.context.robot[Firmware]
     code = call.context.updates.obstacle(md5)

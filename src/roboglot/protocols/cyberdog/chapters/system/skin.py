@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from typing import Any
 
 from roboglot.model.components.interaction.skin import ElectronicSkin, Shade, SkinPattern
 from roboglot.model.errors import InvalidGoal, Refused
@@ -18,7 +17,7 @@ OVER_TIME = frozenset({SkinMode.REARWARD, SkinMode.FORWARD, SkinMode.FLASH, Skin
 
 
 @TABLE.on(Code.ENABLE_SKIN, right=Right.DRIVE, needs=(ElectronicSkin,))
-async def enable_skin(call: Call, *, data: bool) -> dict[str, Any]:
+async def enable_skin(call: Call, *, data: bool) -> dict[str, object]:
     """On or off; off, it is dark."""
     call.context.robot[ElectronicSkin].enable(data)
     return {"success": True, "message": ""}

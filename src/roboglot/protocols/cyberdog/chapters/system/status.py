@@ -81,7 +81,7 @@ def ticks(context: Context, address: str) -> Any:
 
 
 @TABLE.on(Code.STATUS, right=Right.SEE)
-async def query_status(call: Call) -> dict[str, Any]:
+async def query_status(call: Call) -> dict[str, object]:
     """The states of the heartbeat, on request."""
     status = status_of(call.context)
     return {
@@ -110,7 +110,7 @@ def _battery(context: Context) -> dict[str, Any]:
     }
 
 
-def _wifi(context: Context) -> dict[str, Any]:
+def _wifi(context: Context) -> dict[str, object]:
     """Its network in the simulated world, but the address where clients reach it."""
     if Network not in context.robot:
         return {"name": "", "ip": context.address, "mac": "", "strength": 0}
@@ -138,7 +138,7 @@ def _versions(context: Context) -> dict[str, Any]:
     return answer
 
 
-def _motor_temperatures(context: Context) -> dict[str, Any]:
+def _motor_temperatures(context: Context) -> dict[str, object]:
     """Celsius, four legs a joint. Robots send text with two decimals, and words of theirs where there are none."""
     warm = dict(context.robot[Motors].temperatures) if Motors in context.robot else {}
     legs = {joint: [warm.get(f"{leg} {name}") for leg in LEGS] for joint, name in JOINTS.items()}
@@ -152,7 +152,7 @@ def _motor_temperatures(context: Context) -> dict[str, Any]:
 NX = "nx"
 LEGS = ("left front", "right front", "left rear", "right rear")
 JOINTS = {"hip": "hip", "thigh": "thigh", "crus": "knee"}
-INFORMATION: Mapping[str, Callable[[Context, str], Any]] = {
+INFORMATION: Mapping[str, Callable[[Context, str], object]] = {
     "version": lambda context, _: _versions(context),
     "sn": lambda context, _: context.robot.description.serial,
     "nick_name": lambda context, _: {"default_name": DEFAULT_NAME, "current_name": nickname(context.robot)},
@@ -187,7 +187,7 @@ async def device_information(
     is_stand: bool = False,
     is_lowpower_control: bool = False,
     uid: str | int = "",
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """Only what was asked for, and always "non-standing", as robots in the field do."""
     wanted = (
         is_version,

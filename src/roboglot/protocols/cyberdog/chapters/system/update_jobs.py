@@ -109,7 +109,7 @@ class UpdateJobs:
 
     # -- what can be wanted; each returns the result's data ----------------------------------------------------------
 
-    async def inquire(self, _: Goal) -> dict[str, Any]:
+    async def inquire(self, _: Goal) -> dict[str, object]:
         """What runs, what is downloaded, what the maker offers."""
         firmware = self._robot[Firmware]
         offered, package = firmware.available, firmware.progress.package
@@ -121,7 +121,7 @@ class UpdateJobs:
             "available": {"version": offered.version, "size": offered.size, "md5": offered.digest} if offered else {},
         }
 
-    async def download(self, goal: Goal) -> dict[str, Any]:
+    async def download(self, goal: Goal) -> dict[str, object]:
         """``data``: modules as 5003 has them; without them what the maker offers."""
         firmware = self._robot[Firmware]
         if firmware.progress.state in UNDER_WAY:
@@ -135,7 +135,7 @@ class UpdateJobs:
         await self._updates.download(package, digests).succeeded()
         return {"version": package.version, "md5": package.digest}
 
-    async def upgrade(self, goal: Goal) -> dict[str, Any]:
+    async def upgrade(self, goal: Goal) -> dict[str, object]:
         """Install what was downloaded (``data``: its MD5, or nothing); it runs after the next restart."""
         package = self._robot[Firmware].progress.package
         named = goal.data or (package.digest if package else "")
@@ -144,7 +144,7 @@ class UpdateJobs:
         await self._updates.installed()
         return {"version": package.version if package else ""}
 
-    async def upgrade_and_reboot(self, goal: Goal) -> dict[str, Any]:
+    async def upgrade_and_reboot(self, goal: Goal) -> dict[str, object]:
         """The same, and restart."""
         done = await self.upgrade(goal)
         self._updates.restart()
@@ -157,7 +157,7 @@ class UpdateJobs:
         await self._robot[Firmware].discard()
         return {}
 
-    async def reboot(self, _: Goal) -> dict[str, Any]:
+    async def reboot(self, _: Goal) -> dict[str, object]:
         """Restart."""
         if self._robot[Firmware].progress.state in (FirmwareState.INSTALLING, FirmwareState.REBOOTING):
             raise Unable(BUSY, "an update is under way")
@@ -178,7 +178,7 @@ class UpdateJobs:
         return {"size": disk.size, "free": disk.free}
 
 
-OPERATIONS: Mapping[str, Callable[[UpdateJobs, Goal], Awaitable[dict[str, Any]]]] = {
+OPERATIONS: Mapping[str, Callable[[UpdateJobs, Goal], Awaitable[dict[str, object]]]] = {
     work.__name__: work
     for work in (
         UpdateJobs.inquire,
@@ -193,5 +193,5 @@ OPERATIONS: Mapping[str, Callable[[UpdateJobs, Goal], Awaitable[dict[str, Any]]]
 }
 
 
-def _progress(progress: FirmwareProgress) -> dict[str, Any]:
+def _progress(progress: FirmwareProgress) -> dict[str, object]:
     return {"state": progress.state, "progress": round(100 * progress.share)}

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from roboglot.model.components.energy.power import Power
 from roboglot.model.components.motion.legs import Legs, Posture
 from roboglot.model.components.sensing.depth_camera import DepthCamera
@@ -28,7 +26,7 @@ LAST_WORDS = 1.0  # s between the answer and the robot's going away
 
 
 @TABLE.on(Code.LEAVE_LOW_POWER, right=Right.DRIVE, needs=(Power,))
-async def leave_low_power(call: Call) -> dict[str, Any]:
+async def leave_low_power(call: Call) -> dict[str, object]:
     """Answered when the robot is awake; an empty battery keeps it in low power."""
     power, clock = call.context.robot[Power], call.context.robot.clock
     waking = power.wake(source=SOURCE)
@@ -47,7 +45,7 @@ async def switch_automatic_low_power(call: Call, *, data: bool) -> dict[str, boo
 
 
 @TABLE.on(Code.WORK_ENVIRONMENT, right=Right.ADMIN, needs=(Settings,))
-async def set_work_environment(call: Call, *, data: str) -> dict[str, Any]:
+async def set_work_environment(call: Call, *, data: str) -> dict[str, object]:
     """Production ("pro") or "test": kept. Simulated robots have the same maker in both."""
     if data not in ENVIRONMENTS:
         return {"success": False, "message": f"the environment is {' or '.join(ENVIRONMENTS)}"}
@@ -56,7 +54,7 @@ async def set_work_environment(call: Call, *, data: str) -> dict[str, Any]:
 
 
 @TABLE.on(Code.UPLOAD_LOG, right=Right.ADMIN, needs=(SystemLog,))
-async def upload_log(call: Call) -> dict[str, Any]:
+async def upload_log(call: Call) -> dict[str, object]:
     """Hand the system's log to the maker; false when the internet is not reached."""
     action = call.context.robot[SystemLog].upload(source=SOURCE)
     try:
@@ -70,14 +68,14 @@ async def upload_log(call: Call) -> dict[str, Any]:
 
 
 @TABLE.on(Code.UPLOAD_MOTION_LOG, right=Right.ADMIN, needs=(SystemLog,))
-async def upload_motion_log(call: Call) -> dict[str, Any]:
+async def upload_motion_log(call: Call) -> dict[str, object]:
     """The same for the log of the motion board (not in the text), which here is one with the system's."""
     answer = await upload_log(call)
     return answer if "error_code" in answer else {**answer, "message": ""}
 
 
 @TABLE.on(Code.SWITCH_POINT_CLOUD, right=Right.EDIT, needs=(DepthCamera,))
-async def switch_point_cloud(call: Call, *, data: bool) -> dict[str, Any]:
+async def switch_point_cloud(call: Call, *, data: bool) -> dict[str, object]:
     """The depth camera, whose points are what is gone around (not in the text); not while a bracelet is followed."""
     camera = call.context.robot[DepthCamera]
     if call.context.tasks.state is TaskState.TAG_FOLLOWING:
@@ -87,7 +85,7 @@ async def switch_point_cloud(call: Call, *, data: bool) -> dict[str, Any]:
 
 
 @TABLE.on(Code.POINT_CLOUD, right=Right.SEE, needs=(DepthCamera,))
-async def point_cloud(call: Call) -> dict[str, Any]:
+async def point_cloud(call: Call) -> dict[str, object]:
     """Whether it is on (not in the text)."""
     return {"success": call.context.robot[DepthCamera].enabled, "message": ""}
 
@@ -122,7 +120,7 @@ async def power_off(call: Call) -> dict[str, bool]:
 
 
 @TABLE.on(Code.CALIBRATE_LEGS, right=Right.ADMIN, needs=(Legs,))
-async def calibrate_legs(call: Call, *, data: bool) -> dict[str, Any]:
+async def calibrate_legs(call: Call, *, data: bool) -> dict[str, object]:
     """False: lie down and let the motors go; true: give them power again and stand."""
     legs, clock = call.context.robot[Legs], call.context.robot.clock
     if not data and legs.posture is Posture.LIMP:
