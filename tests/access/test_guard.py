@@ -19,6 +19,7 @@ from roboglot.access.guard import Guard
 from roboglot.access.store import FILE, AccessStore, Grant
 from roboglot.config import AccessConfig
 from roboglot.model.clock import LockstepClock
+from roboglot.model.components.system.lease import Lease
 from roboglot.operations import Right
 from roboglot.runtime import Runtime
 from tests.access.matrix import ADDRESS, CALLERS, TextCaller, open_frames
@@ -188,6 +189,50 @@ async def test_what_changed_and_what_was_refused_is_kept(runtime: Runtime, store
     assert audit.verify(data / audit.FILE)[0] == 3
     for path in filter(Path.is_file, sorted(data.rglob("*"))):  # noqa: ASYNC240
         assert not any(secret.encode() in path.read_bytes() for secret in secrets), path
+
+
+async def test_what_the_console_changes_is_kept(runtime: Runtime, store: AccessStore, data: Path) -> None:
+    token, seer = store.add_machine("cell", [Grant("a", DRIVE)]), store.add_machine("eye", [Grant("a", SEE)])
+    teacher = store.add_machine("boss", [Grant("*", frozenset({Right.ADMIN}))])
+    guard_of(runtime).reload()
+    assert runtime.console is not None
+    await runtime.console.ready()
+    async with httpx.AsyncClient(base_url=f"http://127.0.0.1:{runtime.console.port}/api/") as client:
+
+        async def ask(who: str, path: str, **values: object) -> int:
+            reply = await client.post(path, json=values, headers={"authorization": f"Bearer {who}"})
+            return reply.status_code
+
+        assert await ask(token, "robots/a/take_control") == 200
+        assert await ask(token, "robots/a/maps") == 200  # changes nothing
+        assert await ask(token, "robots/a/go_to", points=[]) >= 400
+        assert await ask(seer, "robots/a/release_control") == 403
+        assert await ask(token, "class", do="open") == 403
+        assert await ask(teacher, "class", do="open", name="7b") == 200
+    guard_of(runtime).audit.close()
+    rows = [(entry.who, entry.operation, entry.outcome) for _, entry in audit.read(data / audit.FILE)]
+    assert [row for row in rows if row[1] != "go_to"] == [
+        ("cell", "take_control", "done"),
+        ("eye", "release_control", "refused"),
+        ("cell", "class open", "refused"),
+        ("boss", "class open", "done"),
+    ]
+
+
+@pytest.mark.parametrize("taken", ["console cell", "slamware cell", "robomaster cell:4242"])
+async def test_control_goes_with_the_right(runtime: Runtime, store: AccessStore, taken: str) -> None:
+    robot = runtime.fleet.robots["a"]
+    for name in ("cell", "cellar"):
+        store.add_machine(name, [Grant("a", DRIVE)])
+    guard_of(runtime).reload()
+    await robot[Lease].take(taken)
+    store.revoke("cellar")
+    guard_of(runtime).reload()
+    await asyncio.sleep(0)
+    assert robot[Lease].taken_by == taken
+    store.revoke("cell")
+    guard_of(runtime).reload()
+    await until(lambda: not robot[Lease].taken_by)
 
 
 async def until(condition) -> None:  # type: ignore[no-untyped-def]

@@ -8,7 +8,8 @@ import binascii
 import logging
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
@@ -20,6 +21,8 @@ from roboglot.access.store import FILE, AccessStore, Grant, Kind
 from roboglot.config import AccessConfig, is_loopback
 from roboglot.model.admission import NO_PROOF, Admission, Forbidden, LockedOut, Proof, ProofKind, Right, Unknown
 from roboglot.model.client_context import connection, identity
+from roboglot.model.components.system.lease import Lease
+from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
 from roboglot.model.tap import Direction, Exchange
 from roboglot.transport.limiter import Limiter
@@ -255,6 +258,7 @@ class RobotAdmission(Admission):
         self._needs: dict[str, Right] = {}
         self._allowed: dict[tuple[str, str], Right] = {}  # the right that sufficed, until rights change
         self._listeners: list[Callable[[str], None]] = []
+        self._releasing: asyncio.Future[None] | None = None
         self._offers: dict[int, tuple[asyncio.Server, Callable[[], asyncio.Protocol]]] = {}
         robot.admission = self
         robot.tap.listen(self._note_reply)
@@ -313,6 +317,16 @@ class RobotAdmission(Admission):
         self._note(who, connection(), door, operation, "refused", why)
         raise Forbidden(why)
 
+    @contextmanager
+    def noting(self, door: str, operation: str) -> Iterator[None]:
+        """See ``Admission.noting``."""
+        try:
+            yield
+        except RobotError as error:
+            self._note(identity(), connection(), door, operation, "refused", str(error))
+            raise
+        self._note(identity(), connection(), door, operation, "done", "")
+
     def may(self, right: Right) -> bool:
         """Whether the client that is asked for has ``right``."""
         return right in self._rights.get(identity(), NOTHING)
@@ -346,6 +360,8 @@ class RobotAdmission(Admission):
         for action in self._robot.actions.running():
             if cut and action.identity == who:
                 action.cancel(f"{who} may no longer drive")
+        if cut and Lease in self._robot and self._robot[Lease].is_of(who):
+            self._releasing = asyncio.ensure_future(self._robot[Lease].release())
         for listener in tuple(self._listeners):
             listener(who)
 

@@ -136,7 +136,8 @@ class Api:
         wish = _wish(await read_json(receive), RecordingWish)
         for robot in self._desk.robots.values():
             robot.admission.check(CLIENT, "record", Right.ADMIN)
-        return await recordings.do(wish)
+        with self._desk.noting(f"record {wish.do}"):
+            return await recordings.do(wish)
 
     async def _serve_program(self, method: str, name: str, what: str, receive: Receive, send: Send) -> None:
         if method == "GET" and what == "program":
@@ -206,7 +207,8 @@ class Api:
         # The door sees a client on this machine, not the person at the page: only ADMIN may do all that it may.
         view.robot.admission.check(CLIENT, "send a request again", Right.ADMIN)
         exchange = view.wire.get(_whole(number))
-        return await resend(exchange, self._endpoint(name, exchange.door))
+        with view.robot.admission.noting(CLIENT, "send a request again"):
+            return await resend(exchange, self._endpoint(name, exchange.door))
 
     def _endpoint(self, name: str, door: str) -> Endpoint:
         listed = self._desk.doors().get(name, ())

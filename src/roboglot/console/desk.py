@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import contextlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,7 @@ from roboglot.model.components.system.lease import Lease
 from roboglot.model.errors import Forbidden, NotFound, Refused
 from roboglot.model.robot import Robot
 from roboglot.model.stage import Stage
+from roboglot.operations import Operation
 from roboglot.protocols.door import Endpoint
 
 if TYPE_CHECKING:
@@ -138,11 +140,23 @@ class Desk:
         robot = self.view(name, verb).robot
         if verb == TAKE:
             self.check(robot, verb, Right.DRIVE)
-            return await robot[Lease].take(client)
+            with robot.admission.noting(CLIENT, verb):
+                return await robot[Lease].take(client)
         if (operation := VERBS.get(verb)) is None:
             raise NotFound(f"there is no verb {verb!r}")
         self.check(robot, verb, operation.right)
-        return await operation.call(robot, values)
+        if operation.right is Right.SEE:
+            return await operation.call(robot, values)
+        with robot.admission.noting(CLIENT, verb):
+            return await operation.call(robot, values)
+
+    @contextlib.contextmanager
+    def noting(self, what: str) -> Iterator[None]:
+        """Keep what becomes of something that concerns all robots."""
+        with contextlib.ExitStack() as stack:
+            for robot in self.robots.values():
+                stack.enter_context(robot.admission.noting(CLIENT, what))
+            yield
 
     def world_file(self) -> str:
         """Return the simulated world as it stands now, as a file. Raises Forbidden."""
@@ -157,6 +171,10 @@ class Desk:
             raise NotFound(f"there is no verb {verb!r} for the world")
         for robot in self.robots.values():  # a world belongs to all who are in it
             robot.admission.check(CLIENT, verb, operation.right)
+        with self.noting(verb):
+            return await self._change_world(operation, values)
+
+    async def _change_world(self, operation: Operation[str], values: Mapping[str, object]) -> Any:
         if operation.key not in CLOCK_VERBS:
             return await operation.call(self.stage, values)
         if real := sorted(self.robots.keys() - {placed.name for placed in self.stage.robots}):

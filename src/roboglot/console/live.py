@@ -220,7 +220,8 @@ class Page:
         why = ""
         try:
             self._desk.check(view.robot, "drive", Right.DRIVE)
-            pad.drive(velocity, milliseconds())
+            with view.robot.admission.noting(CLIENT, "drive"):
+                pad.drive(velocity, milliseconds())
         except RobotError as error:
             why = str(error)
         if why != self._refused:  # said once, not at every message

@@ -20,8 +20,9 @@ async def start(desk: Desk, name: str, source: str) -> dict[str, Any]:
     programs = _programs(desk, name, Right.PROGRAM)
     if not 0 < len(source) <= SOURCE_MAX:
         raise ValueError(f"a program has 1 to {SOURCE_MAX} characters")
-    await programs.service.save(StoredProgram(TASK, "run by a script", "", "single", "now", source, ""))
-    await programs.service.run(TASK)
+    with desk.robots[name].admission.noting(CLIENT, "program"):
+        await programs.service.save(StoredProgram(TASK, "run by a script", "", "single", "now", source, ""))
+        await programs.service.run(TASK)
     return await program(desk, name)
 
 

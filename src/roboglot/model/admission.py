@@ -6,7 +6,8 @@ Where nothing is configured, nothing is asked: ``asks`` is false, and that is al
 from __future__ import annotations
 
 from asyncio import Protocol, Server
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -61,6 +62,11 @@ class Admission:
 
     def check(self, door: str, operation: str, right: Right | None) -> None:
         """Raises Forbidden unless the client that is asked for (``asking.identity``) has ``right``; None is ADMIN."""
+
+    @contextmanager
+    def noting(self, door: str, operation: str) -> Iterator[None]:
+        """Keep what becomes of an operation that changes something, where no tap shows it: done, or refused and why."""
+        yield
 
     def may(self, right: Right) -> bool:
         """True if the client that is asked for has ``right``."""

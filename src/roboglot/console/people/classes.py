@@ -125,6 +125,10 @@ class Classes:
 
     async def do(self, wish: Wish) -> dict[str, Any]:
         """Do what a teacher wants, and show the class. Raises Forbidden, NotFound, Refused."""
+        with self._desk.noting(f"class {wish.do}"):
+            return await self._do(wish)
+
+    async def _do(self, wish: Wish) -> dict[str, Any]:
         self._check_teacher()
         if wish.do == "open":
             self._open(wish)

@@ -114,6 +114,11 @@ class Lease(Component):
         if Link in self._robot:
             await self._robot[Link].take_back()
 
+    def is_of(self, who: str) -> bool:
+        """Whether control is taken by the client that showed to be ``who``, by whatever door."""
+        _, _, client = self._taken_by.partition(" ")
+        return bool(who) and (client == who or client.startswith(f"{who}:"))
+
     async def release(self) -> None:
         """Let every client move it again. Returns when that is stored."""
         if self._taken_by:
