@@ -30,7 +30,8 @@ from roboglot.protocols.cyberdog.chapters.camera.transfers import Transfers
 from roboglot.protocols.cyberdog.chapters.camera.transmission import Transmission
 from roboglot.protocols.cyberdog.chapters.mapping.reports import MapReports
 from roboglot.protocols.cyberdog.chapters.mapping.task_state import Tasks
-from roboglot.protocols.cyberdog.chapters.motion.gait import SOURCE, Gaits
+from roboglot.protocols.cyberdog.chapters.motion.gait import Gaits
+from roboglot.protocols.cyberdog.chapters.motion.motion_start import SOURCE
 from roboglot.protocols.cyberdog.chapters.motion.stairs import call_off
 from roboglot.protocols.cyberdog.chapters.people.audio import ASK_VOICEPRINTS, TRAINED, activated
 from roboglot.protocols.cyberdog.chapters.people.face_recognition import Faces

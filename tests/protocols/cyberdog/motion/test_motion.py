@@ -15,7 +15,8 @@ from roboglot.model.components.motion.legs import Legs, Posture
 from roboglot.model.components.system.lease import Lease
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
-from roboglot.protocols.cyberdog.chapters.motion.gait import Gaits, Wish
+from roboglot.protocols.cyberdog.chapters.motion.gait import Gaits
+from roboglot.protocols.cyberdog.chapters.motion.motion_start import Wish
 from roboglot.simulation.world.world import World
 from roboglot.testing import assert_pose
 from roboglot.wire.cyberdog.motions import MotionCode

@@ -11,7 +11,7 @@ from roboglot.model.components.motion.docking import Docking
 from roboglot.model.errors import RobotError
 from roboglot.model.map_loading import known_dock
 from roboglot.protocols.cyberdog.chapters.mapping.task_state import Task
-from roboglot.protocols.cyberdog.chapters.motion.gait import SOURCE
+from roboglot.protocols.cyberdog.chapters.motion.motion_start import SOURCE
 from roboglot.protocols.cyberdog.context import Context
 from roboglot.wire.cyberdog.codes import Feedback, TaskResult
 

@@ -18,7 +18,7 @@ from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.chapters.mapping.docking import keep_dock
 from roboglot.protocols.cyberdog.chapters.mapping.labels import newest_map
 from roboglot.protocols.cyberdog.chapters.mapping.task_state import Task
-from roboglot.protocols.cyberdog.chapters.motion.gait import SOURCE
+from roboglot.protocols.cyberdog.chapters.motion.motion_start import SOURCE
 from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.errors import codes_of
 from roboglot.wire.cyberdog.codes import Feedback, TaskResult

@@ -3,29 +3,24 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Coroutine, Sequence
+from collections.abc import Coroutine
 from dataclasses import dataclass
 
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.motion.base import Base
-from roboglot.model.components.motion.driving import BASE, Driving
-from roboglot.model.components.motion.feet import Foot, Footfall, Foothold
 from roboglot.model.components.motion.legs import (
-    BodyPose,
-    FootLift,
     Legs,
     Posture,
-    Step,
 )
 from roboglot.model.errors import RobotError
-from roboglot.model.geometry import STILL, Orientation, Twist
+from roboglot.model.geometry import Twist
 from roboglot.model.robot import Robot
-from roboglot.protocols.cyberdog.chapters.motion.climbing import WayAhead, sees
+from roboglot.protocols.cyberdog.chapters.motion.climbing import sees
+from roboglot.protocols.cyberdog.chapters.motion.motion_start import SOURCE, WATCHDOG, MotionStart, Wish
 from roboglot.protocols.cyberdog.chapters.motion.motion_states import begins_in, entered, of_another, under_way
 from roboglot.protocols.cyberdog.chapters.motion.motion_table import (
     DANCED,
     DANCES,
-    FIGURES,
     FIXED_TIME,
     KNOWN,
     NUMBERS,
@@ -48,29 +43,9 @@ from roboglot.wire.cyberdog.motions import (
     SwitchStatus,
 )
 
-SOURCE = "cyberdog"
-WATCHDOG = 0.2  # s without a servo frame, then the robot stands still
 DURATION_MAX = 60.0  # s that one walk by a result command may take: only an emergency stop ends it
-PASSIVE_TROT = 1.0  # s of that walk by a result command
-POSE_TIME = 0.5  # s into a body pose for which no duration is given
-MOVING = 0.01  # m/s or rad/s from which the body counts as walking
-LOOK = 0.1  # s between two looks ahead
-PAW_LIFT = 0.08  # m
-UPRIGHT = BodyPose()
-
-
-@dataclass(frozen=True, slots=True)
-class Wish:
-    """What a motion is asked for: velocity (base_link), how to hold the body, seconds, how to lift the feet."""
-
-    velocity: Twist = STILL
-    body: BodyPose = UPRIGHT
-    seconds: float = 0.0
-    lift: FootLift | None = None
-    down: frozenset[Foot] = frozenset(Foot)  # the feet that stay on the floor
-
-
 NOTHING_SPECIAL = Wish()
+MOVING = 0.01  # m/s or rad/s from which the body counts as walking
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,13 +62,11 @@ class Gaits:
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
+        self._start = MotionStart(robot)
         self._last: int = Motion.STAND_UP  # the motion commanded last
         self._servo: Action | None = None
         self._rising: Action | None = None  # getting up for a servo
         self._performing: Action | None = None
-        self._body = UPRIGHT  # as the last servo frame wanted it
-        self._ahead = WayAhead(robot)
-        self._standing = 0.0  # m, the belly's height when it stood last
         self._low = 0.0  # m, and when it began to get up
         self._sequences: set[asyncio.Task[MotionCode]] = set()
 
@@ -153,10 +126,10 @@ class Gaits:
                 return Executed(MotionCode.DONE, SwitchStatus.CHANGING, 0.0)
             if motion in SERVO_POSES:
                 relative, _ = POSES[motion]
-                self._hold(wish.body, relative=relative)
+                self._start.hold(wish.body, relative=relative)
             else:
-                self._hold(wish.body)
-                self._servo = self._walk(motion, wish, WATCHDOG, f"{SOURCE} servo")
+                self._start.hold(wish.body)
+                self._servo = self._start.walk(motion, wish, WATCHDOG, f"{SOURCE} servo")
         except RobotError as error:
             return Executed(codes_of(error).motion)
         self._last = motion
@@ -167,31 +140,10 @@ class Gaits:
             return Legs in self._robot
         return motion in WALKS and (motion not in SEEING or sees(self._robot))
 
-    def _walk(self, motion: int, wish: Wish, seconds: float, source: str) -> Action:
-        if Legs in self._robot:
-            self._robot[Legs].walk(WALKS[motion], self._lift(motion, wish))
-            if self._body == UPRIGHT:
-                self._standing = self._robot[Legs].body_height
-        return self._robot[Driving].drive(wish.velocity, lifetime=seconds, source=source)
-
-    def _lift(self, motion: int, wish: Wish) -> FootLift | None:
-        return self._ahead.lift(wish.lift) if motion in SEEING else wish.lift
-
-    async def _look_ahead(self, motion: int, wish: Wish) -> None:
-        """Lift the feet over what comes, until cancelled."""
-        async for _ in self._robot.clock.every(LOOK):
-            self._robot[Legs].walk(WALKS[motion], self._lift(motion, wish))
-
-    def _hold(self, body: BodyPose, *, relative: bool = False) -> None:
-        """Walk, or stand, so held; a frame that wants what the last one wanted changes nothing."""
-        if (relative or body != self._body) and Legs in self._robot:
-            self._robot[Legs].hold(body, duration=WATCHDOG, relative=relative, source=SOURCE)
-            self._body = body
-
     @property
     def _risen(self) -> float:
         """How much of getting up is done; unknown is nothing."""
-        way = self._standing - self._low
+        way = self._start.standing - self._low
         return max(0.0, min(0.99, (self._robot[Legs].body_height - self._low) / way)) if way > 0.01 else 0.0
 
     def end_servo(self) -> Executed:
@@ -220,7 +172,7 @@ class Gaits:
     async def _calibrate(self) -> MotionCode:
         code = await self._go_through(Motion.LIE_DOWN, NOTHING_SPECIAL)
         if code is MotionCode.DONE:
-            self._stop()
+            self._start.stop()
         return code
 
     async def carry_out(self, motion: int, wish: Wish) -> MotionCode:
@@ -253,7 +205,7 @@ class Gaits:
                 action = self._begin(number, wanted)
             except RobotError as error:
                 return codes_of(error).motion
-            looking = self._looking(number, wanted)
+            looking = self._start.looking(number, wanted)
             try:
                 code = await self._ended(action) if action else MotionCode.DONE
             finally:
@@ -262,11 +214,6 @@ class Gaits:
             if code is not MotionCode.DONE:
                 break
         return code
-
-    def _looking(self, motion: int, wish: Wish) -> asyncio.Task[None] | None:
-        if motion not in SEEING or Legs not in self._robot:
-            return None
-        return asyncio.get_running_loop().create_task(self._look_ahead(motion, wish), name="look ahead")
 
     def _leading_to(self, motion: int) -> list[int]:
         """What must come first in the present posture: standing up, sitting down."""
@@ -311,70 +258,8 @@ class Gaits:
         return under_way(self._performing) or any(not task.done() for task in self._sequences)
 
     def _begin(self, motion: int, wish: Wish) -> Action | None:
-        """None: done at once."""
-        robot = self._robot
-        match motion:
-            case Motion.EMERGENCY_STOP:
-                self._stop()
-                return None
-            case Motion.STAND_UP if Legs not in robot:
-                return None
-            case _ if (action := self._posture(motion)) is not None:
-                pass
-            case Motion.USER_SEQUENCE:
-                last = robot[Legs].choreography
-                action = robot[Legs].dance(last.steps, last.footfalls, source=SOURCE)
-            case Motion.USER_GAIT:
-                step = Step(wish.seconds or PASSIVE_TROT, wish.velocity, lift=wish.lift or FootLift())
-                action = self._dance(step, robot[Legs].choreography.footfalls)
-            case Motion.POSE_ONE_FOOT if len(wish.down) < len(Foot):
-                action = self._raise_foot(wish)
-            case _ if motion in POSES:
-                relative, _ = POSES[motion]
-                seconds = wish.seconds or POSE_TIME
-                action = robot[Legs].hold(wish.body, duration=seconds, relative=relative, source=SOURCE)
-            case _:
-                action = self._walk(motion, wish, wish.seconds or PASSIVE_TROT, SOURCE)
-        self._last, self._performing = motion, action
+        """Begin a motion and note it; None: it was done at once."""
+        action = self._start.begin(motion, wish)
+        if action is not None:
+            self._last, self._performing = motion, action
         return action
-
-    def _posture(self, motion: int) -> Action | None:
-        """Begin a motion that takes no parameters; None if ``motion`` does."""
-        robot = self._robot
-        if motion == Motion.STAND_UP:
-            self._body = UPRIGHT
-            return robot[Legs].stand(source=SOURCE)
-        if motion in (Motion.LIE_DOWN, Motion.LIE_DOWN_PASSIVE):
-            return robot[Legs].lie_down(source=SOURCE)
-        if motion in WALK_STANDS:
-            return robot[Driving].drive(Twist(), lifetime=WATCHDOG, source=SOURCE)
-        if motion in FIGURES:
-            return robot[Legs].perform(FIGURES[motion], source=SOURCE)
-        return None
-
-    def _raise_foot(self, wish: Wish) -> Action:
-        """Hold the body by so much otherwise with the feet in the air that are not ``down``, then stand straight."""
-        legs, now = self._robot[Legs], self._robot[Legs].attitude
-        by = wish.body
-        turned = Orientation(now.roll + by.attitude.roll, now.pitch + by.attitude.pitch, now.yaw + by.attitude.yaw)
-        height = None if by.height is None else legs.body_height + by.height
-        lift = wish.lift.front if wish.lift else PAW_LIFT
-        step = Step(wish.seconds, body=BodyPose(height, turned, by.shift), footholds=(Foothold(lift=lift),) * len(Foot))
-        return self._dance(step, [Footfall(wish.seconds, wish.down)])
-
-    def _dance(self, step: Step, footfalls: Sequence[Footfall]) -> Action:
-        """Dance one step; the choreography that 400 repeats stays what it was."""
-        legs = self._robot[Legs]
-        users = legs.choreography
-        try:
-            return legs.dance([step], footfalls, source=SOURCE)
-        finally:
-            legs.choreography = users
-
-    def _stop(self) -> None:
-        """Without legs to give way, standing still at once is the nearest to it."""
-        if Legs in self._robot:
-            self._robot[Legs].go_limp()
-        else:
-            for action in self._robot.actions.running(BASE):
-                action.cancel("emergency stop")

@@ -8,7 +8,8 @@ from roboglot.model.components.motion.driving import Driving
 from roboglot.model.geometry import STILL
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.call import Call
-from roboglot.protocols.cyberdog.chapters.motion.gait import Executed, Wish
+from roboglot.protocols.cyberdog.chapters.motion.gait import Executed
+from roboglot.protocols.cyberdog.chapters.motion.motion_start import Wish
 from roboglot.protocols.cyberdog.chapters.motion.motion_table import POSES, SERVO_POSES, WALKS
 from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.protocols.cyberdog.table import TABLE, push

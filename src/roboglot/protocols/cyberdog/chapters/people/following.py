@@ -17,7 +17,7 @@ from roboglot.model.events import ActionChanged
 from roboglot.operations import BadParameters, Right
 from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.chapters.mapping.task_state import Task
-from roboglot.protocols.cyberdog.chapters.motion.gait import SOURCE
+from roboglot.protocols.cyberdog.chapters.motion.motion_start import SOURCE
 from roboglot.protocols.cyberdog.chapters.people.pursuit import Pursuit, ThingPursuit
 from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.table import TABLE

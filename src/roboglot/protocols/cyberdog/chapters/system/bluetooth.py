@@ -20,7 +20,7 @@ from roboglot.model.errors import NotFound, Refused
 from roboglot.model.robot import Robot
 from roboglot.operations import BadParameters, Right
 from roboglot.protocols.cyberdog.call import Call
-from roboglot.protocols.cyberdog.chapters.motion.gait import SOURCE
+from roboglot.protocols.cyberdog.chapters.motion.motion_start import SOURCE
 from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.wire.cyberdog.codes import Code, InBandError
 

@@ -21,7 +21,7 @@ from roboglot.model.events import FirmwareChanged
 from roboglot.model.robot import Robot
 from roboglot.operations import BadParameters
 from roboglot.protocols.cyberdog.app_link import AppLink
-from roboglot.protocols.cyberdog.chapters.motion.gait import SOURCE
+from roboglot.protocols.cyberdog.chapters.motion.motion_start import SOURCE
 from roboglot.protocols.cyberdog.chapters.system.stored_settings import UPDATE, kept
 from roboglot.protocols.cyberdog.table import push
 from roboglot.wire.cyberdog.codes import Code

@@ -12,7 +12,7 @@ from roboglot.model.components.system.system_log import SystemLog
 from roboglot.model.errors import InvalidGoal, NotFound, Refused, RobotError
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.call import Call
-from roboglot.protocols.cyberdog.chapters.motion.gait import SOURCE
+from roboglot.protocols.cyberdog.chapters.motion.motion_start import SOURCE
 from roboglot.protocols.cyberdog.chapters.system.stored_settings import ENVIRONMENT
 from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.wire.cyberdog.codes import Code, InBandError, MachineState, TaskState, UnlockResult

@@ -1,0 +1,142 @@
+"""Begins one motion on the model: walks, poses, dances, standing still. Knows neither what came before nor its end."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from roboglot.model.actions import Action
+from roboglot.model.components.motion.driving import BASE, Driving
+from roboglot.model.components.motion.feet import Foot, Footfall, Foothold
+from roboglot.model.components.motion.legs import BodyPose, FootLift, Legs, Step
+from roboglot.model.geometry import STILL, Orientation, Twist
+from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog.chapters.motion.climbing import WayAhead
+from roboglot.protocols.cyberdog.chapters.motion.motion_table import FIGURES, POSES, SEEING, WALK_STANDS, WALKS
+from roboglot.wire.cyberdog.motions import Motion
+
+SOURCE = "cyberdog"
+WATCHDOG = 0.2  # s without a servo frame, then the robot stands still
+PASSIVE_TROT = 1.0  # s of that walk by a result command
+POSE_TIME = 0.5  # s into a body pose for which no duration is given
+LOOK = 0.1  # s between two looks ahead
+PAW_LIFT = 0.08  # m
+UPRIGHT = BodyPose()
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """What a motion is asked for: velocity (base_link), how to hold the body, seconds, how to lift the feet."""
+
+    velocity: Twist = STILL
+    body: BodyPose = UPRIGHT
+    seconds: float = 0.0
+    lift: FootLift | None = None
+    down: frozenset[Foot] = frozenset(Foot)  # the feet that stay on the floor
+
+
+class MotionStart:
+    """The motions of one robot, begun."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._body = UPRIGHT  # as the last servo frame wanted it
+        self._ahead = WayAhead(robot)
+        self.standing = 0.0  # m, the belly's height when it stood last
+
+    def walk(self, motion: int, wish: Wish, seconds: float, source: str) -> Action:
+        """Walk at the wished velocity for so many seconds."""
+        if Legs in self._robot:
+            self._robot[Legs].walk(WALKS[motion], self._lift(motion, wish))
+            if self._body == UPRIGHT:
+                self.standing = self._robot[Legs].body_height
+        return self._robot[Driving].drive(wish.velocity, lifetime=seconds, source=source)
+
+    def _lift(self, motion: int, wish: Wish) -> FootLift | None:
+        return self._ahead.lift(wish.lift) if motion in SEEING else wish.lift
+
+    async def _look_ahead(self, motion: int, wish: Wish) -> None:
+        """Lift the feet over what comes, until cancelled."""
+        async for _ in self._robot.clock.every(LOOK):
+            self._robot[Legs].walk(WALKS[motion], self._lift(motion, wish))
+
+    def hold(self, body: BodyPose, *, relative: bool = False) -> None:
+        """Walk, or stand, so held; a frame that wants what the last one wanted changes nothing."""
+        if (relative or body != self._body) and Legs in self._robot:
+            self._robot[Legs].hold(body, duration=WATCHDOG, relative=relative, source=SOURCE)
+            self._body = body
+
+    def looking(self, motion: int, wish: Wish) -> asyncio.Task[None] | None:
+        """Return what looks where the feet go, for motions that see; None for all others."""
+        if motion not in SEEING or Legs not in self._robot:
+            return None
+        return asyncio.get_running_loop().create_task(self._look_ahead(motion, wish), name="look ahead")
+
+    def begin(self, motion: int, wish: Wish) -> Action | None:
+        """Begin a motion; None: it was done at once."""
+        robot = self._robot
+        match motion:
+            case Motion.EMERGENCY_STOP:
+                self.stop()
+                return None
+            case Motion.STAND_UP if Legs not in robot:
+                return None
+            case _ if (action := self._posture(motion)) is not None:
+                pass
+            case Motion.USER_SEQUENCE:
+                last = robot[Legs].choreography
+                action = robot[Legs].dance(last.steps, last.footfalls, source=SOURCE)
+            case Motion.USER_GAIT:
+                step = Step(wish.seconds or PASSIVE_TROT, wish.velocity, lift=wish.lift or FootLift())
+                action = self._dance(step, robot[Legs].choreography.footfalls)
+            case Motion.POSE_ONE_FOOT if len(wish.down) < len(Foot):
+                action = self._raise_foot(wish)
+            case _ if motion in POSES:
+                relative, _ = POSES[motion]
+                seconds = wish.seconds or POSE_TIME
+                action = robot[Legs].hold(wish.body, duration=seconds, relative=relative, source=SOURCE)
+            case _:
+                action = self.walk(motion, wish, wish.seconds or PASSIVE_TROT, SOURCE)
+        return action
+
+    def _posture(self, motion: int) -> Action | None:
+        """Begin a motion that takes no parameters; None if ``motion`` does."""
+        robot = self._robot
+        if motion == Motion.STAND_UP:
+            self._body = UPRIGHT
+            return robot[Legs].stand(source=SOURCE)
+        if motion in (Motion.LIE_DOWN, Motion.LIE_DOWN_PASSIVE):
+            return robot[Legs].lie_down(source=SOURCE)
+        if motion in WALK_STANDS:
+            return robot[Driving].drive(Twist(), lifetime=WATCHDOG, source=SOURCE)
+        if motion in FIGURES:
+            return robot[Legs].perform(FIGURES[motion], source=SOURCE)
+        return None
+
+    def _raise_foot(self, wish: Wish) -> Action:
+        """Hold the body by so much otherwise with the feet in the air that are not ``down``, then stand straight."""
+        legs, now = self._robot[Legs], self._robot[Legs].attitude
+        by = wish.body
+        turned = Orientation(now.roll + by.attitude.roll, now.pitch + by.attitude.pitch, now.yaw + by.attitude.yaw)
+        height = None if by.height is None else legs.body_height + by.height
+        lift = wish.lift.front if wish.lift else PAW_LIFT
+        step = Step(wish.seconds, body=BodyPose(height, turned, by.shift), footholds=(Foothold(lift=lift),) * len(Foot))
+        return self._dance(step, [Footfall(wish.seconds, wish.down)])
+
+    def _dance(self, step: Step, footfalls: Sequence[Footfall]) -> Action:
+        """Dance one step; the choreography that 400 repeats stays what it was."""
+        legs = self._robot[Legs]
+        users = legs.choreography
+        try:
+            return legs.dance([step], footfalls, source=SOURCE)
+        finally:
+            legs.choreography = users
+
+    def stop(self) -> None:
+        """Without legs to give way, standing still at once is the nearest to it."""
+        if Legs in self._robot:
+            self._robot[Legs].go_limp()
+        else:
+            for action in self._robot.actions.running(BASE):
+                action.cancel("emergency stop")
