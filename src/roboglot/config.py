@@ -165,6 +165,8 @@ class Config:
     ``doors`` are the doors' own sections by name; the defaults hold for those that are not there.
     ``database`` is the URL of a PostgreSQL server that keeps what robots remember, for a fleet on several machines;
     without it, a file in the data folder does.
+    ``registry`` is where programs agree on who runs which robot: a server's URL, or a file that those on one machine
+    share; without it, ``database``, and if that is not given either, programs do not ask each other.
     ``insecure`` lets robots listen outside loopback, where everyone who reaches them may drive them.
     """
 
@@ -175,6 +177,7 @@ class Config:
     seed: int = 1
     data: Path = field(default_factory=lambda: default_data_folder(os.environ))
     database: str = ""
+    registry: str = ""
     doors: Mapping[str, Any] = field(default_factory=dict)
     programs: ProgramsConfig = field(default_factory=ProgramsConfig)
     access: AccessConfig = field(default_factory=AccessConfig)

@@ -10,6 +10,7 @@ import os
 import ssl
 from collections.abc import Awaitable, Coroutine, Sequence
 from datetime import tzinfo
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,6 +30,7 @@ from roboglot.fleet import build_fleet, origin_of
 from roboglot.hosting.exclusive import lock_folder
 from roboglot.model.client_context import concerning
 from roboglot.model.clock import Clock, LockstepClock, RealClock
+from roboglot.model.components.system.lease import Lease
 from roboglot.model.events import Rebooted, Rebooting, ShuttingDown
 from roboglot.model.robot import Robot
 from roboglot.programs.engine.engine import Engine
@@ -41,9 +43,12 @@ from roboglot.protocols.door import Clouds, Door, DoorType, Endpoint, PortKind, 
 from roboglot.protocols.lease_desk import LeaseDesk
 from roboglot.protocols.record_desk import RecordDesk
 from roboglot.rehearsal import Rehearsals, scene_of
-from roboglot.storage.opening import open_database
+from roboglot.storage.homes import Homes
+from roboglot.storage.opening import open_database, open_registry
 from roboglot.storage.outbox import Outbox
 from roboglot.storage.programs import program_stores
+from roboglot.storage.residence import Residence, holder_of
+from roboglot.storage.transactions import Transactions
 from roboglot.transport.tls import Tls, server_context
 
 if TYPE_CHECKING:
@@ -134,6 +139,8 @@ class Runtime:
         self.fleet = build_fleet(
             config.world, config.robots, clock=self.clock, seed=config.seed, database=self._database
         )
+        self._registry: Transactions | None = None
+        self._residence = self._join_registry()
         self.guard = Guard(config.data, config.access, self.fleet.robots) if config.access.on else None
         self._gateway: Gateway | None = None
         self._tls = self._build_tls()
@@ -145,6 +152,24 @@ class Runtime:
         self._rehearsals = Rehearsals(memory_together=together)
         self.doors = {robot.name: self._build_doors(robot, self.fleet.robots[robot.name]) for robot in config.robots}
         self.console = self._build_console() if config.console.enabled else None
+
+    def _join_registry(self) -> Residence | None:
+        """Have every robot's lease ask the registry. Raises OSError, ValueError if it cannot be opened."""
+        where = self.config.registry or self.config.database
+        if not where:
+            return None
+        self._registry = open_registry(where)
+        leases = {name: robot[Lease] for name, robot in self.fleet.robots.items()}
+        addresses = {robot.name: robot.address for robot in self.config.robots}
+        residence = Residence(
+            Homes(self._registry),
+            addresses,
+            holder_of(self.config.data),
+            lambda robot: leases[robot].halt("this program may not move the robot any more"),
+        )
+        for name, lease in leases.items():
+            lease.fence(partial(residence.why_not, name))
+        return residence
 
     @property
     def recorder(self) -> Recorder:
@@ -252,6 +277,9 @@ class Runtime:
 
     async def start(self) -> None:
         """Open every door, then let the world run. Raises OSError naming an address that is taken."""
+        if self._residence is not None:
+            await self._residence.take()
+            self._residence.keep()
         if self.guard is not None:
             self.guard.start()
         self._begin_recording()
@@ -284,6 +312,9 @@ class Runtime:
             await _in_time("the program engine", self._engine.close())
         if self._gateway is not None:
             await _in_time("the gateway", self._gateway.close())
+        if self._residence is not None and self._registry is not None:
+            await self._residence.close()
+            self._registry.close()
         if self.guard is not None:
             self.guard.close()
         self._database.close()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
+import sqlite3
 import sys
 import time
 import tomllib
@@ -131,6 +132,32 @@ def move(
 ) -> None:
     """Move a robot, its address and what is stored of it to another shard; both start again."""
     _tell(_ask("move", data, robot=robot, to=to))
+
+
+@app.command()
+def where(
+    robot: Annotated[str, typer.Argument(help="A robot's name; none: all of them.")] = "",
+    registry: Annotated[
+        str, typer.Option(envvar=["ROBOGLOT_REGISTRY", "ROBOGLOT_DATABASE"], help="The registry's URL or file.")
+    ] = "",
+) -> None:
+    """Show which program of which address runs a robot, on any machine, and under which epoch."""
+    from roboglot.storage.homes import Homes
+    from roboglot.storage.opening import open_registry
+    from roboglot.storage.transactions import DatabaseError
+
+    if not registry:
+        sys.exit("roboglot fleet: which --registry?")
+    try:
+        database = open_registry(registry)
+        homes = asyncio.run(Homes(database).all())
+        database.close()
+    except (ValueError, OSError, DatabaseError, sqlite3.Error) as error:
+        sys.exit(f"roboglot fleet: {error}")
+    if robot and robot not in homes:
+        sys.exit(f"roboglot fleet: the registry knows no robot {robot!r}")
+    for home in [homes[robot]] if robot else homes.values():
+        print(f"{home.robot:10} {home.address:16} epoch {home.epoch:<6} {home.holder or 'released'}")
 
 
 @app.command()

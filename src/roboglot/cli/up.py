@@ -56,6 +56,14 @@ def command(
     data: Annotated[
         Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="Folder for programs, places, certificates.")
     ] = None,
+    registry: Annotated[
+        str | None,
+        typer.Option(
+            metavar="URL|FILE",
+            envvar="ROBOGLOT_REGISTRY",
+            help="Where programs agree on who runs which robot; the database if not given.",
+        ),
+    ] = None,
     database: Annotated[
         str | None,
         typer.Option(
@@ -102,6 +110,7 @@ def command(
                 "seed": seed,
                 "data": str(data) if data else None,
                 "database": database,
+                "registry": registry,
                 **_sections(doors),
                 "access": access_section(on=access, insecure=insecure),
                 "console": None if console else {"enabled": False},

@@ -9,6 +9,11 @@ from roboglot.storage.database import Database
 from roboglot.storage.transactions import Transactions
 
 
+def open_registry(where: str) -> Transactions:
+    """Open the registry of robots' homes: a server's URL, or a file. Raises as ``open_database`` does."""
+    return open_database(Path(), where) if "://" in where else open_database(Path(where))
+
+
 def open_database(file: Path, url: str = "", robots: Collection[str] = (), *, in_place: bool = False) -> Transactions:
     """Open PostgreSQL by its ``url``, or without one the ``file``.
 

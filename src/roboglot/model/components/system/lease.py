@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Callable
 from dataclasses import astuple, dataclass
 
 from roboglot.model.actions import Action
@@ -57,6 +58,7 @@ class Lease(Component):
         self._taken_by = str(robot[Settings].get(KEPT, "")) if Settings in robot else ""
         self._last = Holder("", "", self._clock.time())
         self._outside_since: float | None = None
+        self._fence: Callable[[], str] = str  # no reason
         self._logged_at = -math.inf
         robot.actions.guard(self._admit)
         robot.events.listen(ActionChanged, lambda event: self._look() if moves(event.action) else None)
@@ -90,6 +92,16 @@ class Lease(Component):
         """True if control lets ``who`` move the robot."""
         taken = self._taken_by
         return not taken or who == taken or who.startswith((f"{taken} ", f"{taken}:"))
+
+    def fence(self, why_not: Callable[[], str]) -> None:
+        """Ask this before anything moves the robot: why it may not be moved by this program; empty: it may."""
+        self._fence = why_not
+
+    def halt(self, reason: str) -> None:
+        """End everything that moves the robot, whoever has control."""
+        for action in self._robot.actions.running():
+            if moves(action):
+                action.cancel(reason)
 
     async def take(self, who: str = PERSON) -> None:
         """From now on only ``who`` moves the robot: ``PERSON`` (no client at all), or a door or client, by its name:
@@ -135,7 +147,9 @@ class Lease(Component):
         """Raise Busy for an action that may not be. To stop is always allowed, but what others do is not ours."""
         if not moves(action):
             return
-        if self._outside_since is not None:
+        if (fenced := self._fence()) and not _stops(action.goal):
+            why = fenced
+        elif self._outside_since is not None:
             why = "another client moves the robot; it is free when that is done, or when control is taken"
         elif not self.may_move(action.client) and not _stops(action.goal):
             why = f"control is taken by {self._taken_by}"

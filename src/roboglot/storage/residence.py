@@ -1,0 +1,140 @@
+"""Lease of a program's robots in the registry: taken before doors open, renewed, and lost in time.
+
+The holder gives its robots up ``HOLD`` s after it began its last successful renewal; another program takes them when it
+has seen no renewal for ``LEASE`` s. Both count by a clock that nobody can set, so that a robot never runs twice.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import time
+import uuid
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from roboglot.storage.homes import Home, Homes, Occupied
+from roboglot.storage.transactions import DatabaseError
+
+log = logging.getLogger(__name__)
+PERIOD, HOLD, LEASE = 1.0, 4.0, 6.0  # s between renewals; see above
+HOLDER = "holder"  # file in the data folder
+
+
+def uptime() -> float:
+    """Return s that no change of the date moves, and that a machine's sleep counts in."""
+    return time.clock_gettime(time.CLOCK_BOOTTIME) if hasattr(time, "CLOCK_BOOTTIME") else time.monotonic()
+
+
+def holder_of(folder: Path) -> str:
+    """Return the name under which a data folder's program holds robots; made at the first time.
+
+    The folder's lock keeps a second program out: what was held under this name before is free.
+    """
+    file = folder / HOLDER
+    with contextlib.suppress(FileNotFoundError):
+        if name := file.read_text(encoding="ascii").strip():
+            return name
+    name = uuid.uuid4().hex
+    file.write_text(name, encoding="ascii")
+    return name
+
+
+class Residence:
+    """Of the robots of one program. ``lost`` is called once with a robot's name when it must stop."""
+
+    def __init__(
+        self,
+        homes: Homes,
+        addresses: Mapping[str, str],
+        holder: str,
+        lost: Callable[[str], None],
+        now: Callable[[], float] = uptime,
+    ) -> None:
+        self._homes, self._addresses, self._holder, self._lost, self._now = homes, addresses, holder, lost, now
+        self._epochs: dict[str, int] = {}
+        self._elsewhere: set[str] = set()  # another program took them: for good
+        self._reported: set[str] = set()
+        self._until = -float("inf")
+        self._keeping: list[asyncio.Task[None]] = []
+
+    def why_not(self, robot: str) -> str:
+        """Return why the robot may not be moved from here; empty: it may."""
+        if robot in self._elsewhere:
+            return "the robot runs in another program now"
+        return "" if self._now() < self._until else "the registry of robots has not confirmed that it runs here"
+
+    async def take(self) -> None:
+        """Take the robots, if need be after the wait for a program that is gone. Raises OSError if one is in use."""
+        began, silent = self._now(), dict[str, Home]()
+        try:
+            try:
+                self._epochs = await self._homes.take(self._addresses, self._holder, silent)
+            except Occupied as others:
+                log.info("robots %s are held by another program: waiting %g s for a sign of it", others, LEASE)
+                await self._pass(LEASE)
+                began = self._now()
+                self._epochs = await self._homes.take(self._addresses, self._holder, others.homes)
+        except Occupied as others:
+            raise OSError(f"another program runs robot {others}") from None
+        except DatabaseError as error:
+            raise OSError(f"the registry of robots: {error}") from None
+        self._until = began + HOLD
+
+    async def _pass(self, seconds: float) -> None:
+        end = self._now() + seconds
+        while (left := end - self._now()) > 0:  # noqa: ASYNC110 - timers may be early
+            await asyncio.sleep(left)
+
+    def keep(self) -> None:
+        """Renew from now on."""
+        loop = asyncio.get_running_loop()
+        self._keeping = [
+            loop.create_task(self._renew_always(), name="renewals of robots' homes"),
+            loop.create_task(self._watch(), name="watch over robots' homes"),
+        ]
+
+    async def close(self) -> None:
+        """Stop renewing, and let other programs have the robots."""
+        for task in self._keeping:
+            task.cancel()
+        self._until = -float("inf")
+        try:
+            await self._homes.release(self._holder, self._epochs)
+        except DatabaseError as error:
+            log.warning("the registry keeps this program's robots for %g s: %s", LEASE, error)
+
+    async def renew(self) -> None:
+        """Renew once. Raises DatabaseError."""
+        began = self._now()
+        held = await self._homes.renew(self._holder)
+        self._elsewhere |= {robot for robot, epoch in self._epochs.items() if held.get(robot) != epoch}
+        self._until = began + HOLD
+        self.look()
+
+    def look(self) -> None:
+        """Report robots that were lost, and those that are confirmed again."""
+        for robot in self._addresses:
+            why = self.why_not(robot)
+            if not why and robot in self._reported:
+                self._reported.discard(robot)
+                log.warning("robot %s may be moved again: the registry confirmed it", robot)
+            elif why and robot not in self._reported:
+                self._reported.add(robot)
+                log.error("robot %s is stopped: %s", robot, why)
+                self._lost(robot)
+
+    async def _renew_always(self) -> None:
+        while True:
+            await asyncio.sleep(PERIOD)
+            try:
+                await self.renew()
+            except DatabaseError as error:
+                log.warning("the registry of robots cannot be reached: %s", error)
+
+    async def _watch(self) -> None:
+        """Notice the end of the lease also while a renewal waits for an answer."""
+        while True:
+            await asyncio.sleep(min(PERIOD, max(0.01, self._until - self._now())))
+            self.look()

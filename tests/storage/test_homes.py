@@ -1,0 +1,181 @@
+"""A robot has one home: leases, epochs and fencing, in a file and on a server."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from roboglot.config import Config, ConsoleConfig, RobotConfig
+from roboglot.model.action import ActionStatus
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.system.lease import Lease
+from roboglot.model.errors import Busy
+from roboglot.model.geometry import Twist
+from roboglot.runtime import Runtime
+from roboglot.storage import residence as timing
+from roboglot.storage.homes import Homes, Occupied
+from roboglot.storage.opening import open_database
+from roboglot.storage.residence import HOLD, LEASE, Residence, holder_of
+from roboglot.storage.transactions import DatabaseError, Transactions
+from tests.storage.postgresql_server import PostgreSQLServer, needs_postgresql
+
+
+class Watch:
+    """A clock that stands until it is set."""
+
+    now = 1000.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def watch(monkeypatch: pytest.MonkeyPatch) -> Watch:
+    clock, sleep = Watch(), asyncio.sleep
+
+    async def pass_time(seconds: float) -> None:
+        clock.now += seconds
+        await sleep(0)
+
+    monkeypatch.setattr(timing.asyncio, "sleep", pass_time)
+    return clock
+
+
+def home(database: Transactions, holder: str, watch: Watch, lost: Callable[[str], None] = print) -> Residence:
+    return Residence(Homes(database), {"a": f"127.1.0.1#{holder}", "b": "127.1.0.2"}, holder, lost, watch)
+
+
+async def test_a_robot_goes_to_the_next_program_when_its_own_is_silent(database: Transactions, watch: Watch) -> None:
+    lost = list[str]()
+    old, new = home(database, "old", watch, lost.append), home(database, "new", watch)
+    await old.take()
+    assert not old.why_not("a")
+    began = watch.now
+    await new.take()
+    assert watch.now == began + LEASE
+    assert old.why_not("a")
+    assert not new.why_not("a")
+    old.look()
+    assert lost == ["a", "b"]
+    homes = await Homes(database).all()
+    assert {(h.holder, h.epoch) for h in homes.values()} == {("new", 2)}
+    assert homes["a"].address == "127.1.0.1#new"
+
+
+async def test_the_old_program_never_comes_back_with_an_old_epoch(database: Transactions, watch: Watch) -> None:
+    old, new = home(database, "old", watch), home(database, "new", watch)
+    await old.take()
+    await new.take()
+    await old.renew()  # late: the registry answers, but with another's epoch
+    assert "another program" in old.why_not("a")
+    await old.close()
+    assert {h.holder for h in (await Homes(database).all()).values()} == {"new"}
+    await new.renew()
+    assert not new.why_not("a")
+
+
+async def test_a_robot_that_is_renewed_is_refused_to_others(
+    database: Transactions, watch: Watch, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old, new = home(database, "old", watch), home(database, "new", watch)
+    await old.take()
+
+    async def renewed(seconds: float) -> None:
+        watch.now += seconds
+        await old.renew()
+
+    monkeypatch.setattr(timing.asyncio, "sleep", renewed)
+    with pytest.raises(OSError, match="another program runs robot a, b"):
+        await new.take()
+    assert new.why_not("a")
+    assert not old.why_not("a")
+
+
+async def test_a_program_gives_up_before_another_may_begin(database: Transactions, watch: Watch) -> None:
+    old = home(database, "old", watch)
+    await old.take()
+    watch.now += HOLD
+    assert "has not confirmed" in old.why_not("a")
+    assert HOLD < LEASE
+    await old.renew()  # the registry is back, and nobody took them meanwhile
+    assert not old.why_not("a")
+
+
+async def test_released_and_own_robots_are_taken_at_once_and_all_or_none(database: Transactions, watch: Watch) -> None:
+    old, began = home(database, "old", watch), watch.now
+    await old.take()
+    await home(database, "old", watch).take()  # the same folder's next program
+    await old.close()  # an earlier epoch releases nothing
+    homes = Homes(database)
+    assert {h.holder for h in (await homes.all()).values()} == {"old"}
+    await homes.release("old", {"a": 2})
+    with pytest.raises(Occupied) as occupied:
+        await homes.take({"a": "", "b": ""}, "new", {})
+    assert list(occupied.value.homes) == ["b"]
+    assert (await homes.all())["a"].holder == ""
+    assert await homes.take({"a": ""}, "new", {}) == {"a": 3}
+    assert watch.now == began
+
+
+@needs_postgresql
+async def test_robots_stand_while_the_server_is_away_and_go_on_after_it(server: PostgreSQLServer, watch: Watch) -> None:
+    server.empty()
+    database, lost = open_database(Path(), server.url), list[str]()
+    old = home(database, "old", watch, lost.append)
+    await old.take()
+    server.stop()
+    try:
+        with pytest.raises(DatabaseError):
+            await old.renew()
+        old.look()
+        assert not lost
+        watch.now += HOLD
+        old.look()
+        assert lost == ["a", "b"]
+    finally:
+        server.start()
+    await old.renew()
+    assert not old.why_not("a")
+    assert {h.epoch for h in (await Homes(database).all()).values()} == {1}
+    database.close()
+
+
+async def test_a_robot_that_another_program_took_stands_and_refuses(tmp_path: Path) -> None:
+    registry = tmp_path / "registry.db"
+    config = Config(
+        world="empty",
+        robots=(RobotConfig(body="universal", address="127.0.0.1"),),
+        lockstep=True,
+        data=tmp_path / "data",
+        registry=str(registry),
+        console=ConsoleConfig(enabled=False),
+    )
+    runtime = Runtime(config, ())
+    database = open_database(registry)
+    homes = Homes(database)
+    await runtime.start()
+    try:
+        robot = runtime.fleet.robots["a"]
+        driving = robot[Driving].drive(Twist(0.2, 0.0, 0.0))
+        held = (await homes.all())["a"]
+        assert held.holder == holder_of(config.data)
+        await homes.take({"a": "10.0.0.2"}, "another", {"a": held})
+        assert runtime._residence is not None
+        await runtime._residence.renew()
+        assert isinstance(runtime.clock, LockstepClock)
+        await runtime.clock.advance(1.0)
+        assert await driving.done() is ActionStatus.CANCELED
+        with pytest.raises(Busy, match="another program"):
+            robot[Driving].drive(Twist(0.2, 0.0, 0.0))
+        robot[Driving].drive(Twist(0.0, 0.0, 0.0))  # to stop is always allowed
+        await robot[Lease].take("person")  # nor does control help
+        with pytest.raises(Busy, match="another program"):
+            robot[Driving].drive(Twist(0.2, 0.0, 0.0))
+    finally:
+        await runtime.close()
+    assert (await homes.all())["a"].holder == "another"
+    database.close()
