@@ -29,7 +29,7 @@ TESTS = HERE.parent / "tests"
 BUILDINGS = {
     "office": "office",
     "depot": str(TESTS / "data" / "maps" / "depot.yaml"),
-    "tower": str(TESTS / "protocols" / "slamware" / "tower.toml"),
+    "tower": str(TESTS / "protocols" / "slamware" / "data" / "tower.toml"),
     "corridor": str(HERE / "worlds" / "corridor.toml"),
     "ring": str(HERE / "worlds" / "ring.toml"),
     "twins": str(HERE / "worlds" / "twins.toml"),
