@@ -2,6 +2,9 @@
 
 Robot, gateway and `roboglot connect` are processes on this machine; the same client asks the robot directly and behind
 the tunnel, in turns, on the text protocol. Of round trips the best stretch counts, because other work only ever adds.
+The robot has one core; the client and `connect`, which elsewhere are on another machine, share a second: left to itself
+a virtual machine's kernel may wake two of the three on one core, for it takes cores that rest for lent out. What that
+costs is printed, too.
 
     scripts/bench connect
 """
@@ -33,14 +36,14 @@ SECONDS = 10.0
 
 
 @contextlib.contextmanager
-def tunnel(token: str, settings: Path) -> Iterator[None]:
+def tunnel(token: str, settings: Path) -> Iterator[subprocess.Popen[str]]:
     """The robot's ports at HERE."""
     environment = {**os.environ, "ROBOGLOT_TOKEN": token, "XDG_CONFIG_HOME": str(settings)}
     command = [sys.executable, "-m", "roboglot", "connect", f"{ROBOT}:{GATEWAY}", "--address", HERE, "--once"]
     with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         assert process.stdout.readline().startswith("ready")
-        yield
+        yield process
         process.terminate()
 
 
@@ -108,8 +111,28 @@ def _starts(data: bytearray) -> Iterator[int]:
         at = data.find(b"\0\0\1", at + 3)
 
 
+def keep_to(*cores: int, of: int = 0) -> None:
+    """Have a process (0: this one, and those it starts) run there, with all of its threads."""
+    for thread in os.listdir(f"/proc/{of or 'self'}/task"):
+        with contextlib.suppress(ProcessLookupError):
+            os.sched_setaffinity(int(thread), cores)
+
+
+def turns(far: socket.socket, near: socket.socket) -> tuple[float, float]:
+    """µs of the best stretch directly and through the tunnel."""
+    near_spent, far_spent = [], []
+    for _ in range(ROUNDS):
+        near_spent.append(statistics.median(round_trips(near)))
+        far_spent.append(statistics.median(round_trips(far)))
+    pairs = statistics.median(there - here for here, there in zip(near_spent, far_spent, strict=True))
+    print(f"round trip: {min(near_spent):.0f} µs directly, {min(far_spent):.0f} µs through the tunnel")
+    print(f"in the middle of {ROUNDS} turns {pairs:.0f} µs more; load of the machine {os.getloadavg()[0]:.1f}")
+    return min(near_spent), min(far_spent)
+
+
 def main() -> None:
     claims = Claims()
+    cores = sorted(os.sched_getaffinity(0))
     with tempfile.TemporaryDirectory() as name:
         data, config = Path(name) / "data", Path(name) / "robots.toml"
         store = AccessStore(data / FILE)
@@ -118,17 +141,19 @@ def main() -> None:
         store.close()
         config.write_text(f'[access]\nlocal = false\nrequests = 100_000\ngateway = "{ROBOT}:{GATEWAY}"\n')
         options = ("--no-console", "--config", str(config))
-        with served(data, *options, address=ROBOT), tunnel(token, Path(name) / "settings"):
+        with served(data, *options, address=ROBOT) as robot, tunnel(token, Path(name) / "settings") as connector:
             time.sleep(5)  # kernels are loaded
             far, near = line(HERE, "127.0.0.1"), line(ROBOT, DIRECT)
-            near_spent, far_spent = [], []
-            for _ in range(ROUNDS):
-                near_spent.append(statistics.median(round_trips(near)))
-                far_spent.append(statistics.median(round_trips(far)))
-            pairs = statistics.median(there - here for here, there in zip(near_spent, far_spent, strict=True))
-            print(f"round trip: {min(near_spent):.0f} µs directly, {min(far_spent):.0f} µs through the tunnel")
-            print(f"in the middle of {ROUNDS} turns {pairs:.0f} µs more; load of the machine {os.getloadavg()[0]:.1f}")
-            claims.at_most("added to a round trip", min(far_spent) - min(near_spent), 100.0, "µs")
+            print("without a core for each machine:")
+            turns(far, near)
+            keep_to(cores[0], of=robot.process.pid)
+            keep_to(cores[-1], of=connector.pid)
+            keep_to(cores[-1])
+            print("with one:")
+            directly, through_it = turns(far, near)
+            for process in (0, robot.process.pid, connector.pid):
+                keep_to(*cores, of=process)
+            claims.at_most("added to a round trip", through_it - directly, 100.0, "µs")
             usual = jitter(near, DIRECT)
             through = jitter(far, "127.0.0.1")
             print(f"50 Hz pushes are off by {usual:.1f} ms directly, by {through:.1f} ms through the tunnel (p99)")
