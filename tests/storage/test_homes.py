@@ -109,6 +109,8 @@ async def test_released_and_own_robots_are_taken_at_once_and_all_or_none(databas
     old, began = home(database, "old", watch), watch.now
     await old.take()
     await home(database, "old", watch).take()  # the same folder's next program
+    await old.renew()
+    assert "another program" in old.why_not("a")  # the holder's name is the same, the epoch is not
     await old.close()  # an earlier epoch releases nothing
     homes = Homes(database)
     assert {h.holder for h in (await homes.all()).values()} == {"old"}
