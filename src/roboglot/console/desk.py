@@ -174,7 +174,7 @@ class Desk:
         with self.noting(verb):
             return await self._change_world(operation, values)
 
-    async def _change_world(self, operation: Operation[str], values: Mapping[str, object]) -> Any:
+    async def _change_world(self, operation: Operation[str], values: Mapping[str, object]) -> object:
         if operation.key not in CLOCK_VERBS:
             return await operation.call(self.stage, values)
         if real := sorted(self.robots.keys() - {placed.name for placed in self.stage.robots}):

@@ -128,7 +128,7 @@ class Classes:
         with self._desk.noting(f"class {wish.do}"):
             return await self._do(wish)
 
-    async def _do(self, wish: Wish) -> dict[str, Any]:
+    async def _do(self, wish: Wish) -> dict[str, object]:
         self._check_teacher()
         if wish.do == "open":
             self._open(wish)
