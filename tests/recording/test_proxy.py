@@ -9,12 +9,16 @@ from typing import Any
 
 import pytest
 
+from roboglot.demo.clients.phone import Phone
 from roboglot.model.tap import Direction
+from roboglot.protocols.cyberdog.certificates import ensure_certificates, export_client
 from roboglot.recording.lines import Target
+from roboglot.recording.proxy.dog import DogRelay, Proof
 from roboglot.recording.proxy.relay import Book, Relay
 from roboglot.recording.proxy.sniffers import RestSniffer, TextSniffer, rest_operation
 from roboglot.recording.reader import pair, read_recording
-from tests.recording.test_playback import ADDRESS, by_frames, by_rest, run, whole_closing
+from roboglot.testing.addresses import free_port
+from tests.recording.test_playback import ADDRESS, PROGRAM, by_frames, by_rest, run, whole_closing
 
 assert whole_closing  # a fixture of these tests, too
 BETWEEN = ADDRESS.replace("127.0.193.", "127.0.195.")
@@ -69,6 +73,41 @@ async def test_what_passes_is_what_the_robots_own_tap_says(url: str, script: Any
     )
     assert len(told) >= 3
     assert seen == told
+
+
+async def test_a_phone_and_its_dog_do_not_notice(tmp_path: Path) -> None:
+    own, passed, folder = tmp_path / "own.mcap", tmp_path / "passed.mcap", tmp_path / "data" / "cyberdog"
+    proof, certificates, called = ensure_certificates(folder), tmp_path / "certificates", free_port()
+    export_client(folder, certificates)
+    target = Target(f"cyberdog://{ADDRESS}?certs={certificates}&app={called}")
+    phone = Phone(BETWEEN, certificates)
+    await phone.open()
+
+    async def through(_: str) -> Any:
+        book = Book(passed, target, "0")
+        relay = DogRelay(target, BETWEEN, book, Proof(proof.certificate, proof.key, proof.callers), phone.port)
+        await relay.open()
+        try:
+            return await phone.run(PROGRAM)  # the frames come as pushes
+        finally:
+            await relay.close()
+            book.close()
+
+    try:
+        said = await run(tmp_path, "cyberdog2", str(own), through, cyberdog={"app": f"127.0.0.1:{called}"})
+    finally:
+        await phone.close()
+    assert said == ["one", "two"]
+    asked, seen = (pair(read_recording(path).of(door="cyberdog"))[0] for path in (own, passed))
+    assert [(a.request.operation, a.request.payload, [r.payload for r in a.replies]) for a in seen] == [
+        (a.request.operation, a.request.payload, [r.payload for r in a.replies]) for a in asked
+    ]
+    pushes = [
+        {e.payload for e in read_recording(path).of(door="cyberdog") if e.direction is Direction.PUSH}
+        for path in (own, passed)
+    ]
+    assert pushes[1]
+    assert pushes[1] <= pushes[0]
 
 
 async def test_a_disk_that_is_full_stops_the_recording_and_not_the_client(

@@ -42,7 +42,9 @@ app = typer.Typer(
     epilog=EPILOG,
 )
 if TYPE_CHECKING:
-    from roboglot.recording.proxy.relay import Relay
+    from roboglot.recording.lines import Target
+    from roboglot.recording.proxy.dog import DogRelay
+    from roboglot.recording.proxy.relay import Book, Relay
 
 Data = Annotated[Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="The folder that `roboglot up` uses.")]
 
@@ -85,9 +87,13 @@ def status(data: Data = None) -> None:
 
 @app.command()
 def proxy(
-    url: Annotated[str, typer.Argument(help="A real robot: slamware://, robomaster:// or visual://HOST[:PORT].")],
+    url: Annotated[
+        str,
+        typer.Argument(help="A robot: slamware://, robomaster://, visual://HOST[:PORT], cyberdog://HOST?certs=DIR."),
+    ],
     listen: Annotated[str, typer.Option(help="The address of this machine that the client is to use.")],
     to: Annotated[Path, typer.Option(help="The recording, a new file.")] = Path("robot.mcap"),
+    data: Data = None,
 ) -> None:
     """Stand between a client and a robot: pass every byte, and record what it means, until Ctrl-C."""
     from roboglot.recording.lines import Target
@@ -96,7 +102,7 @@ def proxy(
     try:
         target = Target(url)
         book = Book(to, target, metadata.version("roboglot"))
-        relay = Relay(target, listen, book)
+        relay = _dog_relay(target, listen, book, data) if target.door == "cyberdog" else Relay(target, listen, book)
         asyncio.run(_pass(relay, f"{listen} passes everything to {url} and back; it is recorded in {to}"))
     except (OSError, ValueError) as error:
         sys.exit(f"roboglot record: {error}")
@@ -106,7 +112,21 @@ def proxy(
     print(f"{book.files.written} messages are in {to}")
 
 
-async def _pass(relay: Relay, words: str) -> None:
+def _dog_relay(target: Target, listen: str, book: Book, data: Path | None) -> DogRelay:
+    """To the app it is a robot of ours, with the certificates of the data folder. Raises OSError, ValueError."""
+    from roboglot.protocols.cyberdog.certificates import ensure_certificates
+    from roboglot.protocols.cyberdog.server import FOLDER
+    from roboglot.recording.proxy.dog import DogRelay, Proof
+
+    if "certs" not in target.options:
+        raise ValueError("a CyberDog wants to see a certificate: cyberdog://HOST?certs=FOLDER, none for plain gRPC")
+    if target.options["certs"] == "none":
+        return DogRelay(target, listen, book, None)
+    own = ensure_certificates((data or default_data_folder(os.environ)) / FOLDER)
+    return DogRelay(target, listen, book, Proof(own.certificate, own.key, own.callers))
+
+
+async def _pass(relay: Relay | DogRelay, words: str) -> None:
     stop = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, stop.set)

@@ -1,0 +1,183 @@
+"""Passes calls between a CyberDog app and its robot, in both directions, and notes what they mean.
+
+Both ends prove themselves to the proxy, and it to them: TLS lets nothing stand between them unnoticed. The messages
+themselves pass as the bytes that they came as.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import grpc
+
+from roboglot.clients.cyberdog.link import Certificates
+from roboglot.model.tap import Direction
+from roboglot.recording.lines import Target, status_of
+from roboglot.recording.proxy.relay import Book
+from roboglot.wire.cyberdog.channel import APP_NAME, APP_PORT, ROBOT_NAME, client_options, server_options
+from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
+
+log = logging.getLogger(__name__)
+SERVICE = "grpcapi.GrpcApp"
+CALLS_MAX = 512
+
+
+@dataclass(frozen=True, slots=True)
+class Proof:
+    """Certificate and key (PEM) of the proxy as the robot, and whose certificates it believes as apps'."""
+
+    certificate: bytes
+    key: bytes
+    callers: bytes
+
+
+class DogRelay:
+    """Listens at ``address`` as the robot does, and on ``app_port`` of this machine as the app does.
+
+    ``proof`` None, and no ``certs`` in the robot's URL: without TLS. ``app`` of the URL is the port where the robot
+    calls this machine (8981); the app is called at its own host, port ``called``.
+    """
+
+    def __init__(self, target: Target, address: str, book: Book, proof: Proof | None, called: int = APP_PORT) -> None:
+        """Raises ValueError where the URL's certificates cannot be read."""
+        self._target, self._address, self._book, self._proof, self._called = target, address, book, proof, called
+        self._app_port = int(target.options.get("app", APP_PORT))
+        self._own = _certificates(target)
+        self._servers: list[Any] = []
+        self._robot: Any = None
+        self._apps: dict[str, Any] = {}
+        self._app_host = ""
+
+    async def open(self) -> None:
+        """Listen at both ends. Raises OSError."""
+        self._robot = self._channel(f"{self._target.host}:{self._target.port}", ROBOT_NAME, self._to_robot())
+        asked = {"sendMsg": self._pass(self._ask, stream=True), "getFile": self._pass(self._fetch, stream=True)}
+        pushed = {"sendMsg": self._pass(self._push, stream=True), "heartbeat": self._pass(self._beat, stream=False)}
+        own = self._own
+        as_app = own and grpc.ssl_server_credentials([(own.key, own.certificate)], own.ca, require_client_auth=True)
+        proof = self._proof
+        as_robot = proof and grpc.ssl_server_credentials(
+            [(proof.key, proof.certificate)], proof.callers, require_client_auth=True
+        )
+        await self._serve(f"{self._address}:{self._target.port}", asked, as_robot)
+        where = "127.0.0.1" if self._target.host.startswith("127.") else "0.0.0.0"
+        await self._serve(f"{where}:{self._app_port}", pushed, as_app)
+
+    async def close(self) -> None:
+        """Hang up at both ends."""
+        await asyncio.gather(*(server.stop(None) for server in self._servers))
+        for channel in (self._robot, *self._apps.values()):
+            if channel is not None:
+                await channel.close()
+
+    async def _serve(self, where: str, methods: dict[str, Any], credentials: Any) -> None:
+        server = grpc.aio.server(options=server_options(), maximum_concurrent_rpcs=CALLS_MAX)
+        server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler(SERVICE, methods),))
+        try:
+            port = server.add_secure_port(where, credentials) if credentials else server.add_insecure_port(where)
+        except RuntimeError:
+            port = 0
+        if not port:
+            raise OSError(f"cannot listen on {where}: it is taken, or not an address of this machine")
+        await server.start()
+        self._servers.append(server)
+
+    def _channel(self, where: str, name: str, credentials: Any) -> Any:
+        options = client_options(name)
+        if credentials is None:
+            return grpc.aio.insecure_channel(where, options=options)
+        return grpc.aio.secure_channel(where, credentials, options=options)
+
+    def _to_robot(self) -> Any:
+        own = self._own
+        return own and grpc.ssl_channel_credentials(own.ca, own.key, own.certificate)
+
+    def _app(self) -> Any:
+        """The channel to the app that asked last."""
+        if not self._app_host:
+            return None
+        if self._app_host not in self._apps:
+            proof = self._proof
+            credentials = proof and grpc.ssl_channel_credentials(proof.callers, proof.key, proof.certificate)
+            self._apps[self._app_host] = self._channel(f"{self._app_host}:{self._called}", APP_NAME, credentials)
+        return self._apps[self._app_host]
+
+    def _pass(self, handler: Callable[..., Any], *, stream: bool) -> Any:
+        """A method whose messages stay bytes."""
+        return (grpc.unary_stream_rpc_method_handler if stream else grpc.unary_unary_rpc_method_handler)(handler)
+
+    async def _ask(self, request: bytes, context: Any) -> AsyncIterator[bytes]:
+        """The app asks the robot."""
+        self._app_host = _host(context.peer()) or self._app_host
+        code, began = self._note_request(context.peer(), request)
+        async for message in self._called_through(self._robot, "sendMsg", request, context):
+            answer = pb.RecResponse.FromString(message).data.encode()
+            self._book.note(_name(context.peer()), Direction.REPLY, code, answer, status_of("cyberdog", answer), began)
+            yield message
+
+    async def _fetch(self, request: bytes, context: Any) -> AsyncIterator[bytes]:
+        """The app fetches a file."""
+        code, began = self._note_request(context.peer(), request)
+        async for message in self._called_through(self._robot, "getFile", request, context):
+            self._book.note(_name(context.peer()), Direction.REPLY, code, message, "ok", began)
+            yield message
+
+    async def _push(self, request: bytes, context: Any) -> AsyncIterator[bytes]:
+        """The robot tells the app something."""
+        said = pb.SendRequest.FromString(request)
+        where = f"{self._app_host}:{self._called}"
+        self._book.note(where, Direction.PUSH, str(said.nameCode), said.params.encode(), "", None)
+        async for message in self._called_through(self._app(), "sendMsg", request, context):
+            yield message
+
+    async def _beat(self, request: bytes, context: Any) -> bytes:
+        """The robot's heartbeat; without an app there is nobody to take it."""
+        app = self._app()
+        if app is None:
+            await context.abort(grpc.StatusCode.UNAVAILABLE, "no app has come yet")
+        try:
+            answer: bytes = await app.unary_unary(f"/{SERVICE}/heartbeat")(request, timeout=context.time_remaining())
+        except grpc.aio.AioRpcError as error:
+            await context.abort(error.code(), error.details() or "")
+        return answer
+
+    async def _called_through(self, channel: Any, method: str, request: bytes, context: Any) -> AsyncIterator[bytes]:
+        """Call the other end, and pass its answers and its end as they are."""
+        if channel is None:
+            await context.abort(grpc.StatusCode.UNAVAILABLE, "no app has come yet")
+        call = channel.unary_stream(f"/{SERVICE}/{method}")(request, timeout=context.time_remaining())
+        try:
+            async for message in call:
+                yield message
+        except grpc.aio.AioRpcError as error:
+            await context.abort(error.code(), error.details() or "")
+        finally:
+            call.cancel()
+
+    def _note_request(self, peer: str, request: bytes) -> tuple[str, float]:
+        said = pb.SendRequest.FromString(request)
+        code = str(said.nameCode)
+        return code, self._book.note(_name(peer), Direction.REQUEST, code, said.params.encode(), "", None)
+
+
+def _certificates(target: Target) -> Certificates | None:
+    folder = target.options.get("certs", "none")
+    try:
+        return None if folder == "none" else Certificates.load(Path(folder))
+    except OSError as error:
+        raise ValueError(f"the certificates in {folder} cannot be read: {error.strerror}") from None
+
+
+def _name(peer: str) -> str:
+    """gRPC's name of a peer ("ipv4:127.0.0.1:40312") as host:port."""
+    return unquote(peer.partition(":")[2])
+
+
+def _host(peer: str) -> str:
+    return _name(peer).rpartition(":")[0]
