@@ -14,7 +14,9 @@ def _along_columns(marked: Any, cap: float) -> Any:
     """Distance in cells to the nearest marked cell of the same column, ``cap`` at most: down, then up."""
     height, width = marked.shape
     away = np.empty((height, width), np.float32)
-    column = np.full(width, np.float32(cap))
+    column = np.empty(width, np.float32)
+    for col in range(width):
+        column[col] = np.float32(cap)
     for row in range(height):
         for col in range(width):
             column[col] = (

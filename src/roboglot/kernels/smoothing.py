@@ -20,7 +20,7 @@ def line_cost(cost: Any, row0: float, col0: float, row1: float, col1: float) -> 
     total = 0.0
     for i in range(count + 1):
         share = i / count
-        value = cost[int(np.round(row0 + share * (row1 - row0))), int(np.round(col0 + share * (col1 - col0)))]
+        value = cost[int(np.rint(row0 + share * (row1 - row0))), int(np.rint(col0 + share * (col1 - col0)))]
         if not np.isfinite(value):
             return np.inf
         total += value * (0.5 if i == 0 or i == count else 1.0)

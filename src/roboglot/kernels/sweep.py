@@ -47,7 +47,9 @@ def sweep(edges: Any, circles: Any, directions: Any, x: float, y: float, yaw: fl
     from the first to the second end; ``circles`` (n, 4) are x, y, radius, 0. Only the outsides of solids are seen.
     """
     rays = directions.shape[0]
-    ranges = np.full(rays, np.inf)
+    ranges = np.empty(rays)
+    for i in range(rays):
+        ranges[i] = np.inf
     step = 2.0 * math.pi / rays
     cos, sin = math.cos(yaw), math.sin(yaw)
     for i in range(edges.shape[0]):

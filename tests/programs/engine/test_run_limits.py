@@ -9,6 +9,7 @@ import pytest
 
 from roboglot.programs.engine import calls as calls_module
 from roboglot.programs.engine import engine as engine_module
+from roboglot.programs.engine import share as share_module
 from roboglot.programs.engine.calls import Calls
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.engine.events import (
@@ -20,7 +21,7 @@ from roboglot.programs.engine.events import (
     Output,
 )
 from roboglot.programs.engine.run import SHORT_COST, Run
-from roboglot.programs.engine.share import BURST, SHARE_MAX, Share
+from roboglot.programs.engine.share import BURST, LIGHT_BURST, SHARE_MAX, Share
 from tests.programs.playing import BUSY, PRELUDE, last, play, process_state, started, until
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
@@ -123,8 +124,20 @@ async def test_programs_that_take_much_get_turns_one_by_one() -> None:
     assert loop.time() - began >= (0.03 + 7 * 0.005) / SHARE_MAX - BURST - 0.01
 
 
-async def test_hostile_programs_together_keep_to_the_share(engine: Engine) -> None:
-    """Whatever they send, the server's thread has most of its time for others."""
+async def test_hostile_programs_together_keep_to_the_share(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever they send, the server's thread has most of its time for others.
+
+    What they are charged is counted, and what they cost is compared with it: both hold on a busy machine, too.
+    """
+    light = SHARE_MAX / 100  # all of them take more than that, however little a busy machine leaves to them
+    monkeypatch.setattr(share_module, "LIGHT", light)
+    charges, charge = list[float](), Share.charge
+
+    def counted(share: Share, seconds: float, now: float) -> None:
+        charges.append(seconds)
+        charge(share, seconds, now)
+
+    monkeypatch.setattr(Share, "charge", counted)
     sources = (
         "x = [[] for i in range(20000)]\nwhile True: cyberdog.echo(x)",
         "while True: print('x' * 100)",
@@ -139,13 +152,17 @@ async def test_hostile_programs_together_keep_to_the_share(engine: Engine) -> No
 
     serving = [asyncio.create_task(serve(run)) for run in runs]
     await asyncio.sleep(1.0)  # what each may take at first
+    charges.clear()
     loop = asyncio.get_running_loop()
     before, spent = loop.time(), time.thread_time()
     await asyncio.sleep(1.0)
-    share = (time.thread_time() - spent) / (loop.time() - before)
+    passed, spent = loop.time() - before, time.thread_time() - spent
+    charged, longest = sum(charges), max(charges)
     await asyncio.gather(*(run.kill() for run in runs))
     await asyncio.gather(*serving)
-    assert share < 2 * SHARE_MAX
+    free = len(runs) * (light * (passed + LIGHT_BURST) + longest)  # without a turn, and beyond one's end
+    assert charged <= SHARE_MAX * (passed + BURST) + free
+    assert spent < 1.7 * charged + 0.05 * passed  # nothing large is done without being charged
 
 
 async def test_a_long_call_is_read_in_turns(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from typing import Any
 
 import pytest
@@ -23,6 +23,7 @@ from roboglot.storage.database import Database
 from roboglot.storage.programs import program_stores
 
 HOST = "127.0.0.77"
+LOOKS_MAX = 3000  # each takes 10 ms, and longer where the machine is busy
 
 
 @pytest.fixture
@@ -284,6 +285,13 @@ async def test_where_a_program_is(address: str) -> None:
         assert found["target_id"] == task
         return found["state"], found["line"], found["module"], found["block"]
 
+    async def reached(condition: Callable[[tuple[str, int, str, str]], bool]) -> tuple[str, int, str, str]:
+        for _ in range(LOOKS_MAX):  # the other end tells nothing by itself
+            if condition(found := await place("t")):
+                return found
+            await asyncio.sleep(0.01)
+        raise AssertionError(found)
+
     assert await place("t") == ("null", 0, "", "")
     module = {"type": "module", "operate": "save", "target_id": ["m"], "mode": "common", "condition": "hang()"}
     assert (await ask(link, id="0", body="x = 1\nwhile x:\n    pass", **module))["state"] == 0
@@ -291,13 +299,10 @@ async def test_where_a_program_is(address: str) -> None:
     save = {"type": "task", "operate": "save", "target_id": ["t"], "mode": "single", "condition": "now"}
     assert (await ask(link, id="1", body=body, **save))["state"] == 0
     assert (await ask(link, id="2", type="task", operate="run", target_id=["t"]))["state"] == 0
-    while (await place("t"))[0] != "suspend":  # noqa: ASYNC110 - the other end tells nothing by itself
-        await asyncio.sleep(0.01)
+    await reached(lambda found: found[0] == "suspend")
     assert await place("t") == ("suspend", 3, "", "c")
     assert (await ask(link, id="3", type="task", operate="recover", target_id=["t"]))["state"] == 0
-    async with asyncio.timeout(10):
-        while (found := await place("t"))[2] != "hang" or found[1] < 2:  # noqa: ASYNC110
-            await asyncio.sleep(0.01)
+    found = await reached(lambda found: found[2] == "hang" and found[1] >= 2)
     assert found[0] == "run"
     assert found[1] in (2, 3)
     await ask(link, id="4", type="task", operate="shutdown", target_id=["t"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -206,6 +207,26 @@ async def test_recovery_gives_up_in_time_and_turns_only_if_it_may(
     turned = abs(math.degrees(world.truth.pose_of("a").yaw - before.yaw))
     assert turned > 20 if turns else turned < 1
     assert robot[Base].velocity.speed < 0.01
+
+
+@pytest.mark.parametrize("name", ["RecoverLocalizationAction", "ManualRelocalizationAction"])
+async def test_a_search_that_finds_several_places_at_once_lets_time_pass(
+    robot: Robot, client: httpx.AsyncClient, forward: Forward, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """It looked again in the same instant, for ever: in lockstep the world stood still."""
+    looks = itertools.count(1)
+
+    async def several(_localization: object, _region: object) -> tuple[list[None], Pose]:
+        assert next(looks) < 100
+        return [None, None], Pose()
+
+    await forward(seconds=1)
+    monkeypatch.setattr(type(robot[Localization]), "_look", several)
+    id = await start(client, name, relocalization_options={"max_recover_time": 5_000})
+    await forward(seconds=6)
+    assert next(looks) < 20
+    if name == "RecoverLocalizationAction":
+        assert await state(client, id) == {"status": 4, "result": -1, "reason": "LOCALIZATION_LOST"}
 
 
 @pytest.mark.world("office")

@@ -18,7 +18,7 @@ from roboglot.wire.slamware.platform import GeneralEvent
 
 RECOVER_SECONDS = 30.0  # when the client sets no limit
 TURN = math.radians(60)  # before it looks again
-PUSHED_SECONDS = 0.5  # between two looks while it is pushed
+PAUSE_SECONDS = 0.5  # between two looks from the same place, and while it is pushed
 
 
 def recover_localization(context: Context, options: RecoverLocalizationOptions) -> Action:
@@ -40,6 +40,8 @@ def recover_localization(context: Context, options: RecoverLocalizationOptions) 
             except (NotLocalized, Expired):
                 if turns and Driving in robot and not _docked(context) and robot.clock.time() < deadline:
                     await errand.do(robot[Driving].move_by(Pose(yaw=TURN), source=PART))
+                else:
+                    await robot.clock.sleep(PAUSE_SECONDS)  # several places that fit are found at once
         raise NotLocalized(f"no place that fits was found in {seconds:g} s")
 
     context.actions.abort()  # it looks while it stands
@@ -53,10 +55,10 @@ def manual_relocalization(context: Context, _: NoOptions) -> Action:
         robot = errand.robot
         while not _docked(context) or (dock := home_dock(robot)) is None:
             try:
-                await errand.do(robot[Localization].relocalize(source=PART), within=PUSHED_SECONDS * 4)
+                await errand.do(robot[Localization].relocalize(source=PART), within=PAUSE_SECONDS * 4)
                 return
             except (NotLocalized, Expired):
-                await robot.clock.sleep(PUSHED_SECONDS)
+                await robot.clock.sleep(PAUSE_SECONDS)
         robot[Localization].set_pose(dock.pose)
         context.events.note(GeneralEvent.RESET_MAP_TO_DOCK)
 
