@@ -80,10 +80,15 @@ class Look:
             return False
         if self.fitting < SURE_FITTING or self.hidden > SURE_HIDDEN or self.floating > SURE_FLOATING:
             return False
-        if self.well_known < SURE_WELL_KNOWN:
+        if self.well_known < SURE_WELL_KNOWN and not self.is_undisputed:
             return False
         needed = CROWDED_CLOSE if self.aside > CROWDED else SURE_CLOSE
         return self.agreement >= SURE_AGREEMENT and self.close >= needed + CLOSE_PER_HIDDEN * self.hidden
+
+    @property
+    def is_undisputed(self) -> bool:
+        """Whether not one ray speaks against the place, which makes up for a map that was seen only for a moment."""
+        return self.aside + self.hidden + self.floating == 0.0 and self.close >= CROWDED_CLOSE
 
     @property
     def is_exact(self) -> bool:
