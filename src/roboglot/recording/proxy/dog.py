@@ -11,7 +11,6 @@ import logging
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 from urllib.parse import unquote
 
 import grpc
@@ -49,9 +48,9 @@ class DogRelay:
         self._target, self._address, self._book, self._proof, self._called = target, address, book, proof, called
         self._app_port = int(target.options.get("app", APP_PORT))
         self._own = _certificates(target)
-        self._servers: list[Any] = []
-        self._robot: Any = None
-        self._apps: dict[str, Any] = {}
+        self._servers: list[grpc.aio.Server] = []
+        self._robot: grpc.aio.Channel | None = None
+        self._apps: dict[str, grpc.aio.Channel] = {}
         self._app_host = ""
 
     async def open(self) -> None:
@@ -76,7 +75,9 @@ class DogRelay:
             if channel is not None:
                 await channel.close()
 
-    async def _serve(self, where: str, methods: dict[str, Any], credentials: Any) -> None:
+    async def _serve(
+        self, where: str, methods: dict[str, grpc.RpcMethodHandler], credentials: grpc.ServerCredentials | None
+    ) -> None:
         server = grpc.aio.server(options=server_options(), maximum_concurrent_rpcs=CALLS_MAX)
         server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler(SERVICE, methods),))
         try:
@@ -88,17 +89,17 @@ class DogRelay:
         await server.start()
         self._servers.append(server)
 
-    def _channel(self, where: str, name: str, credentials: Any) -> Any:
+    def _channel(self, where: str, name: str, credentials: grpc.ChannelCredentials | None) -> grpc.aio.Channel:
         options = client_options(name)
         if credentials is None:
             return grpc.aio.insecure_channel(where, options=options)
         return grpc.aio.secure_channel(where, credentials, options=options)
 
-    def _to_robot(self) -> Any:
+    def _to_robot(self) -> grpc.ChannelCredentials | None:
         own = self._own
         return own and grpc.ssl_channel_credentials(own.ca, own.key, own.certificate)
 
-    def _app(self) -> Any:
+    def _app(self) -> grpc.aio.Channel | None:
         """The channel to the app that asked last."""
         if not self._app_host:
             return None
@@ -108,11 +109,11 @@ class DogRelay:
             self._apps[self._app_host] = self._channel(f"{self._app_host}:{self._called}", APP_NAME, credentials)
         return self._apps[self._app_host]
 
-    def _pass(self, handler: Callable[..., Any], *, stream: bool) -> Any:
+    def _pass(self, handler: Callable[..., object], *, stream: bool) -> grpc.RpcMethodHandler:
         """A method whose messages stay bytes."""
         return (grpc.unary_stream_rpc_method_handler if stream else grpc.unary_unary_rpc_method_handler)(handler)
 
-    async def _ask(self, request: bytes, context: Any) -> AsyncIterator[bytes]:
+    async def _ask(self, request: bytes, context: grpc.aio.ServicerContext) -> AsyncIterator[bytes]:
         """The app asks the robot."""
         self._app_host = _host(context.peer()) or self._app_host
         code, began = self._note_request(context.peer(), request)
@@ -121,14 +122,14 @@ class DogRelay:
             self._book.note(_name(context.peer()), Direction.REPLY, code, answer, status_of("cyberdog", answer), began)
             yield message
 
-    async def _fetch(self, request: bytes, context: Any) -> AsyncIterator[bytes]:
+    async def _fetch(self, request: bytes, context: grpc.aio.ServicerContext) -> AsyncIterator[bytes]:
         """The app fetches a file."""
         code, began = self._note_request(context.peer(), request)
         async for message in self._called_through(self._robot, "getFile", request, context):
             self._book.note(_name(context.peer()), Direction.REPLY, code, message, "ok", began)
             yield message
 
-    async def _push(self, request: bytes, context: Any) -> AsyncIterator[bytes]:
+    async def _push(self, request: bytes, context: grpc.aio.ServicerContext) -> AsyncIterator[bytes]:
         """The robot tells the app something."""
         said = pb.SendRequest.FromString(request)
         where = f"{self._app_host}:{self._called}"
@@ -136,21 +137,25 @@ class DogRelay:
         async for message in self._called_through(self._app(), "sendMsg", request, context):
             yield message
 
-    async def _beat(self, request: bytes, context: Any) -> bytes:
+    async def _beat(self, request: bytes, context: grpc.aio.ServicerContext) -> bytes:
         """The robot's heartbeat; without an app there is nobody to take it."""
         app = self._app()
         if app is None:
             await context.abort(grpc.StatusCode.UNAVAILABLE, "no app has come yet")
+            raise AssertionError("abort raises")
         try:
             answer: bytes = await app.unary_unary(f"/{SERVICE}/heartbeat")(request, timeout=context.time_remaining())
         except grpc.aio.AioRpcError as error:
             await context.abort(error.code(), error.details() or "")
         return answer
 
-    async def _called_through(self, channel: Any, method: str, request: bytes, context: Any) -> AsyncIterator[bytes]:
+    async def _called_through(
+        self, channel: grpc.aio.Channel | None, method: str, request: bytes, context: grpc.aio.ServicerContext
+    ) -> AsyncIterator[bytes]:
         """Call the other end, and pass its answers and its end as they are."""
         if channel is None:
             await context.abort(grpc.StatusCode.UNAVAILABLE, "no app has come yet")
+            raise AssertionError("abort raises")
         call = channel.unary_stream(f"/{SERVICE}/{method}")(request, timeout=context.time_remaining())
         try:
             async for message in call:
