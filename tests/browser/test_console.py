@@ -240,6 +240,24 @@ async def test_the_wire_shows_requests_and_why_they_fail(served: Served, open_co
     await page.wait_for_selector("text=Copy as nc")
 
 
+async def test_a_paused_wire_goes_back_to_the_first_message(served: Served, open_console: Open) -> None:
+    page = await open_console(view="wire")
+    await until(lambda: served.robot.tap.watched)
+    for number in range(900):
+        served.robot.tap.request("slamware", "GET /old", b"GET /old\n\nnumber %d." % number)
+        if number % 100 == 99:
+            await page.wait_for_selector(f".lines :text('number {number}.')", state="attached")
+    await page.click("text=Pause")
+    await page.fill("[role=search] input", "/old")
+    rows = page.locator(".lines .line")
+    assert await rows.count() == 400
+    await page.click("text=Earlier ones")
+    await page.click("text=Earlier ones")
+    assert await rows.count() == 900
+    assert "number 0." in await rows.first.inner_text()
+    assert await page.locator("text=Earlier ones").count() == 0
+
+
 async def test_hands_break_and_mend_the_robot(served: Served, open_console: Open) -> None:
     page = await open_console(view="world")
     await page.click("#tab-faults")

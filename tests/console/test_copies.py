@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import shlex
+import socket
+import threading
+from http.server import BaseHTTPRequestHandler, HTTPServer
 
 import pytest
 
@@ -22,6 +27,13 @@ PLATE = Description(maker="", model="", serial="", hardware_version="", software
 
 def request(door: str, operation: str, payload: bytes) -> Exchange:
     return Exchange(1.0, "a", door, "127.0.0.1:4711", f"{door} 127.0.0.1", Direction.REQUEST, operation, payload)
+
+
+def printed(program: str) -> str:
+    """Run a copied program."""
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        exec(compile(program, "copied", "exec"), {})
+    return said.getvalue()
 
 
 def test_rest_becomes_curl_with_its_body() -> None:
@@ -77,3 +89,39 @@ async def test_the_log_is_silent_until_opened_and_bounded(monkeypatch: pytest.Mo
 def test_bytes_that_are_no_text_are_shown_as_hexadecimal() -> None:
     assert readable(b"\x00\xff") == "00 ff"
     assert readable("ok;\n好".encode()) == "ok;\n好"
+
+
+def test_copied_python_prints_the_answer_of_the_command_itself() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as door:
+
+        def serve() -> None:
+            line, _ = door.accept()
+            with line:
+                line.recv(100)
+                line.sendall(b"ok;")
+                line.sendall(b"90;")
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        here = Endpoint("RoboMaster text SDK", f"tcp 127.0.0.1:{door.getsockname()[1]}")
+        assert printed(copy(request("robomaster", "robot battery ?", b"robot battery ?"), "python", here)) == "ok;90;\n"
+        thread.join()
+
+
+def test_copied_python_prints_refusals() -> None:
+    server = HTTPServer(("127.0.0.1", 0), BaseHTTPRequestHandler)  # without do_GET: 501
+    thread = threading.Thread(target=server.handle_request)
+    thread.start()
+    here = Endpoint("Slamware REST", f"http://127.0.0.1:{server.server_port}")
+    assert printed(copy(request("slamware", "", b"GET /nothing\n\n"), "python", here)).startswith("501 ")
+    thread.join()
+    server.server_close()
+
+
+def test_copied_python_trusts_the_robots_certificate_by_its_name() -> None:
+    tool = "grpcurl -cacert '/a b/ca' -cert /a/cert -key /a/key -authority cyberdog2.server -proto p -d '{}' h:1 m"
+    proven = copy(request("cyberdog", "1002", b"{}"), "python", Endpoint("CyberDog 2 gRPC", "h:1", tool))
+    assert "['/a b/ca', '/a/key', '/a/cert']" in proven
+    assert "('grpc.ssl_target_name_override', 'cyberdog2.server')" in proven
+    plain = Endpoint("CyberDog 2 gRPC", "h:1", "grpcurl -plaintext -d '{}' h:1 m")
+    assert "insecure_channel('h:1')" in copy(request("cyberdog", "1002", b"{}"), "python", plain)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shlex
 from dataclasses import dataclass
+from itertools import pairwise
 
 from roboglot.console.wire_log import readable
 from roboglot.model.errors import InvalidGoal
@@ -56,7 +57,7 @@ def copy(exchange: Exchange, form: str, endpoint: Endpoint) -> str:
         case "cyberdog", "grpcurl":
             return _grpcurl(exchange, endpoint)
         case "cyberdog", _:
-            return _dog_python(exchange, address)
+            return _dog_python(exchange, endpoint)
         case _, "websocat":
             return f"printf '%s\\n' {shlex.quote(readable(exchange.payload))} | websocat -n1 {address}"
         case _:
@@ -82,9 +83,10 @@ def _curl(request: Request, address: str) -> str:
 def _rest_python(request: Request, address: str) -> str:
     body = f", data={request.body!r}, headers={{'Content-Type': 'application/json'}}" if request.body else ""
     return (
-        "from urllib.request import Request, urlopen\n\n"
+        "from urllib.error import HTTPError\nfrom urllib.request import Request, urlopen\n\n"
         f"request = Request({address + request.path!r}, method={request.method!r}{body})\n"
-        "print(urlopen(request).read().decode())\n"
+        "try:\n    answer = urlopen(request)\nexcept HTTPError as refusal:\n    answer = refusal\n"
+        "print(answer.status, answer.read().decode())\n"
     )
 
 
@@ -101,11 +103,15 @@ def _netcat(exchange: Exchange, address: str) -> str:
 
 def _text_python(exchange: Exchange, address: str) -> str:
     host, _, port = address.rpartition(":")
+    command = _sdk(exchange)
     return (
         "import socket\n\n"
         f"with socket.create_connection(({host!r}, {port}), timeout=10) as robot:\n"
-        f"    robot.sendall({_sdk(exchange).encode()!r})\n"
-        "    print(robot.recv(4096).decode())\n"
+        f"    robot.sendall({command.encode()!r})\n"
+        "    answers = b''\n"
+        f"    while answers.count(b';') < {min(command.count(';'), 2)} and (more := robot.recv(4096)):\n"
+        "        answers += more\n"
+        "    print(answers.decode())\n"
     )
 
 
@@ -115,15 +121,23 @@ def _grpcurl(exchange: Exchange, endpoint: Endpoint) -> str:
     return f"{tool} -d {shlex.quote(message)} {endpoint.address} grpcapi.GrpcApp/sendMsg"
 
 
-def _dog_python(exchange: Exchange, address: str) -> str:
+def _dog_python(exchange: Exchange, endpoint: Endpoint) -> str:
+    words = shlex.split(endpoint.try_line)
+    proof = {word: value for word, value in pairwise(words) if word in ("-cacert", "-key", "-cert", "-authority")}
+    opening = f"grpc.insecure_channel({endpoint.address!r})"
+    keys = ""
+    if "-authority" in proof:  # the robot's certificate names it, not its address
+        files = [proof[word] for word in ("-cacert", "-key", "-cert")]
+        keys = (
+            f"pem = [pathlib.Path(file).read_bytes() for file in {files!r}]\n"
+            f"options = [('grpc.ssl_target_name_override', {proof['-authority']!r})]\n"
+        )
+        opening = f"grpc.secure_channel({endpoint.address!r}, grpc.ssl_channel_credentials(*pem), options)"
     return (
         "import pathlib\n\nimport grpc\n\n"
         "from roboglot.wire.cyberdog.proto.cyberdog_app_pb2 import SendRequest\n"
         "from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import GrpcAppStub\n\n"
-        "pem = {name: pathlib.Path(f'certs/{name}.pem').read_bytes() for name in"
-        " ('ca-cert', 'client-key', 'client-cert')}\n"
-        "keys = grpc.ssl_channel_credentials(pem['ca-cert'], pem['client-key'], pem['client-cert'])\n"
-        f"with grpc.secure_channel({address!r}, keys) as channel:\n"
+        f"{keys}with {opening} as channel:\n"
         f"    request = SendRequest(nameCode={int(exchange.operation or 0)}, params={readable(exchange.payload)!r})\n"
         "    for answer in GrpcAppStub(channel).sendMsg(request):\n        print(answer.nameCode, answer.data)\n"
     )

@@ -41,7 +41,8 @@ async def resend(exchange: Exchange, endpoint: Endpoint) -> Sequence[tuple[str, 
         if opened:
             await line.close()
         if isinstance(error, (ClientError, TimeoutError)):
-            raise Unconnected(f"the door did not answer: {error}") from None
+            why = str(error) or f"nothing came within {RESEND_SECONDS:g} s"
+            raise Unconnected(f"the door did not answer: {why}") from None
         raise
     held = asyncio.get_running_loop().create_task(_hold(line), name="console resend")
     _holding.add(held)

@@ -34,7 +34,7 @@ effect(() => {
 });
 export const wanted = signal({ wire: false, truth: false, seen: false });
 
-const KEPT_MAX = 5000; // exchanges
+const KEPT_MAX = 20_000; // exchanges
 const RETRY = 1000; // ms
 let socket = /** @type {WebSocket | null} */ (null);
 const REVOKED = 1008; // the code with which a socket is closed when its person's rights change

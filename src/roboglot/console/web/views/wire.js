@@ -16,13 +16,17 @@ const refusedOnly = signal(false);
 const pushes = signal(true);
 const paused = signal(/** @type {any[][] | null} */ (null));
 const opened = signal(0);
+const helpings = signal(1); // of them
 
-const shown = computed(() => {
-  const needle = text.value.trim().toLowerCase();
+const most = computed(() => SHOWN_MAX * helpings.value);
+const found = computed(() => {
+  const needle = text.value.trim().toLowerCase(), rows = paused.value ?? exchanges.value, newest = [];
   const fits = (row) => (!door.value || row[DOOR] === door.value) && (!refusedOnly.value || row[REFUSAL]) && (pushes.value || row[DIRECTION] !== "push")
     && (!needle || [CLIENT, CONNECTION, OPERATION, EXCERPT, REFUSAL].some((i) => row[i].toLowerCase().includes(needle)));
-  return (paused.value ?? exchanges.value).filter(fits).slice(-SHOWN_MAX);
+  for (let i = rows.length - 1; i >= 0 && newest.length <= most.value; i--) if (fits(rows[i])) newest.push(rows[i]);
+  return newest.reverse();
 });
+const shown = computed(() => found.value.slice(-most.value));
 
 async function copy(number, form) {
   const reply = await fetch(`/api/robots/${current.value}/wire/${number}/${form}`);
@@ -79,10 +83,11 @@ export function Wire() {
       <label class="grow"><span class="unseen">${t("wire.filter")}</span><input type="search" placeholder=${t("wire.filter")} value=${text.value} onInput=${(e) => { text.value = e.target.value; }} /></label>
       <${Button} label=${t("wire.refusedonly")} on=${refusedOnly.value} onClick=${() => { refusedOnly.value = !refusedOnly.value; }} />
       <${Button} label=${t("wire.pushes")} on=${pushes.value} onClick=${() => { pushes.value = !pushes.value; }} />
-      <${Button} icon=${paused.value ? "play" : "pause"} label=${t(paused.value ? "wire.goon" : "wire.pause")} onClick=${() => { paused.value = paused.value ? null : exchanges.value; }} />
+      <${Button} icon=${paused.value ? "play" : "pause"} label=${t(paused.value ? "wire.goon" : "wire.pause")} onClick=${() => { helpings.value = 1; paused.value = paused.value ? null : exchanges.value; }} />
     </div>
     <p class="muted count">${t("wire.count", { n: rows.length, time: clock.value.toFixed(0) })}${missed.value ? ` · ${t("wire.missed", { n: missed.value })}` : ""}</p>
-    ${rows.length ? html`<ol class="lines" ref=${list} tabindex="0" aria-label=${t("wire.lines")}>${rows.map((row) => html`<${Line} key=${row[NUMBER]} row=${row} slowest=${slowest} />`)}</ol>`
+    ${rows.length ? html`<ol class="lines" ref=${list} tabindex="0" aria-label=${t("wire.lines")}>${paused.value && found.value.length > rows.length && html`<li><${Button} label=${t("wire.earlier")} onClick=${() => { helpings.value++; }} /></li>`}
+      ${rows.map((row) => html`<${Line} key=${row[NUMBER]} row=${row} slowest=${slowest} />`)}</ol>`
       : html`<div class="empty"><h2>${t("wire.empty")}</h2><p>${t("wire.try")}</p><${Try} /></div>`}
   </section>`;
 }
