@@ -106,8 +106,9 @@ def test_probes_ask_only_what_reads(door: str) -> None:
 
 def test_robots_that_are_not_there_and_protocols_that_differ_are_refused() -> None:
     runner, app = CliRunner(), loaded("compare")
-    gone = runner.invoke(app, ["robomaster://127.0.193.99:9", "robomaster://127.0.193.99:9"])
-    assert (gone.exit_code, "cannot be reached" in gone.output) == (2, True)
+    for door in ("slamware", "robomaster", "cyberdog", "visual"):  # two that do not answer must not agree
+        gone = runner.invoke(app, [f"{door}://127.0.193.99:9", f"{door}://127.0.193.99:9"])
+        assert (door, gone.exit_code, "fidelity" in gone.output) == (door, 2, False)
     mixed = runner.invoke(app, ["robomaster://127.0.0.1", "slamware://127.0.0.1"])
     assert (mixed.exit_code, "one protocol" in mixed.output) == (2, True)
     missing = runner.invoke(app, [str(Path("no.mcap")), "slamware://127.0.0.1"])
@@ -128,8 +129,9 @@ async def test_robots_are_compared_by_their_urls(tmp_path: Path) -> None:
     runtime = Runtime(load_config(None, values, sections()))
     await runtime.start()
     try:
-        for door in ("slamware", "robomaster", "visual"):
-            urls = f"{door}://{ADDRESS}", f"{door}://{ADDRESS}"
+        for door in ("slamware", "robomaster", "visual", "cyberdog"):
+            proof = f"?certs={tmp_path}/data/cyberdog/tls" if door == "cyberdog" else ""
+            urls = f"{door}://{ADDRESS}{proof}", f"{door}://{ADDRESS}{proof}"
             same = await compared(urls, None, "", "", Mask(), commands=False)
             assert [row.differences for row in same.rows if row.differences] == []
             assert sum(row.checks for row in same.rows) > 20

@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-from roboglot.clients.errors import ClientError
+from roboglot.clients.errors import ClientError, LinkLost
 from roboglot.model.clock import Clock
 from roboglot.model.tap import Direction, Exchange
 from roboglot.recording.comparing.trees import leaves, tree
@@ -26,6 +26,8 @@ class Replay:
         self._found: list[Exchange] = []
         self._ids: dict[str, str] = {}
         self._started = 0.0
+        self._answered = False
+        self._lost: LinkLost | None = None
 
     async def run(self) -> list[Exchange]:
         """Raises ClientError where the robot cannot be reached at all."""
@@ -39,6 +41,8 @@ class Replay:
             async with asyncio.TaskGroup() as tasks:
                 for mine in lines.values():
                     tasks.create_task(self._one_line(mine))
+        if self._lost and not self._answered:  # silence of a robot that is not there is no session
+            raise self._lost
         return sorted(self._found, key=lambda exchange: exchange.stamp)
 
     async def _one_line(self, mine: Sequence[Asked]) -> None:
@@ -65,8 +69,11 @@ class Replay:
         try:
             answers = await line.ask(request.operation, self._renamed(request.payload), len(asked.replies))
         except ClientError as error:
+            if isinstance(error, LinkLost):
+                self._lost = self._lost or error
             self._note(request.connection, Direction.REPLY, request.operation, b"", "no answer", began, str(error))
             return
+        self._answered = self._answered or bool(answers)
         for payload, status in answers:
             self._note(request.connection, Direction.REPLY, request.operation, payload, status, began)
         for reply, (payload, _) in zip(asked.replies, answers, strict=False):
