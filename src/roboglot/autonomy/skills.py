@@ -32,6 +32,7 @@ from roboglot.autonomy.stairs.alignment import SeenStairAlignment
 from roboglot.autonomy.training import HeardWords
 from roboglot.kernels import NAVIGATION, loading
 from roboglot.kernels.ahead import KernelsUnavailable, compile_beside, missing
+from roboglot.model.background import load
 from roboglot.model.clock import RealClock
 from roboglot.model.components.energy.battery import DockContact
 from roboglot.model.components.interaction.training_words import TrainingWords
@@ -205,7 +206,7 @@ class Autonomy:
             self._report(FaultLevel.WARNING, str(course.unavailable))
         try:
             await compile_beside(NAVIGATION, _log_progress)
-            slam_class, planner_class = await asyncio.to_thread(_estimator_and_planner)
+            slam_class, planner_class = await load(_estimator_and_planner)
         except Exception as error:
             reason = str(error) or type(error).__name__
             course.unavailable = Refused(f"no mapping and no navigation: {reason}")

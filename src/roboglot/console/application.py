@@ -25,6 +25,7 @@ from roboglot.console.studio.channel import Session
 from roboglot.console.studio.classroom import Classroom
 from roboglot.extras import MissingExtra, explaining
 from roboglot.model.admission import Right, Unknown
+from roboglot.model.background import load
 from roboglot.model.client_context import client, identity
 from roboglot.model.errors import RobotError
 from roboglot.protocols.browsers import Browsers, of_rows
@@ -114,7 +115,7 @@ class Application:
         """Return what counts, from the first call on. Raises MissingExtra."""
         if self._metrics is None:
             with explaining("/metrics", "console"):
-                module = await asyncio.to_thread(import_module, "roboglot.console.metrics")
+                module = await load(lambda: import_module("roboglot.console.metrics"))
             self._metrics = self._metrics or cast("Metrics", module.Metrics(self._desk))
         return self._metrics
 

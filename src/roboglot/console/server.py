@@ -16,6 +16,7 @@ from roboglot.console.desk import Desk
 from roboglot.console.settings import BEAT, PORTS_TRIED_MAX
 from roboglot.extras import MissingExtra, in_words, is_there
 from roboglot.model.admission import Admission
+from roboglot.model.background import load
 from roboglot.protocols.browsers import Browsers
 from roboglot.protocols.gate import Gate
 from roboglot.transport.tls import Tls
@@ -70,7 +71,7 @@ class Console:
         await self._tasks[0]
 
     async def _serve(self, listening: socket.socket) -> None:
-        await asyncio.to_thread(_load)
+        await load(_load)
         from uvicorn.config import Config
         from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
         from uvicorn.server import ServerState
@@ -104,7 +105,7 @@ class Console:
 
     async def _push(self, application: Application) -> None:
         """Send metrics to the collector."""
-        otlp = await asyncio.to_thread(importlib.import_module, "roboglot.console.otlp")
+        otlp = await load(lambda: importlib.import_module("roboglot.console.otlp"))
         await otlp.Pusher(await application.metrics(), self._config.otlp, self._config.otlp_period).run()
 
     async def _beat(self, application: Application) -> None:

@@ -1,4 +1,4 @@
-"""Work beside the event loop in threads that give way: pictures and video take what clients leave of the machine."""
+"""Work beside the event loop: in threads that give way to clients, and in one that the end does not wait for."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import asyncio
 import os
 import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextvars import copy_context
 from functools import cache
 from typing import TypeVar
@@ -18,6 +18,27 @@ NICENESS = 10  # of the threads: a tenth of a core where the event loop wants it
 async def beside(job: Callable[[], R]) -> R:
     """Return the result of ``job``, done in one of as many threads as there are processors."""
     return await asyncio.get_running_loop().run_in_executor(_pool(os.getpid()), copy_context().run, job)
+
+
+async def load(job: Callable[[], R]) -> R:
+    """Return the result of ``job``, which imports modules, in a thread of its own.
+
+    Neither the loop's end nor the interpreter's waits for that thread, unlike those of an executor: an import of Numba
+    and what it compiles take seconds, and nothing is lost when the process ends in the midst of them.
+    """
+    result: Future[R] = Future()
+
+    def work() -> None:
+        result.set_running_or_notify_cancel()  # from here on it cannot be cancelled
+        try:
+            found = job()
+        except BaseException as error:  # noqa: BLE001
+            result.set_exception(error)
+        else:
+            result.set_result(found)
+
+    threading.Thread(target=work, name="loading", daemon=True).start()
+    return await asyncio.wrap_future(result)
 
 
 @cache

@@ -11,9 +11,11 @@ import logging
 from collections.abc import Awaitable
 from contextvars import copy_context
 from http import HTTPStatus
+from types import ModuleType
 from typing import TYPE_CHECKING, cast
 
 from roboglot.model.admission import NO_PROOF, Admission, Forbidden, Proof, ProofKind, Right, Unknown
+from roboglot.model.background import load
 from roboglot.model.client_context import ask_for
 from roboglot.protocols.browsers import Browsers, of_texts
 from roboglot.protocols.channels import Channel, Session
@@ -67,7 +69,7 @@ class WebSocketServer:
         self.browsers = browsers or Browsers(f"[{door}]")
         self.connections: set[Connection] = set()
         self._server: asyncio.Server | None = None
-        self._loading: asyncio.Future[object] | None = None
+        self._loading: asyncio.Task[ModuleType] | None = None
 
     async def start(self) -> None:
         """Listen. Raises OSError naming an address that is taken."""
@@ -77,7 +79,7 @@ class WebSocketServer:
         name, most = f"{self.door} WebSocket", CONNECTIONS_MAX
         self._server = await self._gate.listen(lambda: Connection(self), name, self.address, self.port, None, most)
         self.port = self._server.sockets[0].getsockname()[1]
-        self._loading = loop.run_in_executor(None, importlib.import_module, LIBRARY)
+        self._loading = loop.create_task(load(lambda: importlib.import_module(LIBRARY)), name="WebSocket library")
 
     async def close(self) -> None:
         """Stop listening and close every connection."""

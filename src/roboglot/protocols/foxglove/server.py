@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from roboglot.extras import explained
+from roboglot.model.background import load
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.protocols.browsers import Browsers
@@ -102,7 +103,7 @@ class FoxgloveDoor:
     async def topics(self) -> Topics:
         """Return the robot's topics. Raises ImportError where the extra is not installed."""
         if self._topics is None:
-            module = await asyncio.get_running_loop().run_in_executor(None, import_module, TOPICS)
+            module = await load(lambda: import_module(TOPICS))
             self._topics = self._topics or module.Topics(self.robot)
         assert self._topics is not None
         return self._topics

@@ -6,6 +6,7 @@ Loads MuJoCo when the first world is made, not when imported. Knows no map and n
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import math
 from collections.abc import Mapping, Sequence
@@ -15,6 +16,8 @@ from importlib.metadata import version
 
 import numpy as np
 
+from roboglot.kernels.ahead import KernelsUnavailable, compile_beside
+from roboglot.model.background import load
 from roboglot.model.clock import Clock, RealClock, Timer
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Description, Robot
@@ -173,10 +176,15 @@ class World:
 
     async def prepare(self, *, wait: bool) -> None:
         """Load the compiled kernels; return at once, or with ``wait`` when they are used (a lockstep world waits)."""
-        loading = asyncio.to_thread(self._environment.sight.load_kernel)
-        self._loading = asyncio.create_task(loading, name="kernels of the world")
+        self._loading = asyncio.create_task(self._load_kernels(), name="kernels of the world")
         if wait:
             await self._loading
+
+    async def _load_kernels(self) -> None:
+        """Have the lidars use the compiled kernel; compile it first, in a process of its own, where it is not."""
+        with contextlib.suppress(KernelsUnavailable):  # autonomy reports it; lidars go on without
+            await compile_beside(("sweep",))
+            await load(self._environment.sight.load_kernel)
 
     def start(self) -> None:
         """Let time pass; needs the running loop."""

@@ -1,0 +1,46 @@
+"""Work beside the event loop."""
+
+import asyncio
+import subprocess
+import sys
+import threading
+
+import pytest
+
+from roboglot.model.background import load
+
+ENDS = """
+import asyncio, threading
+from roboglot.model.background import load
+
+async def main():
+    loading = asyncio.ensure_future(load(threading.Event().wait))  # an import that never ends
+    await asyncio.sleep(0)
+
+asyncio.run(main())
+"""
+
+
+def test_loading_does_not_hold_up_the_end_of_the_process() -> None:
+    subprocess.run([sys.executable, "-c", ENDS], check=True, timeout=30)
+
+
+async def test_loading_answers_from_another_thread() -> None:
+    assert await load(threading.current_thread) is not threading.current_thread()
+
+
+async def test_error_of_loading_is_raised_to_who_waits() -> None:
+    with pytest.raises(ZeroDivisionError):
+        await load(lambda: 1 / 0)
+
+
+async def test_cancelled_loading_ends_without_a_word(caplog: pytest.LogCaptureFixture) -> None:
+    go, gone = threading.Event(), threading.Event()
+    loading = asyncio.ensure_future(load(lambda: (go.wait(), gone.set())))
+    await asyncio.sleep(0)
+    loading.cancel()
+    go.set()
+    assert await asyncio.to_thread(gone.wait, 10)
+    with pytest.raises(asyncio.CancelledError):
+        await loading
+    assert not caplog.records
