@@ -40,7 +40,7 @@ GOAL = 0.2  # m, how near a succeeded drive must have come
 
 @dataclass
 class Walker:
-    """One robot of the crowd, what it was told, and where it began to stand."""
+    """One robot of the crowd, the command it got, and where it began to stand."""
 
     robot: Robot
     role: str
@@ -51,7 +51,7 @@ class Walker:
     before: Pose = field(default_factory=Pose)  # where it was a look ago
     shoved: float = 0.0
     presses: int = 0
-    told: bool = False  # whether it said that something is wrong with where it is
+    reported_lost: bool = False  # whether it said that something is wrong with where it is
 
     def listen(self) -> None:
         """Hear what it says of itself."""
@@ -61,7 +61,7 @@ class Walker:
         events.listen(LocalizationLost, self._tell)
 
     def _tell(self, _: Event) -> None:
-        self.told = True
+        self.reported_lost = True
 
     def count(self, _: BumperPressed) -> None:
         """It touches something."""
@@ -83,7 +83,7 @@ class Outcome:
 
 
 async def leave(seed: int, seconds: float) -> Outcome:
-    """Have ten robots of all bodies leave one corridor at once, whoever stands in whose way."""
+    """Have ten robots of all bodies leave one corridor at once, no matter who stands in whose way."""
     clock, database = LockstepClock(), Database(":memory:")
     configs = [RobotConfig(f"r{n}", body=BODIES[(n + seed) % len(BODIES)]) for n in range(10)]
     fleet = build_fleet(CORRIDOR, configs, clock=clock, seed=seed, database=database)
@@ -208,7 +208,7 @@ def _look(fleet: Fleet, walker: Walker) -> None:
 def _judge(fleet: Fleet, walker: Walker, outcome: Outcome) -> None:
     robot, name = walker.robot, f"{walker.robot.id} ({walker.robot.description.model}, {walker.role})"
     outcome.presses += walker.presses
-    if walker.shoved > SHOVED and not walker.told:
+    if walker.shoved > SHOVED and not walker.reported_lost:
         outcome.silent.append(f"{name}: shoved by {walker.shoved:.2f} m")
     if walker.shoved > outcome.shoved:
         outcome.shoved, outcome.worst = walker.shoved, name

@@ -75,7 +75,7 @@ def test_sunday_is_0_and_7() -> None:
     assert parse_cycle("02 15 * * 1,5,7").weekdays == {0, 1, 5}
 
 
-def test_restricted_days_are_told_from_free_ones() -> None:
+def test_restricted_days_are_distinguished_from_free_ones() -> None:
     assert parse_cycle("45 4 1,10,22 * *").any_day is False
     assert parse_cycle("45 4 1,10,22 * *").any_weekday is True
     assert parse_cycle("@reboot") == Cycle(at_start=True)

@@ -20,6 +20,8 @@ WORDS_MAX = 5  # in 10,000 lines
 COLUMNS_MAX = 120  # of a line of docs; table rows, code and what is generated may be longer
 SOURCES = sorted(p for p in (ROOT / "src").rglob("*.py") if not p.name.endswith(GENERATED))
 
+TESTS = sorted((ROOT / "tests").rglob("*.py"))
+
 BY_PROGRAM = [ROOT / "docs" / name for name in ("capabilities.md", "coverage.md", "reference/programs.md")]
 PAGES = sorted(p for p in [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")] if p not in BY_PROGRAM)
 
@@ -40,18 +42,14 @@ def functions(path: Path) -> Iterator[tuple[str, int]]:
 
 def test_no_folder_is_crowded() -> None:
     """A folder that grows beyond this becomes two, each with a purpose."""
-    others = [
-        *(ROOT / "tests").rglob("*.py"),
-        *(ROOT / "docs").rglob("*.md"),
-        *(ROOT / "benchmarks").rglob("*.py"),
-    ]
+    others = [*TESTS, *(ROOT / "docs").rglob("*.md"), *(ROOT / "benchmarks").rglob("*.py")]
     crowds = Counter(path.parent.relative_to(ROOT) for path in [*SOURCES, *others])
     assert {str(folder): n for folder, n in crowds.items() if n > FILES_MAX} == {}
 
 
 def test_no_file_is_long() -> None:
     """A file does one thing."""
-    files = [*SOURCES, *(ROOT / "tests").rglob("*.py"), *(ROOT / "benchmarks").rglob("*.py")]
+    files = [*SOURCES, *TESTS, *(ROOT / "benchmarks").rglob("*.py")]
     counted = {str(path.relative_to(ROOT)): len(path.read_text().splitlines()) for path in files}
     assert {name: lines for name, lines in counted.items() if lines > LINES_MAX} == {}
 
@@ -65,7 +63,7 @@ def test_no_function_is_long() -> None:
     assert long == {}
 
 
-@pytest.mark.parametrize("texts", [SOURCES, PAGES], ids=["src", "docs"])
+@pytest.mark.parametrize("texts", [SOURCES, PAGES, TESTS], ids=["src", "docs", "tests"])
 def test_plain_words(texts: list[Path]) -> None:
     """The words of scripts/words.txt make a sentence be read twice; a few are data or another's own words."""
     words = [line.partition("->")[0] for line in (ROOT / "scripts" / "words.txt").read_text().splitlines()]

@@ -167,20 +167,20 @@ def test_a_comment_or_a_tools_setting_does_not(locked: Path) -> None:
     assert locks.complaints(locked) == []
 
 
-def test_a_pin_that_only_one_lock_has_is_told(locked: Path) -> None:
+def test_a_pin_that_only_one_lock_has_is_reported(locked: Path) -> None:
     dev = locked / "requirements/dev.lock"
     dev.write_text(dev.read_text().replace("\nrich==", "\nrich==0+"))
     assert [line for line in locks.complaints(locked) if "doesn't hold rich==" in line]
 
 
-def test_other_hashes_for_the_same_pin_are_told(locked: Path) -> None:
+def test_other_hashes_for_the_same_pin_are_reported(locked: Path) -> None:
     dev = locked / "requirements/dev.lock"
     good = next(iter(next(iter(locks.pins(dev.read_text()).values()))))
     dev.write_text(dev.read_text().replace(good, "sha256:" + "0" * 64))
     assert len(locks.complaints(locked)) == 1
 
 
-def test_a_pin_without_a_hash_is_told(locked: Path) -> None:
+def test_a_pin_without_a_hash_is_reported(locked: Path) -> None:
     run = locked / "requirements/run.lock"
     run.write_text(run.read_text() + "evil==1\n")
     assert "requirements/run.lock: evil==1 has no hash" in locks.complaints(locked)

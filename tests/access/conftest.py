@@ -27,7 +27,7 @@ def store(data: Path) -> AccessStore:
     for caller in CALLERS:
         robot = "b" if caller.name == "owner-of-b" else "a"
         rights = [Right.ADMIN] if caller.name in ("owner-of-b", "revoked") else [Right(caller.name)]\
-            if caller.name != "nobody" else []  # fmt: skip
+            if caller.name != "unknown" else []  # fmt: skip
         if rights:
             store.allow(caller.address, [Grant(robot, frozenset(rights))])
             store.add_app(caller.name, [Grant(robot, frozenset(rights))])

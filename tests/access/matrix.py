@@ -38,7 +38,7 @@ class Caller:
 
 
 CALLERS = (
-    Caller("nobody", "127.0.95.1", NOTHING),
+    Caller("unknown", "127.0.95.1", NOTHING),
     *(Caller(right, f"127.0.95.{number}", whole([right])) for number, right in enumerate(Right, 2)),
     Caller("revoked", "127.0.95.10", NOTHING),
     Caller("owner-of-b", "127.0.95.11", NOTHING),

@@ -29,7 +29,7 @@ async def test_a_task_has_its_owners_rights_and_ends_with_them(runtime: Runtime,
     assert link is not None
     await each_minute(link)
     await link.close()
-    other = await open_frames(OTHER.address)  # whoever speaks last is not who it runs for
+    other = await open_frames(OTHER.address)  # the last speaker is not who it runs for
     assert other is not None
     await frame_states(other, [{"type": "task", "operate": "inquiry", "target_id": []}])
     asked: list[str] = []

@@ -24,7 +24,7 @@ PNG, JPEG = "iVBORw0KGgo", "/9j/"
 
 @contextlib.asynccontextmanager
 async def passing(shown: Shown) -> AsyncIterator[None]:
-    """Robot time passes as fast as it goes while somebody waits for the robot."""
+    """Robot time passes as fast as it goes while someone waits for the robot."""
 
     async def pass_time() -> None:
         while True:
@@ -88,18 +88,18 @@ async def test_over_streamable_http(shown: Shown) -> None:
 async def test_go_to_drives_there_and_tells_how_it_ended(shown: Shown) -> None:
     async with tools(shown) as client:
         async with passing(shown):
-            told = await call(client, "go_to", x=1.0, y=0.5)
-        assert told["status"] == "SUCCEEDED"
-        assert told["pose"][:2] == pytest.approx([1.0, 0.5], abs=0.15)
+            result = await call(client, "go_to", x=1.0, y=0.5)
+        assert result["status"] == "SUCCEEDED"
+        assert result["pose"][:2] == pytest.approx([1.0, 0.5], abs=0.15)
         assert shown.robot[Localization].pose.distance_to(Pose(1.0, 0.5, 0.0)) < 0.15
 
 
 async def test_drive_brakes_by_itself_and_is_bounded(shown: Shown) -> None:
     async with tools(shown) as client:
         async with passing(shown):
-            told = await call(client, "drive", x=0.3, seconds=1.0)
-        assert told["status"] == "SUCCEEDED"
-        assert 0.1 < told["pose"][0] < 0.4
+            result = await call(client, "drive", x=0.3, seconds=1.0)
+        assert result["status"] == "SUCCEEDED"
+        assert 0.1 < result["pose"][0] < 0.4
         assert "less than or equal to 2" in await refusal(client, "drive", x=0.3, seconds=3.0)
 
 
@@ -147,15 +147,15 @@ async def test_a_plan_is_tried_before_the_robot_moves(shown: Shown) -> None:
     before = shown.robot[Localization].pose
     free = [{"do": "go_to", "x": 1.0, "y": 0.5}, {"do": "drive", "yaw": 1.0, "seconds": 1.0}]
     async with tools(shown) as client:
-        told = await call(client, "rehearse", plan=free)
-        assert told["safe"], told
-        assert [step["status"] for step in told["steps"]] == ["SUCCEEDED", "SUCCEEDED"]
-        assert told["path"][-1] == pytest.approx([1.0, 0.5], abs=0.15)
+        result = await call(client, "rehearse", plan=free)
+        assert result["safe"], result
+        assert [step["status"] for step in result["steps"]] == ["SUCCEEDED", "SUCCEEDED"]
+        assert result["path"][-1] == pytest.approx([1.0, 0.5], abs=0.15)
         (placed,) = shown.desk.stage.robots
         shown.desk.stage.add_obstacle(placed.pose.compose(Pose(0.9, 0.0)))
-        told = await call(client, "rehearse", plan=[{"do": "drive", "x": 1.0, "seconds": 2.0}])
-        assert not told["safe"]
-        assert {hit["what"] for hit in told["hits"]} == {"a box"}
-        assert told["hits"][0]["point"][0] < 0.7
+        result = await call(client, "rehearse", plan=[{"do": "drive", "x": 1.0, "seconds": 2.0}])
+        assert not result["safe"]
+        assert {hit["what"] for hit in result["hits"]} == {"a box"}
+        assert result["hits"][0]["point"][0] < 0.7
         assert "at most 20" in await refusal(client, "rehearse", plan=free * 11)
     assert shown.robot[Localization].pose == before

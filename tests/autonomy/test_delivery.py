@@ -120,7 +120,7 @@ async def test_queues_are_bounded(robot: Robot) -> None:
     await delivery.accept(OrderRequest(OrderKind.RETURN, "room"))
     assert len(delivery.orders) <= ENDED_MAX + OPEN_MAX
     with pytest.raises(NotFound):
-        await delivery.cancel("nobody")
+        await delivery.cancel("unknown")
     with pytest.raises(InvalidGoal):
         await delivery.accept(OrderRequest(OrderKind.RETURN, "room", stops=("room",) * 1000))
     with pytest.raises(NotFound):

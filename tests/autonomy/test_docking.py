@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 
 @pytest.mark.world("office", seed=3)
 async def test_it_finds_back_to_its_dock(tour: Tour) -> None:
-    docking, told, charging = tour.robot[Docking], [], []
+    docking, reported, charging = tour.robot[Docking], [], []
     assert docking.home == ORIGIN
     await tour.go((14.0, 10.0))
     assert not tour.robot[DockContact].docked
 
     def watch(event: ActionChanged) -> None:
-        told.append(event.action.feedback)
+        reported.append(event.action.feedback)
         if event.action.status is ActionStatus.SUCCEEDED:
             charging.append(tour.robot[Battery].state.dock_charging)
 
@@ -38,7 +38,7 @@ async def test_it_finds_back_to_its_dock(tour: Tour) -> None:
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     assert tour.robot[DockContact].docked
     assert tour.truth.distance_to(tour.start) < 0.04
-    assert list(dict.fromkeys(told)) == [None, "approaching", "docking", "docked"]
+    assert list(dict.fromkeys(reported)) == [None, "approaching", "docking", "docked"]
 
 
 @pytest.mark.world("empty")
@@ -126,7 +126,7 @@ async def test_an_unknown_dock_is_found_nearby(tour: Tour) -> None:
 
 
 @pytest.mark.world("empty")
-async def test_an_unknown_dock_far_away_is_told(tour: Tour) -> None:
+async def test_an_unknown_dock_far_away_is_reported(tour: Tour) -> None:
     await tour.go((6.0, 5.0))
     tour.robot[Docking].set_home(None)
     action = await tour.end_of(tour.robot[Docking].dock())

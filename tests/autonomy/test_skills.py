@@ -1,4 +1,4 @@
-"""What skills a robot gets from its parts, and that nobody waits for a compiler."""
+"""What skills a robot gets from its parts, and that no one waits for a compiler."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ async def test_start_does_not_wait_for_kernels_and_navigation_does() -> None:
     await autonomy.close()
 
 
-async def test_start_waits_when_told_to() -> None:
+async def test_start_waits_when_asked_to() -> None:
     autonomy = Autonomy(robot_on(LockstepClock(), Base, Odometry, Lidar))
     await autonomy.start(wait=True)
     assert autonomy.ready

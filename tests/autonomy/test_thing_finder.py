@@ -1,4 +1,4 @@
-"""A single thing among the lidar's points: found where it stands, told from walls, found again where it went."""
+"""A single thing among the lidar's points: found where it stands, no wall, found again where it went."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ async def test_a_word_said_three_times(robot, world, forward):
     assert robot[TrainingWords].all() == [TrainedWord("abracadabra", "wave_task")]
 
 
-async def test_nobody_said_anything(robot, forward):
+async def test_no_one_said_anything(robot, forward):
     teaching = robot[TrainingWords].teach("x", seconds=2.0)
     await forward(seconds=3)
     assert isinstance(teaching.error, Expired)

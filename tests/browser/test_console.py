@@ -47,7 +47,7 @@ SMALL_TARGETS = """() => [...document.querySelectorAll('button, a, select, input
 
 @pytest_asyncio.fixture(loop_scope="session")
 async def open_console(browser: Any, served: Served) -> AsyncIterator[Open]:
-    """Open the console as somebody, in a browser of their own; it must say nothing bad on its own console."""
+    """Open the console as someone, in a browser of their own; it must say nothing bad on its own console."""
     opened, said = [], []
 
     async def open_it(person: str = "anna", view: str = "live", language: str = "en", **options: Any) -> Page:

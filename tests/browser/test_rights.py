@@ -206,7 +206,7 @@ async def test_a_token_signs_in_and_its_rotation_signs_out(guarded: Guarded, ope
     await page.wait_for_selector(".sign")
 
 
-async def test_guesses_are_limited_and_told_apart_from_nothing(guarded: Guarded, open_page: Open) -> None:
+async def test_guesses_are_limited_and_differ_from_nothing(guarded: Guarded, open_page: Open) -> None:
     guarded.add("ben", "see")
     guarded.forget_tries()
     page = await open_page()

@@ -63,7 +63,7 @@ def test_people_apps_and_addresses(tmp_path: Path) -> None:
         (("audit",), "there is none"),
     ],
 )
-def test_mistakes_are_told_in_one_line(tmp_path: Path, arguments: tuple[str, ...], words: str) -> None:
+def test_mistakes_are_reported_in_one_line(tmp_path: Path, arguments: tuple[str, ...], words: str) -> None:
     ended = call(*arguments, "--data", str(tmp_path))
     assert ended.returncode == 1
     assert words in ended.stderr

@@ -85,7 +85,7 @@ def test_addresses_follow_one_another() -> None:
         addresses(1, "127.0.0.9", "10.99.0.0/24")
 
 
-def test_an_address_of_others_is_told_how_to_have(tmp_path: Path) -> None:
+def test_how_to_have_an_address_of_others_is_explained(tmp_path: Path) -> None:
     data = tmp_path / "data"
     store = AccessStore(data / FILE)
     token = store.add_machine("cell", [Grant("*", frozenset({Right.SEE}))])

@@ -36,9 +36,9 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Run]:
 
 
 def test_status_is_json(run: Run) -> None:
-    told = json.loads(run("status").stdout)
-    assert told["task_status"]["task_status"] == 101
-    assert told["bat_info"]["power"] > 0
+    reported = json.loads(run("status").stdout)
+    assert reported["task_status"]["task_status"] == 101
+    assert reported["bat_info"]["power"] > 0
 
 
 def test_a_photo_is_left_here(run: Run, tmp_path: Path) -> None:
@@ -57,7 +57,7 @@ def test_go_tells_the_way_and_map_saves(run: Run) -> None:
 @pytest.mark.parametrize(
     "words", [["fly"], ["go", "1"], ["drive"], ["drive", "nan", "0", "0", "1"], ["status", "--certs", "/nowhere"]]
 )
-def test_mistakes_are_told_in_a_line(run: Run, words: list[str]) -> None:
+def test_mistakes_are_reported_in_a_line(run: Run, words: list[str]) -> None:
     failed = run(*words)
     assert failed.returncode == 1
     assert failed.stderr.startswith("roboglot cyberdog: ")

@@ -83,7 +83,7 @@ def test_too_few_files_is_one_sentence(tmp_path: Path) -> None:
     assert done.stderr.count("\n") == 1
 
 
-def test_running_out_of_files_is_told_once(caplog: pytest.LogCaptureFixture) -> None:
+def test_running_out_of_files_is_reported_once(caplog: pytest.LogCaptureFixture) -> None:
     loop = asyncio.new_event_loop()
     try:
         files = OpenFiles()

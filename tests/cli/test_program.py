@@ -163,8 +163,8 @@ async def test_a_task_is_suspended_recovered_shut_down_and_deleted(shell: Shell)
     assert process.stdout
     assert await asyncio.wait_for(process.stdout.readline(), PATIENCE) == b"on\n"
     for operate, state in (("suspend", "suspend"), ("recover", "run"), ("shutdown", "shutdown"), ("delete", "")):
-        told = await shell.call(operate, "t")
-        assert (told.status, told.out, told.err) == (0, f"t: {operate} accepted\n", "")
+        answer = await shell.call(operate, "t")
+        assert (answer.status, answer.out, answer.err) == (0, f"t: {operate} accepted\n", "")
         async with asyncio.timeout(PATIENCE):
             while "".join(task.state for task in await shell.service.tasks()) != state:  # noqa: ASYNC110
                 await asyncio.sleep(0.01)
@@ -175,7 +175,7 @@ async def test_a_task_is_suspended_recovered_shut_down_and_deleted(shell: Shell)
 
 @pytest.fixture
 def interruptible() -> Iterator[None]:
-    """Whoever runs the tests in the background of a script has processes ignore interruptions from the start."""
+    """Anyone who runs the tests in the background of a script has processes ignore interruptions from the start."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
@@ -199,12 +199,12 @@ async def test_an_interruption_ends_the_program(shell: Shell) -> None:
     [
         (("run",), "which file"),
         (("run", "/nowhere/t.py"), "No such file"),
-        (("log", "nobody"), "there is no task nobody"),
+        (("log", "unknown"), "there is no task unknown"),
         (("list", "--robot", "ws://127.0.0.78:9"), "no answer"),
         (("list", "--robot", "http://x"), "ws://HOST:PORT"),
     ],
 )
-async def test_mistakes_are_told_in_one_line(shell: Shell, arguments: tuple[str, ...], words: str) -> None:
+async def test_mistakes_are_reported_in_one_line(shell: Shell, arguments: tuple[str, ...], words: str) -> None:
     shell.address = arguments[-1] if "--robot" in arguments else shell.address
     ended = await shell.call(*arguments)
     assert ended.status == 1

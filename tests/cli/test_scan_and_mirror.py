@@ -81,7 +81,7 @@ async def test_a_dog_is_recognised_by_its_certificate(
     assert found == scan.Found(f"cyberdog://127.0.0.1:{door.port}?certs=DIR", "CyberDog 2 CN=cyberdog2.server")
 
 
-async def test_robomasters_that_broadcast_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_robomasters_that_broadcast_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     async def discover(seconds: float) -> list[str]:
         return ["10.0.0.5"]
 

@@ -88,8 +88,8 @@ async def test_a_head_that_never_ends_is_not_waited_for(
     monkeypatch.setattr(http_connection, "REQUEST_SECONDS_MAX", 0.2)
     reader, writer = await asyncio.open_connection("127.0.0.1", port)
     writer.write(sent)
-    told = await asyncio.wait_for(reader.read(), PATIENCE)
-    assert told.count(b"HTTP/1.1 401") == answers
+    answered = await asyncio.wait_for(reader.read(), PATIENCE)
+    assert answered.count(b"HTTP/1.1 401") == answers
     writer.close()
 
 

@@ -86,13 +86,15 @@ async def test_the_board_and_the_page_name_what_there_is(shown: Shown) -> None:
     await scraped(shown)
     await say("command;", "robot battery ?;")
     names = {name for name, *_ in await scraped(shown)}
-    told = {name.removesuffix("_total") for name in names} | {name.removesuffix("_bucket") for name in names}
-    told |= {f"roboglot_{which}" for which in ("refusals", "pushes", "actions_ended", "link_up", "link_age_seconds")}
+    reported = {name.removesuffix("_total") for name in names} | {name.removesuffix("_bucket") for name in names}
+    reported |= {
+        f"roboglot_{which}" for which in ("refusals", "pushes", "actions_ended", "link_up", "link_age_seconds")
+    }
     board = json.loads((ROOT / "deploy/grafana.json").read_text())
     asked = " ".join(target["expr"] for panel in board["panels"] for target in panel["targets"])
     for text in (asked, (ROOT / "docs/metrics.md").read_text()):
         for name in re.findall(r"\broboglot_[a-z_]+", text):
-            assert name.removesuffix("_total").removesuffix("_bucket") in told, name
+            assert name.removesuffix("_total").removesuffix("_bucket") in reported, name
 
 
 async def test_a_collector_gets_the_same_values(shown: Shown) -> None:

@@ -49,7 +49,7 @@ class Ended:
 
 @dataclass
 class Terminal:
-    """Somebody who types, in a folder with the clone's .venv and examples, next to robot a."""
+    """Someone who types, in a folder with the clone's .venv and examples, next to robot a."""
 
     runtime: Runtime
     address: str
@@ -171,7 +171,7 @@ def free_port() -> int:
 async def terminal(
     folder: Path, address: str, body: str = "universal", access: AccessConfig | None = None
 ) -> AsyncIterator[Terminal]:
-    """``roboglot up`` in lockstep, in this process, with the doors' own ports, and somebody beside it."""
+    """``roboglot up`` in lockstep, in this process, with the doors' own ports, and someone beside it."""
     (folder / "tools").mkdir()
     for name, text in TOOLS.items():
         (folder / "tools" / name).write_text(text)

@@ -35,9 +35,9 @@ def inline(page: Path, words: str) -> str:
 async def test_the_first_drive_ends_where_it_says(tmp_path: Path, page: Path) -> None:
     async with terminal(tmp_path, "127.0.0.71") as user:
         said = await user.type_block(block_with(page, "MoveToAction"))
-        told = re.fullmatch(r"ok;ok;(\S+) (\S+) (\S+);ok;", said[3].said)
-        assert told, said
-        x, y, clockwise = map(float, told.groups())
+        answered = re.fullmatch(r"ok;ok;(\S+) (\S+) (\S+);ok;", said[3].said)
+        assert answered, said
+        x, y, clockwise = map(float, answered.groups())
         assert (x, y) == pytest.approx((1.5, 0.0), abs=SLACK)
         assert clockwise == pytest.approx(30, abs=3)
         assert (tmp_path / "certs/client-key.pem").exists()
@@ -66,8 +66,8 @@ async def test_the_text_page_begins_with_a_drive(page: str, tmp_path: Path) -> N
         ended = await user.type(line.removeprefix("$ "))
         numbers = r"-?\d+\.\d+"
         assert re.sub(numbers, "#", ended.said) == re.sub(numbers, "#", answer)
-        for told, wanted in zip(re.findall(numbers, ended.said), re.findall(numbers, answer), strict=True):
-            assert float(told) == pytest.approx(float(wanted), abs=0.5 if float(wanted) < 0.1 else SLACK)
+        for answered, wanted in zip(re.findall(numbers, ended.said), re.findall(numbers, answer), strict=True):
+            assert float(answered) == pytest.approx(float(wanted), abs=0.5 if float(wanted) < 0.1 else SLACK)
         assert_pose(user.moved, x=0.5, y=0.0, deg=0)
 
 
@@ -174,9 +174,9 @@ async def test_the_page_of_access_lets_in_and_throws_out(tmp_path: Path) -> None
         verified = await user.type(".venv/bin/roboglot audit --verify")
         assert verified.status == 0, verified
         assert "rows, whole" in verified.said
-        told = await user.type(".venv/bin/roboglot doctor --security")
-        assert "shift-lead" in told.said
-        assert token not in told.said
+        answered = await user.type(".venv/bin/roboglot doctor --security")
+        assert "shift-lead" in answered.said
+        assert token not in answered.said
 
 
 async def test_the_text_client_drives_and_listens(tmp_path: Path, vendor_ports: None) -> None:

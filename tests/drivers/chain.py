@@ -60,7 +60,7 @@ class Script:
 
 
 def free_port() -> int:
-    """A TCP port that nobody has now, and that the system gives to no outgoing connection meanwhile."""
+    """A TCP port that no one has now, and that the system gives to no outgoing connection meanwhile."""
     for port in random.sample(range(*PORTS), 100):
         with socket.socket() as probe, contextlib.suppress(OSError):
             probe.bind(("", port))

@@ -40,7 +40,7 @@ SIDE, SPEED = 0.4, 0.3  # m, m/s
 
 
 class Front(Protocol):
-    """A client: a side of a square and a left turn, going ahead until it is gone; what it is told, and where it goes.
+    """A client: a side of a square and a left turn, going ahead until it is gone; what it reports, and where it goes.
 
     ``battery`` is in percent, ``pose`` in a frame of its own (None: this protocol tells none of such a robot);
     ``navigate`` goes to a point so far to the left by the robot's navigation.
@@ -101,8 +101,8 @@ class Rest:
         return (await self.client.get_power_status()).battery_percentage
 
     async def pose(self) -> Pose:
-        told = await self.client.get_odo_pose()
-        return Pose(told.x, told.y, told.yaw)
+        reported = await self.client.get_odo_pose()
+        return Pose(reported.x, reported.y, reported.yaw)
 
     async def navigate(self, left: float) -> None:
         here = await self.client.get_pose()
@@ -142,8 +142,8 @@ class Phone:
             await (await self.client.relocalise()).succeeded()
             self.localized = True
         with self.client.watch(values.Pose) as pushes:
-            async for told in pushes:
-                return pose_of(told)
+            async for reported in pushes:
+                return pose_of(reported)
         raise AssertionError
 
     async def navigate(self, left: float) -> None:
@@ -177,9 +177,9 @@ class Blocks:
         door.subscribe(self._hear)
 
     def _hear(self, text: str) -> None:
-        told: dict[str, Any] = json.loads(text).get("feedback") or {}
-        if told.get("operate") == "stop" and told["id"].startswith("task_"):
-            self.ended.add(told["target_id"])
+        reported: dict[str, Any] = json.loads(text).get("feedback") or {}
+        if reported.get("operate") == "stop" and reported["id"].startswith("task_"):
+            self.ended.add(reported["target_id"])
 
     async def run(self, body: str) -> None:
         await self.begin(body)

@@ -17,7 +17,7 @@ class Fault:
     def __init__(self) -> None:
         self.delay = 0.0  # robot s, each way
         self.lossy = False  # TCP comes late, datagrams do not come
-        self.silent = False  # half-open: nothing passes, nobody is told
+        self.silent = False  # half-open: nothing passes, no one is notified
         self.garbage = b""  # said instead of the robot's next answers
         self.after = b""  # a question from which on garbage is what it answers
         self.late = b"", 0.0  # a question whose own answer comes so much later, robot s
@@ -59,7 +59,7 @@ class Proxy:
         for task in tuple(self._tasks):
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
-        await asyncio.sleep(0.02)  # whoever was let in or dialled meanwhile comes to his end
+        await asyncio.sleep(0.02)  # a client that was let in or dialled meanwhile comes to his end
         for writer in tuple(self._writers):
             writer.transport.abort()
             with contextlib.suppress(OSError):

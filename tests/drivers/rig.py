@@ -33,14 +33,14 @@ class Rig:
         self.proxies: list[Proxy] = []
         self._robot, self._folder = robot, folder
         self._ports = [free_port() for _ in range(4)]
-        self._told = UdpProxy(robot.clock, (HOST, free_port()), self.fault)
+        self._reported = UdpProxy(robot.clock, (HOST, free_port()), self.fault)
         self._door: Door | None = None
 
     async def open(self) -> None:
         """Relays, then the door."""
         clock, robot_at = self._robot.clock, EP_ADDRESS if self.back == "robomaster" else HOST
         if self.back == "robomaster":
-            await self._told.start()
+            await self._reported.start()
         for port in self._ports[: 2 if self.back == "robomaster" else 1]:
             self.proxies.append(Proxy(clock, (robot_at, port), self.fault))
         driver_port = free_port()
@@ -55,7 +55,7 @@ class Rig:
                 self.url = f"slamware://{HOST}:{port}"
             case "robomaster":
                 _, event, video, audio = (self.proxies[0].port, self.proxies[1].port, *self._ports[2:])
-                push = self._told._target[1]
+                push = self._reported._target[1]
                 ports = f"event={event}&video={video}&audio={audio}&push={push}"
                 self.url = f"robomaster://{HOST}:{port}?{ports}&local={HOST}"
             case _:
@@ -69,7 +69,7 @@ class Rig:
             case "slamware":
                 self._door = SlamwareDoor(self._robot, HOST, SlamwareConfig(port=control))
             case "robomaster":
-                config = RoboMasterConfig(control, video, audio, self._told.port, event, free_port())
+                config = RoboMasterConfig(control, video, audio, self._reported.port, event, free_port())
                 self._door = RoboMasterDoor(self._robot, EP_ADDRESS, config)
             case _:
                 dog = CyberDogConfig(port=control, app_port=self.proxies[-1].port)
@@ -108,7 +108,7 @@ class Rig:
         """All of it."""
         for proxy in self.proxies:
             await proxy.close()
-        await self._told.close()
+        await self._reported.close()
         await self.stop()
 
 

@@ -102,7 +102,7 @@ async def test_its_pictures_and_photos_are_what_the_dog_sees(driven: Robot, robo
         camera.set_exposure(1.0)
 
 
-async def test_battery_motors_network_and_power_are_told(driven: Robot, robot: Robot) -> None:
+async def test_battery_motors_network_and_power_are_reported(driven: Robot, robot: Robot) -> None:
     near, far = driven[Battery].state, robot[Battery].state
     assert (near.voltage, near.capacity) == pytest.approx((far.voltage, far.capacity), rel=0.02)
     assert near.temperature == pytest.approx(far.temperature, abs=1)
@@ -128,7 +128,7 @@ async def test_battery_motors_network_and_power_are_told(driven: Robot, robot: R
         power.sleep()
 
 
-async def test_it_speaks_as_loudly_as_it_is_told(driven: Robot, robot: Robot) -> None:
+async def test_it_speaks_as_loudly_as_asked(driven: Robot, robot: Robot) -> None:
     speaker, said = driven[Speaker], list[str]()
     robot.events.listen(Spoke, lambda event: said.append(event.text))
     async with asyncio.timeout(PATIENCE):
@@ -166,7 +166,7 @@ async def test_labels_of_its_map_are_places_here(labelled: Robot, driven: Robot)
     assert list(near.all()) == [hall]
 
 
-async def test_its_skin_shows_what_it_is_told(driven: Robot, robot: Robot) -> None:
+async def test_its_skin_shows_what_it_is_given(driven: Robot, robot: Robot) -> None:
     near, far = driven[ElectronicSkin], robot[ElectronicSkin]
 
     async def becomes(**wanted: object) -> None:
@@ -178,7 +178,7 @@ async def test_its_skin_shows_what_it_is_told(driven: Robot, robot: Robot) -> No
     await becomes(pattern=SkinPattern.REARWARD, cycle=1.5)
     near.show(SkinPattern.FOOTFALLS, standing=Shade.DARK)
     await becomes(pattern=SkinPattern.FOOTFALLS, standing=Shade.DARK)
-    assert set(near.shades) == {Patch.FRONT, Patch.MIDDLE, Patch.REAR}  # nobody tells it of the feet
+    assert set(near.shades) == {Patch.FRONT, Patch.MIDDLE, Patch.REAR}  # no one tells it of the feet
     near.enable(False)
     await becomes(enabled=False)
     with pytest.raises(InvalidGoal):

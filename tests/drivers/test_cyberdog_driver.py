@@ -137,7 +137,7 @@ async def test_it_stands_square_before_stairs(
     action.cancel()
     await until(lambda: action.status.ended)
     assert action.status is ActionStatus.CANCELED
-    assert not robot.actions.running(BASE)  # the dog was told, and stands
+    assert not robot.actions.running(BASE)  # the dog was ordered to, and stands
     assert world.truth.pose_of("a").x < 3.44
 
 
@@ -223,7 +223,7 @@ async def test_it_follows_and_docks_by_its_own_skills_also_when_it_is_localized(
     await until(lambda: docking.status.ended)
 
 
-async def test_what_the_dog_did_for_nobody_is_stopped_when_the_link_is_back(
+async def test_what_the_dog_did_for_no_one_is_stopped_when_the_link_is_back(
     driven: Robot, robot: Robot, until: Until, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     going = driven[Navigation].navigate_to([Point(6.0, 0.0)], NavigationOptions(), source="test")
@@ -233,14 +233,14 @@ async def test_what_the_dog_did_for_nobody_is_stopped_when_the_link_is_back(
         broken.delattr(link_module, "_heartbeat")  # the dog's heartbeats do not get through
         await until(lambda: going.status.ended)
     assert not skill.status.ended  # it sees to its safety itself
-    told = driven.events.subscribe(LinkChanged)
+    reported = driven.events.subscribe(LinkChanged)
     await until(lambda: driven[Link].state is LinkState.UP, patience=60)
     await until(lambda: skill.status.ended, patience=2)
     assert skill.status is ActionStatus.CANCELED
     begun = driven.clock.time()
     await until(lambda: driven.clock.time() - begun > 1.5)  # heartbeats later
-    assert OTHERS not in {event.holder for event in told.drain()}  # it was ours all the time
-    told.close()
+    assert OTHERS not in {event.holder for event in reported.drain()}  # it was ours all the time
+    reported.close()
 
 
 async def test_it_announces_what_it_adds(driven: Robot, until: Until) -> None:

@@ -122,7 +122,7 @@ async def test_new_certificates_are_used_as_soon_as_they_are_there(
         await other_certificates(way)
         await until(clock, lambda: link.state is LinkState.LOST, 3)
         await clock.sleep(4)
-        assert link.state is LinkState.LOST  # nobody is let in with the old ones
+        assert link.state is LinkState.LOST  # no one is let in with the old ones
         assert link.reason
         await stands(world, clock)
         way.hand_out_certificates()
@@ -250,7 +250,7 @@ async def test_letting_go_of_a_silent_robot_ends_though_time_stands_still(
         start = world.truth.pose_of("a")
         await until(driven.clock, lambda: world.truth.pose_of("a").distance_to(start) > 0.1, 5)
         way.fault.silent = True
-    # What is left is the fixtures' to close, and nobody moves the clock: it must not hang.
+    # What is left is the fixtures' to close, and no one moves the clock: it must not hang.
 
 
 @pytest.mark.parametrize("back", ["robomaster"])
@@ -273,15 +273,15 @@ async def test_a_dogs_reckoned_pose_stands_when_its_frames_do(
 ) -> None:
     async with connect() as driven:
         await drives(driven, world)
-        told, real = driven[Odometry].reading.pose, world.truth.pose_of("a")
+        reported, real = driven[Odometry].reading.pose, world.truth.pose_of("a")
         way.fault.silent = True
         await driven.clock.sleep(2)
-        way_told = told.distance_to(driven[Odometry].reading.pose)
-        assert way_told == pytest.approx(real.distance_to(world.truth.pose_of("a")), abs=0.05)
+        way_reported = reported.distance_to(driven[Odometry].reading.pose)
+        assert way_reported == pytest.approx(real.distance_to(world.truth.pose_of("a")), abs=0.05)
 
 
 @pytest.mark.parametrize("back", ["cyberdog"])
-async def test_what_clients_are_told_names_no_files(
+async def test_what_clients_receive_names_no_files(
     back: str, way: Rig, connect: Connect, rest: OpenRest, tmp_path: Path
 ) -> None:
     async with connect() as driven:
@@ -293,6 +293,6 @@ async def test_what_clients_are_told_names_no_files(
         health = await dashboard.get_robot_health()
         with pytest.raises(SlamwareRefused) as refused_:
             await dashboard.begin("MoveByAction", MoveByOptions(Direction.FORWARD, duration=500))
-        for told in (driven[Link].reason, str(health), str(refused_.value), str(driven[Health].faults)):
-            assert str(tmp_path) not in told
-            assert "certs" not in told
+        for reported in (driven[Link].reason, str(health), str(refused_.value), str(driven[Health].faults)):
+            assert str(tmp_path) not in reported
+            assert "certs" not in reported

@@ -1,4 +1,4 @@
-"""Who moves a robot once its link is back, or when somebody else comes: what is ours ends, what is theirs goes on."""
+"""Who moves a robot once its link is back, or when someone else comes: what is ours ends, what is theirs goes on."""
 
 import math
 
@@ -42,16 +42,16 @@ async def test_what_the_robot_still_does_when_the_link_is_back_is_stopped(
         await until(driven.clock, lambda: world.truth.pose_of("a").distance_to(start) > 0.2)
         await until(driven.clock, lambda: driven[Link].holder == US, 1)
         await cut(way)
-        await until(driven.clock, lambda: action.status is ActionStatus.ABORTED, 3)  # its client was told
+        await until(driven.clock, lambda: action.status is ActionStatus.ABORTED, 3)  # its client was notified
         lost = world.truth.pose_of("a")
         await driven.clock.sleep(0.5)
         assert world.truth.pose_of("a").distance_to(lost) > 0.05  # the robot goes on by its own skill
-        told = driven.events.subscribe(LinkChanged)
+        reported = driven.events.subscribe(LinkChanged)
         await healed(way)
         await until(driven.clock, lambda: driven[Link].state is LinkState.UP)
         await driven.clock.sleep(1)
-        assert OTHERS not in {event.holder for event in told.drain()}  # it is ours while it brakes
-        told.close()
+        assert OTHERS not in {event.holder for event in reported.drain()}  # it is ours while it brakes
+        reported.close()
         assert world.truth.pose_of("a").distance_to(start) < 3.5  # on the way
         await stands(world, driven.clock)
 
@@ -60,10 +60,10 @@ async def test_what_the_robot_still_does_when_the_link_is_back_is_stopped(
 async def test_what_is_ours_is_never_taken_for_anothers(back: str, way: Rig, connect: Connect, world: World) -> None:
     async with connect() as driven:
         way.fault.late = b"MoveByAction", 0.4  # the robot tells its number before this answer makes it ours
-        with driven.events.subscribe(LinkChanged) as told:
+        with driven.events.subscribe(LinkChanged) as reported:
             action = driven[Driving].drive(Twist(x=0.2), source="test")
             await driven.clock.sleep(3)
-            assert OTHERS not in {event.holder for event in told.drain()}
+            assert OTHERS not in {event.holder for event in reported.drain()}
         assert action.status is ActionStatus.EXECUTING
 
 
@@ -101,7 +101,7 @@ async def test_another_client_takes_over_from_who_drives_by_hand(
         assert await script.ask("chassis speed x 0.3 y 0 z 0;") == "fail"
         assert await script.ask("chassis move x 0.3;") == "fail"
         assert [each.name for each in driven[Health].faults] == [OUTSIDE]
-        await theirs  # nobody interrupts it
+        await theirs  # no one interrupts it
         await until(driven.clock, lambda: not driven[Link].holder, 1)
         assert await script.ask("chassis speed x 0.1 y 0 z 0;") == "ok"  # it is free
         await until(driven.clock, lambda: driven[Link].holder == US, 1)

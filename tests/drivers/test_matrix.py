@@ -33,18 +33,18 @@ CELLS = [
 ]
 
 
-TELLS_NO_POSE = {("robomaster", "cyberdog")}  # the dog's app is told a pose in the map, and an EP has neither
+TELLS_NO_POSE = {("robomaster", "cyberdog")}  # the dog's app is given a pose in the map, and an EP has neither
 # RoboMaster's words know no goals, and an EP has neither navigation nor a lidar for ours.
 NAVIGATES = {("slamware", "cyberdog"), ("slamware", "visual"), ("cyberdog", "slamware"), ("cyberdog", "visual")}
 LEFT = 0.5  # m
 
 
-async def agree(client: Front, told_start: Pose, real: Pose) -> None:
-    """What the client is told agrees with what is, to 5 cm and 2 degrees."""
-    told = await client.pose()
-    assert told
-    told = told.relative_to(told_start)
-    assert_pose(told, x=real.x, y=real.y, deg=math.degrees(real.yaw), within=0.05, within_deg=2)
+async def agree(client: Front, reported_start: Pose, real: Pose) -> None:
+    """What the client receives agrees with what is, to 5 cm and 2 degrees."""
+    reported = await client.pose()
+    assert reported
+    reported = reported.relative_to(reported_start)
+    assert_pose(reported, x=real.x, y=real.y, deg=math.degrees(real.yaw), within=0.05, within_deg=2)
 
 
 @pytest.fixture
@@ -94,23 +94,23 @@ async def test_a_cell(
     await robot.clock.sleep(3.0 if back == "cyberdog" else 0.5)  # a dog finds itself in its map meanwhile
     async with front(door, driven, tmp_path / "front", free_port) as client:
         assert await client.battery() == pytest.approx(robot[Battery].state.percentage * 100, abs=1)
-        told_start, start = await client.pose(), world.truth.pose_of("a")
-        assert (told_start is None) is ((back, door) in TELLS_NO_POSE)
+        reported_start, start = await client.pose(), world.truth.pose_of("a")
+        assert (reported_start is None) is ((back, door) in TELLS_NO_POSE)
         for _ in range(3):  # an open square: its end is not its beginning, and left is not right
             await client.side()
             await client.turn()
         await robot.clock.sleep(1)
         real = world.truth.pose_of("a").relative_to(start)
         assert_pose(real, x=0.0, y=0.4, deg=-90, within=0.2, within_deg=25)  # some clients only know times
-        if told_start is not None:
-            await agree(client, told_start, real)
+        if reported_start is not None:
+            await agree(client, reported_start, real)
         if (back, door) in NAVIGATES:
-            assert told_start
+            assert reported_start
             before = world.truth.pose_of("a")
             await client.navigate(LEFT)
             await robot.clock.sleep(1)
             assert_pose(world.truth.pose_of("a").relative_to(before), x=0.0, y=LEFT, within=0.2)
-            await agree(client, told_start, world.truth.pose_of("a").relative_to(start))
+            await agree(client, reported_start, world.truth.pose_of("a").relative_to(start))
         begun = world.truth.pose_of("a")
         await client.go()
         async with asyncio.timeout(30):

@@ -44,12 +44,12 @@ async def script(driven_ep: Robot, text_door: Open, forward: Forward) -> Script:
     return Script(await text_door(driven_ep), forward)
 
 
-async def test_the_arm_goes_where_it_is_told(script: Script, robot: Robot, driven_ep: Robot) -> None:
+async def test_the_arm_goes_where_it_should(script: Script, robot: Robot, driven_ep: Robot) -> None:
     assert await script.done("robotic_arm moveto x 5 y 3 wait_for_complete true;") == "ok"
     real, home = robot[Arm].position, robot[Arm].home
     assert (real.x - home.x, real.z - home.z) == pytest.approx((0.05, 0.03), abs=0.002)
-    told = await script.client.numbers("robotic_arm position ?;")
-    assert told == pytest.approx([5.0, 3.0], abs=0.25)
+    reported = await script.client.numbers("robotic_arm position ?;")
+    assert reported == pytest.approx([5.0, 3.0], abs=0.25)
     assert await script.done("robotic_arm move x -2 y 1 wait_for_complete true;") == "ok"
     assert robot[Arm].position.z - home.z == pytest.approx(0.04, abs=0.003)
     assert await script.client.ask("robotic_arm move x 50 y 0;") == "fail"
@@ -98,7 +98,7 @@ async def test_servos_turn(script: Script, robot: Robot, driven_ep: Robot) -> No
         driven_ep[Servos].angle(4)
 
 
-async def test_the_blaster_fires_as_many_as_it_was_told(script: Script, robot: Robot, driven_ep: Robot) -> None:
+async def test_the_blaster_fires_as_many_as_asked(script: Script, robot: Robot, driven_ep: Robot) -> None:
     before = robot[Blaster].ammo
     assert await script.client.ask("blaster bead 3;") == "ok"
     assert await script.client.ask("blaster bead ?;") == "3"
@@ -111,7 +111,7 @@ async def test_the_blaster_fires_as_many_as_it_was_told(script: Script, robot: R
         _ = driven_ep[Blaster].ammo
 
 
-async def test_a_hit_is_told_to_every_door(script: Script, robot: Robot, driven_ep: Robot, world: World) -> None:
+async def test_a_hit_is_reported_to_every_door(script: Script, robot: Robot, driven_ep: Robot, world: World) -> None:
     heard: list[ArmorHit] = []
     driven_ep.events.listen(ArmorHit, heard.append)
     assert await script.client.ask("armor sensitivity 8;") == "ok"
@@ -153,10 +153,10 @@ async def test_distances_come_in_metres(script: Script, robot: Robot, driven_ep:
     assert await script.client.ask("ir_distance_sensor measure on;") == "ok"
     await script.forward(seconds=0.5)
     for name in sensors.names:
-        told, real = sensors.reading(name), robot[RangeSensors].reading(name)
-        assert told is not None
+        reported, real = sensors.reading(name), robot[RangeSensors].reading(name)
+        assert reported is not None
         assert real is not None
-        assert told.distance == pytest.approx(real.distance, rel=0.1)
+        assert reported.distance == pytest.approx(real.distance, rel=0.1)
     assert await script.client.ask("ir_distance_sensor measure off;") == "ok"
     await script.forward(seconds=0.3)
     assert (robot[RangeSensors].measuring, sensors.reading("ir_1")) == (False, None)
@@ -178,7 +178,7 @@ async def test_lamps_shine_through(script: Script, robot: Robot, driven_ep: Robo
 async def test_lamps_shine_again_after_a_lost_link(driven_ep: Robot, robot: Robot, forward: Forward) -> None:
     driven_ep[Light].shine("rear", Colour(7, 8, 9))
     await forward(seconds=0.2)
-    robot[Light].shine("rear", Colour())  # somebody else
+    robot[Light].shine("rear", Colour())  # someone else
     driven_ep[Base]._client._link._transport.abort()  # type: ignore[attr-defined]
     await forward(seconds=2)
     assert driven_ep[Link].state is LinkState.UP
@@ -188,9 +188,9 @@ async def test_lamps_shine_again_after_a_lost_link(driven_ep: Robot, robot: Robo
 async def test_single_wheels_are_those_of_the_build(driven_ep: Robot, robot: Robot, forward: Forward) -> None:
     driven_ep[Driving].drive(WheelSpeeds(front_left=8, front_right=4, rear_left=-2, rear_right=2), source="test")
     await forward(seconds=1)
-    told, real = driven_ep[Base].wheel_speeds, robot[Base].wheel_speeds
+    reported, real = driven_ep[Base].wheel_speeds, robot[Base].wheel_speeds
     for corner in ("front_left", "front_right", "rear_left", "rear_right"):
-        assert getattr(told, corner) == pytest.approx(getattr(real, corner), abs=0.3)
+        assert getattr(reported, corner) == pytest.approx(getattr(real, corner), abs=0.3)
     assert real.front_left > real.rear_left + 3
 
 
@@ -209,7 +209,7 @@ async def test_pictures_come_through(driven_ep: Robot, robot: Robot, forward: Fo
     assert (frame.width, frame.height) == (real.width, real.height)
     assert abs(frame.luma.astype(int) - real.luma).mean() < 12
     await forward(seconds=0.2)
-    assert not robot[Camera]._feed.viewers  # type: ignore[attr-defined]  # nobody looks: the robot films no more
+    assert not robot[Camera]._feed.viewers  # type: ignore[attr-defined]  # no one looks: the robot films no more
     camera.set_exposure(-0.8)
     await forward(seconds=0.1)
     assert (camera.exposure, robot[Camera].exposure) == (-1.0, -1.0)

@@ -58,9 +58,9 @@ async def test_rest_drives_an_asymmetric_path(driven_ep: Robot, rest: OpenRest, 
     await do(client, forward, "MoveByAction", MoveByOptions(Direction.FORWARD, duration=1000))
     left = world.truth.pose_of("a").relative_to(start)
     assert left.y == pytest.approx(0.4, abs=0.1)
-    told = await client.get_odo_pose()
+    reported = await client.get_odo_pose()
     here = driven_ep[Odometry].reading.pose
-    assert (told.x, told.y, told.yaw) == pytest.approx((here.x, here.y, here.yaw), abs=0.01)
+    assert (reported.x, reported.y, reported.yaw) == pytest.approx((here.x, here.y, here.yaw), abs=0.01)
 
 
 async def test_a_square_and_a_side_step_end_where_they_should(driven_ep: Robot, world: World, forward: Forward) -> None:

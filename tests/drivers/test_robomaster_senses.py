@@ -36,7 +36,7 @@ def profile(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
-async def test_pwm_outputs_put_out_what_they_are_told_also_after_a_lost_link(
+async def test_pwm_outputs_put_out_what_they_are_given_also_after_a_lost_link(
     driven_ep: Robot, robot: Robot, text_door: Open, until: Until
 ) -> None:
     script, pwm = await text_door(driven_ep), driven_ep[PwmPorts]
@@ -96,12 +96,12 @@ async def test_its_microphone_and_applause_reach_the_next_robot(
     with driven_ep[Hearing].claps() as runs:
         await forward(seconds=0.2)
         world.hands.make_sound(claps(3), beside)
-        told = runs.drain()
+        reported = runs.drain()
         for _ in range(30):
             await forward(seconds=0.1)
             await asyncio.sleep(0.001)
-            told += runs.drain()
-        assert [run.count for run in told] == [3]
+            reported += runs.drain()
+        assert [run.count for run in reported] == [3]
 
 
 @pytest.mark.world("playground", body="robomaster_ep")
@@ -125,10 +125,10 @@ async def test_it_sees_people_markers_and_lines(
     with vision.markers.subscribe(), vision.lines.subscribe():
         await until(lambda: vision.markers.latest is not None and len(vision.markers.latest.seen) > 1)
         assert vision.markers.latest
-        told = {marker.symbol: marker for marker in vision.markers.latest.seen}
-        assert told["forward"].colour is Colour.BLUE
-        assert all(told[symbol].colour is Colour.RED for symbol in told if symbol != "forward")
-        assert told["forward"].distance == pytest.approx(
+        reported = {marker.symbol: marker for marker in vision.markers.latest.seen}
+        assert reported["forward"].colour is Colour.BLUE
+        assert all(reported[symbol].colour is Colour.RED for symbol in reported if symbol != "forward")
+        assert reported["forward"].distance == pytest.approx(
             1.4 * 0.17 / 0.3, abs=0.1
         )  # taken to be as small as the maker's
         await until(lambda: vision.lines.latest is not None and vision.lines.latest.seen)

@@ -109,7 +109,7 @@ async def test_strips_shine_in_the_robots_modes(driven: Robot, robot: Robot, for
         near.shine("left", lamp=1)
 
 
-async def test_the_emergency_stop_holds_it_and_is_told_to_every_door(
+async def test_the_emergency_stop_holds_it_and_is_reported_to_every_door(
     driven: Robot, robot: Robot, rest: OpenRest, until: Until, forward: Forward
 ) -> None:
     dashboard, changes = await rest(driven), list[bool]()
@@ -144,7 +144,7 @@ async def test_it_sleeps_and_wakes(driven: Robot, robot: Robot, until: Until) ->
 
 
 @pytest.mark.world("office", body="hermes")
-async def test_its_network_is_told_and_set(driven: Robot, robot: Robot, until: Until) -> None:
+async def test_its_network_is_reported_and_set(driven: Robot, robot: Robot, until: Until) -> None:
     near, far = driven[Network], robot[Network]
     assert (near.state.ssid, near.state.mac, near.state.address) == (far.state.ssid, far.state.mac, far.state.address)
     assert near.signal == pytest.approx(max(min(far.signal, -50.0), -100.0), abs=1)

@@ -237,9 +237,9 @@ async def test_the_lease_tells_who_moves_the_robot(
         taking = asyncio.ensure_future(driven[Lease].take("test"))
         while not taking.done():
             await forward(seconds=0.02)
-        with driven.events.subscribe(LinkChanged) as told:
-            await forward(seconds=1)  # it brakes, and nobody takes it for the other's any more
-            assert "another client" not in {event.holder for event in told.drain()}
+        with driven.events.subscribe(LinkChanged) as reported:
+            await forward(seconds=1)  # it brakes, and no one takes it for the other's any more
+            assert "another client" not in {event.holder for event in reported.drain()}
         await driven[Lease].release()
         mine = driven[Driving].move_by(Pose(x=0.2), source="test")
         await forward(seconds=1)

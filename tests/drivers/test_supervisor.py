@@ -13,26 +13,26 @@ from roboglot.model.robot import Description, Robot
 
 SERVED, FLAPPING = STEADY + 1.0, 1.0  # s until it is gone again
 FIRST_THERE = 7  # the try, from 0, that finds it; no other does
-NOBODY = Description(maker="", model="", serial="", hardware_version="", software_version="", radius=0.25, height=0.3)
+UNKNOWN = Description(maker="", model="", serial="", hardware_version="", software_version="", radius=0.25, height=0.3)
 
 
 async def pauses_of(clock: LockstepClock, there: Collection[int], served: float) -> tuple[list[float], set[LinkState]]:
     """Between the tries, of which those in ``there`` find it for ``served`` s; and the states on the way."""
-    robot = Robot("a", NOBODY, clock)
+    robot = Robot("a", UNKNOWN, clock)
     link = Link("ep://away", clock, robot.events, Health(clock, robot.events))
     tried: list[float] = []
 
     async def begin() -> None:
         tried.append(clock.time())
         if len(tried) - 1 not in there:
-            raise LinkLost("nobody there")
+            raise LinkLost("no one there")
 
     async def serve() -> None:
         await clock.sleep(served)
         raise LinkLost("it left")
 
     async def stop() -> None:
-        """It cannot be told."""
+        """It cannot be commanded."""
 
     supervisor = Supervisor(link, clock, begin, serve)
     supervisor.start()

@@ -43,8 +43,8 @@ def _example() -> Any:
     ("length", "body"), [(None, b"no json"), (None, b"[]"), (None, b"{}"), ("-1", b""), ("x", b"")]
 )
 async def test_the_page_refuses_what_is_no_offer(length: str | None, body: bytes) -> None:
-    nobody: Any = None
-    page = _example().serve(nobody, 0, [])
+    no_one: Any = None
+    page = _example().serve(no_one, 0, [])
 
     def post() -> int:
         link = http.client.HTTPConnection("127.0.0.1", page.server_port, timeout=5.0)

@@ -84,11 +84,11 @@ async def test_the_robot_is_killed_in_the_middle(tmp_path: Path) -> None:
         await dog.stop_task()
         async with the_app_is_killed_while_mapping(dog, data) as again:
             await again.download_update([{**MODULE, "latest": {"version": "1.3.2.0", "packages": [SMALL]}}])
-            with again.watch(UpdateProgress) as told:
-                while (await anext(told)).download_progress < 100:
+            with again.watch(UpdateProgress) as reported:
+                while (await anext(reported)).download_progress < 100:
                     pass
                 await again.install_update(SMALL["md5"])
-                while (await anext(told)).upgrade_progress < 20:
+                while (await anext(reported)).upgrade_progress < 20:
                     pass
             kill(robot)
     async with talking(data) as (_, dog):

@@ -87,7 +87,7 @@ def test_what_one_door_begins_another_door_sees_and_ends(pair: ServedRobot) -> N
     assert ended["state"]["result"] == -2  # type: ignore[index]
 
 
-def test_garbage_at_every_door_harms_nobody(pair: ServedRobot) -> None:
+def test_garbage_at_every_door_harms_no_one(pair: ServedRobot) -> None:
     garbage = [b"\x00\xff" * 5000, b"GET " + b"a" * 100_000, b";" * 3000, b"{" * 70_000, b"\r\n\r\n"]
     half_open = []
     for port in TCP_PORTS:
@@ -212,11 +212,11 @@ def refused(*starts: tuple[str, ...]) -> list[str]:
     return [said for _, said in ends]
 
 
-def test_mistakes_are_told_in_plain_words(pair: ServedRobot, tmp_path: Path) -> None:
+def test_mistakes_are_reported_in_plain_words(pair: ServedRobot, tmp_path: Path) -> None:
     broken = tmp_path / "broken"
     broken.mkdir()
     (broken / "roboglot.db").write_bytes(b"no database" * 1000)
-    told = refused(
+    errors = refused(
         ("--data", str(pair.data), "--address", "127.0.0.56"),
         ("--data", str(tmp_path / "1"), "--address", FIRST),
         ("--data", str(tmp_path / "2"), "--world", "atlantis"),
@@ -225,7 +225,7 @@ def test_mistakes_are_told_in_plain_words(pair: ServedRobot, tmp_path: Path) -> 
         ("--data", str(tmp_path / "4"), "--robot", "b=octopus"),
     )
     for words, said in zip(
-        ("another roboglot uses", "1448", "atlantis", "name=body", "database", "octopus"), told, strict=True
+        ("another roboglot uses", "1448", "atlantis", "name=body", "database", "octopus"), errors, strict=True
     ):
         assert words in said
 

@@ -68,7 +68,7 @@ def test_rays_leave_free_floor_and_occupied_walls() -> None:
     assert not room.evidence[:15].any()  # behind the wall nothing is known
 
 
-def test_somebody_who_walks_on_leaves_no_trace() -> None:
+def test_someone_who_walks_on_leaves_no_trace() -> None:
     room = Room()
     ranges = ranges_in_room((4.0, 3.0, 0.0), 0.0, np.random.default_rng(2))
     blocked = ranges.copy()

@@ -40,7 +40,7 @@ VmFlags: rd ex mr mw me
 """
 
 
-def test_only_what_nobody_wrote_to_is_given_back() -> None:
+def test_only_what_no_one_wrote_to_is_given_back() -> None:
     assert list(_unwritten(MAPS)) == [(0x7F00, 0x7F10, 40 * 1024)]
 
 
@@ -55,8 +55,8 @@ def test_given_back_memory_is_there_again_when_needed() -> None:
 
     assert compiled() == 42  # LLVM is in memory now
     assert rest() > 10_000_000
-    told = blur(np.ones(4), np.zeros(4, np.float32), 0.0, 0.5, 2.0)
-    assert told.tolist() == [1.0] * 4
+    blurred = blur(np.ones(4), np.zeros(4, np.float32), 0.0, 0.5, 2.0)
+    assert blurred.tolist() == [1.0] * 4
     assert compiled() == 42
 
 

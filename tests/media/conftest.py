@@ -28,7 +28,7 @@ def number_of(luma: np.ndarray) -> int:
 
 
 class BarCamera(Camera):
-    """A new picture 30 times a second while somebody looks."""
+    """A new picture 30 times a second while someone looks."""
 
     width, height, rate, fov = WIDTH, HEIGHT, 30.0, 1.0
     mount = Mount(0, 0, 0)

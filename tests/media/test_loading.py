@@ -1,4 +1,4 @@
-"""Encoders and kernels are loaded when somebody looks, not before: a start stays quick."""
+"""Encoders and kernels are loaded when someone looks, not before: a start stays quick."""
 
 from __future__ import annotations
 

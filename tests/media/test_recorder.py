@@ -87,7 +87,7 @@ async def test_an_end_at_once_takes_no_robot_time(recorder, lockstep, tmp_path):
 
 
 @pytest.mark.parametrize("where", ["nowhere/a.mp4", "a.mp4"])
-async def test_a_failure_is_told_and_leaves_nothing(recorder, lockstep, tmp_path, where):
+async def test_a_failure_is_reported_and_leaves_nothing(recorder, lockstep, tmp_path, where):
     recorder.start(tmp_path / where)
     await lockstep.advance(0.1 if "/" in where else 0.0)  # no folder; or no picture
     stopping = asyncio.ensure_future(recorder.stop())

@@ -1,4 +1,4 @@
-"""The H.264 stream: decodes, also from the middle; one encoder for all; nothing while nobody looks."""
+"""The H.264 stream: decodes, also from the middle; one encoder for all; nothing while no one looks."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ async def test_it_goes_from_accepted_to_succeeded(actions: Actions, clock: Locks
     assert action.status is ActionStatus.SUCCEEDED
     assert (action.reason, action.ended_at) == ("", 4)
     executing = ActionStatus.EXECUTING
-    assert seen == [ActionStatus.ACCEPTED, executing, executing, ActionStatus.SUCCEEDED]  # "half" is told once
+    assert seen == [ActionStatus.ACCEPTED, executing, executing, ActionStatus.SUCCEEDED]  # "half" is reported once
 
 
 async def test_a_new_one_waits_until_the_old_one_has_braked(actions: Actions, clock: LockstepClock) -> None:

@@ -1,4 +1,4 @@
-"""Live feeds: work only while somebody looks, slow viewers, joining."""
+"""Live feeds: work only while someone looks, slow viewers, joining."""
 
 from __future__ import annotations
 

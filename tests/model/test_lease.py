@@ -1,4 +1,4 @@
-"""Who moves a robot, who alone may, and what everybody else is told."""
+"""Who moves a robot, who alone may, and what everyone else learns."""
 
 import asyncio
 
@@ -36,7 +36,7 @@ async def test_the_newest_command_has_the_robot_and_everybody_can_see_whose_it_i
 ) -> None:
     lease = robot[Lease]
     assert lease.holder is None
-    with robot.events.subscribe(ControlChanged) as told:
+    with robot.events.subscribe(ControlChanged) as reported:
         with asking_for(SCRIPT):
             first = robot[Driving].drive(Twist(x=0.2), source="one")
         await forward(seconds=0.5)
@@ -49,10 +49,10 @@ async def test_the_newest_command_has_the_robot_and_everybody_can_see_whose_it_i
         assert second.status is ActionStatus.SUCCEEDED
         assert lease.holder is None
         assert lease.last.who == DASHBOARD
-        assert [event.holder for event in told.drain()] == [SCRIPT, DASHBOARD]
+        assert [event.holder for event in reported.drain()] == [SCRIPT, DASHBOARD]
 
 
-async def test_two_clients_of_one_door_are_told_apart(robot: Robot, forward: Forward) -> None:
+async def test_two_clients_of_one_door_are_distinguished(robot: Robot, forward: Forward) -> None:
     with asking_for(DASHBOARD):
         one = robot[Driving].drive(Twist(x=0.2), source="slamware")
         assert robot[Driving].drive(Twist(x=0.1), source="slamware") is one
@@ -133,7 +133,7 @@ async def test_what_moves_nothing_needs_no_control(robot: Robot) -> None:
         robot[Speaker].say("hello", source="one")
 
 
-async def test_a_real_robot_that_somebody_else_moves_is_left_to_him_until_it_is_taken_back(
+async def test_a_real_robot_that_someone_else_moves_is_left_to_him_until_it_is_taken_back(
     robot: Robot, forward: Forward
 ) -> None:
     link = robot.add(Link, Link("test://", robot.clock, robot.events, robot[Health]))

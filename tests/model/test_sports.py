@@ -1,4 +1,4 @@
-"""Counting needs a body that is seen, and no repetition that nobody saw the middle of."""
+"""Counting needs a body that is seen, and no repetition that no one saw the middle of."""
 
 from roboglot.model.perception import JOINTS, Box, Joint, SkeletonSeen, Sport
 from roboglot.model.sports import SportCounter

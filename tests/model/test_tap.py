@@ -1,4 +1,4 @@
-"""The tap: everything to those who follow, and nothing at all while nobody does."""
+"""The tap: everything to those who follow, and nothing at all while no one does."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ async def test_a_request_and_its_reply_belong_together(clock: LockstepClock) -> 
     assert answered == Exchange(0.25, *common, Direction.REPLY, "GET /x", b"no", "403", "not now", 0.25)
 
 
-def test_it_is_watched_while_somebody_follows(clock: LockstepClock) -> None:
+def test_it_is_watched_while_someone_follows(clock: LockstepClock) -> None:
     tap, heard = Tap("a", clock), list[Exchange]()
     assert not tap.watched
     leave = tap.listen(heard.append)

@@ -138,9 +138,9 @@ async def test_nothing_gets_out(name: str, world: World, played: tuple[bool, dic
     rules, results = played
     result = results[name]
     assert isinstance(result.ending, (Finished, Failed))
-    told = result.output + (result.ending.message if isinstance(result.ending, Failed) else "")
-    assert world.secret not in told
-    assert "ESCAPED" not in told
+    shown = result.output + (result.ending.message if isinstance(result.ending, Failed) else "")
+    assert world.secret not in shown
+    assert "ESCAPED" not in shown
     assert {call.name for call in result.calls} <= PRELUDE.callable_names()
     assert not (world.folder / name).exists()
     assert (world.folder / "secret.txt").read_text() == world.secret
@@ -208,7 +208,7 @@ async def test_monstrous_text_is_answered(engine: Engine, source: str) -> None:
 
 @pytest.mark.asyncio(loop_scope="module")
 async def test_a_program_cannot_read_the_replies_of_another(engine: Engine) -> None:
-    """Two runs at once, each with its own socket: what one is told the other never sees."""
+    """Two runs at once, each with its own socket: what one receives the other never sees."""
 
     async def one(word: str) -> str:
         run = await engine.start("print(cyberdog.echo(1))", PRELUDE)

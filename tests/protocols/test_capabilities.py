@@ -126,5 +126,5 @@ def unavailable(code: int, answers: list[str]) -> bool:
     """Whether the answer is that of a robot without the part."""
     if code in SILENT_WITHOUT_SERVICE:
         return not answers
-    told = [json.loads(answer) for answer in answers if answer]
-    return any(each.get("error_code") == 322 or each.get("code") == 3008 for each in told)
+    reported = [json.loads(answer) for answer in answers if answer]
+    return any(each.get("error_code") == 322 or each.get("code") == 3008 for each in reported)

@@ -84,7 +84,7 @@ async def test_control_is_seen_taken_given_and_released(desk: Path, robot: Robot
     assert (await _ask(desk / NAME, Request("take", "b"))).error == "there is no robot 'b'; there are a"
 
 
-async def test_only_the_owner_gets_in_and_what_is_no_wish_is_told_so(desk: Path) -> None:
+async def test_only_the_owner_gets_in_and_what_is_no_wish_is_reported(desk: Path) -> None:
     assert stat.S_IMODE((desk / NAME).stat().st_mode) == 0o600
     for line in (b"what?\n", b'{"do":"dance"}\n', b'{"does":1}\n', b"\xff\n"):
         assert (await say(desk, line))["error"]
@@ -109,7 +109,7 @@ async def test_without_a_socket_the_robots_are_there_all_the_same(
     await made.close()
 
 
-def test_the_command_says_when_nobody_is_there(tmp_path: Path) -> None:
+def test_the_command_says_when_no_one_is_there(tmp_path: Path) -> None:
     with pytest.raises(SystemExit, match="no `roboglot up` answers"):
         command(data=tmp_path)
 

@@ -67,12 +67,12 @@ async def test_what_passes_is_what_the_robots_own_tap_says(url: str, script: Any
     assert await run(tmp_path, "universal", str(own), through)
     door = Target(url).door
     sessions = [pair(read_recording(path).of(door=door))[0] for path in (own, passed)]
-    told, seen = (
+    reported, seen = (
         [(a.request.operation, a.request.payload, [(r.payload, r.status) for r in a.replies]) for a in session]
         for session in sessions
     )
-    assert len(told) >= 3
-    assert seen == told
+    assert len(reported) >= 3
+    assert seen == reported
 
 
 async def test_a_phone_and_its_dog_do_not_notice(tmp_path: Path) -> None:

@@ -36,7 +36,7 @@ class Lab:
         return self.robots["a"]
 
     async def see(self, kind: str, seconds: float = 0.3, robot: str = "a") -> list[Any]:
-        """What a detector last told after so long."""
+        """What a detector last reported after so long."""
         detector: Detector[Any] = getattr(self.robots[robot][Vision], kind)
         with detector.subscribe() as viewer:
             await self.clock.advance(seconds)

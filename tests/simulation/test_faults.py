@@ -183,16 +183,16 @@ async def test_who_was_lost_is_found_only_when_sure(sim):
         enabled, started, quality, lost = True, True, 0.9, None
 
     sim.robot.add(Localization, Guess())
-    told = []
+    reported = []
     for quality, why in (
         (0.3, None), (0.1, None), (0.3, None), (0.45, None), (0.6, None), (0.3, None),
         (0.9, LostReason.NO_FIT), (0.9, None),
     ):  # fmt: skip
         Guess.quality, Guess.lost = quality, why
         await sim.clock.advance(0.3)
-        told.append([fault.name for fault in sim.robot[Health].faults])
+        reported.append([fault.name for fault in sim.robot[Health].faults])
     lost = ["not localized"]
-    assert told == [[], lost, lost, lost, [], [], lost, []]
+    assert reported == [[], lost, lost, lost, [], [], lost, []]
 
 
 FILE = """
@@ -208,7 +208,7 @@ options = { charge = 0.05 }
 
 [[faults]]
 kind = "jack_jammed"
-robot = "nobody"
+robot = "unknown"
 at = 1.0
 """
 
@@ -220,7 +220,7 @@ async def test_a_world_file_plans_faults(tmp_path, caplog, simulate):
     battery = sim.robot[Battery]
     await sim.clock.advance(1.9)
     assert battery.state.percentage > 0.8
-    assert "jack_jammed" in caplog.text  # nobody has that name: told, not fatal
+    assert "jack_jammed" in caplog.text  # no one has that name: reported, not fatal
     await sim.clock.advance(1.0)
     assert battery.state.percentage < 0.06
     await sim.clock.advance(3.0)

@@ -29,7 +29,7 @@ async def test_claps_are_counted(count):
     assert heard.stamp == pytest.approx(0.5 + 0.35 * (count - 1), abs=0.06)
 
 
-async def test_runs_of_claps_are_told_apart():
+async def test_runs_of_claps_are_distinguished():
     with lab(people=[ANNA]) as room, room.robot[Hearing].claps() as viewer:
         anna = room.world.hands.person("anna")
         anna.wait(0.5)
@@ -83,7 +83,7 @@ async def test_a_robot_does_not_understand_itself_but_others():
             assert [speech.text for speech in other.drain()] == ["hello"]
 
 
-async def test_nothing_is_listened_to_while_nobody_asks():
+async def test_nothing_is_listened_to_while_no_one_asks():
     with lab(people=[ANNA]) as room:
         microphone = room.robot[Microphone]
         viewer = room.robot[Hearing].claps()

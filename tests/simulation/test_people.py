@@ -50,7 +50,7 @@ async def test_turning_takes_time_and_standing_is_at_once():
         assert anna.pose == here
 
 
-async def test_scripts_begin_anew_and_wait_while_somebody_directs():
+async def test_scripts_begin_anew_and_wait_while_someone_directs():
     script = [{"do": "walk", "to": [6.0, 6.0]}, {"do": "wait", "seconds": 1.0}, {"do": "walk", "to": [6.0, 5.0]}]
     with lab(people=[ANNA | {"script": script}]) as room:
         anna = room.world.hands.person("anna")
@@ -212,7 +212,7 @@ async def test_a_robot_that_stands_in_the_way_is_walked_around():
             nearest = min(nearest, room.world.truth.pose_of("a").distance_to(anna.pose))
         assert anna.pose.point == Point(1.5, 5.0)
         assert nearest > 0.45
-        assert room.world.truth.pose_of("a").distance_to(Pose(4.0, 5.0)) < 0.02  # nobody pushed it
+        assert room.world.truth.pose_of("a").distance_to(Pose(4.0, 5.0)) < 0.02  # no one pushed it
 
 
 async def test_where_there_is_no_room_aside_they_step_back():

@@ -110,7 +110,7 @@ async def test_a_robot_hears_what_another_one_plays(simulate):
     assert peak == pytest.approx(1000, abs=5)
 
 
-async def test_playing_takes_its_time_and_is_told(simulate):
+async def test_playing_takes_its_time_and_is_reported(simulate):
     run = simulate("empty")
     with run.robot.events.subscribe(SoundPlayed) as played:
         action = run.robot[Speaker].play(tone(500, 1.0), source="test")
@@ -133,7 +133,7 @@ async def test_a_new_sound_takes_over_and_the_old_one_falls_silent(simulate):
     assert np.abs(wave).max() < 1000
 
 
-async def test_without_a_voice_a_text_is_told_but_not_heard(simulate, monkeypatch, tmp_path):
+async def test_without_a_voice_a_text_is_reported_but_not_heard(simulate, monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
     run = simulate("empty")
     with run.robot.events.subscribe(Spoke) as spoke:

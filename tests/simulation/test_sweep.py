@@ -98,10 +98,10 @@ def test_the_compiled_kernel_sees_the_same():
 def test_noise_and_the_ends_of_the_range(make):
     exact = np.array([5.0, 5.0, 0.1, 0.149, 0.151, 11.99, 12.01, np.inf, 3.0])
     noise = np.array([0.0, -2.0, 0.0, 1.0, -1.0, 1.0, -2.0, 0.0, 100.0], np.float32)
-    told = make(exact, noise, 0.01, 0.15, 12.0)
-    assert told.dtype == np.float32
+    reported = make(exact, noise, 0.01, 0.15, 12.0)
+    assert reported.dtype == np.float32
     seen = np.array([5.0, 4.98, np.nan, 0.159, np.nan, 12.0, 11.99, np.inf, 4.0])
-    assert np.allclose(told, seen, atol=1e-6, equal_nan=True)
+    assert np.allclose(reported, seen, atol=1e-6, equal_nan=True)
 
 
 def test_the_compiled_noise_is_the_same_to_the_bit():

@@ -66,7 +66,7 @@ async def test_people_walk_and_the_lidar_sees_them(simulate):
         nearest.append(float(sim.robot[Lidar].scan.ranges[270:].min()))
     assert (floor, sim.world.truth.people[0][0]) == (0, 0)
     assert sim.world.truth.people[0][1].x > before.x + 10
-    assert min(nearest) < 0.8 < max(nearest)  # somebody came past
+    assert min(nearest) < 0.8 < max(nearest)  # someone came past
 
 
 async def test_people_wait_for_a_robot_in_their_way_then_go_around(simulate):
@@ -92,7 +92,7 @@ async def test_odometry_does_not_notice_being_lifted(simulate):
     assert sim.robot[Odometry].reading.pose == Pose()
 
 
-async def test_nobody_is_put_outside_the_world(simulate):
+async def test_no_one_is_put_outside_the_world(simulate):
     sim = simulate(start=Pose(5, 5))
     for pose, floor in ((Pose(-0.1, 5), 0), (Pose(5, 10.1), 0), (Pose(math.nan, 5), 0), (Pose(5, 5), 1)):
         with pytest.raises(ValueError, match="no place"):

@@ -28,12 +28,12 @@ def binary_folder() -> Path | None:
 
 
 class PostgreSQLServer:
-    """``url`` is a database that trusts whoever reaches its socket."""
+    """``url`` is a database that trusts any client that reaches its socket."""
 
     def __init__(self, folder: Path, binaries: Path) -> None:
         self._folder, self._binaries = folder, binaries
-        # The server refuses to run as root: then it is nobody's, and the folder, too.
-        self._user = pwd.getpwnam("nobody") if os.geteuid() == 0 else None
+        # The server refuses to run as root: then it is no one's, and the folder, too.
+        self._user = pwd.getpwnam("unknown") if os.geteuid() == 0 else None
         self._server: subprocess.Popen[bytes] | None = None
         self.url = f"postgresql:///postgres?host={folder}&user=robots"
 
@@ -62,14 +62,14 @@ class PostgreSQLServer:
         raise RuntimeError("PostgreSQL did not start")
 
     def stop(self) -> None:
-        """At once; whoever is connected loses the connection."""
+        """At once; every client loses the connection."""
         if self._server:
             self._server.send_signal(signal.SIGQUIT)  # no waiting for anybody
             self._server.wait(20)
             self._server = None
 
     def empty(self) -> None:
-        """As if nobody had been there."""
+        """As if no one had been there."""
         with psycopg.connect(self.url, autocommit=True, connect_timeout=5) as connection:
             connection.execute("DROP SCHEMA public CASCADE")
             connection.execute("CREATE SCHEMA public")

@@ -40,10 +40,10 @@ async def test_favourites_come_in_the_order_of_bytes_and_stay_when_robots_delete
     assert not await store.set_favourite("one", "module", "b", favourite=True)
     assert not await store.set_favourite("two", "task", "b", favourite=True)
     await store.save("one", "task", "b", "100 % of b's second")
-    await store.delete("one", "task", ["b", "plain", "nobody's"])
-    told = ["the B", "the _a", "100 % of b's second", "the é", "the 张三"]
-    assert await store.favourites("one", "task", []) == told
-    assert await store.favourites("one", "task", ["B", "é"]) == [told[1], told[2], told[4]]
+    await store.delete("one", "task", ["b", "plain", "no one's"])
+    expected = ["the B", "the _a", "100 % of b's second", "the é", "the 张三"]
+    assert await store.favourites("one", "task", []) == expected
+    assert await store.favourites("one", "task", ["B", "é"]) == [expected[1], expected[2], expected[4]]
     assert not await store.set_favourite("one", "task", "plain", favourite=True)
     assert await store.set_favourite("one", "task", "b", favourite=False)
     assert "100 % of b's second" not in await store.favourites("one", "task", [])
@@ -103,7 +103,7 @@ def test_what_is_newer_than_this_program_is_not_touched(server: PostgreSQLServer
         PostgreSQL(server.url)
 
 
-def test_nobody_there_is_told_in_one_line(tmp_path: Path) -> None:
-    with pytest.raises(OSError, match="connection") as told:
+def test_no_one_there_is_reported_in_one_line(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="connection") as expected:
         PostgreSQL(f"postgresql:///robots?host={tmp_path}")
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(expected.value)

@@ -101,7 +101,7 @@ async def test_a_program_gives_up_before_another_may_begin(database: Transaction
     watch.now += HOLD
     assert "has not confirmed" in old.why_not("a")
     assert HOLD < LEASE
-    await old.renew()  # the registry is back, and nobody took them meanwhile
+    await old.renew()  # the registry is back, and no one took them meanwhile
     assert not old.why_not("a")
 
 

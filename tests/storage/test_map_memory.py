@@ -61,9 +61,9 @@ async def test_all_of_it_is_new_at_once_and_after_a_start(database: Database) ->
     drawn = Annotations().with_new(WALL)
     new = Replacement(Drawings([NEW], drawn), {"k": [1]}, {"f": b"2", "gone": None})
     before = Drawings(here.places.all(), here.annotations.current)
-    told: list[Drawings] = []
-    await here.memory.replace(lambda now: told.append(now) or new)
-    assert told == [before]
+    reported: list[Drawings] = []
+    await here.memory.replace(lambda now: reported.append(now) or new)
+    assert reported == [before]
     for seen in (here, parts(database)):
         assert list(seen.places.all()) == [NEW]
         assert seen.annotations.current.lines == drawn.lines

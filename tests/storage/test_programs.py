@@ -34,7 +34,7 @@ async def test_programs_are_kept_per_robot_and_kind_and_listed_by_id(database: D
         await tasks.put(program(id))
     await tasks.put(program("t1", body="print(1)"))
     assert [p.id for p in await tasks.all()] == ["t1", "t10", "t2"]
-    assert [p.id for p in await tasks.all(["t2", "nobody", "t1", "t2"])] == ["t1", "t2"]
+    assert [p.id for p in await tasks.all(["t2", "unknown", "t1", "t2"])] == ["t1", "t2"]
     assert await tasks.get("t1") == program("t1", body="print(1)")
     assert await tasks.count() == 3
     for other in (DatabaseProgramStore(database, "b"), DatabaseProgramStore(database, "a", "module")):

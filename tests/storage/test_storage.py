@@ -61,19 +61,19 @@ async def test_places_come_back_in_order_and_per_robot(open_database: Open) -> N
 async def test_removing_what_is_not_there_is_an_error(open_database: Open) -> None:
     stored = places(open_database())
     with pytest.raises(NotFound):
-        await stored.remove("nobody")
+        await stored.remove("unknown")
     await stored.put(PointOfInterest("x", Pose(), {}))
     await stored.remove("x")
     assert places(open_database()).all() == ()
 
 
-async def test_every_change_is_told(open_database: Open) -> None:
+async def test_every_change_is_reported(open_database: Open) -> None:
     events = EventStream()
     stored = StoredPlaces(open_database(), "a", LockstepClock(), events)
-    with events.subscribe(PlacesChanged) as told:
+    with events.subscribe(PlacesChanged) as reported:
         await stored.put(PointOfInterest("x", Pose(), {}))
         await stored.clear()
-        assert len(told.drain()) == 2
+        assert len(reported.drain()) == 2
 
 
 async def test_maps_come_back_cell_by_cell(open_database: Open) -> None:

@@ -29,7 +29,7 @@ def test_pytest_does_not_rewrite_the_asserts_of_roboglot() -> None:
     assert type(sys.modules[__name__].__loader__).__module__ == "_pytest.assertion.rewrite"
 
 
-def test_a_pose_that_is_off_is_told() -> None:
+def test_a_pose_that_is_off_is_reported() -> None:
     assert_pose(Pose(1, 2, 0.01), x=1.02, y=2, deg=0)
     with pytest.raises(AssertionError, match=r"x is 1\.000, not 1\.100; yaw is 90\.0, not 0\.0 degrees"):
         assert_pose(Pose(1, 2, 1.5707963), x=1.1, y=2, deg=0)

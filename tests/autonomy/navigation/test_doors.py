@@ -1,4 +1,4 @@
-"""Doors: where a robot got in, it gets out; who stands in the only one is waited for; how narrow one is, is told."""
+"""Doors: where a robot got in, it gets out; who stands in the only one is waited for; narrow ones are reported."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ async def test_it_gets_through_at_a_slant(tour: Tour) -> None:
 
 
 @pytest.mark.world(WIDE)
-async def test_a_gap_that_is_too_narrow_ends_the_drive_in_time_and_is_told(tour: Tour) -> None:
+async def test_a_gap_that_is_too_narrow_ends_the_drive_in_time_and_is_reported(tour: Tour) -> None:
     """The map has a door of 0.9 m; two boxes that stand in it when the robot is close leave 0.48 m."""
     await tour.go((6.0, 3.0))
     await tour.go((2.0, 3.0))
@@ -87,7 +87,7 @@ async def test_a_person_in_the_only_door_is_waited_for(tour: Tour) -> None:
 
 
 @pytest.mark.world(WIDE)
-async def test_a_person_who_stays_in_the_only_door_is_told(tour: Tour) -> None:
+async def test_a_person_who_stays_in_the_only_door_is_reported(tour: Tour) -> None:
     tour.world.hands.add_obstacle(Pose(4.0, 3.0, 0.0), PERSON)
     await tour.clock.advance(30.0)
     begun = tour.clock.time()

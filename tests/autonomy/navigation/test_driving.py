@@ -266,7 +266,7 @@ async def test_a_paused_move_holds_and_goes_on(carted: Robot, cart: Cart, clock:
     assert cart.pose.x == pytest.approx(2.0, abs=0.01)
 
 
-async def test_an_emergency_stop_lasts_until_somebody_says_stand_up(carted: Robot, clock: LockstepClock) -> None:
+async def test_an_emergency_stop_lasts_until_someone_says_stand_up(carted: Robot, clock: LockstepClock) -> None:
     legs = carted.add(Legs, SlowLegs(carted, Posture.LIMP))
     for _ in range(3):  # a joystick goes on sending
         with pytest.raises(EmergencyStopped):

@@ -52,14 +52,14 @@ def say_where_the_lift_is(tour: Tour) -> None:
 
 
 async def test_up_and_down_again_with_a_map_and_a_dock_a_floor(tour: Tour) -> None:
-    floors, told = tour.robot[Floors], []
+    floors, reported = tour.robot[Floors], []
     await tour.go((4.5, 10.0))
     say_where_the_lift_is(tour)
     downstairs = tour.robot[Mapping].grid
-    tour.robot.events.listen(ActionChanged, lambda event: told.append(event.action.feedback))
+    tour.robot.events.listen(ActionChanged, lambda event: reported.append(event.action.feedback))
     action = await tour.end_of(floors.ride(1), 400.0)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
-    assert [t for t in dict.fromkeys(told) if isinstance(t, RideStage)] == list(RideStage)
+    assert [t for t in dict.fromkeys(reported) if isinstance(t, RideStage)] == list(RideStage)
     assert tour.world.truth.floor_of("a") == floors.current == 1
     assert tour.truth.x > 2.4
     assert tour.robot[Docking].home is None

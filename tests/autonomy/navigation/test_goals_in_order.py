@@ -103,9 +103,9 @@ async def test_who_succeeds_was_at_every_goal(tour: Tour, body: str, spots: list
         track.append(tour.truth.relative_to(tour.start))
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     assert passed_in_order(track, wanted, TOLERANCE + LOCALIZATION) == len(wanted)
-    told = [number for number in left if number >= 0]
-    assert {before - after for before, after in pairwise(told)} <= {0, 1}  # they count down one by one
-    assert (told[0], told[-1]) == (len(wanted), 1)
+    reported = [number for number in left if number >= 0]
+    assert {before - after for before, after in pairwise(reported)} <= {0, 1}  # they count down one by one
+    assert (reported[0], reported[-1]) == (len(wanted), 1)
     assert not tour.bumps
 
 

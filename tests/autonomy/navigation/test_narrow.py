@@ -1,4 +1,4 @@
-"""Corridors: walls on both sides over some length, told once each; a doorway is none."""
+"""Corridors: walls on both sides over some length, reported once each; a doorway is none."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ def walls(left, right, length=2.0):
     return np.concatenate([np.column_stack([x, np.full(81, left)]), np.column_stack([x, np.full(81, -right)])])
 
 
-def test_each_corridor_is_told_once():
+def test_each_corridor_is_reported_once():
     watch = NarrowWatch(0.2)
     assert watch.entered(walls(2.0, 2.0)) is None
     assert abs(watch.entered(walls(0.5, 0.4)) - 0.9) < 1e-6

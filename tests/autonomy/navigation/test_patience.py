@@ -42,7 +42,7 @@ async def test_getting_closer_is_progress() -> None:
     assert not patience.spent
 
 
-async def test_wheels_that_turn_in_vain_are_told() -> None:
+async def test_wheels_that_turn_in_vain_are_reported() -> None:
     clock = LockstepClock()
     patience, follower = made(clock), SimpleNamespace(left=5.0, speed=0.3)
     patience.look(follower)  # type: ignore[arg-type]

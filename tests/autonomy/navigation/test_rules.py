@@ -146,22 +146,22 @@ async def test_on_strict_tracks_it_waits_and_tells_after_three_minutes(
     assert journey.BLOCKED_SECONDS == 180.0  # as docs/autonomy.md says; here it shall be shorter
     monkeypatch.setattr(journey, "BLOCKED_SECONDS", PilotTuning().patience + 15.0)
     await draw(tour, track(1.5, 5.0, 8.5, 5.0))
-    told: list[RobotBlocked] = []
-    tour.robot.events.listen(RobotBlocked, told.append)
+    reported: list[RobotBlocked] = []
+    tour.robot.events.listen(RobotBlocked, reported.append)
     action = tour.head_for((8.5, 5.0), tracks=Tracks.STRICT)
     await tour.until(lambda: tour.truth.x > 3.0)
     stone = tour.world.hands.add_obstacle(Pose(6.0, 5.0, 0.0), (0.5, 0.5, 1.0))
     await tour.clock.advance(PilotTuning().patience + 5.0)
     assert action.status is ActionStatus.EXECUTING
     assert tour.blocks
-    assert not told
+    assert not reported
     await tour.clock.advance(20.0)
-    assert [event.action for event in told] == [action]
+    assert [event.action for event in reported] == [action]
     tour.world.hands.remove_obstacle(stone)
     await tour.end_of(action)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
-    assert len(told) == 1
-    assert math.isclose(told[0].seconds, journey.BLOCKED_SECONDS, abs_tol=2.0)
+    assert len(reported) == 1
+    assert math.isclose(reported[0].seconds, journey.BLOCKED_SECONDS, abs_tol=2.0)
 
 
 async def test_in_maintenance_the_map_changes_only_there(tour: Tour) -> None:

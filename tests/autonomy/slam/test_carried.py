@@ -27,7 +27,7 @@ def test_echoes_of_carried_legs_say_nothing():
     legs = [(0.43, 0.43), (-0.43, 0.43), (-0.43, -0.43), (0.43, -0.43)]
     for degrees in (45, 135, 225, 315):
         ranges[degrees - 1 : degrees + 2] = 0.59
-    ranges[90] = 0.6  # somebody between the legs
+    ranges[90] = 0.6  # someone between the legs
     scan = LaserScan(1.0, ranges, 0.0, float(angles[1]), 0.1, 10.0, Pose())
     reader = ScanReader()
     assert (np.hypot(*reader.read(scan).points.T) < 1.0).sum() == 13

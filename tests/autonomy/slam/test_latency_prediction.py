@@ -1,4 +1,4 @@
-"""Where a late robot will be: what it was told while odometry could not know of it is added."""
+"""Where a late robot will be: what it was sent while odometry could not know of it is added."""
 
 import math
 
@@ -23,7 +23,7 @@ def base() -> Base:
     return _Base()
 
 
-async def test_what_was_told_within_the_delay_is_added(base: Base, clock: LockstepClock) -> None:
+async def test_what_was_sent_within_the_delay_is_added(base: Base, clock: LockstepClock) -> None:
     foresight = Foresight(base, clock)
     assert foresight.ahead(Pose(1.0)) == Pose(1.0)
     foresight.sent(Twist(x=1.0))

@@ -93,7 +93,7 @@ async def test_the_revision_stands_for_what_the_grid_shows(tour: Tour) -> None:
 
 
 @pytest.mark.world("office")
-async def test_a_rough_pose_is_corrected_a_wrong_one_told(tour: Tour) -> None:
+async def test_a_rough_pose_is_corrected_a_wrong_one_reported(tour: Tour) -> None:
     await tour.go((20.0, 10.0))
     localization, jumps = tour.robot[Localization], []
     tour.robot.events.listen(PoseJumped, jumps.append)
@@ -142,7 +142,7 @@ async def test_spinning_wheels_do_not_carry_the_pose_away(tour: Tour) -> None:
 
 
 @pytest.mark.world("empty")
-async def test_somebody_who_stood_there_is_forgotten(tour: Tour) -> None:
+async def test_someone_who_stood_there_is_forgotten(tour: Tour) -> None:
     box = tour.world.hands.add_obstacle(Pose(5.0, 5.0, 0.0), (0.4, 0.4, 1.7))
     await tour.clock.advance(4.0)
     mapping = tour.robot[Mapping]

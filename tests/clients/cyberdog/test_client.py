@@ -52,7 +52,7 @@ TABLE: tuple[tuple[str, tuple[Any, ...], int | None], ...] = (
     ("change_faces", (1, "ewa"), None),
     ("recognise_faces", ("ewa",), None),
     ("remove_member", ("ewa",), None),
-    ("end_video", ("nobody",), None),
+    ("end_video", ("unknown",), None),
     ("photo", (), None),
     ("keep_photo", (), None),
     ("record", (), None),
@@ -134,9 +134,9 @@ async def test_every_code_of_the_contract_once(client, door: CyberDogDoor, robot
     pushed = {int(code) for code in pushes}
     assert {int(row.key) for row in contract("cyberdog")} <= asked | pushed
     assert robot[Bluetooth].connected is None
-    told = list[tuple[str, float]]()
-    assert await client.update("reset", on_feedback=lambda *how: told.append(how)) == {}
-    assert told == [("idle", 0.0)]
+    reported = list[tuple[str, float]]()
+    assert await client.update("reset", on_feedback=lambda *how: reported.append(how)) == {}
+    assert reported == [("idle", 0.0)]
 
 
 async def outcome(client: CyberDogClient, name: str, arguments: tuple[Any, ...]) -> int | str | None:
@@ -177,26 +177,26 @@ async def test_every_push_arrives_as_its_value(client: CyberDogClient, door: Cyb
     await client.found()
     await _until(lambda: door._context.app.connected)
     for code, value in EXAMPLES.items():
-        with client.watch(type(value)) as told:
+        with client.watch(type(value)) as reported:
             door._context.app.push(pushes[code], msgspec.to_builtins(value))
             async with asyncio.timeout(5):
-                assert await anext(told) == value
+                assert await anext(reported) == value
     with client.signals.subscribe() as signals:
         door._context.app.push(pushes[Code.VIDEO], {"is_closed": True, "uid": "x"})
         async with asyncio.timeout(5):
             assert await anext(signals) == End("x", done=True)
 
 
-async def test_tasks_are_awaited_told_and_cancelled(client: CyberDogClient, door, world) -> None:
+async def test_tasks_are_awaited_reported_and_cancelled(client: CyberDogClient, door, world) -> None:
     await client.found()
-    told: list[int] = []
-    await (await client.relocalise(on_feedback=told.append))
-    assert told[-1] == 3108
+    reported: list[int] = []
+    await (await client.relocalise(on_feedback=reported.append))
+    assert reported[-1] == 3108
     begun = world.truth.pose_of("a")
     with client.watch(values.Pose) as poses:
-        await (await client.navigate(1.0, 0.3, on_feedback=told.append))
+        await (await client.navigate(1.0, 0.3, on_feedback=reported.append))
         pose = poses.drain()[-1]
-    assert told[-1] == 308
+    assert reported[-1] == 308
     reached = begun.compose(Pose(pose.px, pose.py, 2 * math.atan2(pose.qz, pose.qw)))
     assert reached.distance_to(world.truth.pose_of("a")) < 0.2
     far = await client.navigate(3.0, 0.0)
@@ -246,7 +246,7 @@ async def test_pictures_move(client: CyberDogClient, door, world) -> None:
     await _until(lambda: door._context.video.viewers == 0)
 
 
-async def test_a_dead_link_is_told_at_once_and_mends(client: CyberDogClient, door: CyberDogDoor) -> None:
+async def test_a_dead_link_is_reported_at_once_and_mends(client: CyberDogClient, door: CyberDogDoor) -> None:
     await client.found()
     port = door.port
     await door._server.stop(None)

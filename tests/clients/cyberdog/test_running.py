@@ -43,7 +43,7 @@ async def test_a_task_whose_stream_breaks_is_joined_again() -> None:
     assert heard == [300, 308]
 
 
-async def test_a_task_that_nobody_knows_any_more_has_not_succeeded() -> None:
+async def test_a_task_that_no_one_knows_any_more_has_not_succeeded() -> None:
     streams = [(Code.START_TASK, [*BEGUN, None]), (Code.JOIN_TASK, [{"accepted": Accepted.NOTHING_TO_JOIN}])]
     task = await talking(iter(streams)).navigate(1.0, 0.0)
     with pytest.raises(TaskFailed) as failed:
@@ -52,7 +52,7 @@ async def test_a_task_that_nobody_knows_any_more_has_not_succeeded() -> None:
 
 
 @pytest.mark.parametrize("nonsense", ["what?", '{"accepted": "perhaps"}'])
-async def test_nonsense_is_told_at_once(nonsense: str) -> None:
+async def test_nonsense_is_reported_at_once(nonsense: str) -> None:
     with pytest.raises(BadAnswer):
         await talking(iter([(Code.START_TASK, [nonsense])])).navigate(1.0, 0.0)
     task = await talking(iter([(Code.START_TASK, [*BEGUN, nonsense])])).navigate(1.0, 0.0)

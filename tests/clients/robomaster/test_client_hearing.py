@@ -43,17 +43,17 @@ async def test_pushes_of_every_kind(client, run, forward, robot) -> None:
         for _ in range(20):
             await forward(seconds=0.05)
             await asyncio.sleep(0.002)
-        told = everything.drain()
+        reported = everything.drain()
         stop()
-    kinds = [type(each) for each in told]
+    kinds = [type(each) for each in reported]
     assert {ChassisPosition, ChassisAttitude, ChassisStatus, GimbalAttitude, GameInput, TargetsSeen, LinesSeen} == set(
         kinds
     )
     assert kinds.count(ChassisPosition) == pytest.approx(10, abs=1)
-    assert heard == [each for each in told if isinstance(each, ChassisStatus)]
+    assert heard == [each for each in reported if isinstance(each, ChassisStatus)]
     assert heard[-1].static
-    assert next(each for each in reversed(told) if isinstance(each, GameInput)).data[0] == 2
-    assert {each.kind for each in told if isinstance(each, TargetsSeen)} == {"marker"}
+    assert next(each for each in reversed(reported) if isinstance(each, GameInput)).data[0] == 2
+    assert {each.kind for each in reported if isinstance(each, TargetsSeen)} == {"marker"}
 
 
 @BUILDS
@@ -87,7 +87,7 @@ async def test_what_is_watched_ends_with_the_client(client) -> None:
         await anext(watched)
 
 
-async def test_two_robots_share_a_push_port_and_are_told_apart() -> None:
+async def test_two_robots_share_a_push_port_and_are_distinguished() -> None:
     """By the address that a datagram comes from."""
     import socket
 
@@ -137,7 +137,7 @@ async def test_sound(client, run, forward) -> None:
     await packets.aclose()
 
 
-async def test_a_robot_that_nobody_holds_is_found(door, robot, run) -> None:
+async def test_a_robot_that_no_one_holds_is_found(door, robot, run) -> None:
     port = door._config.broadcast_port
     assert await run(discover(30, first=True, clock=robot.clock, port=port)) == [ADDRESS]
     assert await run(discover(3, clock=robot.clock, port=port)) == [ADDRESS]

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.world("empty", body="robomaster_ep")
 
 
 class FakeRobot:
-    """Answers ``ok`` to ``command``, and to anything else what it is told, as bytes; {} is the seq number."""
+    """Answers ``ok`` to ``command``, and to anything else what it is given, as bytes; {} is the seq number."""
 
     def __init__(self) -> None:
         self.answers: list[str] = []
@@ -109,7 +109,7 @@ async def test_many_at_once_each_get_their_own(faked, fake) -> None:
     assert [each.pitch for each in got] == list(range(20))
 
 
-async def test_late_and_lost_answers_confuse_nobody(faked, fake, clock) -> None:
+async def test_late_and_lost_answers_confuse_no_one(faked, fake, clock) -> None:
     asked = asyncio.ensure_future(faked.chassis.get_attitude())
     await settle()
     await clock.advance(3)
@@ -179,7 +179,7 @@ async def test_it_comes_back_by_itself_and_says_so(faked, fake, clock) -> None:
     server.close()
 
 
-async def test_nobody_there(clock) -> None:
+async def test_no_one_there(clock) -> None:
     client = RoboMasterClient("127.0.0.1", clock=clock, ports=Ports(control=1))
     with pytest.raises(LinkLost, match="cannot be reached"):
         await client.connect()

@@ -149,7 +149,7 @@ JSON = b"HTTP/1.1 200 OK\r\ncontent-length: %d\r\n\r\n%s"
         (b"HTTP/1.1 200 OK\r\nx: " + b"y" * 40_000 + b"\r\n\r\n", BadAnswer),
     ],
 )
-async def test_bad_answers_are_told_and_nothing_hangs(
+async def test_bad_answers_are_reported_and_nothing_hangs(
     fake: Callable[[Reply], Awaitable[SlamwareClient]], data: bytes, error: type[Exception]
 ) -> None:
     client = await fake(answering(data))
@@ -165,9 +165,9 @@ async def test_silence_is_a_time_out_and_no_robot_is_a_lost_link(
 
     with pytest.raises(TimedOut):
         await (await fake(silent)).get_pose()
-    async with SlamwareClient("127.0.0.1", 1) as nobody:
+    async with SlamwareClient("127.0.0.1", 1) as no_one:
         with pytest.raises(LinkLost, match="cannot be reached"):
-            await nobody.get_pose()
+            await no_one.get_pose()
 
 
 async def test_a_question_is_asked_again_on_a_new_connection_but_a_command_never(

@@ -158,7 +158,7 @@ REFUSED = {
     "dispatch_by_pois": 404,
     "get_elevators_by_id": 400,  # nor are there elevators on it
     "get_pose_relation_to_elevator": 400,
-    "post_task_event": 404,  # nobody called
+    "post_task_event": 404,  # no one called
     "cancel_task_by_task_id": 404,
     "cancel_task_by_order_id": 404,
     "start_pickup": 403,  # it does not deliver just now

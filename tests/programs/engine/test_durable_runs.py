@@ -216,7 +216,7 @@ async def test_a_journal_knows_what_was_under_way(tmp_path: Path) -> None:
     assert (history.header, history.interrupted) == (header, "cyberdog.motion.turn")
     slept = Answer("time.sleep", b'{"t":"value","value":null}')
     assert list(history.answers) == [slept, Answer("cyberdog.motion.turn", None)]
-    assert await Journal(store, "t").reopen(store.headers_now()["t"]) == history  # nobody has answered it yet
+    assert await Journal(store, "t").reopen(store.headers_now()["t"]) == history  # no one has answered it yet
     second.answered("cyberdog.motion.turn", b"{}")
     await second.begin("cyberdog.motion.go_straight")
     third = await Journal(store, "t").reopen(store.headers_now()["t"])
@@ -261,7 +261,7 @@ def test_what_only_reads_may_be_asked_again(name: str, acts: bool) -> None:
 
 
 async def test_a_task_that_is_new_has_no_past(second: Callable[[], ProgramService]) -> None:
-    """A second run of a task begins at its beginning, whatever the first one was told."""
+    """A second run of a task begins at its beginning, whatever the first one was given."""
     service = second()
     for _ in range(2):
         await service.save(StoredProgram("t", "", "", "single", "now", "cyberdog.task.start()\nprint('once')", ""))

@@ -129,7 +129,7 @@ async def test_a_killed_worker_is_a_crash(engine: Engine) -> None:
     assert "signal 11" in end.message
 
 
-async def test_answers_nobody_waits_for_are_errors_of_the_caller(engine: Engine) -> None:
+async def test_answers_no_one_waits_for_are_errors_of_the_caller(engine: Engine) -> None:
     run = await engine.start("cyberdog.echo(1)", PRELUDE)
     call = await anext(run)
     assert isinstance(call, Call)

@@ -1,4 +1,4 @@
-"""Stepping and stopping at lines: a watched program halts where it is told, and nowhere else."""
+"""Stepping and stopping at lines: a watched program halts where it is asked to, and nowhere else."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ async def test_a_busy_program_is_halted_and_its_stops_change(engine: Engine) -> 
     assert process_state(run.pid) == ""
 
 
-async def test_a_run_that_nobody_watches_does_not_halt(engine: Engine) -> None:
+async def test_a_run_that_no_one_watches_does_not_halt(engine: Engine) -> None:
     run = await engine.start(LOOP, PRELUDE)
     run.position.step()
     run.position.stop_at([("", 4)])
@@ -135,7 +135,7 @@ def _go_on(run: Run, event: object) -> bool:
     return True
 
 
-async def test_a_halt_that_nobody_asked_for_breaks_the_protocol() -> None:
+async def test_a_halt_that_no_one_asked_for_breaks_the_protocol() -> None:
     forged = (
         "import os\n"
         'body = b\'{"t":"call","id":1,"name":"$halt","args":[],"kwargs":{}}\'\n'

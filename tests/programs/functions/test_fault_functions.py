@@ -31,9 +31,9 @@ async def test_the_battery_tells_its_charge_and_that_nothing_drives(caller: Call
     world.faults.inject("low_battery", "a", charge=0.08)
     world.faults.inject("emergency_stop", "a")
     await caller.clock.advance(0.5)
-    told = await caller("cyberdog.bms.data")
-    assert field(told, "batt_soc") == 8
-    assert field(told, "power_motor_shutdown")
+    data = await caller("cyberdog.bms.data")
+    assert field(data, "batt_soc") == 8
+    assert field(data, "power_motor_shutdown")
 
 
 async def test_without_a_network(caller: Caller, world: World) -> None:
@@ -41,5 +41,5 @@ async def test_without_a_network(caller: Caller, world: World) -> None:
     assert field(await caller("cyberdog.network.data"), "is_connected")
     world.faults.inject("wifi_loss", "a")
     await caller.clock.advance(1.5)
-    told = await caller("cyberdog.network.data")
-    assert (field(told, "is_connected"), field(told, "ssid"), field(told, "robot_ip")) == (False, "", "")
+    data = await caller("cyberdog.network.data")
+    assert (field(data, "is_connected"), field(data, "ssid"), field(data, "robot_ip")) == (False, "", "")

@@ -73,10 +73,10 @@ async def test_who_takes_over_ends_it(caller: Caller, anna: Actor) -> None:
     await caller("cyberdog.follow.add_personnel", "Anna")
     await caller("cyberdog.follow.follow_personnel", "Anna")
     await caller.clock.advance(1.5)
-    caller.robot[Driving].drive(Twist(), lifetime=2.0, source="somebody")
+    caller.robot[Driving].drive(Twist(), lifetime=2.0, source="someone")
     await caller.clock.advance(1.0)
     assert field(await caller("cyberdog.follow.state"), "describe") == "somebody else moves the robot"
-    assert [action.source for action in caller.robot.actions.running()] == ["somebody"]
+    assert [action.source for action in caller.robot.actions.running()] == ["someone"]
 
 
 async def test_it_goes_around_what_stands_between(caller: Caller, world: World, anna: Actor) -> None:

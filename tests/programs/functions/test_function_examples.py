@@ -101,7 +101,7 @@ async def test_examples_of_motions(player: Player, part: int, monkeypatch: pytes
 
 
 @pytest.mark.world("empty", body="cyberdog2")
-async def test_examples_of_what_needs_nobody(player: Player) -> None:
+async def test_examples_of_what_needs_no_one(player: Player) -> None:
     for name in sorted(OTHERS, key=lambda name: name != "cyberdog.touch.data"):  # before anybody has touched it
         await player.stand_at(5.0, 5.0)
         await player.play(name, EXAMPLES[name])

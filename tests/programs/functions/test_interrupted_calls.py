@@ -90,9 +90,9 @@ def succeeded(result: Record) -> bool:
 async def test_motions_keep_their_number(caller: Caller) -> None:
     result = await call_cut_off(caller.session, "cyberdog.motion.turn", [90], {})
     usual = await caller("cyberdog.motion.turn", 1000)
-    for told in (result, usual):
-        assert isinstance(told, Record)
-        assert field(told, "response.motion_id") == field(usual, "response.motion_id") != 0
+    for reported in (result, usual):
+        assert isinstance(reported, Record)
+        assert field(reported, "response.motion_id") == field(usual, "response.motion_id") != 0
     assert (field(result, "response.result"), field(result, "response.code")) == (False, 3029)  # type: ignore[arg-type]
 
 

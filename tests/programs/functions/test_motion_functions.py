@@ -200,10 +200,10 @@ async def test_pausing_holds_a_walk_and_its_time(caller: Caller, world: World) -
     assert_pose(world.truth.pose_of("a").relative_to(before), x=1.0, y=0.0, within=0.1)
 
 
-async def test_who_takes_the_base_away_is_told(caller: Caller) -> None:
+async def test_who_takes_the_base_away_is_reported(caller: Caller) -> None:
     walking = caller.start("cyberdog.motion.go_straight", 0.25, 0, 10)
     await caller.clock.advance(1.0)
-    caller.robot[Driving].drive(Twist(), lifetime=0.1, source="somebody")
+    caller.robot[Driving].drive(Twist(), lifetime=0.1, source="someone")
     await caller.clock.advance(2.0)
     result = walking.result()
     assert (field(result, "state.code"), field(result, "response.code")) == (1, 3011)
@@ -236,7 +236,7 @@ async def test_the_limits_can_be_read(caller: Caller) -> None:
     [("low_battery", 3026), ("motor_fault", 3032), ("emergency_stop", 3040), ("brake_released", 3040)],
 )
 @pytest.mark.world("empty")
-async def test_what_is_wrong_with_the_robot_is_told_by_its_number(
+async def test_what_is_wrong_with_the_robot_is_reported_by_its_number(
     caller: Caller, world: World, fault: str, code: int
 ) -> None:
     world.faults.inject(fault, "a")
@@ -250,11 +250,11 @@ async def test_what_is_wrong_with_the_robot_is_told_by_its_number(
         assert field(await caller("cyberdog.motion.get_down"), "response.code") == 0
 
 
-async def test_a_program_without_control_is_told_so(caller: Caller) -> None:
+async def test_a_program_without_control_learns_so(caller: Caller) -> None:
     robot = caller.session.robot
     await robot[Lease].take("robomaster")
-    told = await caller("cyberdog.motion.go_straight", 0.3, 0.1)
-    assert field(told, "response.code") == 3011
+    answer = await caller("cyberdog.motion.go_straight", 0.3, 0.1)
+    assert field(answer, "response.code") == 3011
     assert not robot.actions.running(BASE)
 
 

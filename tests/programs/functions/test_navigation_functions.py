@@ -96,7 +96,7 @@ async def test_who_takes_over_cancels_the_drive(home: Caller) -> None:
     await home("cyberdog.navigation.turn_on_navigation")
     going = home.start("cyberdog.navigation.navigation_to_preset", "kitchen")
     await home.clock.advance(0.6)
-    home.robot[Driving].drive(Twist(), lifetime=0.1, source="somebody")
+    home.robot[Driving].drive(Twist(), lifetime=0.1, source="someone")
     await home.clock.advance(1.0)
     assert result_of(going.result()) == (1, 5)
 
@@ -122,7 +122,7 @@ async def test_a_map_of_an_earlier_life_is_loaded_and_found(home: Caller, world:
     assert localization.pose.distance_to(pose) < 0.1
 
 
-async def test_somebody_helps_a_robot_that_does_not_know_where_it_is(
+async def test_someone_helps_a_robot_that_does_not_know_where_it_is(
     home: Caller, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     localization, known = home.robot[Localization], []
@@ -147,7 +147,7 @@ async def test_somebody_helps_a_robot_that_does_not_know_where_it_is(
         await home.clock.advance(12.0)
         assert not helped.done()
         assert (await said.next()).text == REQUEST
-        known.append("here")  # somebody has carried it
+        known.append("here")  # someone has carried it
         assert result_of(await helped_to_the_end(home, helped)) == (0, 0)
         assert (await said.next()).text == "navigation succeeded"
     known.clear()

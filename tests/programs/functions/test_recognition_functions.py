@@ -23,7 +23,7 @@ HOLD, THUMB = ENUMS["GestureType"]["stop_sign"], ENUMS["GestureType"]["thumb_up"
 
 @pytest.fixture
 async def anna(caller: Caller, world: World) -> Actor:
-    """Somebody who stands before the camera, and nobody else in sight."""
+    """Someone who stands before the camera, and no one else in sight."""
     world.hands.place("a", Pose(2.0, 5.0))
     ben, anna = world.hands.person("ben"), world.hands.person("anna")
     ben.stand()
@@ -145,7 +145,7 @@ async def test_a_volume_out_of_range_is_refused_also_when_nothing_is_said(caller
             assert field(result, "state.describe") == f"volume = {volume} is outside of 0 to 100 %"
 
 
-async def test_nobody_trains(caller: Caller, anna: Actor) -> None:
+async def test_no_one_trains(caller: Caller, anna: Actor) -> None:
     result = await caller("cyberdog.skeleton.sports_recognition", 1, 2, 5, False)
     assert field(result, "response").fields.items() >= {"result": 1, "algo_switch": 2, "counts": 0}.items()
     assert caller.robot[Vision].skeletons.latest is None
@@ -172,7 +172,7 @@ async def test_counting_ends_when_asked_and_with_the_program(caller: Caller, ann
 
 async def test_members_are_known_by_their_faces(caller: Caller, world: World, anna: Actor) -> None:
     members = caller.robot[Members]
-    assert field(await caller("cyberdog.personnel.face_recognized", []), "state.code") == 1  # nobody is known
+    assert field(await caller("cyberdog.personnel.face_recognized", []), "state.code") == 1  # no one is known
     for name in ("Anna", "Ben"):
         await members.add(name)
         await members.set_face(name, world.hands.person(name.lower()).face)
@@ -210,10 +210,10 @@ async def test_members_are_known_by_their_voices(caller: Caller, world: World, a
 @pytest.mark.parametrize(
     ("name", "args"),
     [
-        ("face_recognized", (["nobody"], False, 60)),
+        ("face_recognized", (["unknown"], False, 60)),
         ("face_recognized", ([], False, 29)),
         ("face_recognized", ([], False, float("nan"))),
-        ("voiceprint_recognized", (["nobody"], False, 3)),
+        ("voiceprint_recognized", (["unknown"], False, 3)),
         ("voiceprint_recognized", ([], False, 31)),
         ("voiceprint_recognized", ([], False, 3, -1)),
     ],
@@ -241,7 +241,7 @@ async def test_phrases_that_are_known(caller: Caller, anna: Actor) -> None:
     assert field(await caller("cyberdog.train.training_words_recognized", 4), "state.code") == 1
 
 
-async def test_a_word_that_somebody_teaches_is_understood(caller: Caller, anna: Actor) -> None:
+async def test_a_word_that_someone_teaches_is_understood(caller: Caller, anna: Actor) -> None:
     teaching = caller.robot[TrainingWords].teach("dance", seconds=20.0)
     for _ in range(REPEATS):
         anna.say("跳舞")
@@ -258,7 +258,7 @@ async def test_a_word_that_somebody_teaches_is_understood(caller: Caller, anna: 
     assert field(waiting.result(), "response").fields == taught
 
 
-async def test_a_face_shows_what_somebody_feels(caller: Caller, anna: Actor) -> None:
+async def test_a_face_shows_what_someone_feels(caller: Caller, anna: Actor) -> None:
     await caller.robot[Members].add("Anna")
     await caller.robot[Members].set_face("Anna", anna.face)
     for emotion, number in ((Emotion.NEUTRAL, 0.0), (Emotion.HAPPY, 1.0), (Emotion.AFRAID, 5.0)):

@@ -46,7 +46,7 @@ CHARGING = [
 
 
 @pytest.mark.parametrize(
-    ("charge", "charging", "supply", "told"),
+    ("charge", "charging", "supply", "expected"),
     [
         (0.5, True, Supply.WIRE, [2, False, True, False, False, False, True]),
         (0.5, True, Supply.WIRELESS, [2, False, False, False, True, True, True]),
@@ -56,10 +56,12 @@ CHARGING = [
         (0.98, False, Supply.NONE, [1, True, False, False, False, False, False]),
     ],
 )
-async def test_charging(bare_caller: Caller, charge: float, charging: bool, supply: Supply, told: list[object]) -> None:
+async def test_charging(
+    bare_caller: Caller, charge: float, charging: bool, supply: Supply, expected: list[object]
+) -> None:
     bare_caller.robot.add(Battery, Charged(BatteryState(charge, 25.0, 2.0, 25.0, charging, 7, supply)))
     data = await bare_caller("cyberdog.bms.data")
-    assert [field(data, name) for name in CHARGING] == told
+    assert [field(data, name) for name in CHARGING] == expected
 
 
 class Charged(Battery):
@@ -72,7 +74,7 @@ class Charged(Battery):
 
 
 @pytest.mark.parametrize(
-    ("state", "told"),
+    ("state", "expected"),
     [
         (BatteryState(0.5, 25.0, -1.0, 25.0, False, 7, health=0.934), [93, 0, 0, 0, 0]),
         (BatteryState(0.04, 25.0, -1.0, 25.0, False, 7, buzzing=True), [100, 0, 1, 0, 0]),
@@ -81,11 +83,11 @@ class Charged(Battery):
         (BatteryState(1.0, 25.0, 2.0, 25.0, True, 7, Supply.CONTACTS), [100, 0, 0, 2, 2]),
     ],
 )
-async def test_the_batterys_guard(bare_caller: Caller, state: BatteryState, told: list[int]) -> None:
+async def test_the_batterys_guard(bare_caller: Caller, state: BatteryState, expected: list[int]) -> None:
     bare_caller.robot.add(Battery, Charged(state))
     data = await bare_caller("cyberdog.bms.data")
     names = ("batt_health", "disable_charge", "buzze", "power_supply", "status")
-    assert [field(data, name) for name in names] == told
+    assert [field(data, name) for name in names] == expected
 
 
 async def test_a_sleeping_robot_has_its_motors_off(caller: Caller) -> None:

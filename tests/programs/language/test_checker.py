@@ -1,4 +1,4 @@
-"""The checker: what a pupil is told, and what is let through. In this process, on text that is known."""
+"""The checker: what a pupil is shown, and what is let through. In this process, on text that is known."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ def robot(walker: tuple[World, Robot]) -> Robot:
 
 @pytest.fixture
 async def phoned(door: CyberDogDoor, app: App, robot: Robot, data: Path) -> AsyncIterator[CyberDogDoor]:
-    """A door whose app is configured, and that nobody calls."""
+    """A door whose app is configured, and that no one calls."""
     opened = CyberDogDoor(robot, ADDRESS, CyberDogConfig(port=0, app=f"127.0.0.1:{app.port}"), data)
     await opened.start()
     yield opened
@@ -69,7 +69,7 @@ async def test_heartbeats_come_every_half_second(phoned, app, clock: LockstepClo
         assert len(app.ticks) == beats
 
 
-async def test_without_an_address_nobody_is_dialled(door, app, forward) -> None:
+async def test_without_an_address_no_one_is_dialled(door, app, forward) -> None:
     await forward(seconds=3)
     await asyncio.sleep(0.02)
     assert not app.ticks
@@ -142,7 +142,7 @@ async def test_a_second_client_does_not_take_the_app_s_place(door, client, app, 
 
 
 class Dialling(AppLink):
-    """Nobody ever answers: every attempt lasts five seconds."""
+    """No one ever answers: every attempt lasts five seconds."""
 
     async def _keep(self, _target: str) -> bool:
         self.attempts = [*getattr(self, "attempts", []), self._clock.time()]
@@ -157,7 +157,7 @@ async def test_a_call_during_an_attempt_leads_to_the_next_at_once(clock: Lockste
     link.seen("ipv4:127.0.0.1:4711")
     await clock.advance(4.0)
     assert link.attempts == [0.0, 5.0]
-    await clock.advance(5.5)  # nobody called during the second attempt: a pause follows it
+    await clock.advance(5.5)  # no one called during the second attempt: a pause follows it
     assert link.attempts == [0.0, 5.0]
     await clock.advance(1.0)
     assert link.attempts == [0.0, 5.0, pytest.approx(12.0)]
@@ -257,7 +257,7 @@ async def test_program_frames_pass_through(robot, data, app, pems, messages, pas
     assert programs.front_end is None
 
 
-async def test_any_address_of_the_machine_is_told_by_the_way_to_the_app(robot, data, app, passing: Passing) -> None:
+async def test_any_address_of_the_machine_is_reported_by_the_way_to_the_app(robot, data, app, passing: Passing) -> None:
     door = CyberDogDoor(robot, "0.0.0.0", CyberDogConfig(port=0, app=f"127.0.0.1:{app.port}"), data)
     await door.start()
     await passing(lambda: app.ticks)

@@ -110,7 +110,7 @@ async def test_the_remote_control_s_gear(client, app, robot, gadget, passing, fo
     assert await client.ask(8013) == {"data": 2}
 
 
-async def test_whoever_wears_the_bracelet_is_followed(client, robot, world, gadget, passing, forward) -> None:
+async def test_anyone_who_wears_the_bracelet_is_followed(client, robot, world, gadget, passing, forward) -> None:
     none = Stream(client, 6004, {"type": 11})
     await passing(lambda: none.ended)
     assert none.codes == [1000, 1001, 15]

@@ -102,7 +102,7 @@ def test_broken_and_expired_ones_are_not_replaced_silently(tmp_path: Path, monke
 
 @pytest.mark.parametrize("name", ["ca-cert.pem", "server-cert.pem", "server-key.pem"])
 @pytest.mark.parametrize("half", [True, False])
-def test_half_of_a_change_changes_nothing_and_is_told_at_the_start(tmp_path: Path, name: str, half: bool) -> None:
+def test_half_of_a_change_changes_nothing_and_is_reported_at_the_start(tmp_path: Path, name: str, half: bool) -> None:
     """A file that is cut short, or a key or certificate whose other half has not come yet."""
     ensure_certificates(tmp_path / "new")
     file, store = tmp_path / "tls" / name, CertificateStore(tmp_path)
@@ -133,7 +133,7 @@ async def test_certificates_that_are_replaced_count_at_the_next_connection(
     try:
         async with old.channel(door.port) as connected:
             assert await Client(connected, messages).raw(10001)
-            (tls / "server-key.pem").write_text("half a fi")  # somebody copies new ones and is not done
+            (tls / "server-key.pem").write_text("half a fi")  # someone copies new ones and is not done
             async with old.channel(door.port) as channel:
                 assert await Client(channel, messages).raw(10001)
             ensure_certificates(tmp_path / "other")

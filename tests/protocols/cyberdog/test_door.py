@@ -116,7 +116,7 @@ async def test_an_oversize_message_is_refused_and_the_next_is_answered(client) -
     assert await client.ask(10001, '{"a":"' + "x" * 4_000_000 + '"}')
 
 
-async def test_garbage_on_the_socket_disturbs_nobody(door, client) -> None:
+async def test_garbage_on_the_socket_disturbs_no_one(door, client) -> None:
     _, writer = await asyncio.open_connection(ADDRESS, door.port)
     writer.write(b"\x00\xff" * 4000)
     await writer.drain()

@@ -9,7 +9,7 @@ from roboglot.model.clock import LockstepClock
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
 
-# kind: robot time until it is told, the self check's code, the state, the code of walking
+# kind: robot time until it is reported, the self check's code, the state, the code of walking
 WORDS = {
     "low_battery": (0.5, 0, 1, 3013),
     "motor_fault": (0.5, 2, 0, 3032),

@@ -182,7 +182,7 @@ async def test_the_first_request_of_all_is_answered(
 
 
 class Wire:
-    """A connection that takes what it is sent in the end, and breaks when it is told to."""
+    """A connection that takes what it is sent in the end, and breaks when it is asked to."""
 
     def __init__(self) -> None:
         self.sent: list[str] = []
@@ -262,7 +262,7 @@ async def test_a_broken_connection_loses_nothing(clock: LockstepClock) -> None:
 async def test_a_lost_app_finds_its_answers_and_no_old_news(clock: LockstepClock) -> None:
     wire = Wire()
     queue = FrameQueue(wire.send, clock, 0)
-    queue.answer("nobody asked")
+    queue.answer("no one asked")
     await queue.room_for_answers()
     queue.answer("early")
     queue.publish("missed")

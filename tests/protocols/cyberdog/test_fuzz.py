@@ -71,14 +71,14 @@ def requests(rng: random.Random) -> list[tuple[int, Any]]:
 async def test_requests_of_any_shape_at_a_whole_dog(
     door: CyberDogDoor, client: Client, robot: Robot, forward: Forward, caplog: pytest.LogCaptureFixture
 ) -> None:
-    rng, told = random.Random(7), list[Any]()
+    rng, answers = random.Random(7), list[Any]()
     assert {Firmware, Power} <= set(robot.interfaces)
     dog = door._context
     assert dog
 
     async def ask(code: int, params: Any) -> None:
         async def reply(value: object) -> None:
-            told.append(json.loads(write(value) or "{}"))
+            answers.append(json.loads(write(value) or "{}"))
 
         try:
             last = await answer(Call(code, json.dumps(params), dog, reply))
@@ -101,7 +101,7 @@ async def test_requests_of_any_shape_at_a_whole_dog(
     for one in under_way:
         one.cancel()
     await asyncio.wait_for(asyncio.gather(*under_way, return_exceptions=True), PATIENCE)
-    assert len(told) > len(asked) / 2
-    assert all(isinstance(one, dict) for one in told)
+    assert len(answers) > len(asked) / 2
+    assert all(isinstance(one, dict) for one in answers)
     assert [record.message for record in caplog.records if record.levelno >= logging.ERROR] == []
     assert await client.ask(10001)

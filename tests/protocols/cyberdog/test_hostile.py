@@ -76,18 +76,18 @@ def dog_of_no_robot() -> Any:
 
     plate = Description(maker="", model="", serial="", hardware_version="", software_version="", radius=0.1, height=0.1)
 
-    class Nobody:
+    class Silent:
         connected = False
 
         def push(self, *_: object) -> None:
-            """To nobody."""
+            """To no one."""
 
         def forget(self) -> None:
             """Whom?"""
 
     class Context:
         robot = Robot("a", plate, LockstepClock())
-        app, tasks, stored_map, pursuit, relay, address, files = Nobody(), Tasks(), "", None, None, "", None
+        app, tasks, stored_map, pursuit, relay, address, files = Silent(), Tasks(), "", None, None, "", None
 
     Context.gaits = Gaits(Context.robot)  # type: ignore[attr-defined]
     return Context()

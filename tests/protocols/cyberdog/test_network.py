@@ -47,7 +47,7 @@ class Afar:
         return asking.result()
 
     async def fall_silent(self) -> None:
-        """Half-open: nobody is told, and the app is missed in the end."""
+        """Half-open: no one is notified, and the app is missed in the end."""
         self.fault.silent = True
         await self.passing(lambda: not self.door._context.app.connected)
 

@@ -51,7 +51,7 @@ async def test_the_volume_is_the_loudspeaker_s(client, robot) -> None:
     assert robot[Speaker].volume == pytest.approx(0.35)
 
 
-async def test_the_eyes_shine_as_bright_as_told(client, robot) -> None:
+async def test_the_eyes_shine_as_bright_as_asked(client, robot) -> None:
     assert await client.ask(1015, {"eyelight": 50}) == {"success": True}
     assert {lamp.red for lamp in robot[Light].lamps("eyes")} == {128}
     assert await client.ask(1015, {"eyelight": 0}) == {"success": True}
@@ -59,8 +59,8 @@ async def test_the_eyes_shine_as_bright_as_told(client, robot) -> None:
     assert await client.ask(1015, {"eyelight": -1}) == {"success": False}
 
 
-async def test_whoever_speaks_is_silenced(client, robot, forward) -> None:
-    saying = robot[Speaker].say("a rather long sentence, which nobody wants to hear to its end", source="another")
+async def test_anyone_who_speaks_is_silenced(client, robot, forward) -> None:
+    saying = robot[Speaker].say("a rather long sentence, which no one wants to hear to its end", source="another")
     await forward(seconds=0.2)
     assert await client.ask(1025) == {}
     assert saying.status.name == "CANCELED"
@@ -147,7 +147,7 @@ async def test_training_can_be_cancelled_runs_out_and_needs_a_member(
 ) -> None:
     await client.ask(10001)
     await passing(lambda: app.ticks)
-    await client.ask(3011, {"nick_name": "nobody", "voiceprint_id": "v2"})
+    await client.ask(3011, {"nick_name": "unknown", "voiceprint_id": "v2"})
     await until(lambda: app.of(3013))
     assert app.of(3013) == [{"code": 5010, "voiceprint_id": "v2"}]
     await client.ask(1020, {"member": "ben"})

@@ -52,7 +52,7 @@ async def test_the_self_check_waits_for_the_first_scan(client, forward: Forward)
 
 
 @pytest.mark.parametrize(
-    ("part", "level", "code", "told"),
+    ("part", "level", "code", "expected"),
     [
         ("lidar", FaultLevel.FATAL, 4, {"sensor": {"lidar": 2109}}),
         ("bumper", FaultLevel.ERROR, 4, {"sensor": {"lidar": 0, "others": 1}}),
@@ -62,10 +62,10 @@ async def test_the_self_check_waits_for_the_first_scan(client, forward: Forward)
         ("battery", FaultLevel.WARNING, 0, {}),
     ],
 )
-async def test_whatever_fails_is_in_the_self_check(client, robot, forward, part, level, code, told) -> None:
+async def test_whatever_fails_is_in_the_self_check(client, robot, forward, part, level, code, expected) -> None:
     await forward(seconds=1)
     robot[Health].set("broken for the test", True, part, level)
     well = {"motion_manager": 0, "device": {"bms": 0}, "sensor": {"lidar": 0}}
-    assert await self_check(client) == (code, {**well, **told})
+    assert await self_check(client) == (code, {**well, **expected})
     robot[Health].set("broken for the test", False, part, level)
     assert await self_check(client) == (0, well)

@@ -1,4 +1,4 @@
-"""Updates as goals (5010), whose stream can be joined again (5011): what happens to the firmware, and what is told."""
+"""Updates as goals (5010), whose stream can be joined again (5011): the firmware, and what is reported."""
 
 from __future__ import annotations
 

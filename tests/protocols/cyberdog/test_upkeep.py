@@ -224,23 +224,23 @@ async def test_the_depth_camera_is_switched(client, robot) -> None:
 
 
 async def test_progress_is_pushed_ten_times_a_second_at_most(robot, forward) -> None:
-    told: list[float] = []
+    reported: list[float] = []
 
     class Phone:
         on_found: ClassVar[list[Any]] = []
 
         def push(self, push: Push, _: object) -> None:
-            told.extend([robot.clock.time()] if push.code == 5005 else [])
+            reported.extend([robot.clock.time()] if push.code == 5005 else [])
 
     updates = Updates(robot, Phone())  # type: ignore[arg-type]
     firmware = robot[Firmware]
     updates.download(FirmwarePackage("1.3.2.0", 100_000_000, MD5, url="app"), frozenset({MD5}))
     await forward(seconds=1)
-    before = len(told)
+    before = len(reported)
     for _ in range(50):  # as often as a real robot may tell
         robot.events.publish(FirmwareChanged(stamp=robot.clock.time(), progress=firmware.progress))
         await forward(seconds=0.02)
-    assert 5 <= len(told) - before <= 11
+    assert 5 <= len(reported) - before <= 11
     updates.close()
 
 
@@ -251,7 +251,7 @@ async def test_the_last_app_is_dialled_again_after_a_restart(client, door, app, 
     app.ticks.clear()
     again = CyberDogDoor(robot, ADDRESS, CyberDogConfig(port=0, app_port=app.port), data)
     await again.start()
-    await passing(lambda: app.ticks)  # nobody asked for anything
+    await passing(lambda: app.ticks)  # no one asked for anything
     await again.close()
 
 

@@ -37,7 +37,7 @@ def pushes() -> Iterator[Inbox]:
 
 @pytest.fixture
 def broadcasts() -> Iterator[Inbox]:
-    """Where somebody listens for robots on the network."""
+    """Where someone listens for robots on the network."""
     inbox = Inbox("")
     yield inbox
     inbox.socket.close()
@@ -69,7 +69,7 @@ Connect = Callable[..., Awaitable[TextClient]]
 
 @pytest.fixture
 async def connect(door: RoboMasterDoor) -> AsyncIterator[Connect]:
-    """Opens control connections, from 127.0.0.1 unless told."""
+    """Opens control connections, from 127.0.0.1 unless given."""
     clients: list[TextClient] = []
 
     async def open_one(host: str = "127.0.0.1") -> TextClient:

@@ -1,6 +1,6 @@
 """Run by test_robomaster_vigil.py as root of a network of its own: a robot, a client on a cable, the cable cut.
 
-argv[1]: the groups that may send echo requests ("0 0": ours; empty: nobody). Prints how long the robot moved on.
+argv[1]: the groups that may send echo requests ("0 0": ours; empty: no one). Prints how long the robot moved on.
 """
 
 import asyncio
@@ -55,24 +55,24 @@ async def main(cable: str) -> None:
     client = await asyncio.create_subprocess_exec(
         "nsenter", "-t", cable, "-n", sys.executable, "-c", DRIVE, stdout=asyncio.subprocess.PIPE
     )
-    told = {}
+    reported = {}
     try:
         assert client.stdout
         assert await client.stdout.readline() == b"drives\n"
         await until(lambda: robot[Base].velocity.x > 0.35, 5)
         await asyncio.sleep(1.5)
-        told["alive"] = robot[Base].velocity.x
+        reported["alive"] = robot[Base].velocity.x
         run("nsenter", "-t", cable, "-n", "ip", "link", "set", "vb", "down")
-        told["ordered"] = await until(lambda: not robot.actions.running() or robot[Base].velocity.x < 0.3, 6)
-        told["stopped"] = told["ordered"] + await until(lambda: robot[Base].velocity.speed < 0.02, 2)
-        told["forgotten"] = told["stopped"] + await until(lambda: not door.context.active, 8)
+        reported["ordered"] = await until(lambda: not robot.actions.running() or robot[Base].velocity.x < 0.3, 6)
+        reported["stopped"] = reported["ordered"] + await until(lambda: robot[Base].velocity.speed < 0.02, 2)
+        reported["forgotten"] = reported["stopped"] + await until(lambda: not door.context.active, 8)
     finally:
         client.kill()
         await client.wait()
         await door.close()
         await fleet.close()
         database.close()
-    print(json.dumps(told))
+    print(json.dumps(reported))
 
 
 if sys.argv[1]:

@@ -158,7 +158,7 @@ async def test_a_move_that_is_taken_over_fails(client, connect, forward) -> None
     assert await client.reply() == FAIL
 
 
-async def test_nobody_waits_for_ever(client, robot, forward, monkeypatch) -> None:
+async def test_no_one_waits_for_ever(client, robot, forward, monkeypatch) -> None:
     monkeypatch.setattr("roboglot.protocols.robomaster.waiting.WAIT_MAX", 1.0)
     client.send("chassis move x 2 vxy 0.2 wait_for_complete true;")
     await asyncio.sleep(0.05)

@@ -109,7 +109,7 @@ async def test_the_robot_stops_when_the_client_that_drove_it_is_gone_though_othe
     assert await monitor.ask("chassis status ?;") != ""
     await monitor.close()
     await forward(seconds=0.5)
-    assert abs(robot[Base].velocity.yaw) > 0.9, "whoever only looked takes nothing along"
+    assert abs(robot[Base].velocity.yaw) > 0.9, "a client that only looked takes nothing along"
     monitor = await connect()
     assert await monitor.ask("robot mode ?;") == "chassis_lead;"
     await client.close()
@@ -149,7 +149,7 @@ async def test_a_client_that_only_finishes_writing_is_gone_too(client, robot, fo
 
 async def test_another_door_keeps_driving_when_our_client_goes(client, robot, forward) -> None:
     await client.ask("chassis speed x 0.2;")
-    theirs = robot[Driving].drive(Twist(0.1), source="somebody else")
+    theirs = robot[Driving].drive(Twist(0.1), source="someone else")
     await forward(seconds=1)
     await client.close()
     await forward(seconds=1)
@@ -167,7 +167,7 @@ async def test_a_new_session_may_drive_while_the_old_one_brakes(client, connect,
     assert robot[Base].velocity.x == pytest.approx(0.2, abs=0.03)
 
 
-async def test_garbage_harms_nobody(client, connect) -> None:
+async def test_garbage_harms_no_one(client, connect) -> None:
     other = await connect()
     other.send(bytes(range(256)) * 40 + b";")
     assert await other.reply() == "command format error: command parse error;"
@@ -192,7 +192,7 @@ async def test_mutated_commands_get_one_answer_each(client, connect) -> None:
     assert await other.ask("robot mode ?;") in ("chassis_lead;", "free;")
 
 
-async def test_a_megabyte_without_end_harms_nobody(client, connect) -> None:
+async def test_a_megabyte_without_end_harms_no_one(client, connect) -> None:
     other = await connect()
     other.send(b"x" * 1_000_000)
     assert await client.ask("robot mode ?;") == "chassis_lead;"
@@ -231,7 +231,7 @@ async def test_a_client_that_is_not_read_from_can_leave(client, door, robot, for
     assert robot[Base].velocity.speed < 0.02
 
 
-async def test_replies_that_nobody_reads_are_not_piled_up(client, connect, door) -> None:
+async def test_replies_that_no_one_reads_are_not_piled_up(client, connect, door) -> None:
     client.writer.transport.pause_reading()
     client.writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     for connection in door._connections:
@@ -272,7 +272,7 @@ async def test_a_taken_address_is_named(door, robot) -> None:
         await second.start()
 
 
-async def test_an_address_that_is_none_is_told(robot) -> None:
+async def test_an_address_that_is_none_is_reported(robot) -> None:
     with pytest.raises(OSError, match="no-such-host is no IPv4 address"):
         await RoboMasterDoor(robot, "no-such-host", RoboMasterConfig(control_port=0, event_port=0)).start()
 

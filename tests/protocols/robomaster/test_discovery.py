@@ -8,7 +8,7 @@ async def test_every_two_seconds_from_the_address_in_the_text(door, broadcasts, 
     assert broadcasts.drain() == [("robot ip 127.0.0.9", "127.0.0.9")] * 3
 
 
-async def test_silent_while_somebody_is_in_sdk_mode(connect, broadcasts, forward) -> None:
+async def test_silent_while_someone_is_in_sdk_mode(connect, broadcasts, forward) -> None:
     client = await connect()
     await forward(seconds=2.001)
     assert len(broadcasts.texts()) == 1, "a connection alone doesn't hold the robot"

@@ -18,7 +18,7 @@ RATES = "1 5 10 20 30 50"
 SMALL = 0.001  # as far as "just outside" goes for numbers with decimals
 
 Range = tuple[float, float] | str  # closed; or words
-# Template -> ranges. ``wait`` marks what answers at the end unless told otherwise.
+# Template -> ranges. ``wait`` marks what answers at the end unless stated otherwise.
 COMMANDS: dict[str, dict[str, Range]] = {
     "robot mode {mode}": {"mode": "chassis_lead gimbal_lead free"},
     "chassis speed x {x} y {y} z {z}": {"x": (-3.5, 3.5), "y": (-3.5, 3.5), "z": (-600.0, 600.0)},

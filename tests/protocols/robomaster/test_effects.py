@@ -238,10 +238,10 @@ async def test_gripper(client, forward) -> None:
 async def test_infrared_sees_the_wall(client, robot, forward) -> None:
     await client.ask("ir_distance_sensor measure on;")
     await forward(seconds=0.2)
-    told = float((await client.ask("ir_distance_sensor distance 1 ?;"))[:-1])
+    reported = float((await client.ask("ir_distance_sensor distance 1 ?;"))[:-1])
     seen = robot[RangeSensors].reading("ir_1")
-    assert told == pytest.approx(1000 * min(seen.distance, 10.0), abs=0.1)
-    assert told > 50
+    assert reported == pytest.approx(1000 * min(seen.distance, 10.0), abs=0.1)
+    assert reported > 50
 
 
 async def test_exposure_changes_the_picture(client, robot) -> None:
@@ -300,7 +300,7 @@ async def test_audio_is_a_packet_a_write(client, forward, listen) -> None:
     assert sum(frame.samples for p in packets[1:] for frame in codec.decode(av.Packet(p))) >= 960 * 15
 
 
-async def test_nothing_is_drawn_while_nobody_looks(client, robot, forward, monkeypatch) -> None:
+async def test_nothing_is_drawn_while_no_one_looks(client, robot, forward, monkeypatch) -> None:
     drawn = []
     monkeypatch.setattr(type(robot[Camera]), "subscribe", lambda _self: drawn.append(1))
     await client.ask("stream on;")

@@ -35,7 +35,7 @@ async def test_keys_and_mouse_reach_the_client(client, door, robot, pushes, forw
 
 @PILOT
 @pytest.mark.parametrize("text", ["press W", "jump", "", "click nose", "mouse 2 0", "mouse x", "mouse 1", "press \xff"])
-async def test_what_is_no_input_is_told(door, robot, text: str) -> None:
+async def test_what_is_no_input_is_reported(door, robot, text: str) -> None:
     pilot = await asyncio.open_connection(ADDRESS, port_of(door, "pilot"))
     assert (await say(pilot, f"{text}\n")).startswith("error: ")
     assert robot[InputDevice].state.keys == ()

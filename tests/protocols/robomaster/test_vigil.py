@@ -36,11 +36,11 @@ def test_the_robot_stops_when_the_cable_is_cut(network: None, groups: str, order
     """0.5 s is the claim; standing still takes the brakes a moment more."""
     ended = subprocess.run([*ALONE, sys.executable, str(LAB), groups], capture_output=True, text=True, timeout=60)
     assert ended.returncode == 0, ended.stderr
-    told = json.loads(ended.stdout)
-    assert told["alive"] > 0.35, "a client that only listens is alive"
-    assert told["ordered"] < ordered
-    assert told["stopped"] < stopped
-    assert 3 < told["forgotten"] < 7, "the session ends with the connection, which the kernel gives up"
+    reported = json.loads(ended.stdout)
+    assert reported["alive"] > 0.35, "a client that only listens is alive"
+    assert reported["ordered"] < ordered
+    assert reported["stopped"] < stopped
+    assert 3 < reported["forgotten"] < 7, "the session ends with the connection, which the kernel gives up"
 
 
 @pytest.fixture

@@ -1,6 +1,6 @@
 """Requests made from the door's own OpenAPI document, right and wrong ones, and what their answers have to be.
 
-A generator of its own, for it needs what no general one has: names that earlier answers told, so that requests reach
+A generator of its own, for it needs what no general one has: names that earlier answers gave, so that requests reach
 something. By hand, against a robot that is up: ``python tests/protocols/slamware/generated.py --count 100000``.
 """
 
@@ -323,7 +323,7 @@ def main() -> None:
                 continue
             except httpx.ConnectError:
                 failures += 1
-                print(f"nobody there after {number} requests; a setting of delivery may have let it run empty")
+                print(f"no one there after {number} requests; a setting of delivery may have let it run empty")
                 break
             statuses[reply.status_code] += 1
             if problem := generator.problem(request, reply):

@@ -43,7 +43,7 @@ async def test_two_requests_in_one_packet(bare_door: SlamwareDoor) -> None:
 
 
 @pytest.mark.parametrize("garbage", [b"\x16\x03\x01\x02\x00\x01" * 40, b"\0" * 100, b"hello\r\n\r\n", b"GET\r\n\r\n"])
-async def test_garbage_is_dropped_and_nobody_notices(
+async def test_garbage_is_dropped_and_no_one_notices(
     bare_door: SlamwareDoor, bare_client: httpx.AsyncClient, garbage: bytes
 ) -> None:
     assert (await raw(bare_door, garbage))[:12] in (b"", b"HTTP/1.1 400")
@@ -137,7 +137,7 @@ async def test_who_wishes_for_another_protocol_gets_a_plain_answer(
     assert not caplog.records
 
 
-async def test_nobody_is_connected_elsewhere(bare_door: SlamwareDoor) -> None:
+async def test_no_one_is_connected_elsewhere(bare_door: SlamwareDoor) -> None:
     assert (await raw(bare_door, b"CONNECT example.org:443 HTTP/1.1\r\nHost: example.org:443\r\n\r\n")).startswith(
         b"HTTP/1.1 400 "
     )

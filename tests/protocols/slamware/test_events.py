@@ -1,4 +1,4 @@
-"""GET events: what happens to the robot, in the vendor's words, told once."""
+"""GET events: what happens to the robot, in the vendor's words, reported once."""
 
 import httpx
 import pytest

@@ -12,7 +12,7 @@ from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
 
 HEALTH = "/api/core/system/v1/robot/health"
-RECORDS = {  # kind: robot time until it is told, errorCode
+RECORDS = {  # kind: robot time until it is reported, errorCode
     "low_battery": (0.5, 0x1020100),
     "motor_fault": (0.5, 0x2030100),
     "cliff": (0.5, 0x1047003),

@@ -179,7 +179,7 @@ async def test_poses(robot: Robot, client: httpx.AsyncClient, forward: Forward) 
     assert quality == round(robot[Localization].quality * 100)
 
 
-async def test_the_robot_believes_where_it_is_told_to_be(robot: Robot, client: httpx.AsyncClient) -> None:
+async def test_the_robot_believes_where_it_is_asked_to_be(robot: Robot, client: httpx.AsyncClient) -> None:
     url = f"{SLAM}/localization/pose"
     assert (await client.put(f"{SLAM}/localization/:enable", json={"enable": False})).json() is True
     reply = await client.put(url, json={"x": 1.5, "y": -2, "z": 0, "yaw": 7, "pitch": 0, "roll": 0})

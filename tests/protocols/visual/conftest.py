@@ -1,4 +1,4 @@
-"""Robots with programs and somebody who sends frames to them."""
+"""Robots with programs and someone who sends frames to them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Robots and their cloud: what is done on one is kept, told in order, and comes to the others as favourites."""
+"""Robots and their cloud: what is done on one is kept, reported in order, and comes to the others as favourites."""
 
 from __future__ import annotations
 
@@ -157,14 +157,14 @@ async def test_what_happens_is_recorded_in_order(robots: Robots, database: Datab
     await app.save("t", "pass")
     await app.ask("run", "t")
     await app.ends("t")
-    await app.ask("delete", "nobody")
+    await app.ask("delete", "unknown")
     await app.ask("inquiry")
-    await app.ask("run", "nobody")  # refused: not done, not told
+    await app.ask("run", "unknown")  # refused: not done, not reported
     await sent(app, database)
     assert await operations(robots) == [("t", "run"), ("t", "start"), ("t", "stop")]
 
 
-async def test_a_cloud_that_is_away_delays_nobody_and_is_told_later(robots: Robots, tmp_path: Path) -> None:
+async def test_a_cloud_that_is_away_delays_no_one_and_is_reported_later(robots: Robots, tmp_path: Path) -> None:
     await robots.cloud.down()
     database = Database(tmp_path / "robot.db")
     app = await robots.robot("one", database)
@@ -191,7 +191,7 @@ async def test_a_cloud_that_is_away_delays_nobody_and_is_told_later(robots: Robo
 
 
 class Scripted:
-    """A cloud that says what it is told to."""
+    """A cloud that says what it is asked to."""
 
     def __init__(self, clock: LockstepClock, *answers: CloudAnswer | Exception) -> None:
         self.clock = clock
@@ -311,7 +311,7 @@ async def test_only_accounts_come_in_and_see_their_own(cloud: Cloud) -> None:
     assert len((await cloud.post(new, **inquiry)).items) == 1
 
 
-async def test_what_is_no_cloud_is_told_in_plain_words(cloud: Cloud) -> None:
+async def test_what_is_no_cloud_is_reported_in_plain_words(cloud: Cloud) -> None:
 
     async def chatty(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         await reader.readuntil(b"{}")
@@ -321,8 +321,8 @@ async def test_what_is_no_cloud_is_told_in_plain_words(cloud: Cloud) -> None:
     server = await asyncio.start_server(chatty, HOST, 0)
     link = CloudLink(f"http://{HOST}:{server.sockets[0].getsockname()[1]}", "t", "a")
     words = [b"HTTP/1.1 200 OK\r\n\r\nhello", b"220 mail"]
-    for told in ("no answer of a cloud", "no HTTP"):
-        with pytest.raises(BadAnswer, match=told):
+    for message in ("no answer of a cloud", "no HTTP"):
+        with pytest.raises(BadAnswer, match=message):
             await link.post("{}")
     server.close()
     await server.wait_closed()

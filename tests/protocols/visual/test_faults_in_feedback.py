@@ -1,4 +1,4 @@
-"""What a front end is told when the robot's disk or its program engine fails."""
+"""What a front end is sent when the robot's disk or its program engine fails."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ async def test_a_full_disk_means_a_list_that_cannot_be_updated(connect: Connect,
     app = await connect(plain_robot, database.on(cast(Disk, disk)))
     assert (await app.save("kept", "pass"))["state"] == 0
     disk.free = 0
-    told = await app.save("new", "pass")
-    assert (told["state"], "disk is full" in told["describe"]) == (25, True)
+    feedback = await app.save("new", "pass")
+    assert (feedback["state"], "disk is full" in feedback["describe"]) == (25, True)
     [answer] = await app.ask("delete", "kept")
     assert answer["state"] == 25
     assert (await app.state("kept"), await app.state("new")) == ("wait_run", "null")
@@ -43,14 +43,16 @@ async def test_a_full_disk_means_a_list_that_cannot_be_updated(connect: Connect,
     database.close()
 
 
-async def test_a_broken_database_is_told_in_the_same_way(connect: Connect, plain_robot: Robot, tmp_path: Path) -> None:
+async def test_a_broken_database_is_reported_in_the_same_way(
+    connect: Connect, plain_robot: Robot, tmp_path: Path
+) -> None:
     database = Database(tmp_path / "robot.db")
     app = await connect(plain_robot, database)
     with sqlite3.connect(tmp_path / "robot.db") as other:
         other.execute("ALTER TABLE program RENAME TO gone")
     other.close()
-    told = await app.save("t", "pass")
-    assert (told["state"], "no such table" in told["describe"]) == (25, True)
+    feedback = await app.save("t", "pass")
+    assert (feedback["state"], "no such table" in feedback["describe"]) == (25, True)
     with sqlite3.connect(tmp_path / "robot.db") as other:
         other.execute("ALTER TABLE gone RENAME TO program")
     other.close()

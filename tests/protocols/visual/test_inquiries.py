@@ -47,7 +47,7 @@ async def test_people_and_training_words(connect: Connect, robot: Robot) -> None
     word = {"id": "终止任务", "mode": "training_words", "style": "vp_task", "condition": "shutdown"}
     assert answer["list"] == [word | {"describe": "终止任务"}]
     assert await ids("all") == [zhang, ann, *sorted(["终止任务", "暂停任务", "继续任务"])]
-    assert await ids("all", ann, "nobody") == [ann]
+    assert await ids("all", ann, "unknown") == [ann]
     await robot[TrainingWords].learn(TrainedWord("跳舞", "dance"))
     [answer] = await app.ask("inquiry", "跳舞", type="AI", mode="training_words")
     assert answer["list"][0]["condition"] == "dance"

@@ -26,20 +26,20 @@ PATIENCE = 60.0  # s of the machine's time
 
 
 async def life(database: Path, words: Path, seconds: float | None) -> Counter[tuple[str, ...]]:
-    """One life of the server, killed after some seconds of its work, or until nothing is under way; what it told."""
+    """What one life of the server reported: killed after some seconds of its work, or until nothing is under way."""
     arguments = [str(database), str(words), str(TASKS), "0" if seconds is None else "1"]
     script = Path(__file__).with_name("killed_robot.py")
     pipe = asyncio.subprocess.PIPE
     server = await asyncio.create_subprocess_exec(sys.executable, str(script), *arguments, stdout=pipe)
     assert server.stdout
-    told = []
+    reported = []
     if seconds is not None:
-        told.append(await asyncio.wait_for(server.stdout.readline(), PATIENCE))
+        reported.append(await asyncio.wait_for(server.stdout.readline(), PATIENCE))
         await asyncio.sleep(seconds)
         server.kill()
-    told += (await asyncio.wait_for(server.stdout.read(), PATIENCE)).splitlines()
+    reported += (await asyncio.wait_for(server.stdout.read(), PATIENCE)).splitlines()
     await server.wait()
-    return Counter(tuple(line.decode().split()) for line in told)
+    return Counter(tuple(line.decode().split()) for line in reported)
 
 
 async def log(database: Path) -> list[str]:
@@ -53,12 +53,12 @@ async def log(database: Path) -> list[str]:
 
 async def test_runs_survive_kills(tmp_path: Path) -> None:
     chance, database, words = random.Random(5), tmp_path / "robot.db", tmp_path / "words"
-    told: Counter[tuple[str, ...]] = Counter()
+    reported: Counter[tuple[str, ...]] = Counter()
     for _ in range(KILLS):
-        told += await life(database, words, chance.choice([0.0, chance.uniform(0, 0.05), chance.uniform(0, 0.5)]))
+        reported += await life(database, words, chance.choice([0.0, chance.uniform(0, 0.05), chance.uniform(0, 0.5)]))
     last = await life(database, words, None)
     assert last["over",] == 1
-    told += last
+    reported += last
     interrupted = {tuple(text.split()[1:]) for text in await log(database) if text.startswith("interrupted")}
     runs: dict[str, list[int]] = defaultdict(list)
     of: dict[str, str] = {}
@@ -72,6 +72,6 @@ async def test_runs_survive_kills(tmp_path: Path) -> None:
         assert {(run, str(step)) for step in missing} <= interrupted, run
     for number in range(TASKS):
         id = f"t{number}"
-        assert told["begun", id] <= list(of.values()).count(id) <= told["asked", id]
-    recovered = sum(count for words, count in told.items() if words[0] == "recovered")
+        assert reported["begun", id] <= list(of.values()).count(id) <= reported["asked", id]
+    recovered = sum(count for words, count in reported.items() if words[0] == "recovered")
     print(f"{KILLS} kills, {len(runs)} runs, {recovered} recoveries, {len(interrupted)} calls interrupted")

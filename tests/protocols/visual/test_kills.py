@@ -188,7 +188,7 @@ async def test_kills(tmp_path: Path) -> None:
 
 
 async def live(server: Server, ledger: Ledger) -> Frame:
-    """Some operations one after the other, then one whose answer nobody waits for."""
+    """Some operations one after the other, then one whose answer no one waits for."""
     for _ in range(ledger.chance.randrange(10)):
         frame = ledger.frame()
         server.send(frame)
@@ -216,7 +216,7 @@ async def settled(server: Server, ledger: Ledger, frame: Frame) -> None:
 
 
 def of(server: Server, id: str) -> list[Frame]:
-    """What the task told by itself, in order."""
+    """What the task reported by itself, in order."""
     return [
         frame
         for frame in server.frames
@@ -236,7 +236,7 @@ def last_news(server: Server, id: str, before: str = "") -> str:
 
 
 def count_starts(server: Server, ledger: Ledger, states: dict[str, str]) -> None:
-    """Begun is what was told to have begun, and what was written down as running right before the kill."""
+    """Begun is what was reported to have begun, and what was written down as running right before the kill."""
     for id in TASKS:
         ledger.starts[id] += news(server, id, "start")
         ledger.starts[id] += states.get(id) == "run" and last_news(server, id) != "start"

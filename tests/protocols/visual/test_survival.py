@@ -30,23 +30,23 @@ async def test_a_lost_client_does_not_leave_half_an_operation(app: FrontEnd) -> 
     assert await app.state("t") == "run"
 
 
-async def test_the_state_is_stored_before_it_is_told(connect: Connect, plain_robot: Robot, tmp_path: Path) -> None:
+async def test_the_state_is_stored_before_it_is_reported(connect: Connect, plain_robot: Robot, tmp_path: Path) -> None:
     database = Database(tmp_path / "robot.db")
     app = await connect(plain_robot, database)
-    told: list[tuple[str, str]] = []
+    reported: list[tuple[str, str]] = []
     reader = Database(tmp_path / "robot.db")
 
     def note(text: str) -> None:
         feedback = json.loads(text)["feedback"]
         found = reader.run_now(lambda c: c.execute("SELECT state FROM program WHERE id='t'").fetchone())
-        told.append((feedback["operate"], found[0] if found else "null"))
+        reported.append((feedback["operate"], found[0] if found else "null"))
 
     app.door.subscribe(note)
     await app.start("t", BUSY)
     for operation in ("suspend", "recover", "shutdown", "delete"):
         await app.ask(operation, "t")
     reader.close()
-    assert told == [
+    assert reported == [
         ("save", "wait_run"),
         ("run", "run_wait"),
         ("start", "run"),
@@ -84,7 +84,7 @@ async def test_closing_the_server_ends_the_programs(app: FrontEnd) -> None:
     assert await app.state("t") == "shutdown"
 
 
-async def test_a_killed_worker_is_told_not_left_running(app: FrontEnd) -> None:
+async def test_a_killed_worker_is_reported_not_left_running(app: FrontEnd) -> None:
     await app.start("t", FOREVER)
     os.kill(app.service._runs["t"]._run.pid, 9)
     await app.ends("t", pace=0.0)

@@ -96,13 +96,13 @@ async def test_a_wrong_body_is_kept_as_an_error_and_says_where(app: FrontEnd) ->
     assert (await app.save("t", "x = 1"))["state"] == 0
 
 
-async def test_what_the_robot_cannot_do_is_told_in_the_answer(app: FrontEnd) -> None:
+async def test_what_the_robot_cannot_do_is_reported_in_the_answer(app: FrontEnd) -> None:
     await app.start("t", "print(cyberdog.led.freed(9).response.code)\n")
     await app.ends("t")
     assert await app.printed("t") == ["1121"]
 
 
-async def test_an_uncaught_error_ends_the_task_and_is_told(app: FrontEnd) -> None:
+async def test_an_uncaught_error_ends_the_task_and_is_reported(app: FrontEnd) -> None:
     await app.start("t", "cyberdog.task.block('a')\nd = {}\nd['厨房']\n")
     await app.ends("t")
     error, block_end = app.news("t", "run")[1:]
@@ -113,7 +113,7 @@ async def test_an_uncaught_error_ends_the_task_and_is_told(app: FrontEnd) -> Non
     assert (await app.service.log("t"))[-1].level == "error"
 
 
-async def test_texts_that_utf8_cannot_hold_are_told_and_logged(app: FrontEnd) -> None:
+async def test_texts_that_utf8_cannot_hold_are_reported_and_logged(app: FrontEnd) -> None:
     await app.start("t", "print('a\\ud800b')\nraise ValueError('\\udfff' * 10)\n")
     await app.ends("t")
     assert app.news("t", "run")[0]["feedback"]["describe"].startswith("ValueError: ??????????")
@@ -181,8 +181,8 @@ async def test_a_breakpoint_holds_until_recover(app: FrontEnd) -> None:
 async def test_several_targets_each_get_their_second_feedback(app: FrontEnd) -> None:
     for id in ("t1", "t10"):
         await app.start(id, BUSY)
-    answers = await app.ask("suspend", "t1", "nobody", "t10")
-    assert [(a["target_id"], a["state"]) for a in answers] == [("nobody", 27), ("t1", 0)]
+    answers = await app.ask("suspend", "t1", "unknown", "t10")
+    assert [(a["target_id"], a["state"]) for a in answers] == [("unknown", 27), ("t1", 0)]
     assert len(app.news("t1", "suspend")) == len(app.news("t10", "suspend")) == 1
     await app.ask("shutdown", "t1")
     assert (await app.state("t1"), await app.state("t10")) == ("shutdown", "suspend")
@@ -232,8 +232,8 @@ async def test_delete_answers_per_target_and_minds_similar_ids(app: FrontEnd) ->
     for id in ("t1", "t10", "t2"):
         await app.save(id, "pass")
     await app.start("t2", BUSY)
-    answers = await app.ask("delete", "t1", "t2", "nobody")
-    assert [(a["target_id"], a["state"]) for a in answers] == [("t1", 0), ("t2", 27), ("nobody", 0)]
+    answers = await app.ask("delete", "t1", "t2", "unknown")
+    assert [(a["target_id"], a["state"]) for a in answers] == [("t1", 0), ("t2", 27), ("unknown", 0)]
     assert [await app.state(id) for id in ("t1", "t10", "t2")] == ["null", "wait_run", "run"]
 
 

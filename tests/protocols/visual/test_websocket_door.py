@@ -1,4 +1,4 @@
-"""Frames over a WebSocket: the same as over any carrier, and nobody from outside who should not be there."""
+"""Frames over a WebSocket: the same as over any carrier, and no one from outside who should not be there."""
 
 from __future__ import annotations
 
@@ -185,7 +185,7 @@ async def test_only_pages_of_this_host_may_come_in(address: str, origin: str, st
     assert (b"s3pPLMBiTxaQ9kYGzzhZRbK+xOo=" in answer) is (status == 101)
 
 
-async def test_what_is_no_websocket_is_told_so(address: str) -> None:
+async def test_what_is_no_websocket_is_reported(address: str) -> None:
     with pytest.raises(BadAnswer, match="404"):
         await TextLink.open(address, "/else")
     assert b" 426 " in await raw(address, "GET /programs HTTP/1.1\r\nHost: x\r\n\r\n")

@@ -87,7 +87,7 @@ async def test_a_trot_lifts_diagonal_pairs_and_planted_feet_do_not_slide(dog):
     assert tops[Foot.LEFT_REAR] == pytest.approx(0.03, abs=0.002)
 
 
-async def test_whoever_stands_still_puts_its_feet_in_order(dog):
+async def test_anyone_who_stands_still_puts_its_feet_in_order(dog):
     dog.robot[Base].set_velocity(Twist(0.5, 0.0, 0.6))
     await dog.clock.advance(2.13)
     dog.robot[Base].set_velocity(Twist())
@@ -144,7 +144,7 @@ async def test_without_steps_the_legs_hold_the_body_back(dog):
     assert dog.pose.x - 2.15 == pytest.approx(0.6, abs=0.03)
 
 
-async def test_a_foot_comes_down_where_it_is_told(dog):
+async def test_a_foot_comes_down_where_it_should(dog):
     holds = (Foothold(0.03, 0.05, lift=0.06), Foothold(), Foothold(), Foothold(-0.03, -0.05, 0.04, 0.06))
     falls = [Footfall(0.4, DIAGONAL), Footfall(9.0, ALL)]
     dog.robot[Legs].dance([Step(2.0, footholds=holds)], falls)
@@ -153,7 +153,7 @@ async def test_a_foot_comes_down_where_it_is_told(dog):
     right = seen[-1][Foot.RIGHT_FRONT]
     assert right.grounded
     assert (right.position.x, right.position.y) == pytest.approx((0.21, -0.075), abs=0.003)
-    left = seen[-1][Foot.LEFT_REAR]  # told to end above the floor, it carries nothing
+    left = seen[-1][Foot.LEFT_REAR]  # made to end above the floor, it carries nothing
     assert not left.grounded
     assert (left.position.x, left.position.z) == pytest.approx((-0.21, 0.04), abs=0.003)
     assert all(feet[Foot.LEFT_FRONT].grounded for feet in seen)

@@ -46,7 +46,7 @@ async def test_brakes_before_it_lies_down_and_drives_only_standing(simulate):
     assert sim.pose.distance_to(there) < 0.001
 
 
-async def test_there_already_is_done_at_once_and_disturbs_nobody(simulate):
+async def test_there_already_is_done_at_once_and_disturbs_no_one(simulate):
     sim = simulate(start=Pose(5, 5))
     sim.world.start()
     action = sim.robot[Legs].stand()

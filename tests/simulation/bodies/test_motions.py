@@ -215,7 +215,7 @@ async def test_own_choreography(dog):
         legs.dance([Step(0.1)] * 1001)
 
 
-async def test_nobody_drives_while_it_performs(dog):
+async def test_no_one_drives_while_it_performs(dog):
     dog.robot[Legs].perform(Motion.DANCE_1)
     await dog.clock.advance(3.0)
     with pytest.raises(Refused):

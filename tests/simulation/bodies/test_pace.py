@@ -24,23 +24,23 @@ def said(caplog: pytest.LogCaptureFixture, *losses: float, speed: float = 1.0) -
     return [record.getMessage() for record in caplog.records]
 
 
-def test_factor_and_lost_time_are_told(caplog: pytest.LogCaptureFixture) -> None:
+def test_factor_and_lost_time_are_reported(caplog: pytest.LogCaptureFixture) -> None:
     (line,) = said(caplog, 0, 2.0, speed=4.0)
     assert "real-time factor 2.40 of 4" in line
     assert "2.0 s of robot time lost just now" in line
 
 
-def test_the_same_pace_is_told_once(caplog: pytest.LogCaptureFixture) -> None:
+def test_the_same_pace_is_reported_once(caplog: pytest.LogCaptureFixture) -> None:
     assert len(said(caplog, 2.0, 2.2, 1.8, 2.0)) == 1
 
 
-def test_worse_is_told_again(caplog: pytest.LogCaptureFixture) -> None:
+def test_worse_is_reported_again(caplog: pytest.LogCaptureFixture) -> None:
     first, second = said(caplog, 1.0, 3.0)
     assert "too slow" in first
     assert "still slower: real-time factor 0.40 of 1, 3.0 s of robot time lost just now, 4.0 s in all" in second
 
 
-def test_the_end_is_told_once_it_lasts(caplog: pytest.LogCaptureFixture) -> None:
+def test_the_end_is_reported_once_it_lasts(caplog: pytest.LogCaptureFixture) -> None:
     assert len(said(caplog, 2.0, *[0.0] * (CALM - 1))) == 1
     caplog.clear()
     _, over, again = said(caplog, 2.0, *[0.0] * (CALM + 3), 2.0)

@@ -24,7 +24,7 @@ def start(simulate, pose, floor=0, robots=("a",)):
     return sim, sim.robot[LiftClient], sim.robot.events.subscribe(*EVENTS)
 
 
-def told(heard):
+def reported(heard):
     return [(type(event).__name__, getattr(event, "floor", None)) for event in heard.drain()]
 
 
@@ -59,13 +59,13 @@ async def test_a_robot_rides_to_the_second_floor_and_drives_out(simulate):
 async def test_it_tells_in_order_what_it_does(simulate):
     sim, lift, heard = start(simulate, BEFORE, floor=1)
     lift.call(1)
-    assert told(heard) == [("LiftCalled", 1)]
+    assert reported(heard) == [("LiftCalled", 1)]
     await sim.clock.advance(15.0)
-    assert told(heard) == [("LiftDoorClosed", 0), ("LiftArrived", 1), ("LiftDoorOpened", 1)]
+    assert reported(heard) == [("LiftDoorClosed", 0), ("LiftArrived", 1), ("LiftDoorOpened", 1)]
     assert lift.floors == ("ground", "first", "second")
     lift.call(1)
     await sim.clock.advance(0.1)
-    assert told(heard) == [("LiftCalled", 1), ("LiftArrived", 1)]  # it is here
+    assert reported(heard) == [("LiftCalled", 1), ("LiftArrived", 1)]  # it is here
 
 
 async def test_a_shut_landing_door_is_seen_and_an_open_one_is_not(simulate):
@@ -117,7 +117,7 @@ async def test_out_of_service_refuses_and_drops_calls(simulate):
     sim.world.faults.clear(fault.number)
     lift.call(1)
     await sim.clock.advance(15.0)
-    assert ("LiftDoorOpened", 1) in told(heard)
+    assert ("LiftDoorOpened", 1) in reported(heard)
 
 
 async def test_people_in_the_car_ride_along_and_too_many_keep_it_waiting(simulate):
@@ -125,7 +125,7 @@ async def test_people_in_the_car_ride_along_and_too_many_keep_it_waiting(simulat
     (fault,) = sim.world.faults.inject("lift_occupied", people=3)
     await sim.clock.advance(0.2)
     assert lift.state.load == pytest.approx(3 * 75 / 630)
-    assert sim.robot[Lidar].scan.ranges[700:900].min() < 1.9  # somebody stands in it
+    assert sim.robot[Lidar].scan.ranges[700:900].min() < 1.9  # someone stands in it
     lift.call(1)
     await sim.clock.advance(15.0)
     assert [solid.kind for solid in sim.world._physics.props.on(1)].count("person") == 3
@@ -140,17 +140,17 @@ async def test_out_of_reach_the_radio_is_silent(simulate):
     await sim.clock.advance(1.5)
     with pytest.raises(Refused, match="out of reach"):
         lift.call(2)
-    sim.world.building.lift.call(2)  # somebody presses the button
+    sim.world.building.lift.call(2)  # someone presses the button
     await sim.clock.advance(20.0)
     assert lift.state.floor == 0  # the last that was heard
-    assert not told(heard)
+    assert not reported(heard)
 
 
 async def test_an_open_shaft_stops_the_robot_before_it_falls(simulate):
     sim, lift, _ = start(simulate, BEFORE)
     lift.call(2)
     await sim.clock.advance(20.0)
-    for half in range(2):  # somebody forces the landing door
+    for half in range(2):  # someone forces the landing door
         sim.world._physics.props.remove(f"landing door 0 {half}")
     sim.robot[Base].set_velocity(Twist(0.7))
     await sim.clock.advance(4.0)

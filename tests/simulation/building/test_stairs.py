@@ -43,7 +43,7 @@ def test_each_step_is_level_and_rises_sheer(x, y, height):
 
 
 @pytest.mark.parametrize(
-    ("entry", "told"),
+    ("entry", "message"),
     [
         ("{ at = [9.0, 5.0], steps = 4 }", "leads outside the floor"),
         ("{ at = [11.0, 5.0], steps = 1, facing = 180 }", "lies outside the floor"),
@@ -53,10 +53,10 @@ def test_each_step_is_level_and_rises_sheer(x, y, height):
         ("{ at = [5.0, 5.0] }", "steps"),
     ],
 )
-def test_what_cannot_be_built_is_told(entry, told, tmp_path):
+def test_what_cannot_be_built_is_reported(entry, message, tmp_path):
     file = tmp_path / "bad.toml"
     file.write_text(f'name = "bad"\n[[floors]]\nsize = [10, 10]\nstairs = [{entry}]\n')
-    with pytest.raises(BadFile, match=told):
+    with pytest.raises(BadFile, match=message):
         load_world(str(file))
 
 

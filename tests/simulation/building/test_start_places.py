@@ -1,4 +1,4 @@
-"""Where robots stand that nobody placed."""
+"""Where robots stand that no one placed."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_a_crowd_stands_wherever_there_is_room(places: Places) -> None:
     assert any(not CORRIDOR[0] < pose.y < CORRIDOR[1] for pose in stand)
 
 
-def test_who_is_told_where_to_stand_stands_there_or_not_at_all(places: Places) -> None:
+def test_who_is_shown_where_to_stand_stands_there_or_not_at_all(places: Places) -> None:
     wanted = Pose(20.0, 10.0, 1.0)
     assert places.next(wanted, 0, 0.25) == (wanted, 0)
     with pytest.raises(ValueError, match="cannot stand"):

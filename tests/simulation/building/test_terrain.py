@@ -88,7 +88,7 @@ async def test_the_lidar_sees_what_of_a_ramp_is_higher_than_itself(simulate):
         ('things = [{ name = "a", at = [1, 1], mass = 900 }]', "mass"),
     ],
 )
-def test_bad_descriptions_are_told(tmp_path, line, message):
+def test_bad_descriptions_are_reported(tmp_path, line, message):
     path = tmp_path / "world.toml"
     path.write_text(f"[[floors]]\nsize = [9, 9]\n{line}\n")
     with pytest.raises(BadFile, match=message):

@@ -13,7 +13,7 @@ from roboglot.model.geometry import STILL, Pose, Twist
 from tests.masking import mask_bumper
 
 
-async def test_drives_where_it_is_told(simulate):
+async def test_drives_where_it_should(simulate):
     sim = simulate(start=Pose(5, 5, math.pi / 2))
     sim.world.start()
     sim.robot[Base].set_velocity(Twist(0.5, 0.2, 0.0))

@@ -80,7 +80,7 @@ async def test_driving_costs_more_than_standing_and_pushing_more_than_driving(si
     assert pushing > 2 * driving
 
 
-async def test_every_percent_is_told(simulate):
+async def test_every_percent_is_reported(simulate):
     sim = simulate(start=Pose(5, 5))
     sim.robot[Battery].set_charge(0.905)
     events = sim.robot.events.subscribe(BatteryChanged)

@@ -121,7 +121,7 @@ async def test_beads_left_are_kept_when_it_ceases(duel):
     assert blaster.ammo == 998
 
 
-async def test_an_empty_magazine_is_told(duel):
+async def test_an_empty_magazine_is_reported(duel):
     blaster = duel.robot[Blaster]
     blaster.set_beads(8)
     for _ in range(125):
@@ -171,8 +171,8 @@ async def test_a_person_who_is_touched_counts_as_a_hand(simulate, tmp_path, plac
     hits = sim.robot.events.subscribe(ArmorHit)
     sim.robot[Base].set_velocity(Twist(0.3 * math.cos(turn)))
     await sim.clock.advance(3.0)
-    told = {(hit.place, hit.kind) for hit in hits.drain()}
-    assert told == {(place, HitKind.HAND)}
+    reported = {(hit.place, hit.kind) for hit in hits.drain()}
+    assert reported == {(place, HitKind.HAND)}
 
 
 async def test_two_robots_that_collide_feel_it_both(duel):

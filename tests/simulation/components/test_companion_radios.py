@@ -69,9 +69,9 @@ async def test_connects_and_knows_it_then(dog):
     assert not bluetooth.history
     with pytest.raises(NotFound):
         await bluetooth.forget(BRACELET)
-    nobody = bluetooth.connect("00:00:00:00:00:00")
+    no_one = bluetooth.connect("00:00:00:00:00:00")
     await dog.clock.advance(3.0)
-    assert isinstance(nobody.error, NotFound)
+    assert isinstance(no_one.error, NotFound)
 
 
 async def test_lost_far_away_and_back_by_itself(dog):

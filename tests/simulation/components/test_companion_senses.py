@@ -98,7 +98,7 @@ async def test_touch(dog):
     assert [event.kind for event in events.drain()] == [TouchKind.LONG, TouchKind.DOUBLE]
     assert dog.robot[Touch].last == (1.0, TouchKind.DOUBLE)
     with pytest.raises(NotFound):
-        dog.world.hands.touch("nobody")
+        dog.world.hands.touch("unknown")
 
 
 def test_a_body_without_a_pad_cannot_be_touched(simulate):

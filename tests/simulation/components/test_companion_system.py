@@ -70,7 +70,7 @@ async def test_an_update_from_the_download_to_the_reboot(dog):
 
 async def test_a_reboot_ends_what_is_under_way_and_goes_on_without_who_asked(dog):
     walking = dog.robot[Legs].stand()
-    rebooting = dog.robot[Firmware].reboot(source="somebody")
+    rebooting = dog.robot[Firmware].reboot(source="someone")
     await dog.clock.advance(5.0)
     assert walking.status.ended
     assert dog.robot[Legs].posture is Posture.LYING
@@ -176,7 +176,7 @@ async def test_asleep_the_lidar_stands_still(dog):
     assert dog.robot[Lidar].scan is not None
 
 
-async def test_goes_to_low_power_by_itself_if_told_to(dog):
+async def test_goes_to_low_power_by_itself_if_set_so(dog):
     power = dog.robot[Power]
     dog.robot[Legs].lie_down()
     await dog.clock.advance(40.0)

@@ -79,7 +79,7 @@ async def test_a_servos_bounds(servos):
         servos.set_speed(1, math.inf)
 
 
-async def test_pwm_ports_put_out_what_they_are_told(sim):
+async def test_pwm_ports_put_out_what_they_are_given(sim):
     ports = sim.robot[PwmPorts]
     assert ports.signal(6) == PwmSignal(0.125, 50.0)
     ports.set_duty(2, 0.4)
@@ -111,8 +111,8 @@ async def test_adapters_measure_what_lies_at_their_inputs(sim):
     await sim.clock.advance(0.25)
     sim.world.hands.apply_voltage("a", 2, 1, 0.5)
     assert adapters.pulse_period(2, 1) == pytest.approx(0.5)
-    told = [(event.stamp, event.adapter, event.port, event.level) for event in levels.drain()]
-    assert told == [(pytest.approx(1.0), 2, 1, True), (pytest.approx(1.5), 2, 1, False)]
+    reported = [(event.stamp, event.adapter, event.port, event.level) for event in levels.drain()]
+    assert reported == [(pytest.approx(1.0), 2, 1, True), (pytest.approx(1.5), 2, 1, False)]
 
 
 async def test_an_adapters_bounds(sim):

@@ -79,7 +79,7 @@ async def test_moving_by_stops_at_the_limits(sim, gimbal):
     assert gimbal.angles == GimbalAngles(pytest.approx(-35 * DEG, abs=1e-4), pytest.approx(-250 * DEG, abs=1e-4))
 
 
-async def test_speed_lasts_until_told_otherwise(sim, gimbal):
+async def test_speed_lasts_until_changed(sim, gimbal):
     gimbal.set_mode(FollowMode.FREE)
     turning = gimbal.set_speed(0.0, 0.5, source="me")
     await sim.clock.advance(2.0)

@@ -81,7 +81,7 @@ async def test_a_single_lamp_of_a_ring(light):
 
 
 @pytest.mark.parametrize(
-    ("told", "error"),
+    ("given", "error"),
     [
         ({"zone": "roof"}, NotFound),
         ({"zone": "front", "colour": Colour(256, 0, 0)}, InvalidGoal),
@@ -91,9 +91,9 @@ async def test_a_single_lamp_of_a_ring(light):
         ({"zone": "gimbal_left", "lamp": 1, "effect": LightEffect.BREATH}, InvalidGoal),
     ],
 )
-async def test_what_cannot_be_shown_is_refused(light, told, error):
+async def test_what_cannot_be_shown_is_refused(light, given, error):
     with pytest.raises(error):
-        light.shine(**told)
+        light.shine(**given)
     assert light.lamps("front") == (DARK,)
 
 

@@ -30,12 +30,12 @@ def flags(sim):
 
 
 async def during(sim, seconds):
-    """All flags that were told meanwhile."""
-    told = set()
+    """All flags that were reported meanwhile."""
+    reported = set()
     for _ in range(round(seconds / 0.1)):
         await sim.clock.advance(0.1)
-        told |= {name for name in MotionFlags.__slots__ if getattr(flags(sim), name)}
-    return told
+        reported |= {name for name in MotionFlags.__slots__ if getattr(flags(sim), name)}
+    return reported
 
 
 async def test_at_rest_on_level_ground(course):
@@ -91,8 +91,8 @@ async def test_ice_is_slippery(course):
     sim = await course(Pose(7.2, 6.7))
     begun = sim.pose.x
     sim.robot[Base].set_velocity(Twist(2.0))
-    told = await during(sim, 0.8)
-    assert "slipping" in told
+    reported = await during(sim, 0.8)
+    assert "slipping" in reported
     assert sim.pose.x - begun < 0.3  # on a dry floor it were more than 1 m
     await sim.clock.advance(3.0)
 
@@ -110,10 +110,10 @@ async def test_on_icy_slopes_it_slides_down(course):
 async def test_a_bump_shakes_and_is_crossed(course):
     sim = await course(Pose(4.0, 1.5))
     sim.robot[Base].set_velocity(Twist(1.5))
-    told = await during(sim, 1.4)
-    assert "impact_z" in told
+    reported = await during(sim, 1.4)
+    assert "impact_z" in reported
     assert sim.pose.x > 5.2
-    assert not flags(sim).impact_z  # it is told for a moment
+    assert not flags(sim).impact_z  # it is reported for a moment
 
 
 async def test_a_low_step_is_climbed_and_a_high_one_is_not(course):
@@ -121,18 +121,18 @@ async def test_a_low_step_is_climbed_and_a_high_one_is_not(course):
     sim.robot[Base].set_velocity(Twist(1.0))
     await sim.clock.advance(1.2)
     assert sim.world.truth.height_of("a") == pytest.approx(0.006, abs=0.001)
-    told = await during(sim, 2.5)
+    reported = await during(sim, 2.5)
     assert sim.pose.x == pytest.approx(9.0 - 0.15, abs=0.02)  # front wheels at its edge
-    assert {"impact_x", "slipping"} <= told
-    assert "impact_y" not in told
+    assert {"impact_x", "slipping"} <= reported
+    assert "impact_y" not in reported
 
 
 async def test_driving_off_an_edge_is_a_fall(course):
     sim = await course(Pose(9.5, 1.5))
     assert sim.world.truth.height_of("a") == pytest.approx(0.08, abs=0.001)
     sim.robot[Base].set_velocity(Twist(2.0))
-    told = await during(sim, 1.2)
-    assert "impact_z" in told
+    reported = await during(sim, 1.2)
+    assert "impact_z" in reported
 
 
 @pytest.mark.parametrize("world", ["empty", "obstacle_course"])
@@ -171,8 +171,8 @@ async def test_a_push_is_felt_along_its_axis(simulate, blow, flag):
     await sim.clock.advance(0.5)
     sim.world.hands.push("a", blow)
     await sim.clock.advance(0.1)
-    told = {name for name in ("impact_x", "impact_y", "impact_z") if getattr(flags(sim), name)}
-    assert told == {flag}
+    reported = {name for name in ("impact_x", "impact_y", "impact_z") if getattr(flags(sim), name)}
+    assert reported == {flag}
     moved = sim.pose.relative_to(Pose(5, 5, 0.8))
     assert math.hypot(moved.x, moved.y) > 0.02
     await sim.clock.advance(0.5)

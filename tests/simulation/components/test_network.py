@@ -68,7 +68,7 @@ async def test_joining_takes_a_while_and_is_kept(robot, forward):
 
 @pytest.mark.world("office")
 @pytest.mark.parametrize(("ssid", "password", "error"), [(OFFICE, "wrong-key", Refused), ("nowhere", "", NotFound)])
-async def test_a_network_that_lets_nobody_in(robot, forward, ssid, password, error):
+async def test_a_network_that_lets_no_one_in(robot, forward, ssid, password, error):
     await forward(seconds=1)
     action = robot[Network].join(ssid, password)
     await forward(seconds=4)

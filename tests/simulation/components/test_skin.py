@@ -46,7 +46,7 @@ async def seen(dog, steps: int, step: float) -> list[str]:
     return found
 
 
-async def test_it_begins_dark_and_shows_what_it_is_told(dog, skin) -> None:
+async def test_it_begins_dark_and_shows_what_it_is_given(dog, skin) -> None:
     assert set(skin.shades) == set(Patch)
     assert set(skin.shades.values()) == {Shade.DARK}
     skin.show(SkinPattern.LIGHT)

@@ -1,4 +1,4 @@
-"""What the camera sees, against geometry done by hand; when it works, and that it does not when nobody looks."""
+"""What the camera sees, against geometry done by hand; when it works, and that it does not when no one looks."""
 
 from __future__ import annotations
 
@@ -232,7 +232,7 @@ async def test_exposure_makes_it_darker_and_brighter():
     world.close()
 
 
-async def test_nothing_is_drawn_while_nobody_looks_and_once_for_many():
+async def test_nothing_is_drawn_while_no_one_looks_and_once_for_many():
     world, robot, clock = await lab(room())
     camera = robot[Camera]
     await clock.advance(1.0)
@@ -344,4 +344,4 @@ async def test_who_is_left_out_would_not_have_been_in_the_picture(simulate, monk
                     sim.world.hands.place(name, Pose(*at, 1.0))
                 seen[cull].append((await sim.robot[Camera].capture()).planes.tobytes())
     assert seen[True] == seen[False]
-    assert len(set(seen[True])) == 5  # in the last ones nobody is to be seen, to either side
+    assert len(set(seen[True])) == 5  # in the last ones no one is to be seen, to either side

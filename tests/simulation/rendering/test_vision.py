@@ -126,7 +126,7 @@ async def test_a_face_must_look_here_and_be_near():
 
 
 @pytest.mark.parametrize("gesture", Gesture)
-async def test_every_gesture_is_told_after_a_moment(gesture):
+async def test_every_gesture_is_reported_after_a_moment(gesture):
     with lab(people=[ANNA]) as room:
         room.world.hands.person("anna").gesture(gesture, seconds=2.0)
         assert await room.see("gestures", 0.35) == []
@@ -311,7 +311,7 @@ async def test_lying_down_one_sees_less_of_the_line():
 # -- time, cost, chance ------------------------------------------------------------------------------------------------
 
 
-async def test_nothing_is_done_while_nobody_watches():
+async def test_nothing_is_done_while_no_one_watches():
     with lab(people=[ANNA], markers=[ONE]) as room:
         vision = room.robot[Vision]
         await room.clock.advance(2.0)

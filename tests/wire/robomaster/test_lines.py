@@ -23,7 +23,7 @@ def test_line_ends_and_empty_commands_are_left_out() -> None:
     assert split(b"command;\r\n;; \n version;\r\n") == ["command", "version"]
 
 
-def test_an_overlong_text_is_told_once_and_the_next_one_read() -> None:
+def test_an_overlong_text_is_reported_once_and_the_next_one_read() -> None:
     assert split(b"x" * LINE_MAX + b";", b"ok;") == ["x" * LINE_MAX, "ok"]
     assert split(b"x" * (LINE_MAX + 1) + b";", b"ok;") == [None, "ok"]
     assert split(*[b"x" * 700] * 3, b"x;ok;") == [None, "ok"]

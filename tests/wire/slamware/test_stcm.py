@@ -1,4 +1,4 @@
-"""Composite maps: what goes in comes out, and what nobody understands is kept byte for byte."""
+"""Composite maps: what goes in comes out, and what no one understands is kept byte for byte."""
 
 from __future__ import annotations
 

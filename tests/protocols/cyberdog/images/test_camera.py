@@ -208,7 +208,7 @@ async def test_files_count_on_the_disk_and_survive_a_restart(client, app, robot,
     assert f"camera {path.name}" in robot[Disk].uses
 
 
-async def test_a_disk_that_fills_up_is_told_and_takes_no_picture(client, app, robot, folder, passing) -> None:
+async def test_a_disk_that_fills_up_is_reported_and_takes_no_picture(client, app, robot, folder, passing) -> None:
     await client.ask(10001)
     await passing(lambda: app.ticks)
     robot[Disk].take("rubbish", robot[Disk].free - 400_000_000)

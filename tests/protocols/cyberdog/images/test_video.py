@@ -160,10 +160,10 @@ async def test_without_a_way_to_the_app_it_gives_up(watch, monkeypatch) -> None:
     assert watcher.signals("error")[0]["error"]["code"] == 1002
     assert await watcher.client.ask(4001, {"uid": "phone"}) == ""
     await asyncio.sleep(0.05)
-    assert not watcher.signals("is_closed")  # nobody of that name any more
+    assert not watcher.signals("is_closed")  # no one of that name any more
 
 
-async def test_what_is_no_offer_is_told(watch, client, app) -> None:
+async def test_what_is_no_offer_is_reported(watch, client, app) -> None:
     for sdp in ("v=0", {"type": "offer", "sdp": "nonsense\r\nm=video"}, {"type": "offer", "sdp": "m=" * 99}):
         assert await client.ask(4001, {"offer_sdp": sdp, "uid": "bad"}) == ""
         await until(lambda: app.of(4001))

@@ -84,7 +84,7 @@ async def test_in_a_map_of_an_earlier_life_the_robot_is_searched(
     await client.ask(6009, {"type": 5, "map_name": "old"})
     robot[Mapping].clear()  # as another door may; a restart does
     begun = world.truth.pose_of("a")
-    world.hands.place("a", Pose(2.5, 6.6, 1.0))  # and somebody carried it away meanwhile
+    world.hands.place("a", Pose(2.5, 6.6, 1.0))  # and someone carried it away meanwhile
     await forward(seconds=0.5)
     again = Stream(client, 6004, {"type": 7})
     await passing(lambda: again.ended)
@@ -115,7 +115,7 @@ async def test_the_dock_goes_with_the_map(client, door, robot, world, forward, p
     assert (await client.ask(10001))["charging_status"]["wireless_charging"] is True
 
 
-async def test_why_it_cannot_charge_is_told(client, robot, world, forward, passing: Passing) -> None:
+async def test_why_it_cannot_charge_is_reported(client, robot, world, forward, passing: Passing) -> None:
     world.hands.place("a", Pose(6.0, 6.0, 0.0))
     await forward(seconds=0.5)
     robot[Docking].set_home(None)
@@ -187,7 +187,7 @@ async def test_a_map_is_found_by_the_number_that_an_app_gave_it(client: Client, 
     numbered = {"mapName": "attic", "map_id": 2**63 + 5, "locationLabelInfo": [bed]}
     assert await client.ask(6002, numbered) == {"success": 0}
     assert (await client.ask(6003, {"map_id": 2**63 + 5}))["mapName"] == "attic"
-    assert (await client.ask(6003, {"map_id": 77}))["mapName"] == "cellar"  # nobody's number counts as none
+    assert (await client.ask(6003, {"map_id": 77}))["mapName"] == "cellar"  # no one's number counts as none
     assert (await client.ask(6003, {"mapName": "attic"}))["locationLabelInfo"] == [bed]
     assert await client.ask(6002, {**numbered, "mapName": "cellar"}) == {"success": 0}  # it means one map at a time
     assert (await client.ask(6003, {"map_id": 2**63 + 5}))["mapName"] == "cellar"

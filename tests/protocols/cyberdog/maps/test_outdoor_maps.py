@@ -46,11 +46,11 @@ async def test_from_the_map_to_the_goal(client: Client, robot, world, forward, p
     asked: list[Region | None] = []
     relocalize = robot[Localization].relocalize
 
-    def told(region: Region | None = None, **more: object) -> object:
+    def relocalize_as_seen(region: Region | None = None, **more: object) -> object:
         asked.append(region)
         return relocalize(region, **more)
 
-    monkeypatch.setattr(robot[Localization], "relocalize", told)
+    monkeypatch.setattr(robot[Localization], "relocalize", relocalize_as_seen)
     assert robot[Gps].reading.fix is not GpsFix.NONE
     stream = Stream(client, 6004, {"type": 7, "outdoor": True})
     await passing(lambda: stream.ended)

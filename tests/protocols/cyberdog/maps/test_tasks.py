@@ -198,7 +198,7 @@ async def test_docking_goes_home(client, robot, world, forward, passing: Passing
     assert (await client.ask(10001))["charging_status"]["wireless_charging"]
 
 
-async def test_tasks_that_nobody_can_do(client, robot) -> None:
+async def test_tasks_that_no_one_can_do(client, robot) -> None:
     assert await client.ask(6004, {"type": 99}) == {"accepted": 2}
     mapping = Stream(client, 6004, {"type": 5, "relative_pos": 0, "keep_distance": -1})  # fields of another task
     await until(lambda: mapping.answers)

@@ -69,7 +69,7 @@ async def test_sitting_figures_begin_with_sitting_down(client, robot, forward) -
     assert (await client.ask(10001))["motion_status"]["motion_id"] == 143
 
 
-async def test_a_dance_is_told_as_a_timeout_and_lying_down_interrupts_it(client, robot, forward) -> None:
+async def test_a_dance_is_reported_as_a_timeout_and_lying_down_interrupts_it(client, robot, forward) -> None:
     asking = asyncio.ensure_future(client.ask(1004, {"motion_id": 140}))
     await until(lambda: robot.actions.running())
     await forward(seconds=5)
@@ -87,7 +87,7 @@ async def test_a_lying_dog_gets_up_for_a_figure(client, robot, forward) -> None:
     assert robot[Legs].posture is Posture.STANDING
 
 
-async def test_what_stands_in_the_way_is_told(client, robot, world, forward) -> None:
+async def test_what_stands_in_the_way_is_reported(client, robot, world, forward) -> None:
     world.hands.place("a", Pose(0.45, 4.0, math.pi))  # before the wall
     await forward(seconds=0.5)
     assert (await answered(client, 1004, {"motion_id": 132}, forward))["code"] == 3041
@@ -131,7 +131,7 @@ async def test_servo_frames_choose_the_gait_the_pose_and_the_lift(client, robot,
     assert (await client.ask(10001))["motion_status"]["motion_id"] == 305
 
 
-async def test_getting_up_for_a_servo_is_told_as_it_goes_on(client, app: App, robot, passing, forward) -> None:
+async def test_getting_up_for_a_servo_is_reported_as_it_goes_on(client, app: App, robot, passing, forward) -> None:
     await client.ask(10001)
     await passing(lambda: app.ticks)
     for _ in range(3):
@@ -139,12 +139,12 @@ async def test_getting_up_for_a_servo_is_told_as_it_goes_on(client, app: App, ro
         await forward(seconds=0.1)
     robot[Legs].lie_down()
     await forward(seconds=6)
-    told = len(app.of(1003))
+    count_before = len(app.of(1003))
     for _ in range(60):
         await client.ask(1002, {"motion_id": 303, "vel_des": [0, 0, 0.1]})
         await forward(seconds=0.1)
-    await until(lambda: len(app.of(1003)) > told + 10)
-    bars = [push["order_process_bar"] for push in app.of(1003)[told:]]
+    await until(lambda: len(app.of(1003)) > count_before + 10)
+    bars = [push["order_process_bar"] for push in app.of(1003)[count_before:]]
     assert bars == sorted(bars)
     assert bars[-1] == 100
     assert len(set(bars)) > 5

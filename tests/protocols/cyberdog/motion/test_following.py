@@ -31,14 +31,14 @@ async def test_the_person_chosen_is_followed(client: Client, app: App, robot, wo
     assert stream.answers[0] == {"accepted": 1}
     assert stream.codes == [1000, 500, 501]
     assert await state(client) == 13
-    told = app.of(6007)[-1]
-    assert (told["track_res_roi"]["width"], told["track_res_roi"]["height"]) == (0, 0)
-    roi = told["body_info_roi"][0]["roi"]
+    reported = app.of(6007)[-1]
+    assert (reported["track_res_roi"]["width"], reported["track_res_roi"]["height"]) == (0, 0)
+    roi = reported["body_info_roi"][0]["roi"]
     assert 0 <= roi["x_offset"] < roi["x_offset"] + roi["width"] <= 640
     assert await client.ask(6008, {"roi": nowhere}) == {"success": False}
     assert await client.ask(6004, {"type": 7}) == {"accepted": 2}
     assert await client.ask(6008, {"roi": roi}) == {"success": True}
-    assert await client.ask(6008, {"roi": roi}) == {"success": False}  # somebody is chosen
+    assert await client.ask(6008, {"roi": roi}) == {"success": False}  # someone is chosen
     await passing(lambda: 503 in stream.codes)
     await forward(seconds=8)
     assert 0.8 < world.truth.pose_of("a").distance_to(anna.pose) < 1.6

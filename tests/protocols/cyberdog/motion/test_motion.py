@@ -98,7 +98,7 @@ async def test_a_lying_robot_gets_up_before_it_walks(client, robot, world, forwa
     assert world.truth.pose_of("a").distance_to(before) > 0.3
 
 
-async def test_every_frame_is_told_about(
+async def test_every_frame_is_reported(
     client: Client, app: App, passing: Callable[..., Awaitable[None]], world: World
 ) -> None:
     await client.ask(10001)
@@ -272,7 +272,7 @@ async def test_without_lidar_there_are_no_tasks_and_no_map(client, robot, world)
     assert await client.ask(6002, {"mapName": "a"}) == {"error_code": 322}
 
 
-async def test_who_has_not_the_control_is_told_that_another_has_it(client, robot, forward) -> None:
+async def test_who_has_not_the_control_is_informed_that_another_has_it(client, robot, forward) -> None:
     lease = robot.add(Lease, Lease(robot))
     await lease.take("robomaster")
     assert await client.ask(1004, {"motion_id": 101}) == {"motion_id": 101, "result": False, "code": 3001}

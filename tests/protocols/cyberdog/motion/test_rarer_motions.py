@@ -104,7 +104,7 @@ async def test_a_foot_is_held_out(client, robot, forward) -> None:
     assert robot[Legs].feet[Foot.RIGHT_FRONT].grounded
     assert (await client.ask(1004, {"motion_id": 400}))["code"] == 3031  # that was no program's sequence
     assert (await client.ask(1004, {**params, "duration": 0}))["code"] == 3010
-    assert (await client.ask(1004, {**params, "contact": 0b1010}))["code"] == 3010  # nobody stands on two feet so long
+    assert (await client.ask(1004, {**params, "contact": 0b1010}))["code"] == 3010  # no one stands on two feet so long
 
 
 async def test_what_a_program_danced_is_danced_again(client, robot, world, forward) -> None:
@@ -183,7 +183,7 @@ async def test_a_dog_that_was_knocked_over_says_so(client, robot, world, forward
     assert (await client.ask(10001))["motion_status"]["motion_id"] == 111
 
 
-async def test_somebody_takes_the_dog_up(client, robot, world, forward) -> None:
+async def test_someone_takes_the_dog_up(client, robot, world, forward) -> None:
     world.hands.lift("a")
     await forward(seconds=1)
     assert (await client.ask(10001))["motion_status"]["motion_id"] == 114
@@ -210,7 +210,7 @@ async def test_walks_that_look_ahead_lift_the_feet_over_what_they_see(
     assert (world.truth.pose_of("a").x > 4.3) is over
 
 
-async def test_nobody_looks_ahead_for_a_walk_whose_door_has_closed(client, door, forward) -> None:
+async def test_no_one_looks_ahead_for_a_walk_whose_door_has_closed(client, door, forward) -> None:
     def looking() -> bool:
         return any(task.get_name() == "look ahead" for task in asyncio.all_tasks())
 

@@ -63,7 +63,7 @@ async def test_down_it_looks_for_the_landings_edge(client, robot, world, forward
     assert_pose(world.truth.pose_of("a"), x=4.9 + BEFORE, deg=180, within=0.03, within_deg=3)
 
 
-async def test_without_a_step_it_says_so_and_disturbs_nobody(client, robot, world, forward) -> None:
+async def test_without_a_step_it_says_so_and_disturbs_no_one(client, robot, world, forward) -> None:
     world.hands.place("a", Pose(2.0, 2.0))
     await forward(seconds=0.5)
     driving = robot[Driving].drive(Twist(yaw=0.1))

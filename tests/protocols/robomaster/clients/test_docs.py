@@ -34,14 +34,14 @@ def transcripts(page: str) -> list[list[str]]:
 CASES = [(page, index) for page in PAGES for index in range(len(transcripts(page)))]
 
 
-def alike(told: str, got: str) -> bool:
+def alike(reported: str, got: str) -> bool:
     """The same words, as many numbers, and those near each other: wheels slip, odometry drifts. ``…``: and so on."""
-    if told.endswith(" …"):
-        told = told.removesuffix(" …")
-        got = " ".join(got.split()[: len(told.split())])
-    if NUMBER.sub("#", told) != NUMBER.sub("#", got):
+    if reported.endswith(" …"):
+        reported = reported.removesuffix(" …")
+        got = " ".join(got.split()[: len(reported.split())])
+    if NUMBER.sub("#", reported) != NUMBER.sub("#", got):
         return False
-    pairs = zip(NUMBER.findall(told), NUMBER.findall(got), strict=True)
+    pairs = zip(NUMBER.findall(reported), NUMBER.findall(got), strict=True)
     return all(
         float(b) == pytest.approx(float(a), abs=0.06 if "." in a else 3 * (float(a) > 20), rel=0.05 * ("." in a))
         for a, b in pairs
@@ -81,7 +81,7 @@ async def test_the_transcripts_are_true(
             await forward(seconds=0.05)
         return await answer
 
-    async def told_meanwhile(cause: str, seconds: float) -> list[str]:
+    async def reported_meanwhile(cause: str, seconds: float) -> list[str]:
         pushes.drain()
         broadcasts.drain()
         causes[cause]()
@@ -91,7 +91,7 @@ async def test_the_transcripts_are_true(
         events._buffer.clear()
         return [*said, *pushes.texts(), *(text.replace("127.0.0.9", "127.0.0.1") for text in broadcasts.texts())]
 
-    wrong, told, answer = [], [], ""
+    wrong, reported, answer = [], [], ""
     for line in transcripts(page)[index]:
         kind, _, text = line.partition(" ")
         match kind:
@@ -102,9 +102,9 @@ async def test_the_transcripts_are_true(
             case "#":
                 waited = re.match(r"(\d+) (?:s later|秒后)", text)
                 assert waited or text in CAUSES, text
-                told = await told_meanwhile(CAUSES.get(text, "time"), float(waited[1]) if waited else 3)
+                reported = await reported_meanwhile(CAUSES.get(text, "time"), float(waited[1]) if waited else 3)
             case "*":
-                wrong += [] if any(alike(text, each) for each in told) else [(line, *sorted(told)[:9])]
+                wrong += [] if any(alike(text, each) for each in reported) else [(line, *sorted(reported)[:9])]
             case _:
                 raise AssertionError(line)
     assert not wrong
@@ -114,10 +114,10 @@ async def test_the_transcripts_are_true(
 def test_every_command_and_message_is_there(page: str) -> None:
     lines = [line for block in transcripts(page) for line in block]
     asked = [line[2:].removesuffix(";") for line in lines if line.startswith("> ")]
-    told = [line[2:].replace("game msg push", "game_msg push") for line in lines if line.startswith("* ")]
+    reported = [line[2:].replace("game msg push", "game_msg push") for line in lines if line.startswith("* ")]
     for row in contract("robomaster"):
         if row.key.startswith("> "):
-            assert any(each.startswith(row.key[2:]) for each in told), row.key
+            assert any(each.startswith(row.key[2:]) for each in reported), row.key
         else:
             words, query = row.key.removesuffix(" ?"), row.key.endswith("?") and "pulse_period" not in row.key
             assert any(each.startswith(words) and each.endswith("?") == query for each in asked), row.key

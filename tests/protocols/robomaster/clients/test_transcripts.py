@@ -11,7 +11,7 @@ FW70 = pytest.mark.parametrize("door", [{"profile": "fw70"}], indirect=True)
 pytestmark = pytest.mark.world("empty", body="robomaster_ep")
 
 TRANSCRIPTS = {
-    # gimbal; those that wait for the end are told not to
+    # gimbal; those that wait for the end are asked not to
     "gimbal speed p 1 y 1": OK,
     "gimbal speed y -450 p 450": OK,
     "gimbal speed p 451": FAIL,

@@ -50,7 +50,7 @@ async def test_a_takeout_from_the_door_of_the_box_to_the_way_home(screen: Screen
     assert "DELIVERY_TASK_START" in await screen.events()
 
 
-async def test_nobody_comes_and_the_parcel_goes_back_to_reception(screen: Screen, robot: Robot) -> None:
+async def test_no_one_comes_and_the_parcel_goes_back_to_reception(screen: Screen, robot: Robot) -> None:
     await screen.prepare(R101=(2.0, 0.0, "ROOM"), desk=(0.0, 1.0, "RECEPTION"))
     cargo: Any = robot[Cargo]
     await screen.operate(0, ":open")
@@ -75,7 +75,7 @@ async def test_nobody_comes_and_the_parcel_goes_back_to_reception(screen: Screen
     ]
     assert await screen.say("start_pickup") == 204
     await screen.operate(0, ":open")
-    await screen.forward(seconds=95)  # taken, but nobody says so: the door shuts by itself, and the box is still full
+    await screen.forward(seconds=95)  # taken, but no one says so: the door shuts by itself, and the box is still full
     assert (await screen.box(0))["lock_status"] == "LOCKED"
     assert (await screen.task(collect["task"]["order_id"]))["status"] == "FAILED"
     assert "COLLECT_NO_PICKUP" in await screen.events()
@@ -114,7 +114,7 @@ async def test_cancel_brakes_and_finish_ends_as_succeeded(screen: Screen) -> Non
     assert [task["task"]["order_id"] for task in running] == [first]
     assert (await screen.client.delete(f"{TASKS}/{running[0]['id']}")).status_code == 200
     assert (await screen.client.delete(f"{TASKS}/orders/{third}")).status_code == 200
-    assert (await screen.client.delete(f"{TASKS}/orders/nobody")).status_code == 404
+    assert (await screen.client.delete(f"{TASKS}/orders/unknown")).status_code == 404
     await screen.until("GOING_HOME")
     assert [(await screen.task(n))["status"] for n in (first, second, third)] == ["CANCELED", "SUCCEEDED", "CANCELED"]
     assert_pose(screen.pose, x=1.0, y=0.0, within=0.15)
@@ -139,7 +139,7 @@ async def test_stops_on_the_way_wait_for_the_operation(screen: Screen) -> None:
     assert await screen.say("end_operation") == 204
     await screen.until("GOING_TO_TASK_POINT", within=5)
     await screen.until("ARRIVED_AT_TASK_POINT")
-    await screen.forward(seconds=301)  # nobody says that it may go on
+    await screen.forward(seconds=301)  # no one says that it may go on
     await screen.until("ARRIVED_AT_TARGET")
     assert_pose(screen.pose, x=2.5, y=1.5, within=0.15)
     assert await screen.say("end_pickup") == 204

@@ -1,4 +1,4 @@
-"""Events that are told seldom, each by its cause in the world: narrow, occupied, no current, lost; and the voice."""
+"""Rare events, each by its cause in the world: narrow, occupied, no current, lost; and the voice."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ACTIONS, EVENTS = "/api/core/motion/v1/actions", "/api/platform/v1/events"
 ALLEY = str(Path(__file__).parents[1] / "data" / "alley.toml")
 
 
-async def told(client: httpx.AsyncClient) -> list[str]:
+async def new_events(client: httpx.AsyncClient) -> list[str]:
     return [event["type"] for event in (await client.get(EVENTS)).json()]
 
 
@@ -36,7 +36,7 @@ async def move(client: httpx.AsyncClient, x: float, y: float) -> None:
 
 
 @pytest.mark.world(ALLEY)
-async def test_a_narrow_corridor_is_told_once_each_way(
+async def test_a_narrow_corridor_is_reported_once_each_way(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward
 ) -> None:
     await forward(seconds=1)
@@ -46,7 +46,7 @@ async def test_a_narrow_corridor_is_told_once_each_way(
         await move(client, goal.x, goal.y)
         await forward(seconds=30)
         assert world.truth.pose_of("a").distance_to(Point(x, 3.0)) < 0.3
-        assert (await told(client)).count("PASS_THE_NARROW_CORRIDOR") == 1
+        assert (await new_events(client)).count("PASS_THE_NARROW_CORRIDOR") == 1
 
 
 @pytest.mark.world("empty")
@@ -54,14 +54,14 @@ async def test_no_corridor_in_a_hall(client: httpx.AsyncClient, forward: Forward
     await forward(seconds=1)
     await move(client, 3.0, 1.0)
     await forward(seconds=12)
-    events = await told(client)
+    events = await new_events(client)
     assert "PASS_THE_NARROW_CORRIDOR" not in events
     assert "CURRENT_POSE_OCCUPIED" not in events
 
 
 @pytest.mark.world("empty")
 @pytest.mark.parametrize("what", ["forbidden area", "wall"])
-async def test_somebody_drew_over_the_robot(client: httpx.AsyncClient, forward: Forward, what: str) -> None:
+async def test_someone_drew_over_the_robot(client: httpx.AsyncClient, forward: Forward, what: str) -> None:
     await forward(seconds=1)
     start, end = {"x": -0.5, "y": 0.0}, {"x": 0.5, "y": 0.0}
     artifact = "/api/core/artifact/v1"
@@ -70,10 +70,10 @@ async def test_somebody_drew_over_the_robot(client: httpx.AsyncClient, forward: 
     else:
         area = {"area": {"start": start, "end": end, "half_width": 0.4}, "metadata": {}}
         await client.post(f"{artifact}/rectangle-areas/forbidden_area", json=area)
-    await told(client)
+    await new_events(client)
     await move(client, 3.0, 1.0)
     await forward(seconds=2)
-    assert (await told(client)).count("CURRENT_POSE_OCCUPIED") == 1
+    assert (await new_events(client)).count("CURRENT_POSE_OCCUPIED") == 1
 
 
 @pytest.mark.world("empty")
@@ -82,13 +82,13 @@ async def test_a_dock_without_current(robot: Robot, client: httpx.AsyncClient, w
     world.faults.inject("dock_dead", "a")
     world.faults.inject("low_battery", "a", charge=0.5)
     await forward(seconds=15)
-    assert (await told(client)).count("CHARGING_BASE_FAILED") == 1
+    assert (await new_events(client)).count("CHARGING_BASE_FAILED") == 1
     assert (await client.get("/api/core/system/v1/power/status")).json()["isCharging"] is False
     await forward(seconds=60)
-    assert "CHARGING_BASE_FAILED" not in await told(client)
+    assert "CHARGING_BASE_FAILED" not in await new_events(client)
     world.faults.clear()
     await forward(seconds=5)
-    assert "START_CHARGING" in await told(client)
+    assert "START_CHARGING" in await new_events(client)
 
 
 @pytest.mark.world("office", body="hermes")
@@ -105,7 +105,7 @@ async def test_a_lost_robot_lets_orders_wait(
     await forward(seconds=3)
     localization: Any = robot[Localization]
     slam = "/api/core/slam/v1/localization"
-    await screen.client.put(f"{slam}/pose", json={"x": 60.0, "y": 60.0, "yaw": 1.0})  # somebody errs
+    await screen.client.put(f"{slam}/pose", json={"x": 60.0, "y": 60.0, "yaw": 1.0})  # someone errs
     await forward(seconds=1)
     for _ in range(60):
         await forward(seconds=1)
@@ -171,16 +171,16 @@ async def test_a_drop_a_free_brake_and_the_end(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward
 ) -> None:
     await forward(seconds=1)
-    await told(client)
+    await new_events(client)
     for fault, event in (("cliff", "CLIFF_DETECTED"), ("brake_released", "BRAKE_RELEASED")):
         world.faults.inject(fault, "a")
         await forward(seconds=0.5)
-        assert (await told(client)).count(event) == 1
+        assert (await new_events(client)).count(event) == 1
         world.faults.clear()
         await forward(seconds=0.5)
     robot[Power].shut_down(restart_after=1.0)
     await forward(seconds=40)
-    assert (await told(client)).count("POWER_OFF") == 1
+    assert (await new_events(client)).count("POWER_OFF") == 1
 
 
 FAILED_RIDES = [
@@ -214,4 +214,4 @@ async def test_where_a_ride_fails(robot: Robot, client: httpx.AsyncClient, forwa
 
         robot.actions.start("ride the lift", ride, resources=set())
         await forward(seconds=0.1)
-        assert [event for event in await told(client) if "ELEVATOR" in event] == events, stage
+        assert [event for event in await new_events(client) if "ELEVATOR" in event] == events, stage

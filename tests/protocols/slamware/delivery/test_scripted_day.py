@@ -76,13 +76,13 @@ class Day(Screen):
                 return state
         raise AssertionError(f"{name} has not ended within {within} s")
 
-    async def told(self) -> Pose:
+    async def reported_pose(self) -> Pose:
         """Where the robot says that it is."""
         pose = (await self.client.get(f"{SLAM}/localization/pose")).json()
         return Pose(pose["x"], pose["y"], pose["yaw"])
 
     async def take(self, box: int) -> None:
-        """Somebody opens the box and takes what is in it."""
+        """Someone opens the box and takes what is in it."""
         assert await self.say("start_pickup") == 204
         await self.operate(box, ":open")
         await self.forward(seconds=4)
@@ -183,10 +183,10 @@ async def test_a_day(day: Day, robot: Robot, world: World) -> None:  # noqa: PLR
     await day.ask("POST", f"{MULTI}/stcm/:reload", {"pose": {"x": here.x, "y": here.y, "yaw": here.yaw}})
     # It restarts, does not know where it is, and finds out.
     await restart(day)
-    assert (await day.told()).distance_to(day.pose) > 1.0
+    assert (await day.reported_pose()).distance_to(day.pose) > 1.0
     await day.look()
     await day.do("RecoverLocalizationAction", max_recover_time=30_000, recover_mode="NoMove")
-    assert_pose(await day.told(), x=day.pose.x, y=day.pose.y, within=0.15)
+    assert_pose(await day.reported_pose(), x=day.pose.x, y=day.pose.y, within=0.15)
     walls = (await day.client.get(f"{ARTIFACT}/lines/walls")).json()
     assert len(walls) == 1
     # Two orders on two floors: the first is taken, the second is not, and goes back to the reception.

@@ -1,4 +1,4 @@
-"""Between files and floors: what goes in comes out, what nobody understands byte for byte; too much is not read."""
+"""Between files and floors: what goes in comes out, what no one understands byte for byte; too much is not read."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ CELLS = st.binary(min_size=12, max_size=12).map(
     lambda data: np.maximum(np.frombuffer(data, np.int8), -127).reshape(3, 4)
 )
 GRIDS = st.builds(OccupancyGrid, CELLS, st.just(0.05), POINTS)
-# Of a vendor's kinds whose payload nobody knows, and of kinds that nobody heard of.
+# Of a vendor's kinds whose payload no one knows, and of kinds that no one heard of.
 USAGES = st.sampled_from(["rectangle_area", "landmark", "dbow", "marker", "pointsmap", "x"])
 STRANGE = st.builds(
     lambda usage, pairs, payload: Layer((("usage", usage), ("type", "vnd.x/y"), *pairs.items()), payload),
@@ -100,7 +100,7 @@ def test_too_much_is_not_read(monkeypatch: pytest.MonkeyPatch) -> None:
         composite_of(FloorMap(annotations=many))
 
 
-async def test_nobody_waits_while_a_large_file_is_read(
+async def test_no_one_waits_while_a_large_file_is_read(
     bare_client: httpx.AsyncClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     done = threading.Event()

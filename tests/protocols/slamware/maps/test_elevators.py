@@ -123,7 +123,7 @@ async def test_where_the_robot_is_relative_to_them(client: httpx.AsyncClient, fo
         assert (await client.get(f"{ELEVATORS}/{LIFT}/pose_relation")).json() == relation
         inside = relation == "in_elevator"
         assert (await client.get(f"{MULTI}/floors/:current")).json()["elevator"] == (LIFT if inside else "")
-    assert (await client.get(f"{ELEVATORS}/nobody/pose_relation")).status_code == 400
+    assert (await client.get(f"{ELEVATORS}/unknown/pose_relation")).status_code == 400
 
 
 async def two_floors(robot: Robot, client: httpx.AsyncClient, origin: Pose) -> None:
@@ -208,7 +208,7 @@ async def test_what_is_nowhere_fails(client: httpx.AsyncClient, forward: Forward
     assert (ended["result"], ended["reason"]) == (-1, "POI not found")
     body = {"action_name": "agent.actions.MultiFloorMoveAction", "options": {"target": {"x": 1, "y": 2}}}
     assert (await client.post(ACTIONS, json=body)).status_code == 400
-    body = {"action_name": "agent.actions.EnterElevatorAction", "options": {"elevator_id": "nobody"}}
+    body = {"action_name": "agent.actions.EnterElevatorAction", "options": {"elevator_id": "unknown"}}
     assert (await client.post(ACTIONS, json=body)).status_code == 400
 
 
@@ -302,7 +302,7 @@ async def test_home_from_the_other_floor_after_an_order(
         if (await client.get("/api/delivery/v1/stage")).json().get("milestone") == "GOING_TO_ELEVATOR":
             break
     execution = "/api/delivery/v1/tasks/:task_execution"
-    await client.put(execution, json={"enable_task_execution": False})  # somebody is at the screen
+    await client.put(execution, json={"enable_task_execution": False})  # someone is at the screen
     await forward(seconds=3)
     held = world.truth.pose_of("a")
     await forward(seconds=20)

@@ -1,4 +1,4 @@
-"""Laser landmarks: what the lidar found is told, what is set helps a lost robot; restricted areas count robots."""
+"""Laser landmarks: what the lidar found is reported, what is set helps a lost robot; restricted areas count robots."""
 
 from __future__ import annotations
 

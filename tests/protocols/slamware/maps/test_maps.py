@@ -244,7 +244,7 @@ async def test_a_cleared_map_is_forgotten_in_memory_only(
     await ok(await client.post("/api/core/system/v1/power/:restartmodule", json={"mode": "RestartModeSoft"}))
     await forward(seconds=10)
     assert robot[Mapping].grid.log_odds.shape == saved
-    assert (await client.get(f"{SLAM}/homedocks")).json() == [dock]  # which nobody entered: it woke up there
+    assert (await client.get(f"{SLAM}/homedocks")).json() == [dock]  # which no one entered: it woke up there
     assert robot[Docking].home is not None
     assert [place.id for place in robot[Places].all()] == ["d1", "later"]
     assert len((await client.get(f"{ARTIFACT}/lines/walls")).json()) == 1
@@ -270,7 +270,7 @@ async def test_landmarks_are_kept(client: httpx.AsyncClient) -> None:
     assert (await client.get(path)).json() == []
 
 
-async def test_loop_closure_is_switched_and_told(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
+async def test_loop_closure_is_switched_and_reported(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
     path = f"{SLAM}/loopclosure/:enable"
     assert (await client.get(path)).json() is robot[Mapping].closes_loops
     for on in (False, True):

@@ -34,7 +34,7 @@ async def test_the_nearest_place(robot: Robot, client: httpx.AsyncClient, forwar
     assert (seen["x"], seen["y"]) == pytest.approx((0.0, 0.5), abs=0.05)
 
 
-async def test_a_lost_robot_is_told_where_it_is_by_name(robot: Robot, client: httpx.AsyncClient, drawn: None) -> None:
+async def test_a_lost_robot_is_placed_by_name(robot: Robot, client: httpx.AsyncClient, drawn: None) -> None:
     pose, dock = "/api/multi-floor/localization/v1/pose", "/api/multi-floor/localization/v1/homedock"
     assert (await client.put(pose, json={"poi_name": "desk"})).status_code == 404  # not loaded yet
     await ok(await client.post(f"{MULTI}/stcm/:sync"))
@@ -42,7 +42,7 @@ async def test_a_lost_robot_is_told_where_it_is_by_name(robot: Robot, client: ht
     assert robot[Localization].pose.distance_to(Pose(1.0, 0.5)) < 0.01
     await ok(await client.put(dock))
     assert robot[Localization].pose.distance_to(Pose(0.6)) < 0.05
-    assert (await client.put(dock, json={"dock_id": "nobody"})).status_code == 404
+    assert (await client.put(dock, json={"dock_id": "unknown"})).status_code == 404
 
 
 @pytest.mark.world("empty")

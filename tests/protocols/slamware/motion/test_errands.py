@@ -92,7 +92,7 @@ async def test_the_stop_button_and_who_takes_the_wheels_end_an_errand(
     robot: Robot, client: httpx.AsyncClient, forward: Forward
 ) -> None:
     await forward(seconds=1)
-    for stop in ("button", "new action", "somebody else"):
+    for stop in ("button", "new action", "someone else"):
         id = await start(client, "MoveToAction", target={"x": 2.5, "y": 1.0})
         await finish(client, forward, id)
         id = await start(client, "GoHomeAction")
@@ -102,7 +102,7 @@ async def test_the_stop_button_and_who_takes_the_wheels_end_an_errand(
         elif stop == "new action":
             await start(client, "RotateAction", angle=0.5)
         else:
-            robot[Driving].drive(Twist(), lifetime=0.1, source="somebody else")
+            robot[Driving].drive(Twist(), lifetime=0.1, source="someone else")
         await forward(seconds=3)
         ended = await state(client, id)
         assert (ended["status"], ended["result"]) == (4, -2), stop
@@ -243,7 +243,7 @@ async def test_a_pushed_robot_knows_its_place_on_the_dock(
     assert events.count("RESET_MAP_TO_DOCK") == 1
 
 
-async def test_a_bound_dock_that_is_gone_is_told(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
+async def test_a_bound_dock_that_is_gone_is_reported(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
     await forward(seconds=1)
     await client.get("/api/platform/v1/events")
     await robot[Settings].put("slamware.home_dock", "a dock that was")

@@ -1,4 +1,4 @@
-"""Actions with several goals, through a real socket: whoever succeeds was at all of them in turn, by the truth."""
+"""Actions with several goals, through a real socket: one that succeeds was at all of them in turn, by the truth."""
 
 from __future__ import annotations
 

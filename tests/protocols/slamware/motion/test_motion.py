@@ -283,7 +283,7 @@ async def test_the_stop_button_stops_what_anybody_began(
 ) -> None:
     world.hands.place("a", Pose(3.0, 5.0))
     await forward(seconds=1)
-    action = robot[Driving].drive(Twist(x=0.5), source="somebody else")
+    action = robot[Driving].drive(Twist(x=0.5), source="someone else")
     await forward(seconds=1)
     current = (await client.get(f"{ACTIONS}/:current")).json()
     assert (current["action_id"], current["action_name"]) == (action.id, FIRMWARE_4 + "MoveByAction")

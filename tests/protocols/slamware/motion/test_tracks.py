@@ -113,7 +113,7 @@ async def test_moving_along_the_tracks_direction_only(
 
 
 @pytest.mark.world("empty", body="hermes")
-async def test_lights_show_what_they_are_told(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
+async def test_lights_show_what_they_are_given(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
     light = robot[Light]
     red = {"red": 200, "green": 0, "blue": 0}
 
