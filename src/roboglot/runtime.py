@@ -31,6 +31,7 @@ from roboglot.hosting.exclusive import lock_folder
 from roboglot.model.client_context import concerning
 from roboglot.model.clock import Clock, LockstepClock, RealClock
 from roboglot.model.components.system.lease import Lease
+from roboglot.model.errors import RobotError
 from roboglot.model.events import Rebooted, Rebooting, ShuttingDown
 from roboglot.model.robot import Robot
 from roboglot.programs.engine.engine import Engine
@@ -302,7 +303,7 @@ class Runtime:
         if self.console is not None:
             await _in_time("the console", self.console.close())
         await asyncio.gather(*(doors.close() for doors in self.doors.values()))
-        await self._leases.close()
+        await _in_time("control of the robots", self._leases.close())
         await self._record_desk.close()
         await _in_time("the fleet", self.fleet.close())
         if self._recorder is not None:
@@ -327,3 +328,5 @@ async def _in_time(name: str, closing: Awaitable[None]) -> None:
         await asyncio.wait_for(closing, CLOSE_SECONDS)
     except TimeoutError:
         log.warning("%s did not close in time", name)
+    except RobotError as error:
+        log.error("%s did not close as it should: %s", name, error)

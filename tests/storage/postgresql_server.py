@@ -33,7 +33,7 @@ class PostgreSQLServer:
     def __init__(self, folder: Path, binaries: Path) -> None:
         self._folder, self._binaries = folder, binaries
         # The server refuses to run as root: then it is no one's, and the folder, too.
-        self._user = pwd.getpwnam("unknown") if os.geteuid() == 0 else None
+        self._user = pwd.getpwuid(65534) if os.geteuid() == 0 else None
         self._server: subprocess.Popen[bytes] | None = None
         self.url = f"postgresql:///postgres?host={folder}&user=robots"
 

@@ -119,10 +119,11 @@ class Database:
         self._connection.execute("BEGIN IMMEDIATE")
         try:
             result = work(self._connection)
+            self._connection.execute("COMMIT")
         except BaseException:
-            self._connection.execute("ROLLBACK")
+            if self._connection.in_transaction:  # a full disk ends some transactions by itself
+                self._connection.execute("ROLLBACK")
             raise
-        self._connection.execute("COMMIT")
         if isinstance(result, sqlite3.Cursor):
             result.close()  # left to another thread's garbage collection, it would reset a statement in use here
         return result
@@ -182,6 +183,10 @@ def database_errors() -> Iterator[None]:
         yield
     except sqlite3.IntegrityError as error:
         raise AlreadyThere(str(error)) from error
+    except sqlite3.OperationalError as error:
+        if error.sqlite_errorcode == sqlite3.SQLITE_FULL:
+            raise DiskFull("the disk is full") from error
+        raise DatabaseError(str(error)) from error
     except sqlite3.Error as error:
         raise DatabaseError(str(error)) from error
 

@@ -97,6 +97,8 @@ class PostgreSQL:
             raise DatabaseError(str(error)) from error
         except psycopg.IntegrityError as error:
             raise AlreadyThere(str(error)) from error
+        except psycopg.errors.DiskFull as error:
+            raise DiskFull("the database's disk is full") from error
         except psycopg.Error as error:
             raise DatabaseError(str(error)) from error
 

@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, Protocol, Self, TypeVar
 
 from roboglot.model.components.system.disk import Disk
-from roboglot.model.errors import Refused
+from roboglot.model.errors import Refused, RobotError
 
 T = TypeVar("T")
 
 
-class DatabaseError(Exception):
+class DatabaseError(RobotError):
     """The database failed; the work was not done, or (its connection broke at the end) perhaps."""
 
 
@@ -20,7 +20,7 @@ class AlreadyThere(DatabaseError):
 
 
 class DiskFull(Refused):
-    """Nothing is left on the robot's disk."""
+    """Nothing is left on the robot's disk, or on the one where its database is."""
 
 
 class Rows(Protocol):
@@ -50,7 +50,7 @@ class Connection(Protocol):
 
 
 class Transactions(Protocol):
-    """A database. Every call is one transaction, and raises DatabaseError; what ``work`` raises rolls it back.
+    """A database. Every call is one transaction, which what ``work`` raises rolls back. Raises DatabaseError, DiskFull.
 
     What one caller writes with ``run`` and ``run_together`` is done in the order of the calls.
     """

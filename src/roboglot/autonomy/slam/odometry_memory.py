@@ -42,4 +42,4 @@ class OdometryMemory:
 
     async def _put(self) -> None:
         self._kept_at = self._slam.way
-        await self._robot[Settings].put(KEY, self._slam.learnt)
+        await self._robot[Settings].keep(KEY, self._slam.learnt)

@@ -196,7 +196,7 @@ class CyberDogDoor:
     def _keep_app(self, host: str) -> None:
         """Find the app again after a restart: an update reports its result then without being asked."""
         if Settings in self._robot:
-            task = asyncio.get_running_loop().create_task(self._robot[Settings].put(APP, host), name="keep the app")
+            task = asyncio.get_running_loop().create_task(self._robot[Settings].keep(APP, host), name="keep the app")
             self._writing.add(task)
             task.add_done_callback(self._writing.discard)
 

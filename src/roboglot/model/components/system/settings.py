@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 from abc import abstractmethod
 from typing import Any
 
 from roboglot.model.components.component import Component
+from roboglot.model.errors import RobotError
+
+log = logging.getLogger(__name__)
 
 
 class Settings(Component):
@@ -18,3 +22,10 @@ class Settings(Component):
     @abstractmethod
     async def put(self, key: str, value: Any) -> None:
         """Set it; returns when it is safe on disk."""
+
+    async def keep(self, key: str, value: Any) -> None:
+        """Set what no client waits for: where that fails, the log says so."""
+        try:
+            await self.put(key, value)
+        except RobotError as error:
+            log.warning("cannot keep %s: %s", key, error)

@@ -56,4 +56,4 @@ class Totals:
 
     async def _keep(self) -> None:
         metres = self.metres if Odometry in self._robot else self._before[0]
-        await self._robot[Settings].put(TOTALS, [round(metres, 3), round(self.seconds, 3)])
+        await self._robot[Settings].keep(TOTALS, [round(metres, 3), round(self.seconds, 3)])
