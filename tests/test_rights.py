@@ -30,8 +30,8 @@ def test_what_moves_the_robot_needs_more_than_sight() -> None:
         (CODES, 1002),
         (CODES, 6004),
     ):
-        operation = table.get(key)  # type: ignore[attr-defined]
-        assert operation.right is Right.DRIVE, key
+        operation = table.get(key)  # type: ignore[arg-type, attr-defined]
+        assert operation.right is Right.DRIVE, key  # type: ignore[union-attr]
 
 
 def test_passwords_are_for_administrators() -> None:

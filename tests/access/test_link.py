@@ -60,7 +60,7 @@ async def tunnels(port: int, drives: Callable[[], bool] = lambda: False) -> Asyn
     _, near = await loop.create_connection(Link, *server.sockets[0].getsockname())
 
     async def opened(_: int, protocol: object) -> object:
-        return await loop.create_connection(protocol, "127.0.0.1", port)  # type: ignore[arg-type,type-var]
+        return await loop.create_connection(protocol, "127.0.0.1", port)  # type: ignore[arg-type, call-overload, type-var]
 
     far = Tunnel(await made, first=2, opened=opened, datagram=lambda *_: None, drives=drives)
     own = Tunnel(near, first=1, opened=opened, datagram=lambda *_: None)

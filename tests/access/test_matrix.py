@@ -81,7 +81,7 @@ def reached(monkeypatch: pytest.MonkeyPatch) -> Iterator[set[object]]:
         kept: dict[Any, Any] = table._operations  # type: ignore[attr-defined]
         for key, operation in list(kept.items()):
             monkeypatch.setitem(kept, key, dataclasses.replace(operation, handler=stand_in(key, operation.handler)))
-    return seen
+    return seen  # type: ignore[return-value]
 
 
 def may(caller: Caller, table: OperationTable[Any], key: object) -> bool:
@@ -273,7 +273,7 @@ async def test_the_wire_view_shows_every_row_that_goes_over_a_wire(
             assert sorted(asked) == sorted(keys), door
             answers = [row for row in shown if row["door"] == door and row["direction"] == "reply"]
             forbidden = {row["operation"] for row in answers if "has no right to" in row["refusal"]}
-            may_not = {key for key in keys if table.get(key_of(key)) and not may(caller, table, key_of(key))}
+            may_not = {key for key in keys if table.get(key_of(key)) and not may(caller, table, key_of(key))}  # type: ignore[arg-type]
             assert forbidden == may_not, (name, door)
             assert all(row["excerpt"] for row in answers if row["operation"] in forbidden)
 

@@ -55,7 +55,7 @@ async def connected(runtime: Runtime, token: str, folder: Path, robot: str = "a"
     connector = Connector("127.0.0.1", runtime._gateway.port, robot, token, HERE, known)
     opened: asyncio.Future[list[int]] = asyncio.get_running_loop().create_future()
     running = asyncio.ensure_future(connector.run(lambda ports, _fingerprint, _new: opened.set_result(ports)))
-    await asyncio.wait([opened, running], return_when=asyncio.FIRST_COMPLETED)
+    await asyncio.wait([opened, running], return_when=asyncio.FIRST_COMPLETED)  # type: ignore[type-var]
     if running.done():
         await running
     yield await opened

@@ -46,7 +46,7 @@ async def call(client: Client, tool: str, **values: Any) -> Any:
     assert not answer.is_error, answer.content
     if answer.structured_content is not None:
         return answer.structured_content.get("result", answer.structured_content)
-    return json.loads(answer.content[0].text)
+    return json.loads(answer.content[0].text)  # type: ignore[union-attr]
 
 
 async def refusal(client: Client, tool: str, **values: Any) -> str:

@@ -66,7 +66,7 @@ async def test_start_does_not_wait_for_kernels_and_navigation_does() -> None:
     assert robot[Mapping].grid.width == 0
     action = robot[Navigation].navigate_to([Point(1.0, 1.0)], NavigationOptions())
     await asyncio.sleep(0.05)
-    assert action.feedback.stage == "planning"
+    assert action.feedback.stage == "planning"  # type: ignore[attr-defined]
     action.cancel()
     await action.done()
     await autonomy.start(wait=True)

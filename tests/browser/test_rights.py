@@ -268,7 +268,7 @@ async def test_pupils_join_by_a_code_and_the_teacher_leads(guarded: Guarded, ope
     code = await teacher.inner_text("output.code")
     pupils = []
     for name in ("Emil", "Frida"):
-        page = await open_page(f"/?code={code}")
+        page = await open_page(f"/?code={code}")  # type: ignore[call-arg]
         await page.fill("input[name=name]", name)
         await page.click("form .main")
         await page.wait_for_selector("text=Scan fits map")
@@ -306,7 +306,7 @@ async def test_pupils_join_by_a_code_and_the_teacher_leads(guarded: Guarded, ope
 
 
 async def test_wrong_codes_are_limited(guarded: Guarded, open_page: Open) -> None:
-    page = await open_page("/?code=NOTONE")
+    page = await open_page("/?code=NOTONE")  # type: ignore[call-arg]
     statuses = await page.evaluate("""async () => { const found = []; for (let i = 0; i < 12; i++) {
         const body = JSON.stringify({name: 'x', code: 'WRONG' + i});
         found.push((await fetch('/api/sign_in', {method: 'POST', body})).status);

@@ -54,7 +54,7 @@ async def test_a_page_hears_what_the_robot_hears(shown: Shown) -> None:
         async with asyncio.timeout(60):
             while abs(heard - PITCH) > PITCH / 20:
                 frame = await receiver.track.recv()
-                heard = pitch_of(frame.to_ndarray().reshape(-1, 2)[:, 0].astype(float))
+                heard = pitch_of(frame.to_ndarray().reshape(-1, 2)[:, 0].astype(float))  # type: ignore[union-attr]
     finally:
         passing.cancel()
         await peer.close()

@@ -61,7 +61,7 @@ async def test_cameras_and_sounds(
 ) -> None:
     names = {kind.__name__: kind for kind in (Camera, VideoStream, Recorder, AudioStream, Speaker, Point)}
     monkeypatch.chdir(tmp_path)
-    names |= {"claps": claps, "Path": Path}
+    names |= {"claps": claps, "Path": Path}  # type: ignore[dict-item]
     await run(snippet("worlds/camera.md", "capture()"), clock, robot=robot, world=world, **names)
     assert (tmp_path / "tour.mp4").exists()
 
@@ -82,7 +82,7 @@ async def test_people_do_as_asked(robot: Robot, world: World, clock: LockstepClo
 async def test_hands_on_a_delivery_robot(robot: Robot, world: World, clock: LockstepClock) -> None:
     code = snippet("worlds/worlds.md", "cargo.put").replace('robot("b")', 'robot("a")')
     await run(code, clock, world=world, Cargo=Cargo, EmergencyStop=EmergencyStop, Pose=Pose)
-    assert robot[EmergencyStop].pressed
+    assert robot[EmergencyStop].pressed  # type: ignore[attr-defined]
 
 
 async def test_an_engine_by_hand() -> None:

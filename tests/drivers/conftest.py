@@ -111,7 +111,7 @@ def profile() -> str:
 @pytest.fixture
 async def ep_door(profile: str, robot: Robot, forward: Forward) -> AsyncIterator[RoboMasterDoor]:
     """The simulated robot behind the text protocol."""
-    door = RoboMasterDoor(robot, EP_ADDRESS, dataclasses.replace(ep_config(), profile=profile))
+    door = RoboMasterDoor(robot, EP_ADDRESS, dataclasses.replace(ep_config(), profile=profile))  # type: ignore[arg-type]
     await door.start()
     yield door
     await door.close()

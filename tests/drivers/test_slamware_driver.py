@@ -165,8 +165,8 @@ async def test_it_navigates_by_the_robots_own_skill(driven: Robot, world: World,
     start = world.truth.pose_of("a")
     action = driven[Navigation].navigate_to([Point(1.0, 0.5)], NavigationOptions(yaw=-1.0), source="test")
     await forward(seconds=1)
-    assert action.feedback.stage == "driving"
-    assert action.feedback.remaining.length > 0.3
+    assert action.feedback.stage == "driving"  # type: ignore[attr-defined]
+    assert action.feedback.remaining.length > 0.3  # type: ignore[attr-defined]
     await forward(seconds=15)
     assert action.status is ActionStatus.SUCCEEDED
     assert_pose(world.truth.pose_of("a").relative_to(start), x=1.0, y=0.5, deg=math.degrees(-1.0))

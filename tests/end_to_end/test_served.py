@@ -100,8 +100,8 @@ def test_garbage_at_every_door_harms_no_one(pair: ServedRobot) -> None:
                     continue  # it may hang up in the middle
         half_open.append(socket.create_connection((FIRST, port), timeout=5))
     assert isinstance(get(POSE), dict)
-    with Line(FIRST) as line:
-        assert line.say("command;quit") == ["ok;", "ok;"]
+    with Line(FIRST) as line:  # type: ignore[assignment]
+        assert line.say("command;quit") == ["ok;", "ok;"]  # type: ignore[attr-defined]
     assert pair.process.poll() is None
     for line in half_open:
         line.close()
@@ -126,9 +126,9 @@ def test_what_was_acknowledged_survives_kill_9(tmp_path: Path) -> None:
         robot.process.wait()
     with served(data, "--world", "empty", address="127.0.0.53"):
         [stored] = get(POIS, "127.0.0.53")  # type: ignore[misc]
-    assert stored["id"] == "kitchen"
-    assert stored["metadata"]["display_name"] == "厨房"
-    assert stored["pose"]["y"] == pytest.approx(-2.25)
+    assert stored["id"] == "kitchen"  # type: ignore[has-type]
+    assert stored["metadata"]["display_name"] == "厨房"  # type: ignore[has-type]
+    assert stored["pose"]["y"] == pytest.approx(-2.25)  # type: ignore[has-type]
 
 
 def test_it_stops_cleanly_on_a_signal(tmp_path: Path) -> None:

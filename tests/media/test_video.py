@@ -16,7 +16,7 @@ from tests.media.conftest import HEIGHT, WIDTH, number_of, picture
 def decoded(data: bytes) -> list[int]:
     """The numbers of the pictures in an Annex B stream, as a player reads it."""
     with av.open(io.BytesIO(data), format="h264") as file:
-        return [number_of(frame.to_ndarray()[:HEIGHT]) for frame in file.decode(video=0)]
+        return [number_of(frame.to_ndarray()[:HEIGHT]) for frame in file.decode(video=0)]  # type: ignore[union-attr]
 
 
 def units(data: bytes) -> list[int]:

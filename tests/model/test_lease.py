@@ -62,7 +62,7 @@ async def test_two_clients_of_one_door_are_distinguished(robot: Robot, forward: 
     await forward(seconds=1)
     assert one.status is ActionStatus.CANCELED
     assert robot[Lease].holder
-    assert robot[Lease].holder.who == "slamware 10.0.0.8"
+    assert robot[Lease].holder.who == "slamware 10.0.0.8"  # type: ignore[union-attr]
     other.cancel()
     await forward(seconds=1)
 

@@ -108,7 +108,7 @@ async def test_one_that_grows_too_large_is_stopped_in_order_and_comes_back(super
     forks(supervisor).say(1, Ready({}))
     await supervisor.until(lambda: [s.state for s in supervisor.shards.values()].count(State.READY) == STARTING_MAX)
     for number in (STARTING_MAX + 1, STARTING_MAX + 2):
-        await supervisor.until(lambda n=number: n in forks(supervisor).links)
+        await supervisor.until(lambda n=number: n in forks(supervisor).links)  # type: ignore[misc]
         forks(supervisor).say(number, Ready({}))
     supervisor._look_after()
     supervisor._look_after()

@@ -49,7 +49,7 @@ async def trace(seed: int) -> str:
             world.faults.inject("lost_localization", "c")
             robots["c"][LiftClient].call(1)
         if second == 15:
-            digest.update(robots["c"][DepthCamera].image.points.tobytes())
+            digest.update(robots["c"][DepthCamera].image.points.tobytes())  # type: ignore[union-attr]
         for name, robot in robots.items():
             digest.update(struct.pack("3d", *pose(world.truth.pose_of(name))))
             digest.update(repr((robot[Imu].reading, robot[Battery].state, robot[Network].signal)).encode())

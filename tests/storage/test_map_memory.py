@@ -62,7 +62,7 @@ async def test_all_of_it_is_new_at_once_and_after_a_start(database: Database) ->
     new = Replacement(Drawings([NEW], drawn), {"k": [1]}, {"f": b"2", "gone": None})
     before = Drawings(here.places.all(), here.annotations.current)
     reported: list[Drawings] = []
-    await here.memory.replace(lambda now: reported.append(now) or new)
+    await here.memory.replace(lambda now: reported.append(now) or new)  # type: ignore[func-returns-value]
     assert reported == [before]
     for seen in (here, parts(database)):
         assert list(seen.places.all()) == [NEW]

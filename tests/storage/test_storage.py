@@ -128,9 +128,9 @@ async def test_transactions_together_share_a_flush_and_no_failure(open_database:
         return work
 
     commits = []
-    await database.run(lambda connection: connection.set_trace_callback(lambda sql: commits.append(sql == "COMMIT")))
+    await database.run(lambda connection: connection.set_trace_callback(lambda sql: commits.append(sql == "COMMIT")))  # type: ignore[attr-defined]
     results = await asyncio.gather(*(database.run_together(write(n)) for n in range(40)), return_exceptions=True)
-    await database.run(lambda connection: connection.set_trace_callback(None))
+    await database.run(lambda connection: connection.set_trace_callback(None))  # type: ignore[attr-defined]
     assert [n for n, result in enumerate(results) if isinstance(result, RuntimeError)] == list(range(3, 40, 7))
     settings = StoredSettings(open_database(), "a")
     assert [n for n in range(40) if settings.get(f"k{n}") is not None] == done

@@ -78,7 +78,7 @@ async def test_a_person_in_the_only_door_is_waited_for(tour: Tour) -> None:
     action = tour.head_for((6.0, 3.0))
     await tour.clock.advance(10.0)
     assert action.status is ActionStatus.EXECUTING, action.reason
-    assert action.feedback.stage == "waiting"
+    assert action.feedback.stage == "waiting"  # type: ignore[attr-defined]
     assert tour.blocks
     tour.world.hands.remove_obstacle(person)
     await tour.end_of(action)
@@ -123,7 +123,7 @@ async def test_a_search_through_unknown_floor_is_bounded(tour: Tour) -> None:
     while not action.status.ended:
         await tour.clock.advance(0.1)
         far, last = far + last.distance_to(tour.truth), tour.truth
-        stages.add(action.feedback.stage)
+        stages.add(action.feedback.stage)  # type: ignore[attr-defined]
     assert isinstance(action.error, Unreachable), action.reason
     assert "unknown floor" in action.reason or "no path" in action.reason
     assert far < 60.0

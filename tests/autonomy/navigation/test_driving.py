@@ -267,7 +267,7 @@ async def test_a_paused_move_holds_and_goes_on(carted: Robot, cart: Cart, clock:
 
 
 async def test_an_emergency_stop_lasts_until_someone_says_stand_up(carted: Robot, clock: LockstepClock) -> None:
-    legs = carted.add(Legs, SlowLegs(carted, Posture.LIMP))
+    legs = carted.add(Legs, SlowLegs(carted, Posture.LIMP))  # type: ignore[abstract]
     for _ in range(3):  # a joystick goes on sending
         with pytest.raises(EmergencyStopped):
             carted[Driving].drive(Twist(x=0.5))
@@ -279,7 +279,7 @@ async def test_an_emergency_stop_lasts_until_someone_says_stand_up(carted: Robot
 
 
 async def test_a_lying_robot_stands_up_first(carted: Robot, cart: Cart, clock: LockstepClock) -> None:
-    carted.add(Legs, SlowLegs(carted, Posture.LYING))
+    carted.add(Legs, SlowLegs(carted, Posture.LYING))  # type: ignore[abstract]
     action = carted[Driving].move_by(Pose(x=0.5), source="door")
     await clock.advance(1.9)
     assert action.status is ActionStatus.ACCEPTED
@@ -290,7 +290,7 @@ async def test_a_lying_robot_stands_up_first(carted: Robot, cart: Cart, clock: L
 
 
 async def test_who_cannot_stand_up_does_not_drive(carted: Robot, cart: Cart, clock: LockstepClock) -> None:
-    carted.add(Legs, SlowLegs(carted, Posture.LYING))
+    carted.add(Legs, SlowLegs(carted, Posture.LYING))  # type: ignore[abstract]
     action = carted[Driving].drive(Twist(x=0.5), source="door")
     await clock.advance(1.0)
     carted.actions.running("legs")[0].cancel()

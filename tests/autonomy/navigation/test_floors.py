@@ -125,7 +125,7 @@ async def test_a_ride_that_is_in_somebodys_way(
 ) -> None:
     say_where_the_lift_is(tour)
     await tour.go((2.7, 10.0), deg=180)
-    (blocked,) = tour.world.faults.inject(fault, **options)
+    (blocked,) = tour.world.faults.inject(fault, **options)  # type: ignore[arg-type]
     action = await tour.end_of(tour.robot[Floors].ride(1), 400.0)
     assert isinstance(action.error, Blocked), action.reason
     assert action.feedback is stage

@@ -122,7 +122,7 @@ async def test_another_try_goes_on_at_the_goal_that_is_next(tour: Tour) -> None:
     for _ in range(450):
         await tour.clock.advance(0.1)
         west = min(west, tour.truth.x)
-    assert len(action.feedback.milestones) == 1
+    assert len(action.feedback.milestones) == 1  # type: ignore[attr-defined]
     tour.world.hands.remove_obstacle(wall)
     await tour.end_of(action)
     assert action.status is ActionStatus.SUCCEEDED, action.reason

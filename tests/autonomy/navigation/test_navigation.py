@@ -54,7 +54,7 @@ async def test_several_goals_in_turn_are_all_passed(tour: Tour) -> None:
     while not action.status.ended:
         await tour.clock.advance(0.02)
         nearest = [min(old, tour.truth.distance_to(Point(*spot))) for old, spot in zip(nearest, spots, strict=True)]
-        reached.append(4 - len(action.feedback.milestones))
+        reached.append(4 - len(action.feedback.milestones))  # type: ignore[attr-defined]
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     assert max(nearest) < 0.07
     assert nearest[-1] < 0.05
@@ -65,7 +65,7 @@ async def test_several_goals_in_turn_are_all_passed(tour: Tour) -> None:
 @pytest.mark.world("empty")
 async def test_feedback_counts_down(tour: Tour) -> None:
     reported: list[NavigationFeedback] = []
-    tour.robot.events.listen(ActionChanged, lambda event: reported.append(event.action.feedback))
+    tour.robot.events.listen(ActionChanged, lambda event: reported.append(event.action.feedback))  # type: ignore[arg-type]
     action = await tour.go((6.0, 5.0), deg=90.0)
     stages = [feedback.stage for feedback in reported if feedback]
     assert stages[0] == "planning"
@@ -96,7 +96,7 @@ async def test_it_waits_where_there_is_no_way_around_and_goes_on_when_there_is(t
     wall = tour.world.hands.add_obstacle(Pose(5.0, 1.2, 0.0), WALL)
     await tour.clock.advance(10.0)
     assert action.status is ActionStatus.EXECUTING
-    assert action.feedback.stage == "waiting"
+    assert action.feedback.stage == "waiting"  # type: ignore[attr-defined]
     assert tour.truth.x < 4.7
     tour.world.hands.remove_obstacle(wall)
     await tour.end_of(action)

@@ -40,7 +40,7 @@ async def draw(tour: Tour, *entries: Line | Area) -> None:
             start=tour.on_map(entry.start.x, entry.start.y),
             end=tour.on_map(entry.end.x, entry.end.y),
             **(
-                {"control": tuple(tour.on_map(p.x, p.y) for p in entry.control)}
+                {"control": tuple(tour.on_map(p.x, p.y) for p in entry.control)}  # type: ignore[arg-type]
                 if isinstance(entry, Line) and entry.control
                 else {}
             ),
@@ -60,7 +60,7 @@ def track(x0: float, y0: float, x1: float, y1: float, *control: tuple[float, flo
 
 
 def area(kind: AreaKind, x: float, y: float, half: float, **more: float) -> Area:
-    return Area(0, kind, Point(x - half, y), Point(x + half, y), half, **more)
+    return Area(0, kind, Point(x - half, y), Point(x + half, y), half, **more)  # type: ignore[arg-type]
 
 
 async def watched(tour: Tour, action: Action) -> list[Pose]:

@@ -98,7 +98,7 @@ def test_a_given_map_stays_and_what_was_added_to_it_is_straightened() -> None:
     rings = [[(0, 0), (14, 0), (14, 10), (0, 10)], [(2, 2), (12, 2), (12, 8), (2, 8)], [(3, 0), (3, 0.5), (3.6, 0.5)],
              [(0, 4), (0.6, 4.4), (0, 5)], [(14, 3), (13.3, 3.4), (14, 4)], [(8, 10), (8, 9.4), (8.8, 9.4)],
              [(6, 2), (6, 1.6), (6.4, 1.6)], [(9, 0), (9.3, 0.6), (9.6, 0)]]  # fmt: skip
-    walls = np.array([(*a, *b) for ring in rings for a, b in zip(ring, ring[1:] + ring[:1], strict=True)], float)
+    walls = np.array([(*a, *b) for ring in rings for a, b in zip(ring, ring[1:] + ring[:1], strict=True)], float)  # type: ignore[call-overload, index, type-var]
     stops = [(1.0, 1.0), (13.0, 1.0), (13.0, 9.0), (1.0, 9.0), (1.0, 1.0), (7.0, 1.0)]
     true: list[Pose] = []
     for (ax, ay), (bx, by) in itertools.pairwise(stops):
@@ -106,14 +106,14 @@ def test_a_given_map_stays_and_what_was_added_to_it_is_straightened() -> None:
         true += [Pose(ax, ay, yaw).compose(Pose(step * 0.4)) for step in range(round(length / 0.4))]
     belief = Belief(odometry=None)  # type: ignore[arg-type]
     for pose in true[:25]:
-        paint(belief.map, corridor_scan(pose, walls), pose, fill=True)
+        paint(belief.map, corridor_scan(pose, walls), pose, fill=True)  # type: ignore[arg-type]
     given, loops, straight = belief.map.copy(), LoopCloser(belief), []
     believed, last = true[0], true[0]
     for number, pose in enumerate(true):
         step = pose.relative_to(last)
         drift = 0.0 if number < 20 or straight else math.radians(0.12)  # a little to one side all the time
         believed, last = believed.compose(Pose(step.x, step.y, step.yaw + drift)), pose
-        scan = corridor_scan(pose, walls)
+        scan = corridor_scan(pose, walls)  # type: ignore[arg-type]
         paint(belief.map, scan, believed, fill=False)
         loops.note(scan, believed, 0.4 * number)
         corrected = next((done for _ in range(40) if (done := loops.advance(believed)) is not None), None)

@@ -102,10 +102,10 @@ async def test_people_around_the_robot_do_not_hide_its_place(tour: Tour) -> None
     await tour.go((12.0, 9.8))
     await tour.go((12.0, 6.5))
     estimator, scan = tour.robot[Localization].estimator, tour.robot[Lidar].scan  # type: ignore[attr-defined]
-    ranges, angles = scan.ranges.copy(), scan.angles
+    ranges, angles = scan.ranges.copy(), scan.angles  # type: ignore[union-attr]
     for bearing, width, away in ((0.0, 0.6, 0.5), (2.0, 0.2, 1.2)):  # one stands right in front, one further off
         ranges[abs(angles - bearing) < width] = away
-    hidden = ScanReader().read(replace(scan, ranges=ranges))
+    hidden = ScanReader().read(replace(scan, ranges=ranges))  # type: ignore[arg-type, type-var]
     (found,) = places(estimator._belief.map, hidden, None)
     assert found.pose.distance_to(tour.truth.relative_to(tour.start)) < 0.05
 

@@ -175,14 +175,14 @@ EXAMPLES: dict[int, values.Value] = {
 async def test_every_push_arrives_as_its_value(client: CyberDogClient, door: CyberDogDoor) -> None:
     assert {int(code) for code in pushes} - {int(Code.VIDEO)} == EXAMPLES.keys()
     await client.found()
-    await _until(lambda: door._context.app.connected)
+    await _until(lambda: door._context.app.connected)  # type: ignore[union-attr]
     for code, value in EXAMPLES.items():
         with client.watch(type(value)) as reported:
-            door._context.app.push(pushes[code], msgspec.to_builtins(value))
+            door._context.app.push(pushes[code], msgspec.to_builtins(value))  # type: ignore[union-attr]
             async with asyncio.timeout(5):
                 assert await anext(reported) == value
     with client.signals.subscribe() as signals:
-        door._context.app.push(pushes[Code.VIDEO], {"is_closed": True, "uid": "x"})
+        door._context.app.push(pushes[Code.VIDEO], {"is_closed": True, "uid": "x"})  # type: ignore[union-attr]
         async with asyncio.timeout(5):
             assert await anext(signals) == End("x", done=True)
 

@@ -38,14 +38,14 @@ async def test_a_task_whose_stream_breaks_is_joined_again() -> None:
     end: list[Said] = [{"accepted": Accepted.YES}, {"feedback_code": 308}, {"result": TaskResult.SUCCESS}]
     streams = [(Code.START_TASK, [*BEGUN, None]), (Code.JOIN_TASK, [None]), (Code.JOIN_TASK, end)]
     heard: list[int] = []
-    task = await talking(iter(streams)).navigate(1.0, 0.0, on_feedback=heard.append)
+    task = await talking(iter(streams)).navigate(1.0, 0.0, on_feedback=heard.append)  # type: ignore[arg-type]
     await task
     assert heard == [300, 308]
 
 
 async def test_a_task_that_no_one_knows_any_more_has_not_succeeded() -> None:
     streams = [(Code.START_TASK, [*BEGUN, None]), (Code.JOIN_TASK, [{"accepted": Accepted.NOTHING_TO_JOIN}])]
-    task = await talking(iter(streams)).navigate(1.0, 0.0)
+    task = await talking(iter(streams)).navigate(1.0, 0.0)  # type: ignore[arg-type]
     with pytest.raises(TaskFailed) as failed:
         await task
     assert failed.value.feedback == 300

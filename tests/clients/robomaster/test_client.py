@@ -56,7 +56,7 @@ CALLS: dict[str, tuple[Callable[[Client], Awaitable[object]], object]] = {
     "servo recenter": (lambda c: c.servo.recenter(1), None),
     "servo angle ?": (lambda c: c.servo.get_angle(1), float),
     "robotic_arm move": (lambda c: c.robotic_arm.move(1, 0), None),
-    "robotic_arm moveto": (lambda c: c.robotic_arm.moveto(*ARM), None),
+    "robotic_arm moveto": (lambda c: c.robotic_arm.moveto(*ARM), None),  # type: ignore[has-type]
     "robotic_arm recenter": (lambda c: c.robotic_arm.recenter(wait=True), None),
     "robotic_arm stop": (lambda c: c.robotic_arm.stop(), None),
     "robotic_arm position ?": (lambda c: c.robotic_arm.get_position(), "ArmPosition"),

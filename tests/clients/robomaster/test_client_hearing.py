@@ -51,7 +51,7 @@ async def test_pushes_of_every_kind(client, run, forward, robot) -> None:
     )
     assert kinds.count(ChassisPosition) == pytest.approx(10, abs=1)
     assert heard == [each for each in reported if isinstance(each, ChassisStatus)]
-    assert heard[-1].static
+    assert heard[-1].static  # type: ignore[attr-defined]
     assert next(each for each in reversed(reported) if isinstance(each, GameInput)).data[0] == 2
     assert {each.kind for each in reported if isinstance(each, TargetsSeen)} == {"marker"}
 
@@ -95,7 +95,7 @@ async def test_two_robots_share_a_push_port_and_are_distinguished() -> None:
         probe.bind(("127.0.0.1", 0))
         number = probe.getsockname()[1]
     port, heard = PushPort("127.0.0.1", number), []
-    stops = [port.attach(f"127.0.0.{n}", lambda data, n=n: heard.append((n, data))) for n in (31, 32)]
+    stops = [port.attach(f"127.0.0.{n}", lambda data, n=n: heard.append((n, data))) for n in (31, 32)]  # type: ignore[misc]
     with contextlib.ExitStack() as stack:
         for n in (31, 32, 33):
             robot = stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
@@ -104,10 +104,10 @@ async def test_two_robots_share_a_push_port_and_are_distinguished() -> None:
         await asyncio.sleep(0.02)
         assert heard == [(31, b"x31"), (32, b"x32")]
         with pytest.raises(LinkLost, match="share one PushPort"):
-            PushPort("127.0.0.1", number).attach("127.0.0.31", heard.append)
+            PushPort("127.0.0.1", number).attach("127.0.0.31", heard.append)  # type: ignore[arg-type]
     for stop in stops:
         stop()
-    PushPort("127.0.0.1", number).attach("127.0.0.31", heard.append)()
+    PushPort("127.0.0.1", number).attach("127.0.0.31", heard.append)()  # type: ignore[arg-type]
 
 
 async def test_pictures(client, run, robot) -> None:

@@ -30,10 +30,10 @@ TROT = [("0110", 6), ("1111", 1), ("1001", 6), ("1111", 1)]
 
 def sequence(*paces: dict[str, Any], name: str = "hop", gaits: list[tuple[str, int]] = STANDING) -> Record:
     """As a program makes it and the worker sends it; a gait is who stands, in the order of FEET, and 30 ms units."""
-    made: Any = RECORDS.class_of("MotionSequence")(name=name)
+    made: Any = RECORDS.class_of("MotionSequence")(name=name)  # type: ignore[call-arg]
     for down, duration in gaits:
         fields = {foot: int(digit) for foot, digit in zip(FEET, down, strict=True)}
-        made.gait_list.push_back(RECORDS.class_of("MotionSequenceGait")(duration=duration, **fields))
+        made.gait_list.push_back(RECORDS.class_of("MotionSequenceGait")(duration=duration, **fields))  # type: ignore[call-arg]
     for pace in paces:
         meta: Any = RECORDS.class_of("MotionSequencePace")()
         for path, value in pace.items():

@@ -35,7 +35,7 @@ def passing(forward: Forward) -> Callable[[Callable[[], object]], Awaitable[None
     async def wait(condition: Callable[[], object]) -> None:
         async with asyncio.timeout(4 * PATIENCE):
             while not condition():
-                await forward(seconds=0.05)
+                await forward(seconds=0.1)
                 await breath(0.005)
 
     return wait

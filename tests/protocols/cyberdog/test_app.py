@@ -64,7 +64,7 @@ async def test_heartbeats_come_every_half_second(phoned, app, clock: LockstepClo
     await asyncio.sleep(0.05)
     for beats in range(len(app.ticks) + 1, len(app.ticks) + 5):
         await clock.advance(0.5)
-        await until(lambda beats=beats: len(app.ticks) == beats)
+        await until(lambda beats=beats: len(app.ticks) == beats)  # type: ignore[misc]
         await asyncio.sleep(0.03)  # for the reply to get home
         assert len(app.ticks) == beats
 
@@ -93,7 +93,7 @@ async def test_a_lying_dog_gets_up_for_its_first_app(door, client, app, robot, f
 async def test_a_lost_app_is_dialled_again(
     phoned: CyberDogDoor, app: App, messages: Messages, pems: Pems, passing: Passing, clock: LockstepClock
 ) -> None:
-    link = phoned._context.app
+    link = phoned._context.app  # type: ignore[union-attr]
     await passing(lambda: link.connected)
     await app.stop()
     lost_from = clock.time()
@@ -247,7 +247,7 @@ async def test_program_frames_pass_through(robot, data, app, pems, messages, pas
     async with pems.channel(door.port) as channel:
         client = Client(channel, messages)
         await client.ask(10001)
-        await passing(lambda: door._context.app.connected)
+        await passing(lambda: door._context.app.connected)  # type: ignore[union-attr]
         frame = '{ "type":"task",   "body":"1+1\\n" }'
         assert await client.raw(2002, frame) == []
         assert programs.got == [frame]

@@ -88,7 +88,7 @@ def test_broken_and_expired_ones_are_not_replaced_silently(tmp_path: Path, monke
 
     class Later(datetime):
         @classmethod
-        def now(cls, _tz: object = None) -> datetime:
+        def now(cls, _tz: object = None) -> datetime:  # type: ignore[override]
             return datetime(2090, 1, 1, tzinfo=UTC)
 
     with monkeypatch.context() as patched:
@@ -149,8 +149,8 @@ async def test_certificates_that_are_replaced_count_at_the_next_connection(
         new = proof()
         app = App(messages)
         await app.start(grpc.ssl_server_credentials(((new.key, new.certificate),), new.ca, require_client_auth=True))
-        door._context.app._app_port = app.port
-        door._context.app.seen("ipv4:127.0.0.1:1")
+        door._context.app._app_port = app.port  # type: ignore[union-attr]
+        door._context.app.seen("ipv4:127.0.0.1:1")  # type: ignore[union-attr]
         await passing(lambda: app.ticks)  # dialled with the new ones
         await app.stop()
     finally:

@@ -22,7 +22,7 @@ def numbers(names: frozenset[str]) -> set[int]:
             continue
         for function in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(function, ast.Call) and _name(function.func) in names:
-                found |= {node.value for node in function.args if _is_number(node)}
+                found |= {node.value for node in function.args if _is_number(node)}  # type: ignore[attr-defined]
     return found
 
 

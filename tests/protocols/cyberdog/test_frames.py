@@ -89,7 +89,7 @@ async def phone(
         stack.push_async_callback(door.close)
         client = Client(await stack.enter_async_context(pems.channel(door.port)), messages)
         await client.ask(10001)
-        await passing(lambda: door._context.app.connected)
+        await passing(lambda: door._context.app.connected)  # type: ignore[union-attr]
         yield Phone(client, app, service, door)
 
 
@@ -111,7 +111,7 @@ async def test_an_inquiry_overtakes_what_programs_do(phone: Phone) -> None:
     for round in range(1, 4):
         before = len(phone.blocks())
         await phone.ask("inquiry", "t")
-        await until(lambda round=round: len(phone.answers("inquiry")) == round)
+        await until(lambda round=round: len(phone.answers("inquiry")) == round)  # type: ignore[misc]
         assert len(phone.blocks()) - before <= ROOM
     await phone.ask("shutdown", "t")
     await until(lambda: any(frame["feedback"]["id"] == "shutdown" for frame in phone.frames if "feedback" in frame))
@@ -122,10 +122,10 @@ async def test_an_inquiry_overtakes_what_programs_do(phone: Phone) -> None:
 async def test_a_program_waits_for_a_slow_phone(phone: Phone) -> None:
     phone.app.gate.clear()
     await phone.start("t", "for n in range(10000): cyberdog.task.block(str(n))\nprint('through')")
-    queue = phone.door._context.frames
-    await until(lambda: queue._news >= ROOM)
+    queue = phone.door._context.frames  # type: ignore[union-attr]
+    await until(lambda: queue._news >= ROOM)  # type: ignore[union-attr]
     await asyncio.sleep(0.2)
-    assert queue._news < 2 * ROOM
+    assert queue._news < 2 * ROOM  # type: ignore[union-attr]
     assert not any(entry.text == "through" for entry in await phone.service.log("t"))
     phone.app.gate.set()
     await phone.ask("shutdown", "t")

@@ -162,7 +162,7 @@ async def test_an_update_that_cannot_be(client, app, robot, passing, forward) ->
     await client.ask(10001)
     await passing(lambda: app.ticks)
     assert await client.ask(5003, {"modules": [{"module": "x"}]}) == {"error_code": 323}
-    broken = {**MODULE, "latest": {**MODULE["latest"], "packages": [{**FILE, "md5": "short"}]}}
+    broken = {**MODULE, "latest": {**MODULE["latest"], "packages": [{**FILE, "md5": "short"}]}}  # type: ignore[dict-item]
     assert await client.ask(5003, {"modules": [broken]}) == {"response": False, "code": 5710}
     robot[Disk].rubbish = robot[Disk].free - 1000
     assert await client.ask(5003, {"modules": MODULE}) == {"response": True, "code": 0}

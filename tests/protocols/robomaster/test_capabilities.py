@@ -67,7 +67,7 @@ async def test_every_command_answers_as_the_page_says(body: str, robot: Robot) -
         await answer(context, "command")
         asked = asyncio.ensure_future(answer(context, text))
         for _ in range(60):
-            await robot.clock.advance(0.1)
+            await robot.clock.advance(0.1)  # type: ignore[attr-defined]
             if asked.done():
                 break
         got = await asked
@@ -78,5 +78,5 @@ async def test_every_command_answers_as_the_page_says(body: str, robot: Robot) -
         if refused != (kind.judge(operation.needs) == "refused"):
             wrong[text] = (got.reply, got.why)
         context.end("the next one")
-        await robot.clock.advance(0.6)
+        await robot.clock.advance(0.6)  # type: ignore[attr-defined]
     assert not wrong

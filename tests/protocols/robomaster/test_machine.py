@@ -88,7 +88,9 @@ class Machine(RuleBasedStateMachine):
     @initialize(target=clients)
     def open_door(self) -> Any:
         """With two clients in SDK mode: from there everything else is near."""
-        self.inbox, self.modes, self.members = Inbox("127.0.0.1"), None, set()
+        self.inbox = Inbox("127.0.0.1")
+        self.modes: Any = None
+        self.members: set[TextClient] = set()
         self.open: set[TextClient] = set()
         config = RoboMasterConfig(0, 0, 0, self.inbox.port, 0, self.inbox.port)
         self.door = RoboMasterDoor(self.lab.robot, ADDRESS, config)
@@ -126,7 +128,7 @@ class Machine(RuleBasedStateMachine):
         got = self.run(self._ask(client, text))
         assert got == (right if inside else IDLE), text
         if inside:
-            self.members.add(client)
+            self.members.add(client)  # type: ignore[arg-type]
         return inside and got != MISSING
 
     # -- connections ---------------------------------------------------------------------------------------------------
@@ -154,7 +156,7 @@ class Machine(RuleBasedStateMachine):
         right = "Already in SDK mode;" if self.modes is not None else "ok;"
         assert self.run(self._ask(client, "command")) == right
         self.modes = self.modes or Modes()
-        self.members.add(client)
+        self.members.add(client)  # type: ignore[arg-type]
 
     @rule(client=clients, really=st.integers(0, 3).map(lambda number: number == 3))
     def leave(self, client: TextClient, really: bool) -> None:

@@ -243,7 +243,7 @@ class Generator:
         if isinstance(value, list):
             if not schema.get("minItems", 0) <= len(value) <= schema.get("maxItems", 1 << 30):
                 return f"{path}: {len(value)} entries"
-            misfits = (self.misfit(entry, schema.get("items", {}), f"{path}[]", more=more) for entry in value)
+            misfits = (self.misfit(entry, schema.get("items", {}), f"{path}[]", more=more) for entry in value)  # type: ignore[assignment]
             return next(filter(None, misfits), "")
         return self._object_misfit(value, schema, path, more) if isinstance(value, dict) else ""
 

@@ -19,4 +19,4 @@ def test_the_judge_notices_what_is_lost() -> None:
             return {"k1": 7, "k3": 5}
 
     writer = Forgetful(known={"k1": 7, "k2": 8}, flying=("k3", 5))
-    assert [problem.split()[1] for problem in writer.check(print)] == ["k2:"]
+    assert [problem.split()[1] for problem in writer.check(print)] == ["k2:"]  # type: ignore[arg-type]

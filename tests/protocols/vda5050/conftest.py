@@ -68,8 +68,8 @@ class Control:
         self.serial = ""
 
     def close(self) -> None:
+        self._client.disconnect()  # first: the loop's thread ends with the connection, else it sleeps for a second
         self._client.loop_stop()
-        self._client.disconnect()
 
     def hear(self) -> None:
         """Take in what has come."""

@@ -179,7 +179,7 @@ async def test_a_message_that_breaks_the_door_ends_nothing(yard: Opened, monkeyp
         raise ZeroDivisionError("a defect")
 
     with monkeypatch.context() as patch:
-        patch.setattr(door._context, "check", broken)
+        patch.setattr(door._context, "check", broken)  # type: ignore[attr-defined]
         one.control.send("order", order("one", [(0, 0), (0.5, 0)]))
         await one.until(lambda: any("broke" in e["errorDescription"] for e in one.control.state["errors"]))
     one.control.send("order", order("two", [(0, 0), (0.5, 0)]))

@@ -151,13 +151,13 @@ async def test_a_robot_that_may_not_start_says_so_at_the_time(app: FrontEnd, pla
     battery = plain_robot.add(Battery, Charge())
     await plan(app, "once", "single", "now + 1minutes")
     await plan(app, "again", "cycle", "* * * * *")
-    battery.charge = 0.04
+    battery.charge = 0.04  # type: ignore[attr-defined]
     await app.clock.advance(60)
     await app.until(lambda: starts(app, "once") and starts(app, "again"), pace=0.0)
     assert [app.news(id, "start")[0]["feedback"]["state"] for id in ("once", "again")] == [27, 27]
     assert (await app.state("once"), await app.state("again")) == ("shutdown", "run_wait")
     assert "not started" in (await app.service.log("once"))[-1].text
-    battery.charge = 1.0
+    battery.charge = 1.0  # type: ignore[attr-defined]
     await app.clock.advance(60)
     await app.ends("again", pace=0.0)
 

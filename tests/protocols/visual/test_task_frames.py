@@ -265,7 +265,7 @@ async def test_debug_runs_at_once_replaces_itself_and_is_not_listed(app: FrontEn
 async def test_the_robots_mode_refuses_in_the_vendors_words(app: FrontEnd, plain_robot: Robot) -> None:
     battery = plain_robot.add(Battery, Charge())
     await app.start("t", BUSY)
-    battery.charge = 0.04
+    battery.charge = 0.04  # type: ignore[attr-defined]
     [answer] = await app.ask("recover", "t")
     words = "The current robot is in [LowPower] mode and does not support <recover> operation."
     assert (answer["state"], answer["describe"]) == (27, words)

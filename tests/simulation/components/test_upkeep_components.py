@@ -31,9 +31,9 @@ async def test_time_left_follows_what_the_robot_does(robot, world, forward):
     assert robot[Battery].state.remaining < 0.95 * idle
     before = robot[Battery].state
     robot[Base].set_velocity(Twist())
-    await forward(seconds=600)
+    await forward(seconds=200)
     used = before.percentage - robot[Battery].state.percentage
-    assert used * idle == pytest.approx(before.percentage * 600, rel=0.15)
+    assert used * idle == pytest.approx(before.percentage * 200, rel=0.15)
 
 
 async def test_on_the_dock_no_time_runs_out(robot, forward):

@@ -60,6 +60,8 @@ def test_what_is_seen() -> None:
 @given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=2), st.tuples(*[st.floats(-1e6, 1e6)] * 3))
 def test_what_our_robots_say_is_understood(profile: Profile, xy: list[float], angles: tuple[float, ...]) -> None:
     position, attitude = hear(profile.push("chassis", ("position", xy), ("attitude", angles), separator=" ; "))
+    assert isinstance(position, ChassisPosition)
+    assert isinstance(attitude, ChassisAttitude)
     assert (position.x, position.y) == pytest.approx(xy, abs=6e-4)
     assert attitude.yaw == pytest.approx(angles[2], abs=6e-4)
 

@@ -128,7 +128,7 @@ async def test_lost_pictures_are_answered_by_the_next_keyframe(watch, robot, for
     await watcher.connect()
     asked: list[float] = []
     real = robot[VideoStream].request_keyframe
-    robot[VideoStream].request_keyframe = lambda: (asked.append(1.0), real())  # type: ignore[method-assign]
+    robot[VideoStream].request_keyframe = lambda: (asked.append(1.0), real())  # type: ignore[func-returns-value, method-assign]
     async with time_passing(forward):
         await until(lambda: len(watcher.frames) >= 3, 4 * PATIENCE)
         asked.clear()

@@ -71,7 +71,7 @@ def main(ip: str) -> None:  # noqa: PLR0915 - one tour
     seen["fire"] = robot.blaster_fire()
     print("TOUCH ME", flush=True)
     events.work()
-    seen["event"] = dataclasses.astuple(happened.get())
+    seen["event"] = dataclasses.astuple(happened.get())  # type: ignore[call-overload]
     events._conn.close()
 
     seen["audio"] = [robot.audio(True), robot.audio(False)]

@@ -104,7 +104,7 @@ async def test_the_transcripts_are_true(
                 assert waited or text in CAUSES, text
                 reported = await reported_meanwhile(CAUSES.get(text, "time"), float(waited[1]) if waited else 3)
             case "*":
-                wrong += [] if any(alike(text, each) for each in reported) else [(line, *sorted(reported)[:9])]
+                wrong += [] if any(alike(text, each) for each in reported) else [(line, *sorted(reported)[:9])]  # type: ignore[list-item]
             case _:
                 raise AssertionError(line)
     assert not wrong

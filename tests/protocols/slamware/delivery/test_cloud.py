@@ -141,7 +141,7 @@ async def test_an_industrial_round(screen: Screen, cloud: Path) -> None:
     ]
     assert_pose(screen.pose, x=3.0, y=0.0, within=0.15)
     assert (task["task"]["type"], task["task"]["order_id"], task["status"]) == ("INDUSTRY", "r-1", "RUNNING")
-    assert task["task"]["task_targets"] == [targets[0], targets[1] | {"wait_time": 0}]
+    assert task["task"]["task_targets"] == [targets[0], targets[1] | {"wait_time": 0}]  # type: ignore[operator]
     assert (await screen.client.get(INDUSTRY, params={"type": "carry_calling"})).json() == []
     assert (await screen.client.get(f"{API}/tasks")).json() == []
     assert await screen.say("end_operation") == 204

@@ -181,7 +181,7 @@ async def test_remote_control_stops_by_itself(
     world.hands.place("a", Pose(5.0, 5.0))
     await forward(seconds=1)
     before = world.truth.pose_of("a")
-    info = await start(client, "MoveByAction", **options)
+    info = await start(client, "MoveByAction", **options)  # type: ignore[arg-type]
     await forward(seconds=2)
     moved = world.truth.pose_of("a").relative_to(before)
     assert (moved.x > 0.05, moved.x < -0.05) == (twist.x > 0, twist.x < 0)
