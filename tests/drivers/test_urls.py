@@ -42,7 +42,7 @@ def test_one_owner_for_each_connection() -> None:
         ("slamware://host:99999", "Port"),
         ("slamware://host/path", "SCHEME://HOST:PORT"),
         ("slamware://host?certs=x", "unknown options: certs"),
-        ("robomaster://host?event=x", "invalid literal"),
+        ("robomaster://host?event=x", "event is a port"),
         ("robomaster://host?colour=red", "unknown options: colour"),
         ("cyberdog://host", "requires certificates"),
         ("cyberdog://host?certs=x&app=y", "app is a port"),

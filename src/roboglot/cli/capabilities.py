@@ -15,9 +15,7 @@ from typing import Annotated
 import typer
 
 from roboglot.config import RobotConfig
-from roboglot.drivers.cyberdog.capabilities import APPROXIMATIONS as CYBERDOG
-from roboglot.drivers.robomaster.capabilities import APPROXIMATIONS as ROBOMASTER
-from roboglot.drivers.slamware.capabilities import APPROXIMATIONS as SLAMWARE
+from roboglot.drivers import DRIVERS as DRIVER_TYPES
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.component import Component
@@ -28,9 +26,8 @@ from roboglot.storage.database import Database
 BODIES = ("universal", "robomaster_ep", "cyberdog2", "hermes")
 # Name to a URL where no robot is, and what the driver announces.
 DRIVERS: Mapping[str, tuple[str, Mapping[type[Component], str]]] = {
-    "slamware://": ("slamware://127.0.0.1:9", SLAMWARE),
-    "robomaster://": ("robomaster://127.0.0.1:9", ROBOMASTER),
-    "cyberdog://": ("cyberdog://127.0.0.1:9?certs=none", CYBERDOG),
+    f"{kind.scheme}://": (f"{kind.scheme}://127.0.0.1:9" + f"?{kind.example}" * bool(kind.example), kind.announced())
+    for kind in DRIVER_TYPES
 }
 PAGE = Path("docs/capabilities.md")
 

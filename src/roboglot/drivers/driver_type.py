@@ -1,0 +1,64 @@
+"""What a driver is to the program: a scheme of URLs, their options, and how it is made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Hashable, Mapping
+from dataclasses import dataclass, field
+from typing import TypeVar, cast
+
+from roboglot.drivers.driver import Driver
+from roboglot.model.components.component import Component
+from roboglot.model.robot import Robot
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """Where a real robot is: the parts of its URL, whose options are among those of its driver."""
+
+    url: str
+    host: str
+    port: int | None
+    options: Mapping[str, str]
+
+    def port_option(self, name: str, default: int) -> int:
+        """Return an option that is a port. Raises ValueError."""
+        text = self.options.get(name, str(default))
+        if not text.isascii() or not text.isdigit() or int(text) > 65_535:
+            raise ValueError(f"{self.url}: {name} is a port")
+        return int(text)
+
+
+@dataclass(frozen=True, slots=True)
+class Workshop:
+    """What the drivers of one program share. Without ``touches`` robots are only observed.
+
+    ``own``: addresses of the program's own doors, which discovery ignores.
+    """
+
+    own: Collection[str] = ()
+    touches: bool = True
+    _shared: dict[Hashable, object] = field(default_factory=dict)
+
+    def shared(self, key: Hashable, make: Callable[[], T]) -> T:
+        """Return the one thing of this key, made when it is asked for first: a UDP port can be bound once."""
+        if key not in self._shared:
+            self._shared[key] = make()
+        return cast(T, self._shared[key])
+
+
+@dataclass(frozen=True, slots=True)
+class DriverType:
+    """One driver. It is imported at every start: ``make`` and ``announced`` import what they need.
+
+    ``make`` adds the components to the bare robot; it raises ValueError for a bad URL. ``announced``: the components
+    that a robot of this kind has or may have, each with how it is only nearly the model's, in plain words, or "".
+    ``example``: options without which a URL is refused.
+    """
+
+    scheme: str
+    make: Callable[[Workshop, Robot, Target], Driver]
+    announced: Callable[[], Mapping[type[Component], str]] = dict
+    options: frozenset[str] = frozenset()
+    example: str = ""
