@@ -15,7 +15,7 @@ DEPOT = Path(__file__).parents[1] / "data" / "maps" / "depot.yaml"
 @pytest.mark.parametrize("world", ["office", pytest.param(str(DEPOT), marks=pytest.mark.slow)], ids=["office", "depot"])
 def test_four_clients_drive_one_robot(world: str, tmp_path: Path, vendor_ports: None) -> None:
     out = tmp_path / "tour.png"
-    command = [sys.executable, "-m", "roboglot", "demo", "--world", world, "--speed", "3"]
+    command = [sys.executable, "-m", "roboglot", "demo", "--world", world, "--speed", "6"]
     done = subprocess.run(
         [*command, "--address", "127.0.0.57", "--out", str(out)],
         capture_output=True,

@@ -4,23 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Coroutine, Sequence
-from dataclasses import replace
+from collections.abc import Coroutine, Sequence
 
 from roboglot.autonomy.delivery.delivery_round import Round
 from roboglot.autonomy.delivery.drive import Driver, Failed
+from roboglot.autonomy.delivery.follow_up import follow_up
 from roboglot.autonomy.delivery.handover import Ears, Signal
 from roboglot.autonomy.delivery.order_book import OrderBook
-from roboglot.autonomy.delivery.rules import (
-    BOXED,
-    PARKING,
-    RECEPTION,
-    at_work,
-    check_requests,
-    place_of_type,
-)
-from roboglot.model.components.energy.battery import Battery, DockContact
-from roboglot.model.components.energy.power import Power
+from roboglot.autonomy.delivery.readiness import Readiness
+from roboglot.autonomy.delivery.rules import BOXED, PARKING, check_requests, place_of_type
 from roboglot.model.components.logistics.delivery import (
     Delivery,
     Failure,
@@ -31,20 +23,15 @@ from roboglot.model.components.logistics.delivery import (
     OrderStatus,
     Phase,
     Policy,
-    Untaken,
 )
-from roboglot.model.components.mapping.localization import Localization
-from roboglot.model.components.mapping.storeys import Storeys
-from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.driving import BASE
 from roboglot.model.errors import Refused, RobotError
-from roboglot.model.events import BatteryChanged, DeliveryNews, DockContactChanged, PoseJumped
+from roboglot.model.events import DeliveryNews
 from roboglot.model.robot import Robot
 
 log = logging.getLogger(__name__)
 HOURS_LOOK = 10.0  # s between looks at the clock while there is nothing to do
 BASE_LOOK = 1.0  # s between looks whether another client still drives the robot
-RECOVERED = 80  # percent from which the robot works again after it was low
 
 
 class QueueDelivery(Delivery):
@@ -62,24 +49,17 @@ class QueueDelivery(Delivery):
         self._job: asyncio.Task[None] | None = None
         self._worker: asyncio.Task[None] | None = None
         self._giving_up: asyncio.Task[None] | None = None
-        self._rest_due = self._low = self._off_work = self._lost = False
-        self._endings: list[Callable[[], None]] = []
+        self._readiness = Readiness(robot, self, self._driver.report)
 
     def start(self) -> None:
         """Go on with what is in the book."""
-        listen = self._robot.events.listen
-        self._endings = [
-            listen(BatteryChanged, self._battery_changed),
-            listen(PoseJumped, lambda _: self._found()),
-            listen(DockContactChanged, self._pushed),
-        ]
+        self._readiness.start()
         if self._book.open:
-            self._wake()
+            self.wake()
 
     def close(self) -> None:
         """Leave the book as it is."""
-        for end in self._endings:
-            end()
+        self._readiness.close()
         for task in (self._worker, self._job, self._giving_up):
             if task:
                 task.cancel()
@@ -104,14 +84,17 @@ class QueueDelivery(Delivery):
         await self._book.set_policy(policy)
         self._driver.report(DeliveryNews.SETTINGS_CHANGED)
         if self._worker:
-            self._wake()
+            self.wake()
 
     async def accept(self, *requests: OrderRequest) -> Sequence[Order]:
         async with self._lock:
             check_requests(self._robot, self.policy, requests, self._book.open)
-            if any(request.kind in BOXED for request in requests) and self._level() <= self.policy.level_no_takeout:
+            if (
+                any(request.kind in BOXED for request in requests)
+                and self._readiness.level <= self.policy.level_no_takeout
+            ):
                 raise Refused("the battery is too low for takeouts")
-            if any(request.remote for request in requests) and self._level() <= self.policy.level_no_cloud:
+            if any(request.remote for request in requests) and self._readiness.level <= self.policy.level_no_cloud:
                 raise Refused("the battery is too low for orders from afar")
             known = {order.number for order in self._book.orders}
             if any(request.number in known for request in requests if request.number):
@@ -119,7 +102,7 @@ class QueueDelivery(Delivery):
             orders = await self._book.add(requests)
         if any(request.remote for request in requests):
             self._driver.report(DeliveryNews.ORDER_RECEIVED)
-        self._wake()
+        self.wake()
         return orders
 
     async def cancel(self, id: str | None = None) -> None:
@@ -141,9 +124,9 @@ class QueueDelivery(Delivery):
     async def execute(self, on: bool) -> None:
         await self._book.hold(not on)
         if on and not self.executing:
-            self._rest_due = True
+            self._readiness.rest_due = True
         self._driver.hold(not on)
-        self._wake()
+        self.wake()
 
     async def start_pickup(self) -> None:
         order = self.current
@@ -170,7 +153,13 @@ class QueueDelivery(Delivery):
         if running and self._job:
             self._job.cancel()
 
-    def _wake(self) -> None:
+    @property
+    def delivers(self) -> bool:
+        """Whether there ever was an order."""
+        return self._worker is not None
+
+    def wake(self) -> None:
+        """Look again at what is to be done."""
         self._woken.set()
         if self._worker is None:
             self._worker = asyncio.get_running_loop().create_task(self._work(), name=f"{self._robot.id} delivers")
@@ -179,20 +168,20 @@ class QueueDelivery(Delivery):
 
     def _next(self) -> Order | None:
         """The order to begin now."""
-        if not self.executing or self._low or self._lost or not at_work(self.policy, self._robot.clock.epoch()):
+        if not self.executing or not self._readiness.works:
             return None
         return next((order for order in self._book.open if order.status is OrderStatus.READY), None)
 
     async def _work(self) -> None:
         while True:
             self._woken.clear()
-            self._watch_hours()
+            self._readiness.look_at_hours()
             if order := self._next():
                 if self._robot.actions.running(BASE):
                     await self._robot.clock.sleep(BASE_LOOK)  # the current driver may finish
                     continue
                 await self._carry_out(order)
-            elif self._rest_due and self.executing and not self._lost:
+            elif self._readiness.rest_due and self.executing and not self._readiness.lost:
                 await self._rest()
             else:
                 await self._wait()
@@ -206,17 +195,10 @@ class QueueDelivery(Delivery):
         except TimeoutError:
             return
 
-    def _watch_hours(self) -> None:
-        off = not at_work(self.policy, self._robot.clock.epoch())
-        if off != self._off_work:
-            self._off_work = off
-            self._rest_due |= off
-            self._driver.report(DeliveryNews.WORK_ENDED if off else DeliveryNews.WORK_BEGAN)
-
     async def _carry_out(self, order: Order) -> None:
         began = order.began_at or self._robot.clock.epoch()
         order = await self._book.change(order.id, status=OrderStatus.RUNNING, began_at=began)
-        self._current, self._phase, self._rest_due = order.id, Phase.WORKING, True
+        self._current, self._phase, self._readiness.rest_due = order.id, Phase.WORKING, True
         station = order.request.kind is OrderKind.STATION
         self._driver.report(DeliveryNews.STATION_STARTED if station else DeliveryNews.ORDER_STARTED)
         failure: Failure | None = None
@@ -235,7 +217,7 @@ class QueueDelivery(Delivery):
         if not order.status.ended:
             order = await self._book.change(order.id, status=status, failure=failure or order.failure)
         if status is OrderStatus.FAILED:
-            await self._follow_up(order)
+            await follow_up(self._robot, self._book, self._driver, self._readiness, order)
 
     async def _do(self, work: Coroutine[None, None, None]) -> bool:
         """Do it as a task that others may cancel; False if they did."""
@@ -250,91 +232,29 @@ class QueueDelivery(Delivery):
         job.result()
         return True
 
-    async def _follow_up(self, order: Order) -> None:
-        """Report that it was not collected, and bring what is left in boxes back to the reception."""
-        kind, request = order.request.kind, order.request
-        if order.failure is Failure.INTERRUPTED:
-            self._rest_due = False  # another client has the robot
-        if order.failure is Failure.NOT_LOCALIZED:
-            self._lose()
-        if kind is OrderKind.DISINFECT:
-            self._driver.report(DeliveryNews.DISINFECT_FAILED)
-        if order.failure is Failure.NOT_TAKEN:
-            self._driver.report(DeliveryNews.NOT_COLLECTED if kind is OrderKind.COLLECT else DeliveryNews.NOT_TAKEN)
-        taken = {result.box for result in order.results if result.failure is None}
-        left = tuple(box for box in request.boxes if box not in taken)
-        reception = place_of_type(self._robot, RECEPTION)
-        if kind not in BOXED or not left or reception is None:
-            return
-        self._driver.report(DeliveryNews.BACK_TO_RECEPTION)
-        untaken = Untaken(request.target, left)
-        waiting = [o for o in self._book.open if o.request.kind is OrderKind.COLLECT and o.status is OrderStatus.READY]
-        if waiting:
-            known = waiting[0]
-            boxes = (*known.request.boxes, *left)
-            merged = replace(known.request, boxes=boxes)
-            await self._book.change(known.id, request=merged, untaken=(*known.untaken, untaken))
-            return
-        (collect,) = await self._book.add([OrderRequest(OrderKind.COLLECT, reception.place.id, boxes=left)])
-        await self._book.change(collect.id, untaken=(untaken,))
-
     async def _rest(self) -> None:
         """To the parking place, or onto the dock; there at once off work and with a low battery."""
-        robot, self._rest_due = self._robot, False
-        docked = DockContact in robot and robot[DockContact].docked
-        parking = None if self._low or self._off_work else place_of_type(robot, PARKING)
+        robot, readiness = self._robot, self._readiness
+        readiness.rest_due = False
+        docked = readiness.docked
+        parking = place_of_type(robot, PARKING) if readiness.parks else None
         try:
             if parking:
                 self._phase = Phase.RETURNING
                 await self._do(self._driver.go(parking, self.policy, self.policy.return_speed))
-            elif not docked and Docking in robot and self._has_home():
+            elif not docked and readiness.has_home:
                 self._phase = Phase.GOING_HOME
                 await self._do(self._driver.go_home(self.policy))
         except Failed as error:
             log.info("robot %s could not go to rest: %s", robot.id, error)
             if error.failure is Failure.NOT_LOCALIZED:
-                self._lose()
+                readiness.lose()
         finally:
             self._phase = Phase.IDLE
 
-    def _lose(self) -> None:
-        """Wait with orders until the pose is set, or the robot stands on its dock."""
-        self._lost = True
-        self._driver.report(DeliveryNews.PLACE_LOST)
-
-    def _found(self) -> None:
-        if self._lost:
-            self._lost = False
-            self._wake()
-
-    def _pushed(self, event: DockContactChanged) -> None:
-        """A lost robot on its dock knows where it is."""
-        if event.docked and self._lost and (home := self._robot[Docking].home) is not None:
-            self._robot[Localization].set_pose(home)
-
-    def _has_home(self) -> bool:
-        maps = self._robot[Storeys].maps if Storeys in self._robot else None
-        return self._robot[Docking].home is not None or (maps is not None and maps.home() != maps.current)
-
-    def _level(self) -> float:
-        return self._robot[Battery].state.percentage * 100 if Battery in self._robot else 100.0
-
-    def _battery_changed(self, _: BatteryChanged) -> None:
-        """Only a robot that has delivered: the battery of all others is not this service's business."""
-        if self._worker is None:
-            return
-        state, level = self._robot[Battery].state, self._level()
-        if self._low and level >= RECOVERED:
-            self._low = False
-            self._driver.report(DeliveryNews.WORK_BEGAN)
-            self._wake()
-        elif not self._low and level <= self.policy.level_home and not state.charging:
-            self._low = self._rest_due = True
-            self._driver.report(DeliveryNews.BATTERY_LOW)
-            giving_up = self._give_up()
-            self._giving_up = asyncio.get_running_loop().create_task(giving_up, name=f"{self._robot.id} battery low")
-        elif level <= self.policy.level_off and not state.charging and Power in self._robot:
-            self._robot[Power].shut_down(source="delivery")
+    def give_up(self) -> None:
+        """Cancel all orders: the battery is low."""
+        self._giving_up = asyncio.get_running_loop().create_task(self._give_up(), name=f"{self._robot.id} battery low")
 
     async def _give_up(self) -> None:
         async with self._lock:
@@ -342,4 +262,4 @@ class QueueDelivery(Delivery):
                 await self._cancel(order, Failure.BATTERY_LOW)
         if self._phase is Phase.RETURNING and self._job:
             self._job.cancel()
-        self._wake()
+        self.wake()

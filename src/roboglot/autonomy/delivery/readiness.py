@@ -1,0 +1,132 @@
+"""Whether a delivering robot may work now: charged, within its hours, and sure of where it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from roboglot.autonomy.delivery.rules import at_work
+from roboglot.model.components.energy.battery import Battery, DockContact
+from roboglot.model.components.energy.power import Power
+from roboglot.model.components.logistics.delivery import Policy
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.storeys import Storeys
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.events import BatteryChanged, DeliveryNews, DockContactChanged, PoseJumped
+from roboglot.model.robot import Robot
+
+RECOVERED = 80  # percent from which the robot works again after it was low
+
+
+class Service(Protocol):
+    """What readiness needs of the service that it belongs to."""
+
+    @property
+    def policy(self) -> Policy: ...
+
+    @property
+    def delivers(self) -> bool:
+        """Whether there ever was an order."""
+
+    def wake(self) -> None:
+        """Look again at what is to be done."""
+
+    def give_up(self) -> None:
+        """Cancel all orders: the battery is low."""
+
+
+class Readiness:
+    """Follows battery, clock and place. ``rest_due``: the robot goes to rest when there is nothing to do."""
+
+    def __init__(self, robot: Robot, service: Service, report: Callable[[DeliveryNews], None]) -> None:
+        self._robot, self._service, self._report = robot, service, report
+        self.rest_due = False
+        self._low = self._off_work = self._lost = False
+        self._endings: list[Callable[[], None]] = []
+
+    def start(self) -> None:
+        """Listen to the robot."""
+        listen = self._robot.events.listen
+        self._endings = [
+            listen(BatteryChanged, self._battery_changed),
+            listen(PoseJumped, lambda _: self._found()),
+            listen(DockContactChanged, self._pushed),
+        ]
+
+    def close(self) -> None:
+        """Listen no more."""
+        for end in self._endings:
+            end()
+
+    @property
+    def works(self) -> bool:
+        """Whether an order may begin now."""
+        hours = at_work(self._service.policy, self._robot.clock.epoch())
+        return hours and not self._low and not self._lost
+
+    @property
+    def lost(self) -> bool:
+        """Whether it does not know where it is."""
+        return self._lost
+
+    @property
+    def parks(self) -> bool:
+        """Whether it rests at its parking place; off work and with a low battery on the dock."""
+        return not self._low and not self._off_work
+
+    @property
+    def docked(self) -> bool:
+        """Whether it stands on a dock."""
+        return DockContact in self._robot and self._robot[DockContact].docked
+
+    @property
+    def has_home(self) -> bool:
+        """Whether there is a dock to go to, on this floor or another."""
+        if Docking not in self._robot:
+            return False
+        maps = self._robot[Storeys].maps if Storeys in self._robot else None
+        return self._robot[Docking].home is not None or (maps is not None and maps.home() != maps.current)
+
+    @property
+    def level(self) -> float:
+        """Charge in percent; full for a robot without a battery."""
+        return self._robot[Battery].state.percentage * 100 if Battery in self._robot else 100.0
+
+    def look_at_hours(self) -> None:
+        """Report the beginning and the end of work."""
+        off = not at_work(self._service.policy, self._robot.clock.epoch())
+        if off != self._off_work:
+            self._off_work = off
+            self.rest_due |= off
+            self._report(DeliveryNews.WORK_ENDED if off else DeliveryNews.WORK_BEGAN)
+
+    def lose(self) -> None:
+        """Wait with orders until the pose is set, or the robot stands on its dock."""
+        self._lost = True
+        self._report(DeliveryNews.PLACE_LOST)
+
+    def _found(self) -> None:
+        if self._lost:
+            self._lost = False
+            self._service.wake()
+
+    def _pushed(self, event: DockContactChanged) -> None:
+        """A lost robot on its dock knows where it is."""
+        if event.docked and self._lost and (home := self._robot[Docking].home) is not None:
+            self._robot[Localization].set_pose(home)
+
+    def _battery_changed(self, _: BatteryChanged) -> None:
+        """Only a robot that has delivered: the battery of all others is not this service's business."""
+        if not self._service.delivers:
+            return
+        state, level, policy = self._robot[Battery].state, self.level, self._service.policy
+        if self._low and level >= RECOVERED:
+            self._low = False
+            self._report(DeliveryNews.WORK_BEGAN)
+            self._service.wake()
+        elif not self._low and level <= policy.level_home and not state.charging:
+            self._low = self.rest_due = True
+            self._report(DeliveryNews.BATTERY_LOW)
+            self._service.give_up()
+        elif level <= policy.level_off and not state.charging and Power in self._robot:
+            self._robot[Power].shut_down(source="delivery")
