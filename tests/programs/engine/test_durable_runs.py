@@ -131,8 +131,12 @@ async def until(condition: Callable[[], object]) -> None:
 async def test_a_task_goes_on_where_its_server_was_killed(second: Callable[[], ProgramService], tmp_path: Path) -> None:
     written = first_life(tmp_path / "robot.db", PROGRAM, "step 2")
     service = second()
-    await until(lambda: "t" in service._runs and service._runs["t"].state == "suspend")
-    await until(lambda: service._runs["t"]._run.suspended)
+    reported: list[tuple[str, str]] = []  # to a front end that was there before the program was back
+    leave = service.reports.join(lambda report: reported.append((report.describe, service._runs["t"].block)))
+    await until(lambda: reported)
+    leave()
+    assert reported == [("Task loop feedback, now state is suspend", "b2")]
+    assert service._runs["t"]._run.suspended
     assert service._runs["t"].block == "b2"
     assert sum("it is suspended: recover it" in text for text in await texts(service)) == 1
     printed = [text for text in await texts(service) if text.startswith("step")]

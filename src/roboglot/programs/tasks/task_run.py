@@ -50,6 +50,7 @@ from roboglot.programs.tasks.reports import (
     RunFigures,
     TaskReport,
     Variables,
+    done,
 )
 from roboglot.programs.tasks.states import TaskOperation, TaskState
 from roboglot.programs.worker.values import unpack
@@ -191,7 +192,7 @@ class TaskRun:
         self.state = TaskState.SUSPEND
         self._session.pause()
         if not self._replaying:
-            await self._run.suspend()
+            await self._hold()
 
     async def close_journal(self) -> None:
         """The run is over and written down: nothing will go on from here."""
@@ -321,7 +322,12 @@ class TaskRun:
         """One call more that is behind the program; after the last it is held where it was lost."""
         self._replaying -= 1
         if not self._replaying and self.state is TaskState.SUSPEND:
-            await self._run.suspend()
+            await self._hold()
+
+    async def _hold(self) -> None:
+        """Stop where it was lost, and report it: front ends that were back before it saw no program."""
+        await self._run.suspend()
+        self._report(done(TaskOperation.SUSPEND, self.task.id, TaskState.SUSPEND))
 
     def _report_block(self, kind: str, id: str) -> None:
         last = self._session.last_state.fields

@@ -121,12 +121,15 @@ export function show() {
 export async function catchUp() {
   const running = opened.value?.running ?? [];
   others.value = running.filter((id) => !mine(id));
-  if (!running.includes(program.value.id)) { settle("idle"); return; }
+  if (running.includes(program.value.id)) await rejoin(); else settle("idle");
+}
+
+/** What was missed of the program while the page was away. */
+async function rejoin() {
   const { log, where } = await ask({ type: "fetch", program: program.value.id });
   printed.value = log.slice(-LINES_MAX).map(entry);
   phase.value = where.state === "suspend" ? "paused" : "running";
   place(where.block, where.line, where.module);
-  if (phase.value === "paused" && !where.block && !where.line) setTimeout(() => { if (phase.value === "paused" && !lit.value) look(); }, 500); // it is on its way back to where it was
 }
 
 /** Another program was opened: what was shown is the other's. */
@@ -191,7 +194,7 @@ function blameRun(found) {
 function report({ feedback, block }) {
   if (!feedback || feedback.type !== "task") return;
   if (!mine(feedback.target_id)) {
-    if (feedback.operate === "start") others.value = [...new Set([...others.value, feedback.target_id])];
+    if (feedback.operate === "start" || /now state is suspend/.test(feedback.describe)) others.value = [...new Set([...others.value, feedback.target_id])];
     if (feedback.operate === "stop" || /now state is shutdown/.test(feedback.describe)) others.value = others.value.filter((id) => id !== feedback.target_id);
     return;
   }
@@ -206,7 +209,7 @@ function report({ feedback, block }) {
     return;
   }
   if (/Task loop feedback/.test(feedback.describe)) {
-    if (/is suspend/.test(feedback.describe)) { phase.value = "paused"; look(); } else if (/is run$/.test(feedback.describe)) phase.value = "running"; else settle("idle");
+    if (/is suspend/.test(feedback.describe)) { if (phase.value === "idle") rejoin().catch(() => undefined); else { phase.value = "paused"; look(); } } else if (/is run$/.test(feedback.describe)) phase.value = "running"; else settle("idle");
   } else if (feedback.operate === "start") phase.value = feedback.state ? "idle" : "running";
   else if (feedback.operate === "stop") settle("idle");
   else if (feedback.operate === "run" && feedback.state && phase.value !== "starting") failure.value ??= { text: feedback.describe, en: "", zh: "", block: lit.value };
