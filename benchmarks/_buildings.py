@@ -85,9 +85,9 @@ class Building:
 
 @asynccontextmanager
 async def building(name: str, body: str = "universal", seed: int = 3) -> AsyncIterator[Building]:
-    """The named building with a robot whose localization and mapping stand still."""
+    """The named building, or the one of a world file, with a robot whose localization and mapping stand still."""
     clock, database = LockstepClock(), Database(":memory:")
-    fleet = build_fleet(BUILDINGS[name], [RobotConfig(body=body)], clock=clock, seed=seed, database=database)
+    fleet = build_fleet(BUILDINGS.get(name, name), [RobotConfig(body=body)], clock=clock, seed=seed, database=database)
     await fleet.start(wait=True)
     robot = fleet.robots["a"]
     await clock.advance(0.5)

@@ -18,6 +18,7 @@ SIGMA = 0.02  # m, of a point against a surface
 SIGMA_LOOSE = 0.06  # m, where the surface has no clear direction
 ROBUST, ROBUST_START = 0.06, 0.24  # m, beyond which a point loses its influence: at the end, at the start
 INLIER = 0.08  # m
+MOVED = 0.003  # m, from which a point's surface is looked up again
 CORRELATION = 0.1  # points are not independent: share of their information that is believed
 
 
@@ -82,11 +83,20 @@ def _add(system: Any, nx: float, ny: float, turn: float, residual: float, weight
 
 @kernel()
 def _linearise(
-    surface: Any, evidence: Any, points: Any, pose: Any, sensor: Any, resolution: float, reach: float, system: Any
+    surface: Any,
+    evidence: Any,
+    points: Any,
+    pose: Any,
+    sensor: Any,
+    resolution: float,
+    reach: float,
+    lines: Any,
+    system: Any,
 ) -> tuple[int, int]:
     """Fill the normal equations at ``pose``; returns how many points fit a surface, how many lie in known cells.
 
-    ``reach`` (m): beyond it a point loses its influence.
+    ``reach`` (m): beyond it a point loses its influence. ``lines`` (n, 7): where each point was when its surface was
+    looked up, and what was found; it is looked up again when the point has moved.
     """
     height, width = evidence.shape
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
@@ -102,9 +112,13 @@ def _linearise(
         row, col = int(np.floor(y / resolution)), int(np.floor(x / resolution))
         if row < 0 or col < 0 or row >= height or col >= width:
             continue
-        beam_x, beam_y = x - sensor_x, y - sensor_y
-        away = np.sqrt(beam_x * beam_x + beam_y * beam_y) + 1e-9
-        mean_x, mean_y, nx, ny, weight = surface_near(surface, evidence, x, y, beam_x / away, beam_y / away, resolution)
+        if not abs(x - lines[i, 0]) + abs(y - lines[i, 1]) < MOVED:
+            beam_x, beam_y = x - sensor_x, y - sensor_y
+            away = np.sqrt(beam_x * beam_x + beam_y * beam_y) + 1e-9
+            found = surface_near(surface, evidence, x, y, beam_x / away, beam_y / away, resolution)
+            lines[i, 0], lines[i, 1] = x, y
+            lines[i, 2], lines[i, 3], lines[i, 4], lines[i, 5], lines[i, 6] = found
+        mean_x, mean_y, nx, ny, weight = lines[i, 2], lines[i, 3], lines[i, 4], lines[i, 5], lines[i, 6]
         if weight == 0.0:
             if evidence[row, col] != 0:
                 known += 1
@@ -191,14 +205,16 @@ def match(
     and those where something is known.
     """
     pose, step, right, system = np.empty(3), np.empty(3), np.empty(3), np.empty(9)
-    information, normal = np.empty((3, 3)), np.empty((3, 3))
+    information, normal, lines = np.empty((3, 3)), np.empty((3, 3)), np.empty((points.shape[0], 7))
+    for i in range(points.shape[0]):
+        lines[i, 0] = np.inf
     for i in range(3):
         pose[i] = start[i]
         for j in range(3):
             information[i, j] = covariance[i, j]
     invert(information)
     reach = ROBUST_START if iterations > 0 else ROBUST
-    fit, known = _linearise(surface, evidence, points, pose, sensor, resolution, reach, system)
+    fit, known = _linearise(surface, evidence, points, pose, sensor, resolution, reach, lines, system)
     for _ in range(iterations):
         _covariance(information, system, normal)
         for i in range(3):
@@ -211,7 +227,7 @@ def match(
             pose[i] += step[i]
         settled = reach <= ROBUST
         reach = max(ROBUST, reach * 0.5)
-        fit, known = _linearise(surface, evidence, points, pose, sensor, resolution, reach, system)
+        fit, known = _linearise(surface, evidence, points, pose, sensor, resolution, reach, lines, system)
         if settled and abs(step[0]) + abs(step[1]) < 2e-4 and abs(step[2]) < 1e-4:
             break
     strain = 0.0

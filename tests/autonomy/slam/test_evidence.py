@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from roboglot.autonomy.navigation.route import SPACING, Route
-from roboglot.autonomy.slam.evidence import GRID_MAX, RESOLUTION, EvidenceGrid
+from roboglot.autonomy.slam.evidence import CELLS_MAX, GRID_MAX, RESOLUTION, EvidenceGrid
 from roboglot.autonomy.slam.scan_points import RAYS_MAX, ScanReader
 from roboglot.model.geometry import Pose
 from roboglot.model.sensing import LaserScan
@@ -124,10 +124,23 @@ def test_a_route_of_one_place_ends_there() -> None:
 
 def test_a_full_map_says_so_once(caplog: pytest.LogCaptureFixture) -> None:
     grid = EvidenceGrid()
-    grid.make_room(0.0, 0.0, 99.0, 1.0)
+    grid.make_room(0.0, 0.0, 330.0, 1.0)
     assert not grid.full
+    assert grid.evidence.shape[1] * RESOLUTION > 330.0
     for _ in range(2):
-        grid.make_room(0.0, 0.0, 120.0, 1.0)
+        grid.make_room(0.0, 0.0, 420.0, 1.0)
     assert grid.full
     assert len(caplog.records) == 1
-    assert "100 m along a side" in caplog.text
+    assert "it has 400 x " in caplog.text
+
+
+def test_a_wide_map_is_bounded_by_its_cells_and_keeps_what_it_holds() -> None:
+    grid = EvidenceGrid()
+    grid.make_room(0.0, 0.0, 150.0, 100.0)
+    assert not grid.full
+    grid.evidence[:] = 7
+    known = grid.evidence.size
+    grid.make_room(0.0, 0.0, 390.0, 390.0)
+    assert grid.full
+    assert grid.evidence.size <= CELLS_MAX
+    assert int((grid.evidence == 7).sum()) == known

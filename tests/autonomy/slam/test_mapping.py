@@ -43,9 +43,10 @@ def test_a_grid_without_known_cells_is_an_empty_map() -> None:
     assert evidence_of(OccupancyGrid(np.zeros((9, 9), np.int8), 0.05, Point())).scans == 0
 
 
-def test_a_map_that_is_too_large_is_refused() -> None:
-    cells = np.zeros((1, 3000), np.int8)
-    cells[0, [0, -1]] = 1
+@pytest.mark.parametrize("shape", [(1, 9000), (3000, 2800)])
+def test_a_map_that_is_too_large_is_refused(shape: tuple[int, int]) -> None:
+    cells = np.zeros(shape, np.int8)
+    cells[0, 0] = cells[-1, -1] = 1
     with pytest.raises(InvalidGoal):
         evidence_of(OccupancyGrid(cells, 0.05, Point()))
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
-from roboglot.autonomy.slam.evidence import GRID_MAX, EvidenceGrid
+from roboglot.autonomy.slam.evidence import CELLS_MAX, EvidenceGrid, is_too_large
 from roboglot.autonomy.slam.grid_import import evidence_of
 from roboglot.model.components.mapping.annotations import Annotations
 from roboglot.model.components.system.file_store import FileStore
@@ -89,9 +89,9 @@ def _packed(storey: Storey) -> bytes:
 
 def _unpacked(data: bytes) -> Storey:
     file = msgspec.msgpack.decode(data, type=_File)
-    if not 0 <= file.width <= GRID_MAX >= file.height >= 0:
+    if min(file.width, file.height) < 0 or is_too_large(file.height, file.width):
         raise ValueError(f"{file.width} x {file.height} cells")
-    raw = zlib.decompressobj().decompress(file.cells, GRID_MAX * GRID_MAX)
+    raw = zlib.decompressobj().decompress(file.cells, CELLS_MAX)
     cells = np.frombuffer(raw, np.int8).reshape(file.height, file.width)
     grid = evidence_of(OccupancyGrid(cells, file.resolution, file.origin))
     return Storey(grid, file.home, file.drawn, file.waiting, file.inside)

@@ -16,7 +16,7 @@ from roboglot.autonomy.navigation.route import Route
 from roboglot.autonomy.navigation.rules import Frame, Layers, layers
 from roboglot.autonomy.navigation.terms import Terms
 from roboglot.autonomy.slam.belief import Belief
-from roboglot.autonomy.slam.evidence import GRID_MAX, RESOLUTION, EvidenceGrid
+from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid, is_too_large
 from roboglot.autonomy.slam.scan_points import ScanPoints
 from roboglot.kernels.distance import distances
 from roboglot.kernels.obstacles import free_way, inflated_cost, nearest_open, remember, reopen, without_things
@@ -342,7 +342,7 @@ class Planner:
         columns = [math.floor(p.x / RESOLUTION) - grid.first_column for p in points]
         top, bottom = min(0, min(rows) - ROOM), max(height, max(rows) + ROOM)
         left, right = min(0, min(columns) - ROOM), max(width, max(columns) + ROOM)
-        if bottom - top > GRID_MAX or right - left > GRID_MAX:
+        if is_too_large(bottom - top, right - left):
             raise Unreachable("the goal lies too far from all that is known")
         standing = np.maximum(self._seen, self._low.seen(grid))
         if (top, bottom, left, right) == (0, height, 0, width):

@@ -21,7 +21,8 @@ log = logging.getLogger(__name__)
 T = TypeVar("T")
 
 RESOLUTION = 0.05  # m
-GRID_MAX = 2000  # cells along one side; what lies beyond is not mapped
+GRID_MAX = 8000  # cells along one side; what lies beyond is not mapped
+CELLS_MAX = 8_000_000  # 20,000 m2: 26 bytes each, twice while the map is straightened
 GROWTH = 100  # cells of room made beyond what asks for it
 PER_STEP = 8  # evidence that makes one step of the int8 map
 
@@ -37,7 +38,7 @@ class EvidenceGrid:
         self.first_row = 0
         self.scans = 0
         self.frozen = False  # whether there are cells that no scan may change
-        self.full = False  # whether something was left out because a side has GRID_MAX cells
+        self.full = False  # whether something was left out because there are CELLS_MAX, or GRID_MAX along a side
         self._drawn = OccupancyGrid(np.zeros((0, 0), np.int8), RESOLUTION, Point())
         self._drawn_scans = 0
         self._kept: dict[str, tuple[int, object]] = {}
@@ -56,16 +57,18 @@ class EvidenceGrid:
         return cast("T", value)
 
     def make_room(self, min_x: float, min_y: float, max_x: float, max_y: float) -> None:
-        """Grow until the rectangle (map, m) is inside, or a side has GRID_MAX cells."""
+        """Grow until the rectangle (map, m) is inside, or there are CELLS_MAX of them, GRID_MAX along a side."""
         row0, column0 = math.floor(min_y / RESOLUTION), math.floor(min_x / RESOLUTION)
         row1, column1 = math.floor(max_y / RESOLUTION) + 1, math.floor(max_x / RESOLUTION) + 1
         height, width = self.evidence.shape
         empty = height == 0
-        rows = _grown(self.first_row, self.first_row + height, row0, row1, empty)
-        columns = _grown(self.first_column, self.first_column + width, column0, column1, empty)
+        most = _side(row1 - row0 + 2 * GROWTH if empty else height)
+        columns = _grown(self.first_column, self.first_column + width, column0, column1, empty, most)
+        rows = _grown(self.first_row, self.first_row + height, row0, row1, empty, _side(columns[1] - columns[0]))
         if not self.full and not (_holds(rows, row0, row1) and _holds(columns, column0, column1)):
             self.full = True
-            log.warning("map leaves out what lies farther away: it has %g m along a side", GRID_MAX * RESOLUTION)
+            down, across = (n * RESOLUTION for n in (rows[1] - rows[0], columns[1] - columns[0]))
+            log.warning("map leaves out what lies farther away: it has %.0f x %.0f m", across, down)
         if (rows, columns) == (
             (self.first_row, self.first_row + height),
             (self.first_column, self.first_column + width),
@@ -131,17 +134,27 @@ def _holds(interval: tuple[int, int], begin: int, end: int) -> bool:
     return interval[0] <= begin and end <= interval[1]
 
 
-def _grown(begin: int, end: int, wanted_begin: int, wanted_end: int, empty: bool) -> tuple[int, int]:
-    """The interval [begin, end) grown over the wanted one, with room to spare, up to GRID_MAX cells."""
+def is_too_large(height: int, width: int) -> bool:
+    """Whether a map cannot have so many cells."""
+    return max(height, width) > GRID_MAX or height * width > CELLS_MAX
+
+
+def _side(other: int) -> int:
+    """How many cells one side may have beside the ``other``."""
+    return min(GRID_MAX, CELLS_MAX // max(1, other))
+
+
+def _grown(begin: int, end: int, wanted_begin: int, wanted_end: int, empty: bool, most: int) -> tuple[int, int]:
+    """The interval [begin, end) grown over the wanted one, with room to spare, up to ``most`` cells."""
     if empty:
         begin = end = (wanted_begin + wanted_end) // 2
     elif begin <= wanted_begin and wanted_end <= end:
         return begin, end
     new_begin = wanted_begin - GROWTH if empty or wanted_begin < begin else begin
     new_end = wanted_end + GROWTH if empty or wanted_end > end else end
-    if new_end - new_begin > GRID_MAX:  # keep what there is and share the rest
-        spare = GRID_MAX - (end - begin)
+    if new_end - new_begin > most:  # keep what there is and share the rest
+        spare = most - (end - begin)
         before = min(begin - new_begin, max(spare // 2, spare - (new_end - end)))
         new_begin = begin - before
-        new_end = min(new_end, new_begin + GRID_MAX)
+        new_end = min(new_end, new_begin + most)
     return new_begin, new_end

@@ -12,10 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.autonomy.slam.evidence import (
+    CELLS_MAX,
     GRID_MAX,
     PER_STEP,
     RESOLUTION,
     EvidenceGrid,
+    is_too_large,
 )
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.maps import OccupancyGrid
@@ -47,8 +49,8 @@ def _resampled(grid: OccupancyGrid) -> tuple[NDArray[np.int8], int, int]:
     if not all(map(math.isfinite, (row, column, finer))) or finer <= 0.0:
         raise InvalidGoal("the map has no place")
     height, width = math.ceil(grid.height / finer - SAME), math.ceil(grid.width / finer - SAME)
-    if max(height, width) > GRID_MAX:
-        raise InvalidGoal(f"a map has at most {GRID_MAX * RESOLUTION:g} m along a side")
+    if is_too_large(height, width):
+        raise InvalidGoal(f"a map has at most {CELLS_MAX * RESOLUTION**2:,.0f} m2, {GRID_MAX * RESOLUTION:g} m a side")
     if abs(finer - 1.0) < SAME:
         return grid.log_odds, round(row), round(column)
     if finer < 1.0:

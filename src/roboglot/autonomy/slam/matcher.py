@@ -163,7 +163,8 @@ def places(
     candidates = _candidates(grid, scan, region, most)
     if not candidates:
         return []
-    least = candidates[0].said.agreement - RIVAL_SUPPORTED
+    first = candidates[0].said  # what the map does not know there may be what tells it from a rival
+    least = first.agreement - RIVAL_SUPPORTED - (1.0 - first.known)
     alike = [one for one in candidates if one.match.fit >= RIVAL_FIT * candidates[0].match.fit]
     alike = [one for one in alike if one.said.agreement >= least]
     best = max(alike, key=lambda one: one.look.exact)

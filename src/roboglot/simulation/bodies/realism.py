@@ -28,7 +28,7 @@ def _clean_imu(section: ImuSection) -> ImuSection:
 
 
 def _clean_lidar(section: LidarSection) -> LidarSection:
-    return replace(section, noise=0.0, dropouts=0.0, sector_every=0.0, jitter=0.0, dark=0.0)
+    return replace(section, noise=0.0, dropouts=0.0, sector_every=0.0, jitter=0.0, dark=0.0, gloss=False)
 
 
 def _hard_odometry(section: OdometrySection) -> OdometrySection:

@@ -16,6 +16,7 @@ from roboglot.simulation.world.description import (
     Cylinder,
     Floor,
     Lift,
+    Material,
     Shelf,
     Spot,
     Wall,
@@ -50,6 +51,7 @@ class Solid:
     size: tuple[float, float, float]
     base: float = 0.0
     round: bool = False
+    material: Material = "plain"
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +76,7 @@ def solids_of(floor: Floor, lift: Lift | None, lift_here: bool) -> Iterator[Soli
         yield from _enclosure(floor)
     for wall in floor.walls:
         for start, end in _pieces(wall):
-            yield _wall_between(start, end, wall.thickness, floor.height)
+            yield _wall_between(start, end, wall.thickness, floor.height, wall.material)
     for thing in floor.furniture:
         yield _furniture(thing)
     for dock in floor.docks:
@@ -147,16 +149,16 @@ def _pieces(wall: Wall) -> Iterator[tuple[Spot, Spot]]:
         yield at(done), at(length)
 
 
-def _wall_between(start: Spot, end: Spot, thickness: float, height: float) -> Solid:
+def _wall_between(start: Spot, end: Spot, thickness: float, height: float, material: Material = "plain") -> Solid:
     middle = Pose((start[0] + end[0]) / 2, (start[1] + end[1]) / 2, math.atan2(end[1] - start[1], end[0] - start[0]))
-    return Solid(Kind.WALL, middle, (math.dist(start, end), thickness, height))
+    return Solid(Kind.WALL, middle, (math.dist(start, end), thickness, height), material=material)
 
 
 def _furniture(thing: Box | Cylinder) -> Solid:
     match thing:
         case Box():
             pose = Pose(*thing.at, math.radians(thing.facing))
-            return Solid(Kind.FURNITURE, pose, thing.size, thing.base)
+            return Solid(Kind.FURNITURE, pose, thing.size, thing.base, material=thing.material)
         case Cylinder():
             size = (2 * thing.radius, 2 * thing.radius, thing.height)
             return Solid(Kind.FURNITURE, Pose(*thing.at), size, thing.base, round=True)

@@ -29,6 +29,7 @@ NotNegative = Annotated[float, Meta(ge=0, le=1000)]
 Coordinate = Annotated[float, Meta(ge=-10_000, le=10_000)]
 Spot = tuple[Coordinate, Coordinate]
 TagNumber = Annotated[int, Meta(ge=0, le=APRIL_MAX)]
+Material = Literal["plain", "glass", "mirror"]
 Colour = Literal["red", "green", "blue", "yellow", "black", "white"]
 
 
@@ -40,12 +41,13 @@ class Opening(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Wall(Struct, frozen=True, forbid_unknown_fields=True):
-    """A straight wall as high as the storey."""
+    """A straight wall as high as the storey; ``material``: what lidars make of it."""
 
     start: Spot = field(name="from")
     end: Spot = field(name="to")
     thickness: Positive = 0.12
     doors: tuple[Opening, ...] = ()
+    material: Material = "plain"
 
     @property
     def length(self) -> float:
@@ -60,6 +62,7 @@ class Box(Struct, frozen=True, forbid_unknown_fields=True, tag="box", tag_field=
     size: tuple[Positive, Positive, Positive]
     facing: float = 0.0
     base: NotNegative = 0.0
+    material: Material = "plain"
 
 
 class Cylinder(Struct, frozen=True, forbid_unknown_fields=True, tag="cylinder", tag_field="shape"):

@@ -21,6 +21,7 @@ from roboglot.simulation.building.props import Props
 from roboglot.simulation.building.terrain import slices_of
 from roboglot.simulation.building.things import Thing
 from roboglot.simulation.people.people import Walker
+from roboglot.simulation.world import gloss
 from roboglot.simulation.world.description import Terrain, WorldDescription
 from roboglot.simulation.world.sweep import (
     Distances,
@@ -47,10 +48,13 @@ class Sight:
     ) -> None:
         self._hulls, self._walkers, self._props, self._things = hulls, walkers, props, tuple(things)
         self._elevations = [world.elevation(number) for number in range(len(world.floors))]
-        self._floors = []
+        self._floors, self._plain, self._glossy = [], [], []
         for floor in world.floors:
             solids = solids_of(floor, world.lift, lift_here=True)
-            self._floors.append(_Still([solid for solid in solids if solid.kind is not Kind.DOCK]))
+            still = [solid for solid in solids if solid.kind is not Kind.DOCK]
+            self._floors.append(_Still(still))
+            self._plain.append(_Still([solid for solid in still if solid.material == "plain"]))
+            self._glossy.append([solid for solid in still if solid.material != "plain"])
         self._terrain = [floor.relief for floor in world.floors]
         self._dark: dict[tuple[int, float, float], tuple[Rows, Rows]] = {}  # by floor, height and share
         self._moving: dict[tuple[int, float], Rows] = {}  # what stands round and moves, by floor and height
@@ -97,6 +101,23 @@ class Sight:
             solids = [solid for solid in self._floors[hull.floor].solids if solid.kind is Kind.FURNITURE][::every]
             kept = self._dark[key] = _edges_at(solids, height), _circles_at(solids, height)
         return self._cast(*kept, _ways(rays), hull.x, hull.y, hull.turned, reach)
+
+    def glossy(self, hull: Hull, height: float, rays: int, reach: float, exact: Distances) -> Distances:
+        """What a lidar has of the ``exact`` turn where there is glass, or a mirror."""
+        if not self._glossy[hull.floor]:
+            return exact
+        circles, ways = self._circles_at(hull.floor, height), _ways(rays)
+        edges = np.concatenate((self._plain[hull.floor].at(height)[0], _edges_at(self._props.on(hull.floor), height)))
+        behind = self._cast(edges, circles, ways, hull.x, hull.y, hull.turned, reach)
+        glass, mirrors = (
+            _edges_at([solid for solid in self._glossy[hull.floor] if solid.material == kind], height)
+            for kind in ("glass", "mirror")
+        )
+        c, s = math.cos(hull.turned), math.sin(hull.turned)
+        eye, there = np.array([[hull.x, hull.y]]), ways @ np.array([[c, s], [-s, c]])
+        found = gloss.seen(behind, glass, mirrors, edges, circles, eye, there)
+        found[found > reach] = np.inf
+        return found
 
     def _edges_with_props(self, key: tuple[int, float], height: float) -> tuple[int, Rows]:
         """The edges of still solids and of movable boxes, and their revision; kept until one of the boxes moves."""

@@ -34,6 +34,7 @@ class LidarSection(Struct, frozen=True, forbid_unknown_fields=True):
 
     ``dropouts``: share of rays that measure nothing (NaN); every ``sector_every`` s on average a packet of a twelfth of
     a turn is lost (0: never); ``jitter``: standard deviation (s) of the stamp, which odometry is looked up by.
+    ``gloss``: whether glass lets rays pass and mirrors reflect them; else both answer like any wall.
     ``dark``: share of the furniture that is black and answers only from less than ``dark_reach`` m (NaN beyond).
     """
 
@@ -48,6 +49,7 @@ class LidarSection(Struct, frozen=True, forbid_unknown_fields=True):
     jitter: Annotated[float, Meta(ge=0, le=0.1)] = 0.0
     dark: Annotated[float, Meta(ge=0, le=1)] = 0.0
     dark_reach: Positive = 2.5
+    gloss: bool = True
 
 
 class SimulatedLidar(Lidar):
@@ -85,6 +87,8 @@ class SimulatedLidar(Lidar):
         rise = rise if abs(rise) > CLIMBED else 0.0
         height = rise + hull.belly + section.above_belly
         exact = self._sight.turn(hull, height, section.rays, section.range_max)
+        if section.gloss:
+            exact = self._sight.glossy(hull, height, section.rays, section.range_max, exact)
         noise = self._random.standard_normal(section.rays, dtype=np.float32)
         ranges = self._sight.blur(exact, noise, section.noise, section.range_min, section.range_max)
         if section.dark:
