@@ -67,7 +67,9 @@ async def test_a_cycle_that_still_runs_is_not_started_twice(app: FrontEnd) -> No
     await app.clock.advance(60)
     await app.until(lambda: starts(app, "t"), pace=0.0)
     await app.clock.advance(60)
-    await app.until(lambda: "second time" in "".join(entry.text for entry in app.service._runs["t"]._log), pace=0.0)
+    await app.until(
+        lambda: "second time" in "".join(entry.text for entry in app.service._runs["t"].log._entries), pace=0.0
+    )
     assert starts(app, "t") == 1
     # The first shutdown ends the program, the second takes it off the schedule.
     await app.ask("shutdown", "t")

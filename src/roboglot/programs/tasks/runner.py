@@ -195,7 +195,7 @@ class Runner:
         """Suspend a run and report it."""
         await run.suspend()
         run.state = TaskState.SUSPEND
-        await self._store.set_state(run.task.id, run.state, run.take_log())
+        await self._store.set_state(run.task.id, run.state, run.log.take())
         self.reports.publish(done(TaskOperation.SUSPEND, run.task.id, run.state))
 
     async def recover(self, run: TaskRun, step: Callable[[], None] | None = None) -> None:
@@ -240,7 +240,7 @@ class Runner:
         self.runs.pop(id, None)
         task = await self._store.get(id) or run.task
         state = state_after(before, operation, task.mode)
-        await self._store.set_state(id, state, run.take_log())
+        await self._store.set_state(id, state, run.log.take())
         await run.close_journal()
         self._ended(task, state)
         return state

@@ -133,7 +133,7 @@ class ProgramService:
         """Return the log of a task, oldest entry first."""
         async with self._lock:  # a run that has just ended may still be written down
             if (run := self._runs.get(id)) is not None:
-                await self._store.append_log(id, run.take_log())
+                await self._store.append_log(id, run.log.take())
             return await self._store.log(id)
 
     async def whereabouts(self, id: str) -> Whereabouts:

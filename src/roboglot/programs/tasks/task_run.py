@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections import deque
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, replace
 
@@ -28,7 +27,7 @@ from roboglot.programs.engine.events import (
 )
 from roboglot.programs.engine.journal import Journal
 from roboglot.programs.engine.run import Run
-from roboglot.programs.engine.share import Meter, metered
+from roboglot.programs.engine.share import metered
 from roboglot.programs.engine.usage import usage_of
 from roboglot.programs.errors import NotAllowed
 from roboglot.programs.functions.interrupted import call_cut_off
@@ -38,7 +37,7 @@ from roboglot.programs.functions.table import SPELLINGS, remember
 from roboglot.programs.functions.table import call as call_function
 from roboglot.programs.language.names import EXCEPTIONS
 from roboglot.programs.library.modules import HEADER_LINES
-from roboglot.programs.stores import LOG_MAX, LOG_TEXT_MAX, LogEntry, StoredProgram
+from roboglot.programs.stores import StoredProgram
 from roboglot.programs.tasks.control import ControlWatch
 from roboglot.programs.tasks.reports import (
     Audience,
@@ -52,12 +51,12 @@ from roboglot.programs.tasks.reports import (
     Variables,
     done,
 )
+from roboglot.programs.tasks.run_log import RunLog
 from roboglot.programs.tasks.states import TaskOperation, TaskState
 from roboglot.programs.worker.values import unpack
 
 log = logging.getLogger(__name__)
 
-LINE_MAX = 64 * 1024  # characters that are printed without an end of the line, before they are taken for one
 _REMEMBERED_MAX = 16 * 1024  # bytes of an answer; the state of a longer one (measurements, lists) is not kept
 _BLOCKS = {"cyberdog.task.block", "cyberdog.task.breakpoint_block"}
 _BLOCKS |= {spelling for spelling, name in SPELLINGS.items() if name in _BLOCKS}
@@ -106,14 +105,12 @@ class TaskRun:
         self._session = Session(robot, task.id, self)
         self._clock = robot.clock
         self._began = robot.clock.time()
-        self._report, self._logged = listeners.report, listeners.logged
+        self._report = listeners.report
         self._at_breakpoint = listeners.at_breakpoint
-        self._pace, self._log_pace = pace, listeners.log_pace
-        self._catching_up: asyncio.Future[None] | None = None  # readers of the log, while the program waits for them
+        self._pace = pace
+        self.log = RunLog(robot.clock, run, listeners.log_pace, lambda entry: listeners.logged(task.id, entry))
         self._block: str | None = None
-        self._line = ""  # printed, and not ended yet
         self._answering: asyncio.Task[None] | None = None
-        self._log: deque[LogEntry] = deque(maxlen=LOG_MAX)
         self._ended_itself = False
         self._journal = journal
         run.calls.answered = journal.answered
@@ -122,7 +119,7 @@ class TaskRun:
         self._stop_next_block = bool(stops and stops.first_block)
         self._insights = insights = listeners.insights
         run.noticed = lambda held: insights.publish(Variables(task.id, held))
-        self.control = ControlWatch(robot, f"visual {task.id}", lambda text: self.write("error", text))
+        self.control = ControlWatch(robot, f"visual {task.id}", lambda text: self.log.write("error", text))
         self._ahead = 0.0  # s that the program's time.monotonic is ahead of the clock, which began anew after a crash
 
     @property
@@ -165,7 +162,7 @@ class TaskRun:
             async for event in self._run:
                 match event:
                     case Output(text=text):
-                        await self._print(text)
+                        await self.log.print(text)
                     case Replayed():
                         await self._follow(event)
                     case Call():
@@ -182,7 +179,7 @@ class TaskRun:
             if self._answering is not None:
                 self._answering.cancel()
             self.control.close()
-            self._end_last_line()
+            self.log.close()
             self._session.cancel("the program has ended")
             await self._run.kill()
         return Outcome(ExitReason.FINISHED) if self._ended_itself else outcome
@@ -227,14 +224,13 @@ class TaskRun:
         """Stop what it does on the robot, and end the process: ``kill`` waits until it is gone."""
         self._session.cancel("the program was ended")
         self._run.end_now()
-        if self._catching_up is not None:
-            self._catching_up.cancel()
+        self.log.hurry()
 
     async def kill(self) -> None:
         """End the process now and call off what it does on the robot."""
         self.call_off()
         await self._run.wait()
-        self._end_last_line()
+        self.log.close()
 
     def begin_block(self, id: str) -> None:
         """End the block before, begin this one: the two always alternate (0.2.1.2.2.2)."""
@@ -252,50 +248,9 @@ class TaskRun:
         """The program asked to be suspended here."""
         await self._at_breakpoint()
 
-    async def _print(self, text: str) -> None:
-        """Write whole lines to the log, as fast as the program's share of the server allows."""
-        meter = Meter(self._run.account)
-        start = 0
-        while (end := text.find("\n", start)) >= 0:
-            self._end_line(text[start:end])
-            start = end + 1
-            if self._log_pace.joined and self._run.exit_reason is not ExitReason.KILLED:
-                await self._let_readers_catch_up()
-            if meter.over:
-                await meter.turn()
-        self._line += text[start:]
-        if len(self._line) > LINE_MAX:
-            self._end_line()
-        meter.stop()
-
-    async def _let_readers_catch_up(self) -> None:
-        """Wait for those who follow the log, and no longer than the program lives."""
-        self._catching_up = asyncio.ensure_future(self._log_pace.wait())
-        await asyncio.wait((self._catching_up,))
-        self._catching_up = None
-
-    def _end_line(self, text: str = "") -> None:
-        """A line is whole."""
-        line, self._line = self._line + text, ""
-        self.write("print", line)
-
-    def _end_last_line(self) -> None:
-        """What was printed without an end of the line is a line, too."""
-        if self._line:
-            self._end_line()
-
     def write(self, level: str, text: str) -> None:
-        """Add to the log, which keeps the newest entries."""
-        clean = (text if level == "print" else text[:LOG_TEXT_MAX]).encode("utf-8", "replace").decode()
-        entry = LogEntry(self._clock.epoch(), level, clean)
-        self._log.append(entry)
-        self._logged(self.task.id, entry)
-
-    def take_log(self) -> list[LogEntry]:
-        """What was written since the last time."""
-        entries = list(self._log)
-        self._log.clear()
-        return entries
+        """Add to the log what a function has to say."""
+        self.log.write(level, text)
 
     async def _follow(self, call: Replayed) -> None:
         """Keep what the host knew of a call that is not made again."""
@@ -350,7 +305,7 @@ class TaskRun:
             else:
                 await self._journal.begin(request.name)
                 value = await call_function(self._session, request.name, request.args, request.kwargs)
-            await self._log_pace.wait()
+            await self.log.pace.wait()
             if request.name in _BLOCKS:
                 await self._pace.wait()
                 if self._stop_next_block or self._block in self._stop_blocks:
