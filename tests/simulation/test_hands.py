@@ -1,5 +1,6 @@
 """The documentation's example of hands runs as it stands there; the same seed gives the same blows and shots."""
 
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ from roboglot.model.components.motion.gimbal import FollowMode, Gimbal
 from roboglot.model.components.motion.motion_status import MotionStatus
 from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.components.sensing.range_sensor import RangeSensors
-from roboglot.model.errors import NotFound
+from roboglot.model.errors import Collided, NotFound
 from roboglot.model.events import ArmorHit
 from roboglot.model.geometry import Pose, Twist, Vector3
 
@@ -37,6 +38,29 @@ def test_hands_find_only_what_is_there(simulate):
     ):
         with pytest.raises(NotFound):
             touch()
+
+
+async def test_somebody_more_stands_in_the_way_until_taken_away(simulate):
+    sim = simulate("empty")
+    hands, start = sim.world.hands, sim.world.hands.robots[0].pose
+    ahead = start.compose(Pose(1.2, 0.0))
+    assert hands.add_person(ahead) == "visitor 1"
+    with pytest.raises(ValueError, match="already"):
+        hands.add_person(ahead, name="visitor 1")
+    sim.world.start()
+
+    async def driven(seconds: float) -> float:
+        for _ in range(round(seconds * 10)):
+            with suppress(Collided):
+                sim.robot[Base].set_velocity(Twist(0.4, 0.0, 0.0))
+            await sim.clock.advance(0.1)
+        return hands.robots[0].pose.distance_to(start)
+
+    assert await driven(6.0) < 1.2
+    hands.remove_person("visitor 1")
+    with pytest.raises(NotFound):
+        hands.person("visitor 1")
+    assert await driven(6.0) > 2.0
 
 
 async def battle(simulate, seed):

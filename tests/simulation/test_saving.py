@@ -43,6 +43,20 @@ async def test_what_hands_did_is_in_the_file(tmp_path: Path) -> None:
     assert (standing.x, standing.y, math.degrees(standing.yaw)) == pytest.approx((1.5, 1.0, 45.0), abs=1e-3)
 
 
+async def test_people_who_came_and_went_are_saved(tmp_path: Path) -> None:
+    world = World(load_world("office"), [RobotPlacement("a", "universal")], clock=LockstepClock())
+    hands = world.hands
+    gone, *others = [person.name for person in hands.people]
+    hands.remove_person(gone)
+    came = hands.add_person(Pose(8.0, 10.0, math.pi / 2), name="Ann")
+    path = tmp_path / "now.toml"
+    path.write_text(hands.world_file(), encoding="utf-8")
+    again = World(load_world(str(path)), [RobotPlacement("a", "universal")], clock=LockstepClock())
+    assert len(again.hands.people) == len(others) + 1
+    ann = again.hands.person(came).pose
+    assert (ann.x, ann.y, ann.yaw) == pytest.approx((8.0, 10.0, math.pi / 2), abs=1e-3)
+
+
 async def test_things_are_where_they_were_left(tmp_path: Path) -> None:
     world = World(load_world("obstacle_course"), [RobotPlacement("a", "universal")], clock=LockstepClock())
     world.hands.move_thing("can", Vector3(2.5, 6.5, 0.0))

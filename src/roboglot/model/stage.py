@@ -228,6 +228,14 @@ class Stage(ABC):
         """Return a person to direct, by name, or by place in the file ("person 0 2": the third on the lowest floor)."""
 
     @abstractmethod
+    def add_person(self, pose: Pose, floor: int = 0, name: str = "") -> str:
+        """Have somebody more stand there; return their name. Raises ValueError for a taken name, or too many."""
+
+    @abstractmethod
+    def remove_person(self, name: str) -> None:
+        """Take a person away. Raises NotFound; ValueError for one who wears a gadget."""
+
+    @abstractmethod
     def move_thing(self, name: str, position: Vector3) -> None:
         """Put a small thing elsewhere, at rest."""
 

@@ -12,6 +12,7 @@ from roboglot.model.stage import Stage
 from roboglot.operations import OperationTable, Right
 
 Floor = Annotated[int, msgspec.Meta(ge=0, le=200)]
+PersonName = Annotated[str, msgspec.Meta(max_length=50)]
 Extent = Annotated[float, msgspec.Meta(gt=0.01, le=20)]
 Seed = Annotated[int, msgspec.Meta(ge=0, le=2**31 - 1)]
 Newtons = Annotated[float, msgspec.Meta(ge=-500, le=500)]  # N s
@@ -74,6 +75,20 @@ async def add_box(
 async def remove_box(stage: Stage, *, number: int) -> None:
     """Take a box away."""
     stage.remove_obstacle(number)
+
+
+@WORLD_VERBS.on("add_person")
+async def add_person(
+    stage: Stage, *, x: Meters, y: Meters, yaw: Radians = 0.0, floor: Floor = 0, name: PersonName = ""
+) -> str:
+    """Have somebody more stand there; the answer is their name."""
+    return stage.add_person(Pose(x, y, yaw), floor, name)
+
+
+@WORLD_VERBS.on("remove_person")
+async def remove_person(stage: Stage, *, person: Name) -> None:
+    """Take a person out of the world."""
+    stage.remove_person(person)
 
 
 @WORLD_VERBS.on("move_person")

@@ -51,10 +51,13 @@ Free = Callable[["Walker", Point], bool]  # whether they can walk straight to th
 
 
 class Walker:
-    """One person: where they are, what they do and feel. ``key`` names them if the description does not."""
+    """One person: where they are, what they do and feel. ``body`` is the physics' name for them.
 
-    def __init__(self, person: Person, floor: int, key: str = "") -> None:
-        self.person, self.floor, self.key = person, floor, person.name or key
+    It names them if the description does not. ``look`` chooses their clothes.
+    """
+
+    def __init__(self, person: Person, floor: int, body: str = "", look: int = 0) -> None:
+        self.person, self.floor, self.key, self.body, self.look = person, floor, person.name or body, body, look
         self.emotion = person.emotion
         self.walking = False
         self.displaced = False  # whether they were put elsewhere since the last tick
@@ -258,8 +261,5 @@ def _strolling(person: Person) -> Iterator[Step]:
 
 def keyed(people: Sequence[Sequence[Person]]) -> list[Walker]:
     """All people of the floors."""
-    return [
-        Walker(person, floor, f"person {floor} {index}")
-        for floor, there in enumerate(people)
-        for index, person in enumerate(there)
-    ]
+    every = ((person, floor, index) for floor, there in enumerate(people) for index, person in enumerate(there))
+    return [Walker(person, floor, f"person {floor} {index}", look) for look, (person, floor, index) in enumerate(every)]

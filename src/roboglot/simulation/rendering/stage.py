@@ -109,10 +109,10 @@ class Stage:
 
     def _people(self, number: int) -> Iterator[Figure]:
         elevation = self._world.elevation(number)
-        for index, walker in enumerate(self._walkers):
+        for walker in self._walkers:
             if walker.floor == number:
                 pose, who = walker.pose, walker.person
-                make = partial(person, index, walker.joints)
+                make = partial(person, walker.look, walker.joints)
                 yield Figure(make, pose.x, pose.y, elevation, rotation(LEVEL, pose.yaw), who.radius)
 
     def _robots(self, number: int, viewer: Hull, sector: _Sector) -> Iterator[Figure]:

@@ -81,8 +81,7 @@ class Hands(Stage):
     def place(self, name: str, pose: Pose, floor: int | None = None) -> None:
         hull = self._population.hull(name)
         floor = hull.floor if floor is None else floor
-        if not Places(self._environment.description).inside(pose, floor):
-            raise ValueError(f"floor {floor} of this world has no place ({pose.x:g}, {pose.y:g}, {pose.yaw:g})")
+        self._check_inside(pose, floor)
         hull.place(pose, floor)
         self._environment.sight.moved()
         if name in self._population.simulated:
@@ -139,6 +138,19 @@ class Hands(Stage):
     def person(self, name: str) -> Actor:
         return Actor(self._population.walker(name))
 
+    def add_person(self, pose: Pose, floor: int = 0, name: str = "") -> str:
+        self._check_inside(pose, floor)
+        name = self._population.add_walker(pose, floor, name).key
+        self._environment.sight.moved()
+        return name
+
+    def remove_person(self, name: str) -> None:
+        walker = self._population.walker(name)
+        if any(gadget.wearer is walker for gadget in self._environment.gadgets.all()):
+            raise ValueError(f"{name} wears a gadget that robots may be bound to")
+        self._population.remove_walker(name)
+        self._environment.sight.moved()
+
     def move_thing(self, name: str, position: Vector3) -> None:
         self._environment.things[name].put(np.array((position.x, position.y, position.z)))
 
@@ -166,3 +178,7 @@ class Hands(Stage):
 
     def clear_fault(self, number: int | None = None) -> None:
         self._faults().clear(number)
+
+    def _check_inside(self, pose: Pose, floor: int) -> None:
+        if not Places(self._environment.description).inside(pose, floor):
+            raise ValueError(f"floor {floor} of this world has no place ({pose.x:g}, {pose.y:g}, {pose.yaw:g})")

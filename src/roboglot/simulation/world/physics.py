@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 from functools import lru_cache
 from typing import Any
 
@@ -17,12 +17,13 @@ from roboglot.model.geometry import Pose
 from roboglot.simulation.bodies.body import Body
 from roboglot.simulation.bodies.hull import Hull, Touch
 from roboglot.simulation.building.blueprint import Kind, Solid
-from roboglot.simulation.building.props import OBSTACLES_MAX, Props
+from roboglot.simulation.building.props import AWAY, OBSTACLES_MAX, Props
 from roboglot.simulation.building.terrain import Ground
 from roboglot.simulation.building.things import Things
+from roboglot.simulation.people.people import keyed
 from roboglot.simulation.world.description import WorldDescription
 from roboglot.simulation.world.rays import Rays
-from roboglot.simulation.world.scene import TIMESTEP, build
+from roboglot.simulation.world.scene import TIMESTEP, VISITORS_MAX, build, visitors
 
 LIGHT = 1.0  # kg; a thing that weighs less gives way before a bumper does
 _compiled = lru_cache(maxsize=8)(build)
@@ -56,15 +57,10 @@ class Physics:
         for hull in self.hulls.values():
             self._shape_of[hull.shape] = hull.shape[0]
         self._docks = {geom for geom in range(model.ngeom) if model.geom(geom).name.startswith("dock ")}
-        self._persons = {
-            int(model.body(f"person {n} {i}").geomadr[0])
-            for n, floor in enumerate(world.floors)
-            for i in range(len(floor.people))
-        }
-        people = [(n, i, p) for n, floor in enumerate(world.floors) for i, p in enumerate(floor.people)]
-        self._people = [(int(model.body(f"person {n} {i}").mocapid[0]), p.height / 2) for n, i, p in people]
+        people = [walker.body for walker in keyed([floor.people for floor in world.floors])] + visitors()
+        self._persons = {int(model.body(person).geomadr[0]) for person in people}
         self._places, self._attitudes = self._data.mocap_pos, self._data.mocap_quat
-        self._facing = [math.nan] * len(self._people)
+        self._people = {person: _Standing(model, person) for person in people}
         self.props = Props(model, self._data, self._elevations)
         self.rays = Rays(model, self._data)
         self._car = (model.joint("car").qposadr[0], model.actuator("car").id) if world.lift else None
@@ -114,13 +110,27 @@ class Physics:
         for hull in loose:
             hull.stand(sum(wheel in touching for wheel in hull.wheels) / len(hull.wheels))
 
-    def move_person(self, index: int, pose: Pose, floor: int) -> None:
+    def move_person(self, body: str, pose: Pose, floor: int) -> None:
         """Have a person stand at ``pose``."""
-        mocap, half = self._people[index]
-        self._places[mocap] = pose.x, pose.y, self._elevations[floor] + half
-        if pose.yaw != self._facing[index]:
-            self._facing[index] = pose.yaw
-            self._attitudes[mocap] = math.cos(pose.yaw / 2), 0.0, 0.0, math.sin(pose.yaw / 2)
+        person = self._people[body]
+        self._places[person.mocap] = pose.x, pose.y, self._elevations[floor] + person.half
+        if pose.yaw != person.facing:
+            person.facing = pose.yaw
+            self._attitudes[person.mocap] = math.cos(pose.yaw / 2), 0.0, 0.0, math.sin(pose.yaw / 2)
+        self._model.body_conaffinity[person.id] = person.bits
+
+    def remove_person(self, body: str) -> None:
+        """Take a person away; ``move_person`` brings them back."""
+        person = self._people[body]
+        self._places[person.mocap] = AWAY
+        self._model.body_conaffinity[person.id] = 0
+
+    def spare_person(self, there: Container[str]) -> str:
+        """Return a spare person's name that is not ``there``. Raises ValueError when all are."""
+        free = next((body for body in visitors() if body not in there), None)
+        if free is None:
+            raise ValueError(f"no more than {VISITORS_MAX} people can be added to a world")
+        return free
 
     def add_obstacle(self, pose: Pose, size: tuple[float, float, float], floor: int) -> int:
         """Put one of the spare boxes there. Raises ValueError when none is left or the size makes no sense."""
@@ -186,3 +196,14 @@ class Physics:
                 duty.begin()
         touched.touches.append(Touch(*touched.seen_from(*at), other in self._persons, other in self._light))
         self._touched.add(touched)
+
+
+class _Standing:
+    """Where the model keeps a person."""
+
+    def __init__(self, model: Any, name: str) -> None:
+        body = model.body(name)
+        geom = body.geomadr[0]
+        self.id, self.mocap, self.bits = body.id, int(body.mocapid[0]), int(model.geom_conaffinity[geom])
+        self.half = float(model.geom_size[geom][:2].sum())  # m: of a capsule, radius and half its straight part
+        self.facing = math.nan

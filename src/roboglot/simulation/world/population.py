@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeVar
 
@@ -13,6 +14,7 @@ from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.assembly import SimulatedRobot
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.people.people import Walker
+from roboglot.simulation.world.description import Person
 
 if TYPE_CHECKING:
     from roboglot.simulation.world.physics import Physics
@@ -25,7 +27,7 @@ class Population:
     """``robots`` and ``simulated`` grow as robots are equipped; their hulls stand in the physics from the start."""
 
     physics: Physics
-    walkers: Sequence[Walker]
+    walkers: list[Walker]  # all who look at people share this list
     robots: dict[str, Robot] = field(default_factory=dict)
     simulated: dict[str, SimulatedRobot] = field(default_factory=dict)
     starts: dict[str, tuple[Pose, int]] = field(default_factory=dict)  # where each stood at first, and on which floor
@@ -67,3 +69,20 @@ class Population:
             if walker.key == name:
                 return walker
         raise NotFound(f"no person here is named {name!r}")
+
+    def add_walker(self, pose: Pose, floor: int, name: str) -> Walker:
+        """Have somebody stand there who is in no file. Raises ValueError for a name that is taken, or too many."""
+        body = self.physics.spare_person({walker.body for walker in self.walkers})
+        if any(walker.key == (name or body) for walker in self.walkers):
+            raise ValueError(f"there is a person {name or body} already")
+        person = Person(path=((pose.x, pose.y),), facing=math.degrees(pose.yaw), name=name or body)
+        walker = Walker(person, floor, body, look=max((walker.look for walker in self.walkers), default=0) + 1)
+        self.walkers.append(walker)
+        self.physics.move_person(body, pose, floor)
+        return walker
+
+    def remove_walker(self, name: str) -> None:
+        """Take a person away. Raises NotFound."""
+        walker = self.walker(name)
+        self.walkers.remove(walker)
+        self.physics.remove_person(walker.body)

@@ -40,10 +40,15 @@ def _floor_now(number: int, floor: Floor, population: Population, environment: E
         for level, solid in population.physics.obstacles.values()
         if level == number
     ]
-    sections = {id(walker.person): walker for walker in population.walkers}
-    people = tuple(_person_now(person, sections[id(person)]) for person in floor.people)
+    here = [walker for walker in population.walkers if walker.floor == number]
+    people = tuple(_person_now(walker.person, walker) for walker in here)
+    where = {id(walker.person): index for index, walker in enumerate(here)}
+    gadgets = tuple(
+        gadget if gadget.wearer is None else replace(gadget, wearer=where[id(floor.people[gadget.wearer])])
+        for gadget in floor.gadgets
+    )
     things = tuple(_thing_now(thing, environment) for thing in floor.things)
-    return replace(floor, furniture=(*floor.furniture, *boxes), people=people, things=things, like="")
+    return replace(floor, furniture=(*floor.furniture, *boxes), people=people, gadgets=gadgets, things=things, like="")
 
 
 def _person_now(person: Person, walker: Walker) -> Person:

@@ -32,6 +32,7 @@ from roboglot.simulation.world.description import (
     SOLIDS_MAX,
     Floor,
     Lift,
+    Person,
     Terrain,
     Thing,
     WorldDescription,
@@ -39,6 +40,7 @@ from roboglot.simulation.world.description import (
 
 TIMESTEP = 0.02 / 3  # s: a third of a tick, and of the time in which a contact gives way
 SLAB = 0.2
+VISITORS_MAX = 8
 PIT = 1.2  # m below the lowest floor
 BELLY_PLAY = 0.002
 CASTER = 0.02
@@ -61,11 +63,13 @@ def build(world: WorldDescription, robots: Sequence[tuple[str, Body]]) -> Any:
     for key in keys_of(world):
         body = root.add_body(name=key, mocap=True, pos=AWAY)
         _add_standing(body, mujoco.mjtGeom.mjGEOM_BOX, [0.1, 0.1, 0.1], STANDS | HANGS | MOVES, name=key)
+    for key in visitors():
+        _add_person(root, key, Person(path=()))
     uneven = Ground(world).uneven
     for name, body in robots:
         _add_robot(spec, name, body, tilting=uneven)
     model = spec.compile()
-    for key in keys_of(world):
+    for key in (*keys_of(world), *visitors()):
         model.body_conaffinity[model.body(key).id] = 0  # away: looking whether it touches anything would cost time
     return model
 
@@ -97,10 +101,19 @@ def _add_floor(spec: Any, world: WorldDescription, number: int, floor: Floor, so
     for thing in floor.things:
         _add_thing(root, thing, elevation)
     for index, person in enumerate(floor.people):
-        body = root.add_body(name=f"person {number} {index}", mocap=True, pos=AWAY)
-        size = [person.radius, max(0.01, person.height / 2 - person.radius), 0]
-        _add_standing(body, mujoco.mjtGeom.mjGEOM_CAPSULE, size, STANDS | HANGS | MOVES)
+        _add_person(root, f"person {number} {index}", person)
     return solids
+
+
+def visitors() -> list[str]:
+    """Return the physics' names of the spare people, who can be put into a world while time passes."""
+    return [f"visitor {number}" for number in range(1, VISITORS_MAX + 1)]
+
+
+def _add_person(root: Any, key: str, person: Person) -> None:
+    body = root.add_body(name=key, mocap=True, pos=AWAY)
+    size = [person.radius, max(0.01, person.height / 2 - person.radius), 0]
+    _add_standing(body, mujoco.mjtGeom.mjGEOM_CAPSULE, size, STANDS | HANGS | MOVES)
 
 
 def _add_standing(body: Any, kind: Any, size: list[float], bits: int, **more: object) -> None:

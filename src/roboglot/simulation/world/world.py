@@ -95,8 +95,8 @@ class World:
         self._population = Population(self._physics, self._walkers)
         self.building = Building(description, self._physics, self._walkers)
         self._environment = self._make_environment(seed)
-        for index, walker in enumerate(self._walkers):
-            self._physics.move_person(index, walker.pose, walker.floor)
+        for walker in self._walkers:
+            self._physics.move_person(walker.body, walker.pose, walker.floor)
         radii = {name: body.hull.radius for name, body in bodies.items()}
         places = Places(description, [(p.start, p.floor, radii[p.name]) for p in robots if p.start is not None])
         for placement in robots:
@@ -238,9 +238,9 @@ class World:
         robots: dict[int, list[Hull]] = {}
         for hull in self._physics.hulls.values():
             robots.setdefault(hull.floor, []).append(hull)
-        for index, walker in enumerate(self._walkers):
+        for walker in self._walkers:
             if walker.walk(TICK, robots.get(walker.floor, ()), self._environment.surroundings.lines.leads):
-                self._physics.move_person(index, walker.pose, walker.floor)
+                self._physics.move_person(walker.body, walker.pose, walker.floor)
             for step in walker.fetch():
                 self._sound(walker, step)
 

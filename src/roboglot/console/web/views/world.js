@@ -23,6 +23,7 @@ async function draw(verb, values) { if ((await command(verb, values)) !== undefi
 
 const WORLD_TOOLS = {
   box: { drag: arrow, drop, done: (from, to) => { drop(); changeWorld("add_box", { ...inWorld(from, to), floor: floor() }); } },
+  visitor: { drag: arrow, drop, done: (from, to) => { drop(); changeWorld("add_person", { ...inWorld(from, to), floor: floor() }); } },
   person: { drag: arrow, drop, done: (from) => { drop(); const { x, y } = inWorld(from, null); const person = someone.value || Object.keys(truth.value?.people ?? {})[0];
     if (person) changeWorld("move_person", { person, x, y }); else say(t("people.none"), true); } },
   move: { drag: arrow, drop, done: (from, to) => { drop(); changeWorld("place_robot", { robot: current.value, ...inWorld(from, to), floor: floor() }); } },
@@ -33,8 +34,8 @@ const MAP_TOOLS = {
   track: { drag: (from, to) => { shape.value = { line: [from, to] }; }, drop, done: (from, to) => { drop(); if (to) draw("add_line", { kind: "track", start: from, end: to }); } },
   area: { drag: (from, to) => { shape.value = { rectangle: [from, to] }; }, drop, done: (from, to) => { drop(); if (to) draw("add_area", rectangle(from, to)); } },
 };
-const NEEDS = { box: "add_box", person: "move_person", move: "place_robot", place: "add_place", wall: "add_line", track: "add_line", area: "add_area" };
-const ICONS = { box: "box", person: "person", move: "move", place: "place", wall: "wall", track: "route", area: "fit" };
+const NEEDS = { box: "add_box", visitor: "add_person", person: "move_person", move: "place_robot", place: "add_place", wall: "add_line", track: "add_line", area: "add_area" };
+const ICONS = { box: "box", visitor: "person", person: "route", move: "move", place: "place", wall: "wall", track: "route", area: "fit" };
 
 /** A forbidden area between two corners. */
 function rectangle([x0, y0], [x1, y1]) {
@@ -53,7 +54,8 @@ function People() {
     <div class="card"><h3>${t("people")}</h3>${names.length ? html`<ul class="list">${names.map((name) => html`<li>
       <${Button} label=${name} on=${(someone.value || names[0]) === name} onClick=${() => { someone.value = name; tool.value = "person"; }} />
       <${Button} label=${t("people.resume")} verb="resume_person" onClick=${() => changeWorld("resume_person", { person: name })} />
-      <${Button} label=${t("say")} verb="person_says" onClick=${() => { const text = prompt(t("say.text")); if (text) changeWorld("person_says", { person: name, text }); }} /></li>`)}</ul>` : html`<p class="muted">${t("people.none")}</p>`}</div>
+      <${Button} label=${t("say")} verb="person_says" onClick=${() => { const text = prompt(t("say.text")); if (text) changeWorld("person_says", { person: name, text }); }} />
+      <${Button} label=${t("remove")} verb="remove_person" onClick=${() => changeWorld("remove_person", { person: name })} /></li>`)}</ul>` : html`<p class="muted">${t("people.none")}</p>`}</div>
     <div class="card"><h3>${t("boxes")}</h3>${boxes.length ? html`<ul class="list">${boxes.map((number) => html`<li><span>${t("box.number", { number })}</span>
       <${Button} label=${t("remove")} verb="remove_box" onClick=${() => changeWorld("remove_box", { number: Number(number) })} /></li>`)}</ul>` : html`<p class="muted">${t("boxes.none")}</p>`}</div>`;
 }
