@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import socket
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from roboglot.clients.robomaster.datagrams import BROADCAST_PORT
 from roboglot.demo.clients.phone import Phone
 from roboglot.model.tap import Direction
 from roboglot.protocols.cyberdog.certificates import ensure_certificates, export_client
+from roboglot.protocols.robomaster.datagrams import Datagrams
 from roboglot.recording.lines import Target
 from roboglot.recording.proxy.dog import DogRelay, Proof
 from roboglot.recording.proxy.relay import Book, Relay
@@ -108,6 +111,36 @@ async def test_a_phone_and_its_dog_do_not_notice(tmp_path: Path) -> None:
     ]
     assert pushes[1]
     assert pushes[1] <= pushes[0]
+
+
+async def test_a_client_that_looks_for_an_ep_finds_the_proxy(tmp_path: Path) -> None:
+    """The robot's address is not this machine's, so its broadcast comes from a socket that is bound to it."""
+    path, found = tmp_path / "x.mcap", asyncio.get_running_loop().create_future()
+
+    class Client(asyncio.DatagramProtocol):
+        def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
+            if addr[0] == BETWEEN and not found.done():
+                found.set_result(data)
+
+    async def script(_: str) -> bytes:
+        loop = asyncio.get_running_loop()
+        client = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        client.bind(("", BROADCAST_PORT))
+        hearing = (await loop.create_datagram_endpoint(Client, sock=client))[0]
+        robot = Datagrams("127.0.0.89")
+        other = Datagrams("127.0.0.90")
+        other.send(b"robot ip 127.0.0.90;", "127.255.255.255", BROADCAST_PORT)
+        robot.send(b"robot ip 127.0.0.89;", "127.255.255.255", BROADCAST_PORT)
+        try:
+            return await asyncio.wait_for(found, 10)
+        finally:
+            for socket_of in (hearing, robot, other):
+                socket_of.close()
+
+    assert await between("robomaster://127.0.0.89", path, script) == f"robot ip {BETWEEN};".encode()
+    heard = read_recording(path).of(door="robomaster")
+    assert [(e.direction, e.payload) for e in heard] == [(Direction.PUSH, b"robot ip 127.0.0.89;")]
 
 
 async def test_a_disk_that_is_full_stops_the_recording_and_not_the_client(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import dataclasses
+import itertools
 import json
 import os
 import subprocess
@@ -11,11 +12,13 @@ import sys
 from pathlib import Path
 
 import pytest
+from websockets.asyncio.client import connect
 
 from roboglot.cli.recordings.rerun import NoRerun, configuration
 from roboglot.clients.slamware import SlamwareClient
 from roboglot.config import Config, ConsoleConfig, RecordConfig, RobotConfig, load_config
 from roboglot.model.clock import LockstepClock
+from roboglot.model.tap import Direction, Exchange
 from roboglot.protocols import sections
 from roboglot.recording.reader import read_recording
 from roboglot.runtime import Runtime
@@ -79,6 +82,70 @@ async def test_the_same_inputs_give_the_same_bytes(tmp_path: Path, seconds: floa
     assert done.stdout.startswith("identical: "), done.stdout + done.stderr
     assert done.returncode == 0
     assert int(done.stdout.split()[1]) > 30 * seconds
+
+
+PROGRAM = """
+import random
+cyberdog.task.block('one')
+print(random.random())
+cyberdog.motion.turn(90)
+for number in range(4):
+    cyberdog.task.block('b%d' % random.randint(0, 99))
+    time.sleep(0.3)
+"""
+
+
+async def with_programs(folder: Path, turns: int) -> Path:
+    """A front end saves, runs, suspends and lists programs, and lets time pass without waiting for answers."""
+    runtime = Runtime(config(folder))
+    await runtime.start()
+    clock = runtime.clock
+    assert isinstance(clock, LockstepClock)
+    rest = SlamwareClient(ADDRESS)
+    heard = 0
+
+    def hear(exchange: Exchange) -> None:
+        nonlocal heard
+        heard += exchange.door == "visual" and exchange.direction is Direction.REQUEST
+
+    runtime.fleet.robots["a"].tap.listen(hear)
+    numbers = itertools.count()
+    async with connect(f"ws://{ADDRESS}:50053/programs") as socket:
+
+        async def send(operate: str, body: str = "") -> None:
+            number = next(numbers)
+            targets = [] if operate == "inquiry" else ["t"]
+            frame = {"type": "task", "target_id": targets, "mode": "single", "condition": "now", "style": ""}
+            await socket.send(
+                json.dumps({**frame, "describe": "", "id": f"x-{number}", "operate": operate, "body": body})
+            )
+            while heard <= number:  # noqa: ASYNC110
+                await asyncio.sleep(0)
+
+        await clock.advance(1.0)
+        await send("save", PROGRAM)
+        for turn in range(turns):
+            await clock.advance(1.037)
+            await send("run")
+            for number in range(5):
+                await clock.advance(0.713)
+                await rest.get_pose()
+                if turn % 2 and number in (1, 3):
+                    await send("suspend" if number == 1 else "recover")
+                await send("inquiry")
+            await clock.advance(2.0)
+    rest.close()
+    await runtime.close()
+    return folder / "r.mcap"
+
+
+@pytest.mark.parametrize("turns", [2, pytest.param(90, marks=pytest.mark.slow)])  # 13 s and ten minutes
+async def test_programs_do_the_same_again(tmp_path: Path, turns: int) -> None:
+    file = await with_programs(tmp_path, turns)
+    ends = [e.payload for e in read_recording(file).of(door="visual") if b'"stop"' in e.payload]
+    assert len(ends) == turns
+    done = await asyncio.to_thread(rerun, file)
+    assert done.stdout.startswith("identical: "), done.stdout + done.stderr
 
 
 async def test_the_first_difference_is_shown_with_what_came_before(tmp_path: Path) -> None:

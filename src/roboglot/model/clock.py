@@ -12,13 +12,15 @@ import itertools
 import math
 import time
 from abc import ABC, abstractmethod
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import contextmanager
 from contextvars import copy_context
 from functools import partial
 from typing import Protocol, TypeVar
 
 T = TypeVar("T")
 YIELD_AFTER = 0.5  # s of lockstep time
+HOLD_MAX = 5.0  # s of the machine that lockstep time waits for work outside of the event loop
 LOCKSTEP_EPOCH = 1_767_225_600.0  # 2026-01-01T00:00:00Z: lockstep traces carry no real date
 
 
@@ -29,7 +31,12 @@ class Timer(Protocol):
 
 
 class Clock(ABC):
-    """Reads and waits for robot time, in seconds."""
+    """Reads and waits for robot time, in seconds.
+
+    ``repeats``: the same inputs give the same trace; nothing may come from chance or from how fast the machine is.
+    """
+
+    repeats = False
 
     @abstractmethod
     def time(self) -> float:
@@ -42,6 +49,22 @@ class Clock(ABC):
     @abstractmethod
     def call_at(self, when: float, callback: Callable[[], None]) -> Timer:
         """Call ``callback`` once when ``time()`` has reached ``when``; soon (never inside this call) if it is past."""
+
+    def hold(self, work: object) -> None:  # noqa: B027 - time that passes by itself waits for nothing
+        """Begin ``work`` outside of the event loop (a process, a disk); lockstep time waits until ``release``."""
+
+    def release(self, work: object) -> None:  # noqa: B027
+        """End what ``hold`` began; do nothing if it has ended."""
+
+    @contextmanager
+    def holding(self) -> Iterator[None]:
+        """Hold while ``with`` lasts."""
+        work = object()
+        self.hold(work)
+        try:
+            yield
+        finally:
+            self.release(work)
 
     def call_later(self, delay: float, callback: Callable[[], None]) -> Timer:
         """Call ``callback`` once, ``delay`` seconds from now."""
@@ -221,10 +244,15 @@ class LockstepClock(Clock):
 
     Needs asyncio's own event loop: after each instant it waits until the loop has nothing ready to run, and only that
     loop lets us see it (uvloop does not). Sockets are not waited for: code that uses one awaits the reply itself.
+    What ``hold`` has announced is waited for, at most HOLD_MAX seconds each.
     """
+
+    repeats = True
 
     def __init__(self) -> None:
         self._now = 0.0
+        self._held: dict[object, float] = {}  # until when, on the loop's clock
+        self._released: asyncio.Future[None] | None = None
         self._order = itertools.count()
         self._heap: list[tuple[float, int, _LockstepTimer]] = []
 
@@ -267,5 +295,31 @@ class LockstepClock(Clock):
         ready = getattr(asyncio.get_running_loop(), "_ready", None)
         if ready is None:
             raise RuntimeError("a lockstep clock needs asyncio's own event loop")
-        while ready:  # noqa: ASYNC110 - nothing to wait for but an empty queue
-            await asyncio.sleep(0)
+        while ready or self._held:
+            if ready:
+                await asyncio.sleep(0)
+            else:
+                await self._wait_for_work()
+
+    def hold(self, work: object) -> None:
+        self._held[work] = asyncio.get_running_loop().time() + HOLD_MAX
+
+    def release(self, work: object) -> None:
+        if self._held.pop(work, None) is not None:
+            self._wake()
+
+    async def _wait_for_work(self) -> None:
+        """Wait until some of it has ended, or has taken too long: that no longer counts."""
+        loop = asyncio.get_running_loop()
+        self._released = loop.create_future()
+        timer = loop.call_at(min(self._held.values()), self._wake)
+        try:
+            await self._released
+        finally:
+            timer.cancel()
+        now = loop.time()
+        self._held = {work: until for work, until in self._held.items() if until > now}
+
+    def _wake(self) -> None:
+        if self._released is not None and not self._released.done():
+            self._released.set_result(None)

@@ -38,6 +38,8 @@ TYPES: dict[str, Any] = {
     "foxglove.SceneUpdate": SceneUpdate_pb2.SceneUpdate,
 }
 
+RANGES = bytes([6 << 3 | 2])  # the field of a scan
+
 
 @cache
 def schema(name: str) -> bytes:
@@ -92,11 +94,20 @@ def encode_scan(at: int, value: tuple[str, LaserScan]) -> bytes:
         frame_id=frame,
         start_angle=scan.angle_min,
         end_angle=scan.angle_min + scan.angle_increment * (len(ranges) - 1),
-        ranges=ranges.tolist(),
     )
     message.pose.orientation.w = 1.0
     _stamp(message.timestamp, at)
-    return bytes(message.SerializeToString())
+    # The ranges' field is the last one, and packed: its bytes are those of the array.
+    return bytes(message.SerializeToString()) + RANGES + _varint(ranges.nbytes) + ranges.astype("<f8").tobytes()
+
+
+def _varint(number: int) -> bytes:
+    """Return the length of a field, seven bits a byte."""
+    found = bytearray()
+    while number > 0x7F:
+        found.append(number & 0x7F | 0x80)
+        number >>= 7
+    return bytes([*found, number])
 
 
 def encode_grid(at: int, value: tuple[str, OccupancyGrid]) -> bytes:

@@ -6,7 +6,7 @@ import json
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import zip_longest
+from itertools import groupby, zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +38,11 @@ class Verdict:
 
 
 def difference(recorded: Path, now: Path) -> Verdict:
-    """Compare the messages of two files in order: topic, robot time and bytes. Raises BadRecording, OSError."""
+    """Compare the messages of two files: topic, robot time and bytes, in order. Raises BadRecording, OSError.
+
+    Within one instant the order counts in each topic, and there among requests, among replies and among pushes: which
+    of two that do not wait for each other comes first is the machine's affair.
+    """
     around: deque[str] = deque(maxlen=AROUND)
     agreed = 0
     for one, other in zip_longest(_messages(recorded), _messages(now)):
@@ -51,9 +55,15 @@ def difference(recorded: Path, now: Path) -> Verdict:
 
 
 def _messages(path: Path) -> Iterator[tuple[str, int, bytes]]:
-    for record in read_messages(path):
-        if record.topic not in LEFT_OUT:
-            yield record.topic, record.at, _bytes(record)
+    counted = (record for record in read_messages(path) if record.topic not in LEFT_OUT)
+    for at, records in groupby(counted, lambda record: record.at):
+        for record in sorted(records, key=_stream):
+            yield record.topic, at, _bytes(record)
+
+
+def _stream(record: Record) -> tuple[str, str]:
+    """What a message has an order in: its topic, and the direction of an exchange."""
+    return record.topic, record.json()["direction"] if record.schema == "roboglot.Exchange" else ""
 
 
 def _bytes(record: Record) -> bytes:

@@ -58,9 +58,11 @@ def does_something(name: str) -> bool:
     return not name.startswith("time.") and not name.endswith(_READING)
 
 
-def header_of(body: str, modules: Mapping[str, str], utc_offset: int, *, watched: bool = False) -> Header:
-    """Of a new run, with a seed of its own."""
-    return Header(body, dict(modules), utc_offset, secrets.randbits(63), watched)
+def header_of(
+    body: str, modules: Mapping[str, str], utc_offset: int, *, watched: bool = False, seed: int | None = None
+) -> Header:
+    """Of a new run; without a seed it gets one by chance."""
+    return Header(body, dict(modules), utc_offset, secrets.randbits(63) if seed is None else seed, watched)
 
 
 class Journal:

@@ -9,6 +9,7 @@ import asyncio
 from collections.abc import Callable, Collection, Coroutine, Sequence
 from dataclasses import replace
 from datetime import datetime, tzinfo
+from zlib import crc32
 
 import msgspec
 
@@ -111,11 +112,14 @@ class Runner:
         """Bring a task in run_wait to life; its own news come after the caller's. Raises ProgramError."""
         here = datetime.fromtimestamp(self._robot.clock.epoch(), self._zone).utcoffset()
         journal = Journal(self._journals, task.id)
+        clock = self._robot.clock
+        clock.hold(journal)
         try:
             modules = await self._library.sources(uses)
             stops = self.stops.get(task.id, Stops() if task.id == DEBUG else None)
             offset = int(here.total_seconds()) if here else 0
-            header = header_of(task.body, modules, offset, watched=stops is not None)
+            seed = crc32(f"{task.id} {clock.time()}".encode()) if clock.repeats else None
+            header = header_of(task.body, modules, offset, watched=stops is not None, seed=seed)
             await journal.open(header)
             living = await self._living(task, header, journal, stops=stops)
         except (SandboxUnavailable, EngineError, ValueError, LookupError, ProgramError) as error:
@@ -123,8 +127,11 @@ class Runner:
             state = TaskState.RUN_WAIT if task.mode == "cycle" else TaskState.SHUTDOWN
             await self._store.set_state(task.id, state, [note])
             await journal.close()
+            clock.release(journal)
             late = isinstance(error, EngineSilent)
             raise (EngineTimeout if late else CannotExecute)(str(error)) from None
+        living.time.begin()
+        clock.release(journal)
         self._supervisors.add(self._supervise(living), f"task {task.id}")
 
     async def revive(self, task: StoredProgram, header: str) -> None:
@@ -193,9 +200,10 @@ class Runner:
 
     async def suspend(self, run: TaskRun) -> None:
         """Suspend a run and report it."""
-        await run.suspend()
-        run.state = TaskState.SUSPEND
-        await self._store.set_state(run.task.id, run.state, run.log.take())
+        with self._robot.clock.holding():
+            await run.suspend()
+            run.state = TaskState.SUSPEND
+            await self._store.set_state(run.task.id, run.state, run.log.take())
         self.reports.publish(done(TaskOperation.SUSPEND, run.task.id, run.state))
 
     async def recover(self, run: TaskRun, step: Callable[[], None] | None = None) -> None:
@@ -203,7 +211,8 @@ class Runner:
         run.state = TaskState.RUN
         if step:
             step()
-        await self._store.set_state(run.task.id, run.state)
+        with self._robot.clock.holding():
+            await self._store.set_state(run.task.id, run.state)
         # First: a program that goes on may begin a block, and halt there, before this one is asked again.
         self.reports.publish(done(TaskOperation.RECOVER, run.task.id, run.state))
         await run.resume()
@@ -216,10 +225,13 @@ class Runner:
                 run.state = TaskState.RUN
                 await self._store.set_state(id, run.state)
                 self.reports.publish(TaskReport(id, TaskOperation.START, "start task"))
-        outcome = await run.execute()
-        async with self._lock:
-            if self.runs.get(id) is run:
-                await self._finish(run, outcome)
+        try:
+            outcome = await run.execute()
+            async with self._lock:
+                if self.runs.get(id) is run:
+                    await self._finish(run, outcome)
+        finally:
+            run.time.end()
 
     async def _finish(self, run: TaskRun, outcome: Outcome) -> None:
         """Store and report the end of a program."""

@@ -310,14 +310,14 @@ class ProgramService:
     async def _turn(self) -> AsyncIterator[None]:
         """Hold the lock, once interrupted runs are restored: suspended, until a user recovers them."""
         async with self._lock:
-            while self._lost and not self._closed:
-                id = next(iter(self._lost))
-                try:
-                    if (task := await self._store.get(id)) is not None:
-                        await self._runner.revive(task, self._lost[id])
-                finally:
-                    del self._lost[id]
-            yield
+            with self.robot.clock.holding():
+                while self._lost and not self._closed:
+                    try:
+                        if (task := await self._store.get(id := next(iter(self._lost)))) is not None:
+                            await self._runner.revive(task, self._lost[id])
+                    finally:
+                        del self._lost[id]
+                yield
 
     async def _revive(self) -> None:
         async with self._turn():

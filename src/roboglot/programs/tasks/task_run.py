@@ -39,6 +39,7 @@ from roboglot.programs.language.names import EXCEPTIONS
 from roboglot.programs.library.modules import HEADER_LINES
 from roboglot.programs.stores import StoredProgram
 from roboglot.programs.tasks.control import ControlWatch
+from roboglot.programs.tasks.process_time import ProcessTime
 from roboglot.programs.tasks.reports import (
     Audience,
     Insight,
@@ -120,6 +121,7 @@ class TaskRun:
         self._insights = insights = listeners.insights
         run.noticed = lambda held: insights.publish(Variables(task.id, held))
         self.control = ControlWatch(robot, f"visual {task.id}", lambda text: self.log.write("error", text))
+        self.time = ProcessTime(robot.clock)
         self._ahead = 0.0  # s that the program's time.monotonic is ahead of the clock, which began anew after a crash
 
     @property
@@ -158,6 +160,7 @@ class TaskRun:
         outcome = Outcome(ExitReason.LOST, "the program was lost")
         ask_for(f"visual {self.task.id}", identity=self.task.owner)
         self.control.start()
+        self.time.begin()
         try:
             async for event in self._run:
                 match event:
@@ -198,11 +201,13 @@ class TaskRun:
     async def suspend(self) -> None:
         """Stop the process wherever it is, then hold what it does on the robot."""
         await self._run.suspend()
+        self.time.stop(True)
         self._session.pause()
 
     async def resume(self) -> None:
         """Let both go on."""
         self._session.resume()
+        self.time.stop(False)
         await self._run.resume()
 
     def step(self) -> None:
@@ -281,6 +286,7 @@ class TaskRun:
 
     async def _hold(self) -> None:
         """Stop where it was lost, and report it: front ends that were back before it saw no program."""
+        self.time.stop(True)
         await self._run.suspend()
         self._report(done(TaskOperation.SUSPEND, self.task.id, TaskState.SUSPEND))
 
@@ -291,11 +297,17 @@ class TaskRun:
         self._report(TaskReport(self.task.id, TaskOperation.RUN, words, block=(kind, id), block_status=StateCode(code)))
 
     async def _halt(self, halted: Halted) -> None:
+        self.time.ask(True)
         await self._at_breakpoint()
         self._run.calls.reply(halted.id)
+        self.time.ask(False)
 
     async def _answer_metered(self, request: Call) -> None:
-        await metered(self._answer(request), self._run.account.charge)
+        self.time.ask(True)
+        try:
+            await metered(self._answer(request), self._run.account.charge)
+        finally:
+            self.time.ask(False)
 
     async def _answer(self, request: Call) -> None:
         try:
@@ -303,7 +315,8 @@ class TaskRun:
             if request.interrupted:
                 value = await call_cut_off(self._session, request.name, request.args, request.kwargs)
             else:
-                await self._journal.begin(request.name)
+                with self._clock.holding():
+                    await self._journal.begin(request.name)
                 value = await call_function(self._session, request.name, request.args, request.kwargs)
             await self.log.pace.wait()
             if request.name in _BLOCKS:

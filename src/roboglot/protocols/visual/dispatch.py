@@ -29,7 +29,8 @@ from roboglot.wire.visual.requests import BadFrame, Kind, Request, parse_request
 log = logging.getLogger(__name__)
 
 PENDING_MAX = 64  # frames being answered at once
-URGENT = frozenset({"suspend", "recover", "shutdown"})  # these wait for nothing but the start of the same task
+# These wait for nothing but the start of the same task; in lockstep, where time waits, for all that came before them.
+URGENT = frozenset({"suspend", "recover", "shutdown"})
 
 
 class Dispatch:
@@ -81,7 +82,8 @@ class Dispatch:
             return
         # A task of its own: what is begun is brought to its end even if the carrier loses its client.
         starting = {id for pending in self._pending.values() if pending.operate == "run" for id in pending.targets}
-        in_order = request.operate not in URGENT or not starting.isdisjoint(request.targets)
+        urgent = request.operate in URGENT and not self._service.robot.clock.repeats
+        in_order = not urgent or not starting.isdisjoint(request.targets)
         task = asyncio.create_task(self._answer(request, answers, in_order=in_order), name=f"frame {request.operate}")
         self._pending[task] = request
         task.add_done_callback(self._pending.pop)
@@ -103,6 +105,7 @@ class Dispatch:
 
     async def _answer(self, request: Request, answers: Answers, *, in_order: bool) -> None:
         async with AsyncExitStack() as stack:
+            stack.enter_context(self._service.robot.clock.holding())
             if in_order:
                 await stack.enter_async_context(self._in_order)
             try:

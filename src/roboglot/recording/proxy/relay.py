@@ -15,6 +15,8 @@ from roboglot.model.tap import Direction, Exchange
 from roboglot.recording.entries import Entry
 from roboglot.recording.files import Files, Limits, Origin
 from roboglot.recording.lines import Target
+from roboglot.recording.proxy.discovery import PORT as DISCOVERY
+from roboglot.recording.proxy.discovery import Announcer
 from roboglot.recording.proxy.sniffers import SNIFFERS, Sniffer
 from roboglot.recording.redaction import Redaction
 from roboglot.recording.thread import WriterThread
@@ -142,6 +144,7 @@ class Relay:
         self._hosts: set[str] = set()
         self._datagrams: asyncio.DatagramTransport | None = None
         self._out: asyncio.DatagramTransport | None = None
+        self._announcer: Announcer | None = None
 
     async def open(self) -> None:
         """Listen. Raises OSError."""
@@ -149,6 +152,9 @@ class Relay:
         for port in (main, *(p for p in SIDE_PORTS.get(self._target.door, ()) if p != main)):
             loop = asyncio.get_running_loop()
             self._servers.append(await loop.create_server(partial(_Client, self, port), self._address, port))
+        if self._target.door == "robomaster":
+            self._announcer = Announcer(self._target.host, self._address, partial(self._pushed, DISCOVERY))
+            await self._announcer.open()
 
     def accept(self, client: _Client, port: int) -> None:
         """Dial the robot for a client that came; what the client says already waits, and is understood."""
@@ -211,11 +217,17 @@ class Relay:
         for host in self._hosts:
             if self._out is not None:
                 self._out.sendto(data, (host, PUSHES))
+        self._pushed(PUSHES, data)
+
+    def _pushed(self, port: int, data: bytes) -> None:
+        """Note a datagram of the robot."""
         words = data.decode("utf-8", "replace").split()[:2]
-        self._book.note(f"*:{PUSHES}", Direction.PUSH, f"> {' '.join(words)}", data, "", None)
+        self._book.note(f"*:{port}", Direction.PUSH, f"> {' '.join(words)}", data, "", None)
 
     async def close(self) -> None:
         """Stop listening and hang up; returns when every connection is gone."""
+        if self._announcer is not None:
+            self._announcer.close()
         for server in self._servers:
             server.close()
         dialling = tuple(self._dialling)

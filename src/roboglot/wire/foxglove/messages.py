@@ -21,7 +21,7 @@ _TIME = struct.Struct("<BQ")
 _PUBLISHED = struct.Struct("<BI")
 _CALL = struct.Struct("<BIII")
 _PLAYBACK = struct.Struct("<BBfBQI")
-_STATE = struct.Struct("<BBQfI")
+_STATE = struct.Struct("<BBQf?I")
 _ASSET = struct.Struct("<BIBI")
 
 
@@ -65,11 +65,15 @@ class Request:
 
 @dataclass(frozen=True, slots=True)
 class Playback:
-    """How a server plays; ``status``: 0 playing, 1 paused, 2 buffering, 3 ended; time in ns, speed, whom it answers."""
+    """How a server plays; ``status``: 0 playing, 1 paused, 2 buffering, 3 ended; time in ns, speed, whom it answers.
+
+    ``sought``: the time has jumped, for the client sought.
+    """
 
     status: int
     time: int
     speed: float
+    sought: bool = False
     request: str = ""
 
 
@@ -150,7 +154,9 @@ def time_message(at: int) -> bytes:
 def playback_state(state: Playback) -> bytes:
     """Return how the server plays."""
     name = state.request.encode()
-    return _STATE.pack(ServerOpcode.PLAYBACK_STATE, state.status, state.time, state.speed, len(name)) + name
+    return (
+        _STATE.pack(ServerOpcode.PLAYBACK_STATE, state.status, state.time, state.speed, state.sought, len(name)) + name
+    )
 
 
 def asset_failure(request: int, why: str) -> bytes:

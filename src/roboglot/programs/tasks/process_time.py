@@ -1,0 +1,40 @@
+"""When a program's process works by itself. Lockstep time stands still meanwhile: how fast it is counts for nothing."""
+
+from __future__ import annotations
+
+from roboglot.model.clock import Clock
+
+
+class ProcessTime:
+    """Of one run: between ``begin`` and ``end`` the clock is held unless the process waits."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._asks = self._stopped = False
+        self._over = True
+
+    def begin(self) -> None:
+        """The process starts."""
+        self._over = False
+        self._look()
+
+    def ask(self, waiting: bool) -> None:
+        """It waits for the answer to a call, or has it."""
+        self._asks = waiting
+        self._look()
+
+    def stop(self, stopped: bool) -> None:
+        """It is suspended, or goes on."""
+        self._stopped = stopped
+        self._look()
+
+    def end(self) -> None:
+        """It is gone, and what became of it is written down."""
+        self._over = True
+        self._look()
+
+    def _look(self) -> None:
+        if self._over or self._asks or self._stopped:
+            self._clock.release(self)
+        else:
+            self._clock.hold(self)

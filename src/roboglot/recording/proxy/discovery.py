@@ -1,0 +1,71 @@
+"""An EP's broadcasts (``robot ip A.B.C.D``, UDP 40926) through the proxy, with its own address in them."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import socket
+from collections.abc import Callable
+from ipaddress import IPv4Address
+
+log = logging.getLogger(__name__)
+PORT = 40926  # robots broadcast to it
+PREFIX = b"robot ip "
+
+
+class Announcer:
+    """Says what the robot at ``host`` says of itself, as if ``address`` were the robot."""
+
+    def __init__(self, host: str, address: str, heard: Callable[[bytes], None]) -> None:
+        self._host, self._address, self._heard = host, address, heard
+        self._in: asyncio.DatagramTransport | None = None
+        self._out: asyncio.DatagramTransport | None = None
+
+    async def open(self) -> None:
+        """Listen; without the port, clients find nothing, and the log says so."""
+        loop = asyncio.get_running_loop()
+        try:
+            self._out, _ = await loop.create_datagram_endpoint(
+                asyncio.DatagramProtocol, local_addr=(self._address, 0), allow_broadcast=True
+            )
+            self._in, _ = await loop.create_datagram_endpoint(lambda: _Ear(self.hear), sock=_listening())
+        except OSError as error:
+            log.warning("broadcasts of the robot do not pass: UDP %d: %s", PORT, error.strerror)
+
+    def hear(self, data: bytes, sender: str) -> None:
+        """Pass one broadcast, if it is this robot's and of the known form."""
+        if sender != self._host or not data.startswith(PREFIX) or self._out is None:
+            return
+        self._heard(data)
+        _, _, rest = data.removeprefix(PREFIX).partition(self._host.encode())
+        everyone = "127.255.255.255" if IPv4Address(self._address).is_loopback else "255.255.255.255"
+        self._out.sendto(PREFIX + self._address.encode() + rest, (everyone, PORT))
+
+    def close(self) -> None:
+        """Listen and speak no more."""
+        for transport in (self._in, self._out):
+            if transport is not None:
+                transport.close()
+
+
+def _listening() -> socket.socket:
+    """Return a socket for broadcasts, beside those of clients on this machine."""
+    ear = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    ear.setblocking(False)
+    ear.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        ear.bind(("", PORT))
+    except OSError:
+        ear.close()
+        raise
+    return ear
+
+
+class _Ear(asyncio.DatagramProtocol):
+    """Hands datagrams on with their sender's address."""
+
+    def __init__(self, heard: Callable[[bytes, str], None]) -> None:
+        self._heard = heard
+
+    def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
+        self._heard(data, addr[0])
