@@ -1,4 +1,4 @@
-// The workshop: change a simulated world and break things in it, and draw on the robot's map.
+// The workshop: change a simulated world, and draw on the robot's map.
 import { useEffect } from "preact/hooks";
 import { signal } from "@preact/signals";
 import { Button, html, robotWord, say, t } from "../base.js";
@@ -21,9 +21,11 @@ const inWorld = (from, to) => { const [x, y, yaw] = toWorld([from[0], from[1], f
 
 async function draw(verb, values) { if ((await command(verb, values)) !== undefined) say(t("drawn")); }
 
+const put = (verb) => ({ drag: arrow, drop, done: (from, to) => { drop(); changeWorld(verb, { ...inWorld(from, to), floor: floor() }); } });
+
 const WORLD_TOOLS = {
-  box: { drag: arrow, drop, done: (from, to) => { drop(); changeWorld("add_box", { ...inWorld(from, to), floor: floor() }); } },
-  visitor: { drag: arrow, drop, done: (from, to) => { drop(); changeWorld("add_person", { ...inWorld(from, to), floor: floor() }); } },
+  box: put("add_box"),
+  visitor: put("add_person"),
   person: { drag: arrow, drop, done: (from) => { drop(); const { x, y } = inWorld(from, null); const person = someone.value || Object.keys(truth.value?.people ?? {})[0];
     if (person) changeWorld("move_person", { person, x, y }); else say(t("people.none"), true); } },
   move: { drag: arrow, drop, done: (from, to) => { drop(); changeWorld("place_robot", { robot: current.value, ...inWorld(from, to), floor: floor() }); } },
@@ -37,7 +39,6 @@ const MAP_TOOLS = {
 const NEEDS = { box: "add_box", visitor: "add_person", person: "move_person", move: "place_robot", place: "add_place", wall: "add_line", track: "add_line", area: "add_area" };
 const ICONS = { box: "box", visitor: "person", person: "route", move: "move", place: "place", wall: "wall", track: "route", area: "fit" };
 
-/** A forbidden area between two corners. */
 function rectangle([x0, y0], [x1, y1]) {
   const middle = (y0 + y1) / 2;
   return { kind: "forbidden", start: [Math.min(x0, x1), middle], end: [Math.max(x0, x1), middle], half_width: Math.max(0.05, Math.abs(y1 - y0) / 2) };
