@@ -1,13 +1,16 @@
 """Settings for all tests: examples are the same in every run, and a slow machine is no failure."""
 
 import fcntl
+import functools
 import gc
 import importlib.util
+import inspect
+import re
 import socket
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -17,6 +20,7 @@ from tests import warm_start
 
 settings.register_profile("same", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("explore", deadline=None, max_examples=1000)  # scripts/test --hypothesis-profile explore
+settings.register_profile("quick", settings.get_profile("same"), max_examples=20)  # scripts/test --fast
 settings.load_profile("same")
 
 # httpx's pool tries to import it at every request: a third of a request's time went into looking for what isn't there.
@@ -38,6 +42,18 @@ PROCESSES = (
     "shards",
 )  # folders that start some
 WORLDS = {"world", "robot", "fleet", "door", "client", "engine", "screen"}
+BUILDS_A_WORLD = re.compile(r"\b(?:World|build_fleet|Runtime|RobotServer|serving)\(")
+STARTS_A_PROCESS = re.compile(r"\b(?:subprocess\.|create_subprocess_|multiprocessing\.|Engine\(|Popen\()")
+HELPERS = re.compile(r"^from (tests\.[\w.]+) import", re.MULTILINE)
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Import no file all of whose tests are left out: that takes longer than the rest of ``scripts/test --fast``."""
+    wanted: str = config.option.markexpr
+    if collection_path.suffix != ".py" or "not simulated and not process" not in wanted:
+        return None
+    text = _text(collection_path)
+    return bool(BUILDS_A_WORLD.search(text) or STARTS_A_PROCESS.search(text)) or None
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -47,8 +63,31 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         folder = item.path.relative_to(TESTS).parts[0]
         if folder in PROCESSES or folder.endswith(".py"):
             item.add_marker("process")
-        if WORLDS & set(getattr(item, "fixturenames", ())):
+        sources = _sources(item)
+        if WORLDS & set(getattr(item, "fixturenames", ())) or any(map(BUILDS_A_WORLD.search, sources)):
             item.add_marker("simulated")
+        if any(map(STARTS_A_PROCESS.search, sources)):
+            item.add_marker("process")
+
+
+def _sources(item: pytest.Item) -> list[str]:
+    """What a test is made of: its file, the helpers that it imports, and its fixtures."""
+    text = _text(item.path)
+    helpers = [TESTS.parent / f"{name.replace('.', '/')}.py" for name in HELPERS.findall(text)]
+    found = [text, *(_text(path) for path in helpers if path.name != "conftest.py" and path.is_file())]
+    known = getattr(getattr(item, "_fixtureinfo", None), "name2fixturedefs", {})
+    made_by = {definition.func for definitions in known.values() for definition in definitions}
+    return found + [_source(function) for function in made_by if function.__module__.startswith("tests.")]
+
+
+@functools.cache
+def _text(path: Path) -> str:
+    return path.read_text(encoding="utf-8")
+
+
+@functools.cache
+def _source(function: Callable[..., object]) -> str:
+    return inspect.getsource(function)
 
 
 def pytest_collection_finish() -> None:
