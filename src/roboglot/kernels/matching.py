@@ -18,7 +18,7 @@ SIGMA = 0.02  # m, of a point against a surface
 SIGMA_LOOSE = 0.06  # m, where the surface has no clear direction
 ROBUST, ROBUST_START = 0.06, 0.24  # m, beyond which a point loses its influence: at the end, at the start
 INLIER = 0.08  # m
-MOVED = 0.003  # m, from which a point's surface is looked up again
+MOVED = 0.0002  # m, from which a point's surface is looked up again: no more than what ends the match
 CORRELATION = 0.1  # points are not independent: share of their information that is believed
 
 
