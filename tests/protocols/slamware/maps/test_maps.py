@@ -195,6 +195,8 @@ async def test_several_floors(robot: Robot, client: httpx.AsyncClient, drawn: No
     assert robot[Mapping].grid.width <= 40
     assert robot[Localization].pose.x == pytest.approx(0.5)
     assert (await client.put(f"{MULTI}/floors/:current", json={"floor": "7F"})).status_code == 404
+    assert (await client.delete(f"{MULTI}/stcm")).status_code == 204
+    await ok(await client.post(f"{MULTI}/stcm/:save"))  # no floor on the disk is lost any more
 
 
 async def test_the_origin_moves_with_all_that_is_drawn(robot: Robot, client: httpx.AsyncClient, drawn: None) -> None:

@@ -120,10 +120,10 @@ class MapKeeper:
                 await self._robot[FileStore].remove(FILE)
 
     async def save(self) -> None:
-        """Memory to disk. Refused with several floors: the others would be lost."""
-        if len(self.floors) > 1:
-            raise Refused(f"the saved map has {len(self.floors)} floors, of which one is in memory")
+        """Memory to disk. Refused where the file has several floors: the others would be lost."""
         async with self._turn:
+            if (floors := await self._count_saved_floors()) > 1:
+                raise Refused(f"the saved map has {floors} floors, of which one is in memory")
             data = self.export()
             settings = {BASIS: {_digest(data): NOT_MOVED}, FLOOR: self.current.map_id}
 
@@ -132,6 +132,12 @@ class MapKeeper:
                 return Replacement(_with_docks(now, docks), settings, {FILE: data, DRAWN: None})
 
             await self._robot[MapMemory].replace(edit)
+
+    async def _count_saved_floors(self) -> int:
+        try:
+            return len(await self._parse(await self._robot[FileStore].read(FILE)))
+        except (NotFound, InvalidGoal):
+            return 0
 
     async def sync(self) -> None:
         """Save and reload; the grid stays as it is, for it is the same."""
