@@ -34,6 +34,7 @@ EXTRA_OF = {
     "prometheus_client": "console",
     "psycopg": "postgresql",
     "pytest_asyncio": "testing",
+    "ray": "fleet",
     "robomasterpy": "demo",
     "rosbags": "logs",
     "uvicorn": "console",
@@ -59,6 +60,7 @@ MODULES: dict[str, tuple[str, ...]] = {
     "mcp": ("mcp",),
     "otlp": ("opentelemetry.proto", "prometheus_client"),
     "vda5050": ("aiomqtt",),
+    "fleet": ("ray",),
     "ros2": ("zenoh", "rosbags", "foxglove_schemas_protobuf", "google", "mcap", "numpy", "zstandard"),
     "demo": ("httpx", "robomasterpy", "cv2"),
 }

@@ -5,16 +5,21 @@ from __future__ import annotations
 import os
 import sys
 from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from roboglot.extras import MissingExtra
 from roboglot.hosting.visible import visible
 
 if TYPE_CHECKING:
+    from roboglot.testing.campaign.local import Ended, Leave
     from roboglot.testing.campaign.table import Table
     from roboglot.testing.campaign.trials import Result, Trial
+
+    Player = Callable[[Iterator[Trial], Leave, Ended], None]
 
 SEEDS_MAX = 100_000
 OUT = Path("campaign")
@@ -25,7 +30,11 @@ def command(
     paths: Annotated[list[Path], typer.Argument(help="Scenario files, or folders with them.")],
     seeds: Annotated[int, typer.Option(min=1, max=SEEDS_MAX, help="So many seeds for each scenario.")] = 100,
     first_seed: Annotated[int, typer.Option(min=0, help="The first of them.")] = 1,
-    workers: Annotated[int, typer.Option(min=1, max=256, help="Trials at once.")] = os.cpu_count() or 1,
+    workers: Annotated[int, typer.Option(min=0, max=10_000, help="Trials at once; 0: one a processor.")] = 0,
+    on: Annotated[
+        str,
+        typer.Option(help="Where, as tasks of Ray: local, ray://HOST, HOST:PORT, auto; else in forked processes."),
+    ] = "",
     out: Annotated[Path, typer.Option(help="Of table and report; what is in it is not played again.")] = OUT,
     longest: Annotated[float, typer.Option(min=1, help="Real seconds after which a trial is ended.")] = 600.0,
 ) -> None:
@@ -45,16 +54,34 @@ def command(
         raise typer.Exit(2) from None
     if len(left) < len(trials):
         print(f"{len(trials) - len(left)} of {len(trials)} trials are in {table.path} already")
-    interrupted = _play(left, table, workers, longest)
+    try:
+        interrupted = _play(left, table, _player(on, [each.path.parent for each in found], workers, longest))
+    except (MissingExtra, OSError, ValueError) as bad:
+        print(f"roboglot campaign: {visible(str(bad))}", file=sys.stderr)
+        raise typer.Exit(2) from None
     _write(table, folder, len(trials))
     if interrupted:
         raise typer.Exit(130)
     raise typer.Exit(0 if all(row.outcome == "passed" for row in table.rows) else 1)
 
 
-def _play(left: list[Trial], table: Table, workers: int, longest: float) -> bool:
-    """Play what is left, with a line for each that did not pass; whether it was interrupted."""
+def _player(on: str, folders: Sequence[Path], workers: int, longest: float) -> Player:
+    """Return what plays trials: the cluster that is meant, or this machine. Raises MissingExtra."""
+    if on:
+        from roboglot.testing.campaign.cluster import play_on
+
+        unique = [folder for folder in folders if not any(other in folder.parents for other in folders)]
+        return lambda trials, leave, ended: play_on(
+            on, trials, dict.fromkeys(unique), workers, longest, leave=leave, ended=ended
+        )
     from roboglot.testing.campaign.local import play_here
+
+    here = workers or os.cpu_count() or 1
+    return lambda trials, leave, ended: play_here(trials, here, longest, leave, ended)
+
+
+def _play(left: list[Trial], table: Table, player: Player) -> bool:
+    """Play what is left, with a line for each that did not pass; whether it was interrupted."""
     from roboglot.testing.campaign.trials import Outcome
 
     kept: Counter[str] = Counter()
@@ -74,7 +101,7 @@ def _play(left: list[Trial], table: Table, workers: int, longest: float) -> bool
             print(f"\r{number} of {len(left)}", end="", file=sys.stderr, flush=True)
 
     try:
-        play_here(iter(left), workers, longest, leave, ended)
+        player(iter(left), leave, ended)
     except KeyboardInterrupt:
         print(f"\ninterrupted: {number} of {len(left)} trials were played; the same command goes on", file=sys.stderr)
         return True

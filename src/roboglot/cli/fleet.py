@@ -10,14 +10,21 @@ import sys
 import time
 import tomllib
 from collections import deque
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import msgspec
 import typer
 
 from roboglot.config import default_data_folder
+from roboglot.extras import MissingExtra
 from roboglot.hosting.visible import visible
+
+if TYPE_CHECKING:
+    from roboglot.shards.keeper import Keeper
+    from roboglot.shards.plan import FleetPlan
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, no_args_is_help=True)
 PATIENCE = 120.0  # s for a wish; stopping and starting 100 shards takes its time
@@ -40,6 +47,12 @@ def up(
     replan: Annotated[
         bool, typer.Option("--replan", help="Forget which robot was moved where, and plan anew.")
     ] = False,
+    on: Annotated[
+        str, typer.Option(help="Where shards run, as actors of Ray: local, ray://HOST, HOST:PORT, auto.")
+    ] = "",
+    detached: Annotated[
+        bool, typer.Option("--detached", help="With --on: shards stay when this command ends.")
+    ] = False,
     data: Data = None,
 ) -> None:
     """Start a fleet and keep it up until Ctrl-C; what robots store stays in its folder."""
@@ -52,8 +65,11 @@ def up(
     asked = {"worlds": worlds, "robots_each": robots_each, "template": template, "first": first_address}
     try:
         plan = _plan(folder, asked, replan=replan)
-        sys.exit(asyncio.run(_serve(plan, folder, memory_max << 20)))
-    except (ValueError, OSError, FolderInUse, NotWarm) as error:
+        if detached and on in ("", "local"):
+            raise ValueError("--detached is for a cluster: --on ray://HOST")
+        with _where(on):
+            sys.exit(asyncio.run(_serve(lambda: _keeper(plan, folder, memory_max << 20, on, detached), folder)))
+    except (ValueError, OSError, FolderInUse, NotWarm, MissingExtra) as error:
         sys.exit(f"roboglot fleet: {error}")
 
 
@@ -188,7 +204,7 @@ def _folder(data: Path | None) -> Path:
     return (data or default_data_folder(os.environ) / "fleet").absolute()
 
 
-def _plan(folder: Path, asked: dict[str, Any], *, replan: bool) -> Any:
+def _plan(folder: Path, asked: dict[str, Any], *, replan: bool) -> FleetPlan:
     """Return the plan that is kept, or a new one. Raises ValueError if the kept one is for something else."""
     from roboglot.shards.plan import FIRST_ADDRESS, load, plan_fleet
 
@@ -210,14 +226,33 @@ def _plan(folder: Path, asked: dict[str, Any], *, replan: bool) -> Any:
     return kept
 
 
-async def _serve(plan: Any, folder: Path, memory_max: int) -> int:
+def _where(on: str) -> AbstractContextManager[None]:
+    """Be part of the cluster that is meant, if one is. Raises MissingExtra, OSError."""
+    if not on:
+        return nullcontext()
+    from roboglot.shards.cluster import joined
+
+    return joined(on)
+
+
+def _keeper(plan: FleetPlan, folder: Path, memory_max: int, on: str, detached: bool) -> Keeper:
+    if on:
+        from roboglot.shards.cluster import ClusterFleet
+
+        return ClusterFleet(plan, folder, on, lasting=detached)
+    from roboglot.shards.supervisor import Supervisor
+
+    return Supervisor(plan, folder, memory_max=memory_max)
+
+
+async def _serve(keeper: Callable[[], Keeper], folder: Path) -> int:
     from roboglot.shards.desk import FleetDesk
-    from roboglot.shards.supervisor import State, Supervisor
+    from roboglot.shards.supervisor import State
 
     began, stop = time.monotonic(), asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, stop.set)
-    supervisor = Supervisor(plan, folder, memory_max=memory_max)
+    supervisor = keeper()
     desk = FleetDesk(supervisor, folder)
     ending = asyncio.ensure_future(stop.wait())
     starting = asyncio.ensure_future(supervisor.start())

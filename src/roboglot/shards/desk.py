@@ -8,15 +8,16 @@ from pathlib import Path
 import msgspec
 
 from roboglot.hosting.local_socket import LocalServer
+from roboglot.shards.keeper import Keeper
 from roboglot.shards.moving import move_robot
-from roboglot.shards.supervisor import Shard, Supervisor
+from roboglot.shards.supervisor import Shard
 from roboglot.shards.wishes import SOCKET, Answer, Request, RobotRow, Row
 
 
 class FleetDesk:
-    """For the supervisor of one fleet."""
+    """For the keeper of one fleet."""
 
-    def __init__(self, supervisor: Supervisor, folder: Path) -> None:
+    def __init__(self, supervisor: Keeper, folder: Path) -> None:
         self._supervisor = supervisor
         self._server = LocalServer(folder / SOCKET, "roboglot fleet", self._answer)
         self._turn = asyncio.Lock()
@@ -43,6 +44,8 @@ class FleetDesk:
 
     async def _grant(self, request: Request) -> None:
         supervisor = self._supervisor
+        if request.do in ("move", "reset") and not supervisor.stores_here:
+            raise ValueError(f"{request.do} is for fleets of one machine: robots of a cluster store in the database")
         match request.do:
             case "move":
                 await move_robot(supervisor, request.robot, request.to)

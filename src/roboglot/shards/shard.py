@@ -11,6 +11,7 @@ import resource
 import signal
 import socket
 import sqlite3
+import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -94,7 +95,8 @@ async def _serve(config: Config, reporter: Reporter) -> int:
 
     stop, loop = asyncio.Event(), asyncio.get_running_loop()
     open_files.OpenFiles().watch(loop)
-    loop.add_signal_handler(signal.SIGTERM, stop.set)
+    if threading.current_thread() is threading.main_thread():  # in a Ray actor, the process belongs to Ray
+        loop.add_signal_handler(signal.SIGTERM, stop.set)
     reporter.watch(stop)
     try:
         runtime = Runtime(config)

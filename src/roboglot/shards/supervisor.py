@@ -85,6 +85,11 @@ class Supervisor:
         """The process that shards are forked from."""
         return self._forks.pid
 
+    @property
+    def stores_here(self) -> bool:
+        """What robots store is in the shards' folders."""
+        return True
+
     async def start(self) -> float:
         """Start all, in turn; returns how long the nursery took to warm up, s. Raises NotWarm."""
         save(self.plan, self.folder)

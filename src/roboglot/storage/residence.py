@@ -18,7 +18,7 @@ from roboglot.storage.homes import Home, Homes, Occupied
 from roboglot.storage.transactions import DatabaseError
 
 log = logging.getLogger(__name__)
-PERIOD, HOLD, LEASE = 1.0, 4.0, 6.0  # s between renewals; see above
+PERIOD, HOLD, LEASE = 0.5, 2.5, 4.0  # s between renewals; see above
 HOLDER = "holder"  # file in the data folder
 
 

@@ -53,7 +53,7 @@ def play_here(trials: Iterator[Trial], workers: int, seconds_max: float, leave: 
         mouth.close()
         running.append(_Running(trial, attempt, process, ear, _now() + seconds_max))
 
-    with _interruptions() as interrupted:
+    with interruptions() as interrupted:
         try:
             while not interrupted.poll():
                 while len(running) < workers and (trial := next(trials, None)) is not None:
@@ -78,7 +78,7 @@ def play_here(trials: Iterator[Trial], workers: int, seconds_max: float, leave: 
 
 
 @contextlib.contextmanager
-def _interruptions() -> Iterator[Connection]:
+def interruptions() -> Iterator[Connection]:
     """Have SIGINT be read from a pipe: raised anywhere, it could lose a process that has just been started."""
     ear, mouth = multiprocessing.Pipe(duplex=False)
     before = signal.signal(signal.SIGINT, lambda *_: mouth.send_bytes(b"!"))

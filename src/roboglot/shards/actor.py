@@ -1,0 +1,131 @@
+"""A shard as an actor: the same code as in a forked process, on a thread of a process that Ray started.
+
+A process that exits is started again by Ray, elsewhere if its node is gone.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import socket
+import threading
+import time
+from collections import deque
+from pathlib import Path
+
+import msgspec
+
+from roboglot.shards.messages import MESSAGE_MAX, Beat, News, Ready, Refusal, pair
+
+AGAIN_SECONDS = 1.0  # before a process whose shard ended lets Ray start another
+STOP_SECONDS = 12.0
+LINES_MAX = 2000  # log lines kept until the fleet fetches them
+EXIT_ENDED = 1
+NODE_DIGITS = 12  # of a node's id
+
+
+class Condition(msgspec.Struct):
+    """How a shard is: what it reported last, and where it runs. ``lines`` are those logged since the last look."""
+
+    pid: int
+    node: str
+    serving: bool
+    ready: Ready | None
+    beat: Beat | None
+    refusal: Refusal | None
+    lines: list[str]
+
+
+class _Lines(logging.Handler):
+    """Keeps log lines until they are fetched."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.INFO)
+        self.kept: deque[str] = deque(maxlen=LINES_MAX)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.kept.append(self.format(record))
+
+
+class ShardActor:
+    """Serves one shard from its beginning to ``stop``.
+
+    ``of_node``: folders of the same name on other nodes are others', so each node has one of its own below them.
+    """
+
+    def __init__(self, settings: dict[str, object], folder: str, *, of_node: bool) -> None:
+        import ray
+
+        from roboglot.hosting.logs import set_up_logging
+        from roboglot.shards.shard import SETTINGS
+
+        self._node = ray.get_runtime_context().get_node_id()[:NODE_DIGITS]
+        self._lines = _Lines()
+        self._stopping = False
+        self._ready: Ready | None = None
+        self._beat: Beat | None = None
+        self._refusal: Refusal | None = None
+        place = Path(folder)
+        if of_node:
+            place /= self._node
+            settings = settings | {"data": str(Path(str(settings["data"])) / self._node)}
+        place.mkdir(parents=True, exist_ok=True, mode=0o700)
+        (place / SETTINGS).write_bytes(msgspec.json.encode(settings))
+        set_up_logging(verbose=False)
+        own = logging.getLogger("roboglot")
+        own.setLevel(logging.INFO)
+        self._lines.setFormatter(logging.Formatter("%(asctime)s %(levelname)-7s %(message)s", "%H:%M:%S"))
+        own.addHandler(self._lines)
+        self._link, theirs = pair()
+        self._link.setblocking(False)
+        self._turn = threading.Lock()
+        self._serving = threading.Thread(target=self._serve, args=(str(place), theirs), name="shard", daemon=True)
+        self._serving.start()
+
+    def look(self) -> bytes:
+        """Return its Condition, encoded."""
+        with self._turn:
+            self._hear()
+            lines = [self._lines.kept.popleft() for _ in range(len(self._lines.kept))]
+            serving = self._serving.is_alive()
+            known = (self._ready, self._beat, self._refusal)
+            return msgspec.json.encode(Condition(os.getpid(), self._node, serving, *known, lines))
+
+    def stop(self) -> bytes:
+        """Close robots and doors in order."""
+        self._stopping = True
+        with self._turn:
+            self._link.close()
+        self._serving.join(STOP_SECONDS)
+        return b""
+
+    def _serve(self, folder: str, link: socket.socket) -> None:
+        from roboglot.shards.shard import run
+
+        try:
+            run(folder, link)
+        except BaseException:
+            logging.getLogger(__name__).exception("the shard ended")
+        finally:
+            with self._turn:
+                self._hear()
+            if not self._stopping and not (self._refusal and self._refusal.lasting):
+                time.sleep(AGAIN_SECONDS)
+                os._exit(EXIT_ENDED)  # Ray starts it again
+
+    def _hear(self) -> None:
+        """Take what the shard sent since the last time."""
+        while not self._stopping:
+            try:
+                packet = self._link.recv(MESSAGE_MAX)
+            except OSError:
+                return
+            if not packet:
+                return
+            match msgspec.json.decode(packet, type=News):
+                case Ready() as ready:
+                    self._ready = ready
+                case Beat() as beat:
+                    self._beat = beat
+                case Refusal() as refusal:
+                    self._refusal = refusal

@@ -1,0 +1,286 @@
+"""A fleet on Ray: every shard is a named actor. Ray places shards, notices what dies and starts it again elsewhere.
+
+This side only asks each actor how it is, once a second, and keeps its log lines.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import logging
+import os
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Protocol
+
+import msgspec
+
+from roboglot.extras import explaining
+from roboglot.hosting.exclusive import lock_folder
+from roboglot.shards.actor import Condition, ShardActor
+from roboglot.shards.messages import Beat
+from roboglot.shards.plan import FleetPlan, save
+from roboglot.shards.supervisor import LOG_FILE, LOG_MAX, Shard, State
+
+with explaining("--on", "fleet"):
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # nothing leaves the machine unasked
+    import ray
+    from ray.exceptions import RayActorError, RayError
+
+log = logging.getLogger(__name__)
+LOCAL = "local"
+NAMESPACE = "roboglot"
+CLIENT_PORT = 10001  # of ray://HOST
+STORE_BYTES = 80 << 20  # of a cluster that we start: actors share nothing
+PERIOD = 1.0  # s between two looks at each shard
+LOOK_MAX = 5.0  # s that an actor may take to answer
+START_MAX = 90.0  # s until every shard has been heard of
+STOP_MAX = 15.0
+CORE_EACH, CORES_MAX = 0.05, 1.0  # processors of a robot, and of a shard: a world is one thread's work
+MEMORY = 256 << 20  # bytes that a shard is placed by
+
+
+def join(where: str) -> None:
+    """Start Ray on this machine (``local``) or join a cluster: ``ray://HOST``, ``HOST:PORT`` or ``auto``.
+
+    Raises OSError in one sentence.
+    """
+    try:
+        if where == LOCAL:
+            ray.init(
+                address="local",
+                namespace=NAMESPACE,
+                include_dashboard=False,
+                object_store_memory=STORE_BYTES,
+                log_to_driver=False,
+                configure_logging=False,
+            )
+            return
+        address = f"{where}:{CLIENT_PORT}" if where.startswith("ray://") and where.count(":") == 1 else where
+        ray.init(address=address, namespace=NAMESPACE, log_to_driver=False, configure_logging=False)
+    except Exception as error:  # noqa: BLE001 - Ray raises bare ones, too
+        lines = str(error).strip().splitlines() or [type(error).__name__]
+        raise OSError(f"--on {where}: {lines[0]}") from None
+
+
+@contextmanager
+def joined(where: str) -> Iterator[None]:
+    """Be part of a cluster for a while; one that was started here ends with it."""
+    join(where)
+    try:
+        yield
+    finally:
+        ray.shutdown()
+
+
+class Reference(Protocol):
+    """What Ray returns for a call."""
+
+    def future(self) -> Future[bytes]:
+        """Return the answer to come."""
+
+
+class Call(Protocol):
+    """A method of an actor."""
+
+    def remote(self) -> Reference:
+        """Call it."""
+
+
+class Actor(Protocol):
+    """Handle of a ``ShardActor``."""
+
+    look: Call
+    stop: Call
+
+
+class ClusterFleet:
+    """One fleet on a cluster that was joined. ``lasting``: its shards stay when this program ends."""
+
+    def __init__(self, plan: FleetPlan, folder: Path, where: str, *, lasting: bool = False) -> None:
+        """Raises FolderInUse; ValueError if robots could run twice on this cluster."""
+        if where != LOCAL:
+            _refuse_unfenced(plan)
+        self.plan, self.folder, self._lasting, self._local = plan, folder, lasting, where == LOCAL
+        self._lock = lock_folder(folder)
+        self.shards = {p.name: Shard(n, p, folder / "shards" / p.name) for n, p in enumerate(plan.shards, start=1)}
+        self._mark = hashlib.sha256(str(folder).encode()).hexdigest()[:8]
+        self._actors: dict[str, Actor] = {}
+        self._nodes: dict[str, str] = {}
+        self._watch: asyncio.Task[None] | None = None
+        self._changed = asyncio.Event()
+        self._loop = asyncio.get_running_loop()
+
+    @property
+    def nursery(self) -> int:
+        """Shards on a cluster are not forked."""
+        return 0
+
+    @property
+    def stores_here(self) -> bool:
+        """A cluster's machines are others."""
+        return self._local
+
+    async def start(self) -> float:
+        """Start all, or find those that stayed; returns when each is ready or has failed."""
+        began = time.monotonic()
+        save(self.plan, self.folder)
+        for shard in self.shards.values():
+            await asyncio.to_thread(self._begin, shard)
+        passed = time.monotonic() - began
+        self._watch = self._loop.create_task(self._look_always(), name="looks at shards")
+        try:
+            await asyncio.wait_for(self.until(lambda: all(map(_settled, self.shards.values()))), START_MAX)
+        except TimeoutError:
+            waiting = [shard.plan.name for shard in self.shards.values() if not _settled(shard)]
+            log.warning("shards %s are not up yet: has the cluster room for them?", ", ".join(waiting))
+        return passed
+
+    async def close(self) -> None:
+        """Stop all shards unless they are to stay, and release the folder."""
+        if self._watch is not None:
+            self._watch.cancel()
+        if not self._lasting:
+            await asyncio.gather(*(self._end(shard) for shard in self.shards.values()))
+        os.close(self._lock)
+
+    async def stop(self, shard: Shard) -> None:
+        """Stop a shard and leave it stopped."""
+        if shard.state is not State.STOPPED:
+            self._turn_to(shard, State.STOPPING)
+            await self._end(shard)
+            shard.pid = 0
+            self._turn_to(shard, State.STOPPED)
+
+    async def restart(self, shard: Shard) -> None:
+        """Stop it if it runs, start it, and wait until it is ready or has failed."""
+        await self.stop(shard)
+        shard.reason = ""
+        await asyncio.to_thread(self._begin, shard)
+        await asyncio.wait_for(self.until(lambda: _settled(shard)), START_MAX)
+
+    async def reset(self, shard: Shard) -> None:
+        """Restart it with nothing stored."""
+        await self.stop(shard)
+        await asyncio.to_thread(shutil.rmtree, shard.plan.settings["data"], ignore_errors=True)
+        await self.restart(shard)
+
+    def node_of(self, name: str) -> str:
+        """Return the node that a shard was last seen on; empty: none yet."""
+        return self._nodes.get(name, "")
+
+    def _begin(self, shard: Shard) -> None:
+        """Create the shard's actor, or find the one that stayed."""
+        plan = shard.plan
+        cores = min(CORES_MAX, CORE_EACH * len(plan.robots))
+        actor = ray.remote(ShardActor).options(
+            name=f"{self._mark}:{plan.name}",
+            namespace=NAMESPACE,
+            get_if_exists=True,
+            lifetime="detached" if self._lasting else None,
+            max_restarts=-1,
+            max_concurrency=4,
+            num_cpus=cores,
+            memory=MEMORY,
+            scheduling_strategy="SPREAD",
+        )
+        self._actors[plan.name] = actor.remote(plan.settings, str(shard.folder), of_node=not self._local)
+        shard.ready, shard.beat = None, Beat(0.0, 0, 0.0)
+        self._turn_to(shard, State.STARTING)
+
+    async def _end(self, shard: Shard) -> None:
+        actor = self._actors.pop(shard.plan.name, None)
+        if actor is None:
+            return
+        try:
+            await asyncio.wait_for(_answer(actor.stop.remote()), STOP_MAX)
+        except (RayError, TimeoutError) as error:
+            log.warning("shard %s is ended by force: %s", shard.plan.name, type(error).__name__)
+        await asyncio.to_thread(ray.kill, actor, no_restart=True)
+
+    async def _look_always(self) -> None:
+        while True:
+            await asyncio.gather(*(self._look(shard) for shard in self.shards.values()))
+            await asyncio.sleep(PERIOD)
+
+    async def _look(self, shard: Shard) -> None:
+        actor = self._actors.get(shard.plan.name)
+        if actor is None or shard.state in (State.STOPPING, State.STOPPED):
+            return
+        try:
+            answer = await asyncio.wait_for(_answer(actor.look.remote()), LOOK_MAX)
+        except (RayActorError, TimeoutError):
+            self._missed(shard)
+            return
+        except RayError as error:
+            log.warning("shard %s cannot be asked: %s", shard.plan.name, error)
+            shard.reason = str(error).strip().splitlines()[0]
+            self._turn_to(shard, State.FAILED)
+            return
+        if actor is self._actors.get(shard.plan.name):
+            self._seen(shard, msgspec.json.decode(answer, type=Condition))
+
+    def _missed(self, shard: Shard) -> None:
+        if shard.state is State.READY:
+            log.warning("shard %s does not answer on %s", shard.plan.name, self._nodes.get(shard.plan.name))
+            shard.reason, shard.ready = "it does not answer; Ray starts it again if its process or node is gone", None
+            self._turn_to(shard, State.STARTING)
+
+    def _seen(self, shard: Shard, condition: Condition) -> None:
+        _keep(shard.folder / LOG_FILE, condition.lines)
+        if shard.pid and (condition.pid, condition.node) != (shard.pid, self._nodes.get(shard.plan.name)):
+            shard.restarts += 1
+            log.warning("shard %s was started again on %s", shard.plan.name, condition.node)
+        shard.pid, self._nodes[shard.plan.name] = condition.pid, condition.node
+        shard.heard, shard.ready = self._loop.time(), condition.ready
+        shard.beat = condition.beat or shard.beat
+        if condition.refusal is not None:
+            shard.reason = condition.refusal.reason
+            state = State.FAILED if condition.refusal.lasting else State.STARTING  # Ray tries that again
+            log.warning("shard %s did not start: %s", shard.plan.name, shard.reason)
+        else:
+            state = State.READY if condition.ready and condition.serving else State.STARTING
+        if state is State.READY:
+            shard.reason = ""
+        if state is not shard.state:
+            self._turn_to(shard, state)
+
+    def _turn_to(self, shard: Shard, state: State) -> None:
+        shard.state, shard.since = state, self._loop.time()
+        self._changed.set()
+
+    async def until(self, condition: Callable[[], bool]) -> None:
+        """Wait until a condition on shards holds."""
+        while not condition():
+            self._changed.clear()
+            await self._changed.wait()
+
+
+async def _answer(reference: Reference) -> bytes:
+    return await asyncio.wrap_future(reference.future())
+
+
+def _settled(shard: Shard) -> bool:
+    return shard.state in (State.READY, State.FAILED, State.STOPPED)
+
+
+def _keep(path: Path, lines: list[str]) -> None:
+    if lines:
+        path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        if path.exists() and path.stat().st_size > LOG_MAX:
+            path.replace(path.with_suffix(".old"))
+        with path.open("a", encoding="utf-8") as file:
+            file.write("\n".join([*lines, ""]))
+
+
+def _refuse_unfenced(plan: FleetPlan) -> None:
+    for shard in plan.shards[:1]:  # they differ in names and addresses only
+        if not (shard.settings.get("registry") or shard.settings.get("database")):
+            raise ValueError(
+                "a fleet on a cluster needs `database` or `registry` in its --template: without one, a robot could run"
+                " on two machines when the network splits"
+            )

@@ -1,0 +1,135 @@
+"""Plays trials on a cluster of Ray: each is a task, placed where a processor is free, tried again if its node dies.
+
+A task plays its trial as a campaign on one machine would: in a process of its own, forked from one that has everything
+loaded. The scenarios' folders travel with the tasks, for nodes that have no such files; what a failed trial leaves
+comes back.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterable, Iterator
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Protocol
+
+import msgspec
+
+from roboglot.extras import explaining
+from roboglot.shards.cluster import LOCAL, joined
+from roboglot.testing.campaign.local import ATTEMPTS_MAX, Ended, Leave, interruptions, play_here
+from roboglot.testing.campaign.trials import Outcome, Result, Trial
+
+with explaining("--on", "fleet"):
+    import ray
+
+FILES_MAX, BYTES_MAX = 2000, 64 << 20  # of a campaign's scenarios, and of what one trial leaves
+LOOK_SECONDS = 0.5  # between two looks at Ctrl-C
+Files = dict[str, bytes]
+
+
+class TooLarge(ValueError):
+    """There is more in a folder than travels over the network."""
+
+
+class Reference(Protocol):
+    """What Ray returns for a task."""
+
+    def future(self) -> Future[tuple[bytes, Files]]:
+        """Return the answer to come."""
+
+
+def play_on(
+    where: str,
+    trials: Iterator[Trial],
+    paths: Iterable[Path],
+    workers: int,
+    seconds_max: float,
+    leave: Leave,
+    ended: Ended,
+) -> None:
+    """Play all of ``trials`` on the cluster ``where``, ``workers`` at a time; 0: as many as it has processors.
+
+    ``paths``: files and folders that they need. Raises KeyboardInterrupt at SIGINT, once what was under way is
+    cancelled; OSError if there is no such cluster; TooLarge.
+    """
+    waiting: dict[Reference, tuple[Trial, Path | None]] = {}
+    with joined(where), interruptions() as interrupted:
+        task = ray.remote(_play).options(num_cpus=1, max_retries=ATTEMPTS_MAX - 1)
+        workers = workers or max(1, int(ray.cluster_resources().get("CPU", 1)))
+        files: object = None
+        while not interrupted.poll():
+            while len(waiting) < workers and (trial := next(trials, None)) is not None:
+                files = files or ray.put({} if where == LOCAL else pack(Path(trial.folder), paths))
+                place = leave(trial)
+                waiting[task.remote(trial, files, seconds_max, keep=place is not None)] = trial, place
+            if not waiting:
+                return
+            done, _ = ray.wait(list(waiting), timeout=LOOK_SECONDS)
+            for reference in done:
+                trial, place = waiting.pop(reference)
+                ended(trial, _result(reference, place))
+        for reference in waiting:
+            ray.cancel(reference)
+        ray.wait(list(waiting), num_returns=len(waiting), timeout=10.0)
+    raise KeyboardInterrupt
+
+
+def _result(reference: Reference, place: Path | None) -> Result:
+    try:
+        encoded, left = ray.get(reference)
+    except ray.exceptions.RayError as error:
+        return Result(Outcome.CRASHED, str(error).strip().splitlines()[0], attempts=ATTEMPTS_MAX)
+    if place is not None:
+        unpack(left, place)
+    return msgspec.json.decode(encoded, type=Result)
+
+
+def _play(trial: Trial, files: Files, seconds_max: float, *, keep: bool) -> tuple[bytes, Files]:
+    """On a node: play one trial; return its result and, if wanted, what it left."""
+    results: list[Result] = []
+    with tempfile.TemporaryDirectory(prefix="roboglot-task-") as folder:
+        scenarios, left = Path(trial.folder), Path(folder, "left")
+        if not _as_here(files, scenarios):
+            scenarios = Path(folder, "scenarios")
+            unpack(files, scenarios)
+        here = Trial(str(scenarios), trial.scenario, trial.name, trial.seed, trial.fingerprint)
+        play_here(
+            iter([here]), 1, seconds_max, lambda _: left if keep else None, lambda _, result: results.append(result)
+        )
+        try:
+            kept = pack(left, [left]) if keep and left.exists() else {}
+        except TooLarge:
+            kept = {}
+    return msgspec.json.encode(results[0]), kept
+
+
+def _as_here(files: Files, folder: Path) -> bool:
+    """Whether this machine has the same files at the same place: then what they refer to is there as well."""
+    places = ((folder / name, content) for name, content in files.items())
+    return all(place.is_file() and place.read_bytes() == content for place, content in places)
+
+
+def pack(folder: Path, paths: Iterable[Path]) -> Files:
+    """Return the files below ``paths`` by their path below ``folder``. Raises TooLarge."""
+    packed: Files = {}
+    size = 0
+    for path in paths:
+        for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
+            if not file.is_file():
+                continue
+            size += file.stat().st_size
+            if size > BYTES_MAX or len(packed) >= FILES_MAX:
+                raise TooLarge(f"{path}: at most {FILES_MAX} files and {BYTES_MAX >> 20} MB travel to a cluster")
+            packed[str(file.relative_to(folder))] = file.read_bytes()
+    return packed
+
+
+def unpack(files: Files, folder: Path) -> None:
+    """Write packed files below ``folder``."""
+    for name, content in files.items():
+        file = folder / name
+        if not file.resolve().is_relative_to(folder.resolve()):
+            raise ValueError(f"{name} is not below the folder")
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(content)

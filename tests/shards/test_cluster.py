@@ -1,0 +1,91 @@
+"""A fleet on several Ray nodes of this machine: a killed node's robots run elsewhere, none of them twice."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("ray", reason="Ray, which roboglot's extra `fleet` brings, is not installed")
+
+os.environ["RAY_AUTH_MODE"] = "disabled"  # no token in the home folder
+os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
+
+import ray
+from ray.cluster_utils import Cluster
+
+from roboglot.shards.cluster import ClusterFleet, joined
+from roboglot.shards.plan import plan_fleet
+from roboglot.shards.supervisor import State
+from roboglot.storage.homes import Home, Homes
+from roboglot.storage.opening import open_registry
+
+STORE = 80 << 20
+FIRST = "127.77.9.1"
+HEALTH = {  # as in deploy/kuberay: a node that is silent for 3 s is gone
+    "health_check_initial_delay_ms": 1000,
+    "health_check_period_ms": 1000,
+    "health_check_timeout_ms": 1000,
+    "health_check_failure_threshold": 2,
+}
+# Ray's own threads leave sockets and files to the collector.
+pytestmark = pytest.mark.filterwarnings("ignore")
+
+
+@pytest.fixture
+def cluster() -> Iterator[Cluster]:
+    """A head without room for shards, and two nodes with room for all."""
+    head = {"num_cpus": 0, "object_store_memory": STORE, "include_dashboard": False, "_system_config": HEALTH}
+    made = Cluster(initialize_head=True, head_node_args=head)
+    yield made
+    made.shutdown()
+
+
+def homes(registry: Path) -> dict[str, Home]:
+    database = open_registry(str(registry))
+    try:
+        return asyncio.run(Homes(database).all())
+    finally:
+        database.close()
+
+
+async def test_a_killed_nodes_robots_run_elsewhere_and_none_twice(cluster: Cluster, tmp_path: Path) -> None:
+    registry = tmp_path / "registry.db"
+    nodes = {n.node_id[:12]: n for n in (cluster.add_node(num_cpus=1, object_store_memory=STORE) for _ in range(2))}
+    template = {"registry": str(registry), "console": {"enabled": False}}
+    plan = plan_fleet(2, 1, template, tmp_path, first=FIRST)
+    with joined(cluster.address):
+        fleet = ClusterFleet(plan, tmp_path / "fleet", cluster.address)
+        try:
+            await fleet.start()
+            states = {(shard.state, shard.reason) for shard in fleet.shards.values()}
+            assert states == {(State.READY, "")}
+            before = await asyncio.to_thread(homes, registry)
+            where = {name: fleet.node_of(name) for name in fleet.shards}
+            victim = where["w1"]
+            began = time.monotonic()
+            cluster.remove_node(nodes[victim], allow_graceful=False)
+            moved = [shard for name, shard in fleet.shards.items() if where[name] == victim]
+            await fleet.until(
+                lambda: all(s.state is State.READY and fleet.node_of(s.plan.name) != victim for s in moved)
+            )
+            print(f"robots of a killed node are back after {time.monotonic() - began:.1f} s")
+            after = await asyncio.to_thread(homes, registry)
+            for shard in fleet.shards.values():
+                (robot,) = shard.plan.robots
+                lost = where[shard.plan.name] == victim
+                assert after[robot].epoch == before[robot].epoch + lost
+                assert (after[robot].holder != before[robot].holder) == lost
+        finally:
+            await fleet.close()
+    assert not ray.is_initialized()
+
+
+async def test_a_cluster_without_a_registry_is_refused(tmp_path: Path) -> None:
+    plan = plan_fleet(1, 1, {}, tmp_path, first=FIRST)
+    with pytest.raises(ValueError, match="needs `database` or `registry`"):
+        ClusterFleet(plan, tmp_path / "fleet", "ray://head")
