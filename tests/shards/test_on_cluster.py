@@ -1,0 +1,161 @@
+"""What a cluster needs from outside of it: the extra, and Kubernetes' manifests in deploy/kuberay."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+import msgspec
+import pytest
+import yaml
+from typer.testing import CliRunner
+
+from roboglot.cli.campaign import command as campaign
+from roboglot.cli.fleet import app
+
+KUBERAY = Path(__file__).parents[2] / "deploy/kuberay"
+LOCK = KUBERAY.parents[1] / "requirements/fleet.lock"
+
+
+class Part(msgspec.Struct, forbid_unknown_fields=True, rename="camel"):
+    """The fields of KubeRay's and Kubernetes' types that the manifests may use; any other is a mistake."""
+
+
+class Metadata(Part):
+    name: str
+
+
+class Key(Part):
+    name: str
+    key: str
+
+
+class Source(Part):
+    secret_key_ref: Key
+
+
+class Variable(Part):
+    name: str
+    value: str = ""
+    value_from: Source | None = None
+
+
+class Port(Part):
+    container_port: int
+    name: str
+
+
+class Amount(Part):
+    cpu: str
+    memory: str
+
+
+class Resources(Part):
+    requests: Amount
+    limits: Amount
+
+
+class Mount(Part):
+    name: str
+    mount_path: str
+
+
+class Container(Part):
+    name: str
+    image: str
+    resources: Resources
+    env: list[Variable] = []
+    ports: list[Port] = []
+    volume_mounts: list[Mount] = []
+
+
+class Claim(Part):
+    claim_name: str
+
+
+class Volume(Part):
+    name: str
+    persistent_volume_claim: Claim
+
+
+class PodSpec(Part):
+    containers: list[Container]
+    volumes: list[Volume] = []
+
+
+class Pod(Part):
+    spec: PodSpec
+
+
+class Head(Part):
+    ray_start_params: dict[str, str]
+    template: Pod
+
+
+class Workers(Head):
+    group_name: str
+    replicas: int
+    min_replicas: int
+    max_replicas: int
+
+
+class Cluster(Part):
+    ray_version: str
+    head_group_spec: Head
+    worker_group_specs: list[Workers]
+
+
+class Job(Part):
+    entrypoint: str
+    shutdown_after_job_finishes: bool
+    ttl_seconds_after_finished: int
+    backoff_limit: int
+    ray_cluster_spec: Cluster
+
+
+class RayCluster(Part, tag_field="kind"):
+    api_version: str
+    metadata: Metadata
+    spec: Cluster
+
+
+class RayJob(Part, tag_field="kind"):
+    api_version: str
+    metadata: Metadata
+    spec: Job
+
+
+@pytest.mark.parametrize("name", ["fleet.yaml", "campaign.yaml"])
+def test_a_manifest_has_only_known_fields_and_the_locked_ray(name: str) -> None:
+    document = msgspec.convert(yaml.safe_load((KUBERAY / name).read_text()), type=RayCluster | RayJob)
+    cluster = document.spec if isinstance(document, RayCluster) else document.spec.ray_cluster_spec
+    assert document.api_version == "ray.io/v1"
+    locked = re.search(r"^ray==([\d.]+)", LOCK.read_text(), re.MULTILINE)
+    assert locked
+    assert cluster.ray_version == locked[1]
+    assert cluster.head_group_spec.ray_start_params["num-cpus"] == "0"
+    for group in (cluster.head_group_spec, *cluster.worker_group_specs):
+        volumes = {volume.name for volume in group.template.spec.volumes}
+        for container in group.template.spec.containers:
+            assert {mount.name for mount in container.volume_mounts} == volumes
+            assert {"RAY_USAGE_STATS_ENABLED"} <= {variable.name for variable in container.env}
+    if isinstance(document, RayJob):
+        from typer import Typer
+        from typer.main import get_command
+
+        whole = Typer()
+        whole.command()(campaign)
+        words = document.spec.entrypoint.split()
+        options = {option for parameter in get_command(whole).params for option in parameter.opts}
+        assert words[:2] == ["roboglot", "campaign"]
+        assert {word for word in words if word.startswith("--")} <= options
+
+
+def test_without_ray_the_extra_is_named_in_one_sentence(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setitem(sys.modules, "ray", None)
+    monkeypatch.delitem(sys.modules, "roboglot.shards.cluster", raising=False)
+    done = CliRunner().invoke(app, ["up", "--worlds", "1", "--on", "local", "--data", str(tmp_path)])
+    assert str(done.exception) == (
+        "roboglot fleet: --on needs ray, which is not installed: pip install 'roboglot[fleet]'"
+    )
