@@ -39,9 +39,8 @@ class Asset:
 
 @cache
 def _paths() -> dict[str, Path]:
-    found = {
-        "/" + path.relative_to(FOLDER).as_posix(): path for path in sorted(FOLDER.rglob("*")) if path.suffix in TYPES
-    }
+    files = ((path.relative_to(FOLDER).as_posix().removesuffix(".gz"), path) for path in sorted(FOLDER.rglob("*")))
+    found = {f"/{name}": path for name, path in files if Path(name).suffix in TYPES}
     for folder in ("/", "/studio/"):
         found[folder] = found[f"{folder}index.html"]
     found["/studio"] = found["/studio/"]
@@ -51,10 +50,16 @@ def _paths() -> dict[str, Path]:
 @cache
 def _read(path: Path) -> Asset:
     plain = path.read_bytes()
+    if path.suffix == ".gz":  # large libraries are stored as they are sent
+        packed, plain = plain, gzip.decompress(plain)
+        return Asset(TYPES[Path(path.stem).suffix], plain, packed, _tag(plain))
     if path.suffix == ".js":  # our own modules: what readers of the source need is not sent; lines keep their numbers
         plain = _COMMENT.sub(b"", plain)
-    tag = f'"{hashlib.sha256(plain).hexdigest()[:24]}"'
-    return Asset(TYPES[path.suffix], plain, gzip.compress(plain, 9, mtime=0), tag)
+    return Asset(TYPES[path.suffix], plain, gzip.compress(plain, 9, mtime=0), _tag(plain))
+
+
+def _tag(plain: bytes) -> str:
+    return f'"{hashlib.sha256(plain).hexdigest()[:24]}"'
 
 
 class Assets:
