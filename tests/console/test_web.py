@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 import json
 import os
 import re
@@ -42,9 +43,11 @@ def test_every_key_of_the_pages_has_words() -> None:
         assert any(key.startswith(prefix) for key in WORDS["en"]), prefix
 
 
-def test_every_fault_has_words_in_both_languages() -> None:
-    missing = [kind for kind in KINDS if f"robot.{kind}" not in WORDS["zh"] or f"robot.{kind}" not in WORDS["en"]]
-    assert missing == []
+def test_every_fault_and_option_has_words_in_both_languages() -> None:
+    options = {name for kind in KINDS.values() for name in list(inspect.signature(kind.begin).parameters)[1:]}
+    wanted = {f"robot.{kind}" for kind in KINDS} | {f"option.{name}" for name in options}
+    assert sorted(wanted - set(WORDS["en"])) == []
+    assert sorted(wanted - set(WORDS["zh"])) == []
 
 
 @pytest.mark.parametrize("folder", [FOLDER / "vendor", FOLDER / "studio" / "vendor", TESTS_VENDOR], ids=str)

@@ -76,7 +76,7 @@ function Faults() {
   return html`<form class="card" onSubmit=${inject}><h3>${t("fault.new")}</h3>
       <label class="field"><span>${t("fault.kind")}</span><select value=${chosen.name} onChange=${(e) => { kind.value = e.target.value; }}>
         ${kinds.map((k) => html`<option value=${k.name}>${robotWord(k.name)}</option>`)}</select></label>
-      ${Object.entries(chosen.options).map(([name, fallback]) => html`<label class="field" key=${`${chosen.name}-${name}`}><span>${name}</span>
+      ${Object.entries(chosen.options).map(([name, fallback]) => html`<label class="field" key=${`${chosen.name}-${name}`}><span>${t(`option.${name}`)}</span>
         <input name=${`option-${name}`} defaultValue=${fallback ?? ""} placeholder=${fallback === null ? t("fault.chosen") : ""} /></label>`)}
       <label class="field"><span>${t("fault.seconds")}</span><input name="duration" type="number" min="0" step="1" placeholder=${t("fault.forever")} /></label>
       <${Button} type="submit" kind="main" label=${t("fault.inject")} verb="inject_fault" /></form>
