@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
+import json
 import socket
 import zipfile
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from websockets.asyncio.client import connect
 
 from roboglot.config import AccessConfig, ConsoleConfig, RobotConfig, load_config
 from roboglot.console.resend import resend
@@ -269,3 +272,22 @@ async def test_answers_leave_at_once(shown: Shown) -> None:
     server = shown.runtime.console._server
     assert server is not None
     assert {listening.proto for listening in server.sockets} == {socket.IPPROTO_TCP}
+
+
+async def test_a_page_that_is_opened_late_sees_all_that_is_kept(shown: Shown) -> None:
+    wire = shown.desk.view("a").wire
+    wire.open()
+    first = wire.last + 1
+    for number in range(450):  # more than two messages hold
+        wire._note(Exchange(0.0, "a", "slamware", "c", "x", Direction.REQUEST, f"GET /{number}", b""))
+    seen: list[str] = []
+    async with connect(shown.url.replace("http", "ws") + "/live") as page, asyncio.timeout(60):
+        await page.send(json.dumps({"type": "watch", "robot": "a", "wire": True}))
+        while len(seen) < 450:
+            text = await page.recv()
+            message = json.loads(text) if isinstance(text, str) else {}
+            if message.get("type") == "wire":
+                assert message["skipped"] == 0
+                seen += [row[6] for row in message["rows"] if row[0] >= first]
+    assert seen == [f"GET /{number}" for number in range(450)]
+    wire.close()

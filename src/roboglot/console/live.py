@@ -21,6 +21,7 @@ from roboglot.console.settings import (
     NAME_MAX,
     OTHERS_BEATS,
     STATE_BEATS,
+    WIRE_MAX,
     WISHES_MAX,
 )
 from roboglot.console.teleop import Pad, Velocity
@@ -153,11 +154,14 @@ class Page:
                 await self._send(frame)
 
     async def _show_wire(self, view: RobotView) -> None:
-        new = view.wire.after(self._wire_at, BATCH_MAX)
-        if new:
-            skipped = new[0].number - self._wire_at - 1 if self._wire_at else 0
-            self._wire_at = new[-1].number
-            await self._tell({"type": "wire", "robot": view.robot.id, "rows": rows(new), "skipped": skipped})
+        first = not self._wire_at  # a page that is opened late gets all that is kept
+        new = view.wire.after(self._wire_at, WIRE_MAX if first else BATCH_MAX)
+        for batch in (new[start : start + BATCH_MAX] for start in range(0, len(new), BATCH_MAX)):
+            if view is not self._watched:
+                return
+            skipped = 0 if first else batch[0].number - self._wire_at - 1
+            self._wire_at = batch[-1].number
+            await self._tell({"type": "wire", "robot": view.robot.id, "rows": rows(batch), "skipped": skipped})
 
     async def _tell(self, message: Mapping[str, Any]) -> None:
         await self._send(msgspec.json.encode(message).decode())
