@@ -68,7 +68,9 @@ async def delete_map(context: Context) -> NoContent:
 
 
 @TABLE.on(
-    f"POST {MAP}/stcm/:save", right=Right.EDIT, needs=(Docking, MapAnnotations, MapMemory, Mapping, Places, Settings)
+    f"POST {MAP}/stcm/:save",
+    right=Right.EDIT,
+    needs=(Docking, FileStore, MapAnnotations, MapMemory, Mapping, Places, Settings),
 )
 async def save_stcm(context: Context) -> None:
     """The map in memory to disk; 403 if the one on disk has several floors."""
