@@ -104,6 +104,26 @@ async def test_a_revoked_driver_stops_at_once(runtime: Runtime, store: AccessSto
     client.close()
 
 
+@pytest.mark.parametrize(
+    ("who", "stays"),
+    [
+        ("slamware stranger", False),
+        ("robomaster 10.1.2.3:40000", False),
+        (f"robomaster {DRIVER.address}:40000", True),
+        ("robomaster", True),
+        ("a person", True),
+    ],
+)
+async def test_control_kept_over_a_restart_needs_the_right(runtime: Runtime, who: str, stays: bool) -> None:
+    lease = runtime.fleet.robots["a"][Lease]
+    await lease.take(who)
+    for admission in guard_of(runtime)._admissions:
+        admission.settle_control()  # as at every start
+    await asyncio.sleep(0)
+    assert lease.taken_by == (who if stays else "")
+    await lease.release()
+
+
 async def test_one_address_has_so_many_connections(runtime: Runtime) -> None:
     admission = runtime.fleet.robots["a"].admission
     admission.connections_max = 3

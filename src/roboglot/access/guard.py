@@ -89,6 +89,8 @@ class Guard:
     def start(self) -> None:
         """Follow the file and the clock, on the running loop."""
         loop = asyncio.get_running_loop()
+        for admission in self._admissions:
+            admission.settle_control()
         self._thread = threading.Thread(target=self._follow, args=(loop,), name="access", daemon=True)
         self._thread.start()
 
@@ -353,6 +355,16 @@ class RobotAdmission(Admission):
             lost = rights - self._rights.get(who, NOTHING)
             if lost or (who in replaced and rights):
                 self._stop(who, cut=Right.DRIVE in lost or who in replaced)
+
+    def settle_control(self) -> None:
+        """Release control that was kept over a restart for a client that may no longer drive."""
+        if Lease not in self._robot or not (client := self._robot[Lease].client):
+            return
+        lease = self._robot[Lease]
+        drives = any(lease.is_of(who) for who, rights in self._rights.items() if Right.DRIVE in rights)
+        if not drives and not (self._guard.config.local and is_loopback(host_of(client) or client)):
+            log.warning("%s, who has control of robot %s, may no longer drive it", client, self._name)
+            self._releasing = asyncio.ensure_future(lease.release())
 
     def _stop(self, who: str, *, cut: bool) -> None:
         log.warning("%s lost rights on robot %s", who, self._name)

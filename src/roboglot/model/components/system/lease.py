@@ -126,10 +126,14 @@ class Lease(Component):
         if Link in self._robot:
             await self._robot[Link].take_back()
 
+    @property
+    def client(self) -> str:
+        """The client that control is taken by, without its door; empty for a whole door, a person, or none."""
+        return "" if self._taken_by == PERSON else self._taken_by.partition(" ")[2]
+
     def is_of(self, who: str) -> bool:
         """Whether control is taken by the client that showed to be ``who``, by whatever door."""
-        _, _, client = self._taken_by.partition(" ")
-        return bool(who) and (client == who or client.startswith(f"{who}:"))
+        return bool(who) and (self.client == who or self.client.startswith(f"{who}:"))
 
     async def release(self) -> None:
         """Let every client move it again. Returns when that is stored."""
