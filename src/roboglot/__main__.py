@@ -1,10 +1,19 @@
 """``python -m roboglot``, and the command ``roboglot``: Ctrl-C ends it without a word also while modules are loaded."""
 
+import os
 import signal
+import sys
+
+
+def _look_elsewhere_last() -> None:
+    """Look into PYTHONPATH last: a module of another project must not stand in for a library of ours."""
+    others = {os.path.abspath(folder) for folder in os.environ.get("PYTHONPATH", "").split(os.pathsep) if folder}
+    sys.path.sort(key=lambda folder: folder in others)
 
 
 def run() -> None:
     """Load the command line and run it. SIGINT has Python's own meaning again when it is loaded."""
+    _look_elsewhere_last()
     before = signal.getsignal(signal.SIGINT)
     if before is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
