@@ -305,9 +305,10 @@ class Runtime:
         await asyncio.gather(*(doors.close() for doors in self.doors.values()))
         await _in_time("control of the robots", self._leases.close())
         await self._record_desk.close()
+        if self.clock.repeats:  # how much robot time robots take to stand still depends on the machine from here on
+            await self._close_recorder()
         await _in_time("the fleet", self.fleet.close())
-        if self._recorder is not None:
-            await self._recorder.close()
+        await self._close_recorder()
         await _in_time("the rehearsals", self._rehearsals.close())
         if self._engine is not None:
             await _in_time("the program engine", self._engine.close())
@@ -320,6 +321,11 @@ class Runtime:
             self.guard.close()
         self._database.close()
         os.close(self._lock)
+
+    async def _close_recorder(self) -> None:
+        if self._recorder is not None:
+            recorder, self._recorder = self._recorder, None
+            await recorder.close()
 
 
 async def _in_time(name: str, closing: Awaitable[None]) -> None:

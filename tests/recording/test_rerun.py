@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from websockets.asyncio.client import connect
+from websockets.asyncio.client import ClientConnection, connect
 
 from roboglot.cli.recordings.rerun import NoRerun, configuration
 from roboglot.clients.slamware import SlamwareClient
@@ -110,7 +110,7 @@ async def with_programs(folder: Path, turns: int) -> Path:
 
     runtime.fleet.robots["a"].tap.listen(hear)
     numbers = itertools.count()
-    async with connect(f"ws://{ADDRESS}:50053/programs") as socket:
+    async with connect(f"ws://{ADDRESS}:50053/programs") as socket, asyncio.TaskGroup() as tasks:
 
         async def send(operate: str, body: str = "") -> None:
             number = next(numbers)
@@ -122,6 +122,7 @@ async def with_programs(folder: Path, turns: int) -> Path:
             while heard <= number:  # noqa: ASYNC110
                 await asyncio.sleep(0)
 
+        reading = tasks.create_task(read_all(socket))
         await clock.advance(1.0)
         await send("save", PROGRAM)
         for turn in range(turns):
@@ -134,9 +135,15 @@ async def with_programs(folder: Path, turns: int) -> Path:
                     await send("suspend" if number == 1 else "recover")
                 await send("inquiry")
             await clock.advance(2.0)
+        reading.cancel()
     rest.close()
     await runtime.close()
     return folder / "r.mcap"
+
+
+async def read_all(socket: ClientConnection) -> None:
+    async for _ in socket:
+        pass
 
 
 @pytest.mark.parametrize("turns", [2, pytest.param(90, marks=pytest.mark.slow)])  # 13 s and ten minutes
@@ -146,6 +153,22 @@ async def test_programs_do_the_same_again(tmp_path: Path, turns: int) -> None:
     assert len(ends) == turns
     done = await asyncio.to_thread(rerun, file)
     assert done.stdout.startswith("identical: "), done.stdout + done.stderr
+
+
+async def test_nothing_is_recorded_after_the_end_begins(tmp_path: Path) -> None:
+    """A robot comes to a stand while the runtime closes, in robot time that depends on the machine."""
+    runtime = Runtime(config(tmp_path))
+    await runtime.start()
+    assert isinstance(runtime.clock, LockstepClock)
+    rest = SlamwareClient(ADDRESS)
+    await rest.begin("MoveToAction", MoveToOptions(Location(3.0, 0.2), MoveOptions()))
+    await runtime.clock.advance(2.08)
+    end = runtime.clock.time()
+    rest.close()
+    await runtime.close()
+    recording = read_recording(tmp_path / "r.mcap")
+    assert runtime.clock.time() > end
+    assert (recording.last - recording.first) / 1e9 <= end
 
 
 async def test_the_first_difference_is_shown_with_what_came_before(tmp_path: Path) -> None:

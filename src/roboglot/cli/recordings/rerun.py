@@ -100,7 +100,7 @@ async def run(recording: Recording, config: Config) -> list[str]:
     try:
         await runtime.start()
         start = recording.epoch or runtime.clock.epoch() - runtime.clock.time()
-        await inputs.play(recording.last / 1e9 - start)
+        await inputs.play((recording.last - round(start * 1e9)) / 1e9)
     finally:
         await runtime.close()
     return inputs.unheard
