@@ -70,7 +70,11 @@ def kill_writers(tmp_path: Path) -> None:
     for child in children:
         assert child.stdout
         child.stdout.readline()
-    time.sleep(2.0)
+    deadline = time.monotonic() + 60.0
+    while not all(numbers(tmp_path / f"{number}.mcap") for number in range(KILLS)):
+        assert time.monotonic() < deadline
+        time.sleep(0.2)
+    time.sleep(1.0)  # some flushes more
     for number, child in enumerate(children):
         killed[number] = time.time_ns()
         child.kill()
