@@ -113,6 +113,8 @@ class Trial:
         """One event, and what came of it."""
         clock, localization, began = self.house.clock, self.robot[Localization], self.house.clock.time()
         self.told.clear()
+        if localization.lost is not None:  # it still says so: since it was pushed to where its map does not reach
+            self.told.append(began)
         await (self.kidnap() if name == "kidnapping" else self.black_out())
         deadline, found, looked = clock.time() + RECOVERED_SECONDS, math.inf, False
         after = clock.time()

@@ -1,8 +1,8 @@
-"""Claim: two laps through the office with drifting odometry (>= 2 m) and people: ATE median <= 5 cm, worst <= 15 cm.
+"""Claim: two laps through the office with drifting odometry (>= 2 m) and people: ATE median <= 3 cm, worst <= 8 cm.
 
-The body's own noise (median <= 2 cm) and three levels of it, five seeds each; <= 2 ms of processor time a scan. The
-truth is the world's, the map frame's origin is where the robot woke up, so nothing is aligned afterwards. ``--quick``:
-one seed a level.
+The body's own noise (median <= 2 cm) and three levels of it, five seeds each; <= 0.5 ms of processor time a scan, 99 of
+100 within 5 ms. The truth is the world's, the map frame's origin is where the robot woke up, so nothing is aligned
+afterwards. ``--quick``: one seed a level.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from roboglot.model.geometry import Pose
 from roboglot.simulation.bodies.files import BODIES
 from roboglot.storage.database import Database
 
-MEDIAN_MAX, WORST_MAX, MILLISECONDS_MAX, DRIFT_MIN = 0.05, 0.15, 2.0, 2.0
+MEDIAN_MAX, WORST_MAX, MILLISECONDS_MAX, MOST_MILLISECONDS_MAX, DRIFT_MIN = 0.03, 0.08, 0.5, 5.0, 2.0
 SEEDS = (1, 2, 3, 4, 5)
 USUAL_MAX = 0.02
 LEVELS: dict[str, dict[str, float]] = {  # what replaces the universal body's figures
@@ -116,7 +116,7 @@ def runs() -> Iterator[tuple[str, int]]:
 
 
 def main() -> None:
-    usual, ates, scans, drifts, failed = list[float](), [], [], [], 0
+    usual, ates, scans, slow, drifts, failed = list[float](), [], [], [], [], 0
     with tempfile.TemporaryDirectory() as folder:
         for level, seed in runs():
             lap = asyncio.run(run(noisy_body(Path(folder), LEVELS[level]), seed))
@@ -125,6 +125,7 @@ def main() -> None:
                 drifts.append(lap.drift)
             failed += bool(lap.failed)
             scans.append(statistics.fmean(lap.scan_seconds) * 1000)
+            slow.append(statistics.quantiles(lap.scan_seconds, n=100)[-1] * 1000)
             print(f"{level:7} seed {seed}  ATE {lap.ate * 100:5.1f} cm, at most {max(lap.errors) * 100:5.1f} cm, "
                   f"drift {lap.drift:4.1f} m, {scans[-1]:.2f} ms a scan  {'; '.join(lap.failed)}",
                   flush=True)  # fmt: skip
@@ -134,6 +135,7 @@ def main() -> None:
     claims.at_most("ATE, median", 100.0 * median, 100.0 * MEDIAN_MAX, "cm")
     claims.at_most("ATE, worst", 100.0 * worst, 100.0 * WORST_MAX, "cm")
     claims.at_most("a scan, on average, slowest run", slowest, MILLISECONDS_MAX, "ms")
+    claims.at_most("99 of 100 scans, slowest run", max(slow), MOST_MILLISECONDS_MAX, "ms")
     claims.at_least("odometry's drift, least", min(drifts), DRIFT_MIN, "m")
     claims.at_most("runs that did not get round", failed, 0, "")
     claims.finish()

@@ -12,6 +12,7 @@ import numpy as np
 
 from roboglot.kernels.compiled import kernel
 from roboglot.kernels.linear import invert
+from roboglot.kernels.occupancy import is_surface
 
 SPREAD = 0.15  # m, within which the cells around a point count
 SIGMA = 0.02  # m, of a point against a surface
@@ -32,10 +33,8 @@ def surface_near(
     total = mean_x = mean_y = xx = xy = yy = 0.0
     for r in range(max(0, row - 2), min(height, row + 3)):
         for c in range(max(0, col - 2), min(width, col + 3)):
-            if evidence[r, c] <= 0:
-                continue
             hits = surface[r, c, 0]
-            if hits <= 0.0:
+            if hits <= 0.0 or not is_surface(evidence, r, c):
                 continue
             if surface[r, c, 3] * beam_x + surface[r, c, 4] * beam_y > 0.2 * hits:
                 continue

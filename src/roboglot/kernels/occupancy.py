@@ -10,8 +10,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from roboglot.kernels.compiled import kernel
+
+Cells = NDArray[np.int16]
 
 HIT = 100
 MISS = -50
@@ -22,6 +25,20 @@ FROZEN = -1
 NEIGHBOURS = 0.06  # rad between rays that count as beside each other
 BETWEEN_MAX = 6
 GRAZING = 0.35  # sine of the angle below which a ray passes along a surface
+
+
+@kernel("boolean(int16[:,::1], int64, int64)")
+def is_surface(evidence: Cells, row: int, col: int) -> bool:
+    """Return True if hits in this cell belong to a surface: it is occupied, or beside an occupied one.
+
+    Echoes scatter to both sides of a wall. Those on the near side lie in cells that rays have cleared; without them
+    every wall would stand farther away, by more the noisier the lidar is and the longer it looked.
+    """
+    for r in range(max(0, row - 1), min(evidence.shape[0], row + 2)):
+        for c in range(max(0, col - 1), min(evidence.shape[1], col + 2)):
+            if evidence[r, c] > 0:
+                return True
+    return False
 
 
 @kernel("boolean(int16[:,::1], float32[:,:,::1], int64, int64, float64, float64, float64)")
@@ -162,7 +179,7 @@ def integrate(
             continue
         if marks[row, col] != scan:
             marks[row, col] = scan
-            if evidence[row, col] <= 0:  # what was there before is gone
+            if not is_surface(evidence, row, col):  # what was there before is gone
                 for part in range(surface.shape[2]):
                     surface[row, col, part] = 0.0
             evidence[row, col] = min(EVIDENCE_MAX, evidence[row, col] + HIT)
@@ -182,15 +199,51 @@ def integrate(
         _clear_between(evidence, surface, marks, scan, ends, i, x, y, resolution)
 
 
-UNKNOWN, FITTING, HIDDEN, FLOATING = 0, 1, 2, 3  # what the map says of an echo
+WIDE = 3.0  # cells to either side of a ray that a surface goes on which it passes through
+UNKNOWN, FITTING, HIDDEN, FLOATING, CROSSING = 0, 1, 2, 3, 4  # what the map says of an echo
+
+
+@kernel("boolean(int16[:,::1], float64, float64)")
+def _is_occupied_near(evidence: Cells, col: float, row: float) -> bool:
+    """Return True if the cell at (col, row) or one beside it is occupied."""
+    middle_row, middle_col = int(np.floor(row)), int(np.floor(col))
+    for r in range(max(0, middle_row - 1), min(evidence.shape[0], middle_row + 2)):
+        for c in range(max(0, middle_col - 1), min(evidence.shape[1], middle_col + 2)):
+            if evidence[r, c] > 0:
+                return True
+    return False
+
+
+@kernel("boolean(int16[:,::1], float64, float64, float64, float64, float64, boolean, float64)")
+def _is_pierced(
+    evidence: Cells, x: float, y: float, end_x: float, end_y: float, slack: float, wide: bool, resolution: float
+) -> bool:
+    """Return True if the ray passes through an occupied cell more than ``slack`` m before its end.
+
+    ``wide``: only where the surface goes on to both sides of the ray, so that it does not just touch an edge.
+    """
+    dx, dy = end_x - x, end_y - y
+    length = np.sqrt(dx * dx + dy * dy)
+    for k in range(1, int((length - slack) / resolution)):
+        at_col, at_row = x / resolution + dx * k / length, y / resolution + dy * k / length
+        col, row = int(np.floor(at_col)), int(np.floor(at_row))
+        if row < 0 or col < 0 or row >= evidence.shape[0] or col >= evidence.shape[1] or evidence[row, col] <= 0:
+            continue
+        left, ahead = -dy / length * WIDE, dx / length * WIDE
+        if not wide or (
+            _is_occupied_near(evidence, at_col + left, at_row + ahead)
+            and _is_occupied_near(evidence, at_col - left, at_row - ahead)
+        ):
+            return True
+    return False
 
 
 @kernel("uint8[::1](int16[:,::1], float64[:,::1], float64, float64, float64, float64)")
 def verdicts(evidence: Any, points: Any, x: float, y: float, slack: float, resolution: float) -> Any:
     """What the map says of each echo at ``points`` (n, 2; m from the grid's corner), seen from (x, y).
 
-    FITTING: on or beside an occupied cell; HIDDEN: the ray passes through a wall more than ``slack`` m before its end;
-    FLOATING: in the midst of floor that was seen free; else UNKNOWN.
+    FITTING: on or beside an occupied cell; CROSSING: so, but the ray passes through a wall more than ``slack`` m before
+    its end; HIDDEN: not so, behind a wall; FLOATING: in the midst of floor that was seen free; else UNKNOWN.
     """
     height, width = evidence.shape
     near = int(np.ceil(slack / resolution))
@@ -206,21 +259,10 @@ def verdicts(evidence: Any, points: Any, x: float, y: float, slack: float, resol
                     occupied = True
                 elif evidence[r, c] == 0:
                     unknown = True
-        if occupied:
+        if _is_pierced(evidence, x, y, points[i, 0], points[i, 1], slack, occupied, resolution):
+            said[i] = CROSSING if occupied else HIDDEN
+        elif occupied:
             said[i] = FITTING
-            continue
-        dx, dy = points[i, 0] - x, points[i, 1] - y
-        length = np.sqrt(dx * dx + dy * dy)
-        steps = int((length - slack) / resolution)
-        pierced = False
-        for k in range(1, steps):
-            c = int(np.floor((x + dx * k * resolution / length) / resolution))
-            r = int(np.floor((y + dy * k * resolution / length) / resolution))
-            if 0 <= r < height and 0 <= c < width and evidence[r, c] > 0:
-                pierced = True
-                break
-        if pierced:
-            said[i] = HIDDEN
         elif not unknown:
             said[i] = FLOATING
     return said

@@ -5,8 +5,11 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
+import pytest
+
 from roboglot.autonomy.slam.odometry_memory import KEY
-from roboglot.autonomy.slam.odometry_noise import FACTOR_MAX, SCALE_BIAS_MAX, LearntBias, LearntNoise
+from roboglot.autonomy.slam.odometry_noise import FACTOR_MAX, SCALE_BIAS_MAX, Doubt, LearntBias, LearntNoise
 from roboglot.config import RobotConfig
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import LockstepClock
@@ -59,3 +62,27 @@ def test_nonsense_in_the_settings_is_left_out() -> None:
     bias.restore({"scale_x": -5.0})
     assert noise.way_factor == FACTOR_MAX**2
     assert bias.scale_x == -SCALE_BIAS_MAX
+
+
+def test_a_turning_gyro_and_wrong_wheels_are_learnt_in_a_second() -> None:
+    """Ten corrections by scans that see everything; afterwards a wrong one changes little."""
+    bias, doubt, moved = LearntBias(), Doubt(way=1e-6, yaw=1e-7), Pose(0.05)
+    for _ in range(10):
+        missing = bias.missing(moved, 0.1)
+        correction = Pose(0.04 * moved.x - missing.x, 0.0, 0.01 * 0.1 - missing.yaw)
+        bias.learn(moved, 0.1, correction, (1.0, 1.0), doubt)
+    assert bias.turn == pytest.approx(0.01, rel=0.05)
+    assert bias.scale_x == pytest.approx(0.04, rel=0.05)
+    known = bias.turn
+    bias.learn(moved, 0.1, Pose(yaw=0.002), (1.0, 1.0), doubt)
+    assert abs(bias.turn - known) < 0.002
+
+
+def test_what_is_not_learnt_yet_widens_the_doubt() -> None:
+    bias, moved = LearntBias(), Pose(0.05)
+    before = bias.spread(np.zeros((3, 3)), moved, 0.1)
+    for _ in range(10):
+        bias.learn(moved, 0.1, Pose(), (1.0, 1.0), Doubt(way=1e-6, yaw=1e-7))
+    after = bias.spread(np.zeros((3, 3)), moved, 0.1)
+    assert before[0, 0] > 10 * after[0, 0] > 0.0
+    assert before[2, 2] > 10 * after[2, 2] > 0.0

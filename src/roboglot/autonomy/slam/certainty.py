@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
 from roboglot.autonomy.slam.scan_points import ScanPoints
 from roboglot.kernels.matching import gaps
-from roboglot.kernels.occupancy import FITTING, FLOATING, HIDDEN, verdicts
+from roboglot.kernels.occupancy import CROSSING, FITTING, FLOATING, HIDDEN, verdicts
 from roboglot.model.geometry import Pose
 
 SLACK = 0.15  # m that a point may lie off what the map shows
@@ -26,6 +26,7 @@ INLIER, CLOSE = 0.08, 0.04  # m off the surface
 WELL_KNOWN, SURE_WELL_KNOWN = 4.0, 0.5  # weight of a surface that many hits made; share of points near such ones
 SURE_FITTING, SURE_HIDDEN, SURE_FLOATING = 0.85, 0.02, 0.02  # share of the points, of a place that is sure …
 SURE_AGREEMENT, SURE_CLOSE, SURE_SIGMA = 0.95, 0.925, 0.03  # … of those near a surface; m, in its worst direction
+SURE_CROSSING = 0.02  # share of the points on a surface that are seen through another one: doors, thin things
 CROWDED, CROWDED_CLOSE = 0.02, 0.975  # with more than so much set aside, so much of the rest must be close
 CLOSE_PER_HIDDEN = 4.0  # how much more of it for each share of rays that pass through walls
 EXACT, EXACT_HIDDEN = 0.965, 0.004  # share of points close to surfaces from which a place outdoes …
@@ -58,7 +59,7 @@ class Look:
     """A scan at a place, as shares: ``aside`` is what ``things`` hide, the others are of the rest.
 
     ``agreement``, ``close``: of the points near a ``well_known`` surface those within 8 and 4 cm of it; ``exact``: of
-    all points those within 4 cm of any.
+    all points those within 4 cm of any; ``crossing``: those on a surface that are seen through another one.
     """
 
     aside: float
@@ -70,6 +71,7 @@ class Look:
     agreement: float
     close: float
     exact: float
+    crossing: float
 
     def is_sure(self, sigma: float) -> bool:
         """Whether it is the place, not one that looks like another which the map does not have.
@@ -77,6 +79,8 @@ class Look:
         ``sigma``: m, of the match in its worst direction.
         """
         if self.things > THINGS_MAX or self.aside > THINGS_SHARE or sigma > SURE_SIGMA:
+            return False
+        if self.crossing > SURE_CROSSING:
             return False
         if self.fitting < SURE_FITTING or self.hidden > SURE_HIDDEN or self.floating > SURE_FLOATING:
             return False
@@ -93,7 +97,7 @@ class Look:
     @property
     def is_exact(self) -> bool:
         """Whether nothing at all speaks against the place."""
-        return self.exact >= EXACT and self.hidden <= EXACT_HIDDEN
+        return self.exact >= EXACT and self.hidden <= EXACT_HIDDEN and self.crossing <= SURE_CROSSING
 
     def is_outdone_by(self, other: Look) -> bool:
         """Whether ``other`` is exact and this place is not nearly so."""
@@ -103,7 +107,8 @@ class Look:
 def supported(grid: EvidenceGrid, scan: ScanPoints, pose: Pose) -> Support:
     """What the map says of ``scan`` if it was taken with base_link at ``pose``."""
     said = _said(grid, scan, pose, scan.nearby(JUDGED_POINTS_MAX))
-    fitting, hidden, floating = (int(np.count_nonzero(said == kind)) for kind in (FITTING, HIDDEN, FLOATING))
+    fitting, floating = (int(np.count_nonzero(said == kind)) for kind in (FITTING, FLOATING))
+    hidden = int(np.count_nonzero((said == HIDDEN) | (said == CROSSING)))
     return Support(len(said), fitting, hidden, floating)
 
 
@@ -119,7 +124,8 @@ def look_at(grid: EvidenceGrid, scan: ScanPoints, pose: Pose) -> Look:
     for thing in things:
         rest[thing] = False
     count, near = max(1, int(rest.sum())), off[rest & (weight >= WELL_KNOWN)]
-    fitting, floating, close = said == FITTING, said == FLOATING, off < CLOSE
+    crossing = said == CROSSING
+    fitting, floating, close = (said == FITTING) | crossing, said == FLOATING, off < CLOSE
     return Look(
         aside=1.0 - count / max(1, len(points)),
         things=len(things),
@@ -130,6 +136,7 @@ def look_at(grid: EvidenceGrid, scan: ScanPoints, pose: Pose) -> Look:
         agreement=float((near < INLIER).mean()) if len(near) else 0.0,
         close=float((near < CLOSE).mean()) if len(near) else 0.0,
         exact=float((close & rest).sum()) / count,
+        crossing=float((crossing & rest).sum()) / count,
     )
 
 

@@ -22,7 +22,7 @@ from roboglot.model.components.mapping.localization import Region
 from roboglot.model.geometry import Pose, wrap_angle
 
 ITERATIONS_MAX = 8
-MATCH_POINTS_MAX = 200
+MATCH_POINTS_MAX = 400
 POINTS_MIN = 15  # that must fit before a match is believed
 KNOWN_SHARE = 0.4  # of all points; when fewer lie on known ground, quality suffers
 SEARCH_STEP = math.radians(1.0)
@@ -38,6 +38,7 @@ PLACE_AGREEMENT = 0.7  # share of the points that must fit, of those that the ma
 PLACE_SUPPORTED, PLACE_KNOWN = 0.85, 0.75  # … by the map's walls and floor; share of all points that it must explain
 PLACE_HIDDEN = 0.06  # … whose rays may pass through walls
 PLACES_MAX = 5  # that look alike are compared
+PLACES_TRIED = 20  # … before one of several is believed to be the only one
 APART, TURNED = 8, 10  # cells, headings between two of them
 SAME, SAME_YAW = 0.3, math.radians(10.0)  # m, rad: nearer ones are one place
 RIVAL_SCORE, RIVAL_FIT = 0.85, 0.9  # of the best: rough score, points that fit, from which a place is a rival
@@ -148,7 +149,7 @@ def place(grid: EvidenceGrid, scan: ScanPoints, region: Region | None) -> Match 
 
     The best of the ``places``, whether or not others look like it.
     """
-    found = _candidates(grid, scan, region, 1)
+    found, _ = _candidates(grid, scan, region, 1)
     return found[0].match if found else None
 
 
@@ -160,7 +161,22 @@ def places(
     More than one: the scan alone does not say where the robot is. None: it is nowhere in the map, or at a place that
     the map knows too little of. In a ``region``, or at the pose where the robot is ``known`` to be, less is enough.
     """
-    candidates = _candidates(grid, scan, region, most)
+    candidates, complete = _candidates(grid, scan, region, most)
+    alike = _alike(candidates)
+    if len(alike) == 1 < len(candidates) and not complete:
+        candidates, complete = _candidates(grid, scan, region, PLACES_TRIED)
+        alike = _alike(candidates)
+        if not complete:  # there are more of them than are looked at: one may be better
+            alike = candidates
+    if not alike:
+        return []
+    expected = region is not None or (known is not None and _is_same(alike[0].match.pose, known))
+    sure = len(alike) > 1 or expected or alike[0].look.is_sure(alike[0].match.sigma)
+    return [one.match for one in alike] if sure else []
+
+
+def _alike(candidates: list[Candidate]) -> list[Candidate]:
+    """Those of ``candidates`` (the best first) that explain the scan about as well as the best."""
     if not candidates:
         return []
     first = candidates[0].said  # what the map does not know there may be what tells it from a rival
@@ -170,16 +186,17 @@ def places(
     best = max(alike, key=lambda one: one.look.exact)
     if best.match.sigma <= SURE_SIGMA:
         alike = [one for one in alike if not one.look.is_outdone_by(best.look)]
-    expected = region is not None or (known is not None and _is_same(alike[0].match.pose, known))
-    sure = len(alike) > 1 or expected or alike[0].look.is_sure(alike[0].match.sigma)
-    return [one.match for one in alike] if sure else []
+    return alike
 
 
-def _candidates(grid: EvidenceGrid, scan: ScanPoints, region: Region | None, most: int) -> list[Candidate]:
-    """Places where the scan may have been taken, and what the map says of it there; the best first."""
+def _candidates(grid: EvidenceGrid, scan: ScanPoints, region: Region | None, most: int) -> tuple[list[Candidate], bool]:
+    """Places where the scan may have been taken, and what the map says of it there; the best first.
+
+    At most so many are looked at; also returns whether these were all.
+    """
     points, corner = scan.nearby(PLACE_POINTS_MAX), grid.corner
     if len(points) < POINTS_MIN:
-        return []
+        return [], True
     fields = grid.kept("fields", lambda: pyramid(likelihood_field(grid.evidence), PYRAMID_LEVELS))
     if region is None:
         floors = grid.kept("floors", lambda: pyramid(_floor(grid, None), PYRAMID_LEVELS))
@@ -187,7 +204,7 @@ def _candidates(grid: EvidenceGrid, scan: ScanPoints, region: Region | None, mos
         floors = pyramid(_floor(grid, region), PYRAMID_LEVELS)
     search = PlaceSearch(fields, floors, turned_offsets(points, HEADINGS, RESOLUTION), (APART, TURNED))
     enough = int(PLACE_SHARE_MIN * 255 * len(points))
-    found: list[Candidate] = []
+    found, score = list[Candidate](), 0
     for number in range(most):
         score, heading, row, col = search.next(enough)
         if score == 0:
@@ -199,7 +216,7 @@ def _candidates(grid: EvidenceGrid, scan: ScanPoints, region: Region | None, mos
         here = Candidate(best, supported(grid, scan, best.pose), look_at(grid, scan, best.pose))
         if here.is_place and not any(_is_same(best.pose, other.match.pose) for other in found):
             found.append(here)
-    return sorted(found, key=lambda one: -one.match.fit)
+    return sorted(found, key=lambda one: -one.match.fit), score == 0
 
 
 def _floor(grid: EvidenceGrid, region: Region | None) -> NDArray[np.uint8]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +18,19 @@ FACTOR_MAX = 100.0  # times the described noise, as a standard deviation
 SURPRISE_MAX = 400.0  # squared ratio: more is no noise but a collision or a hand
 LEARNT_MIN = 0.2  # share of a correction that must come from the scan before it says something
 
-BIAS_GAIN = 0.02  # share of a correction that is learnt
+BIAS_GAIN = 0.02  # share of a correction that is learnt at least
+TURN_UNKNOWN, SCALE_UNKNOWN = 0.01, 0.05  # rad/s, share of the way: standard deviations before anything is learnt
 TURN_BIAS_MAX, SCALE_BIAS_MAX = 0.05, 0.25  # rad/s; share of the way
 LEARNT_TURN_MAX, LEARNT_WAY_MAX = math.radians(1.0), 0.05  # rad, m: larger corrections have other reasons
 LEARNT_WAY_MIN = 0.03  # m driven from which a correction says something of the wheels' scale
+
+
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """How far a correction may be wrong for other reasons than a bias: variances of way (m^2) and yaw (rad^2)."""
+
+    way: float
+    yaw: float
 
 
 class LearntNoise:
@@ -65,6 +75,11 @@ class LearntNoise:
         )
 
     @property
+    def newest(self) -> Doubt:
+        """What was spread last."""
+        return Doubt(self._described[0] * self.way_factor, self._described[1] * self.yaw_factor)
+
+    @property
     def kept(self) -> dict[str, float]:
         """What to keep for the next start."""
         return {"way_factor": self.way_factor, "yaw_factor": self.yaw_factor}
@@ -101,11 +116,15 @@ def _followed(factor: float, ratio: float) -> float:
 
 
 class LearntBias:
-    """What odometry gets wrong all the time: wheels of another size, a gyro that turns by itself."""
+    """What odometry gets wrong all the time: wheels of another size, a gyro that turns by itself.
+
+    Learnt fast at first, when little is known of it, as a Kalman filter does; slowly ever after.
+    """
 
     def __init__(self) -> None:
         self.turn = 0.0  # rad/s that odometry turns too slowly
         self.scale_x = self.scale_y = 0.0  # share of the way ahead and to the left that it leaves out
+        self._unknown = {"turn": TURN_UNKNOWN**2, "scale_x": SCALE_UNKNOWN**2, "scale_y": SCALE_UNKNOWN**2}
 
     @property
     def kept(self) -> dict[str, float]:
@@ -118,22 +137,39 @@ class LearntBias:
             if (value := _number(kept.get(name))) is not None:
                 setattr(self, name, _bounded(value, TURN_BIAS_MAX if name == "turn" else SCALE_BIAS_MAX))
 
+    def spread(self, covariance: NDArray[np.float64], moved: Pose, seconds: float) -> NDArray[np.float64]:
+        """``covariance`` (x, y, yaw) after odometry ``moved`` in so many seconds, for what is not learnt yet."""
+        wider = covariance.copy()
+        along = self._unknown["scale_x"] * moved.x**2 + self._unknown["scale_y"] * moved.y**2
+        wider[0, 0] += along
+        wider[1, 1] += along
+        wider[2, 2] += self._unknown["turn"] * seconds**2
+        return wider
+
     def missing(self, moved: Pose, seconds: float) -> Pose:
         """What to add, in base_link, to odometry that ``moved`` (base_link before) in ``seconds``."""
         back = Pose(yaw=-moved.yaw).compose(Pose(self.scale_x * moved.x, self.scale_y * moved.y))
         return Pose(back.x, back.y, self.turn * seconds)
 
-    def learn(self, moved: Pose, seconds: float, correction: Pose, seen: tuple[float, float]) -> None:
+    def learn(self, moved: Pose, seconds: float, correction: Pose, seen: tuple[float, float], doubt: Doubt) -> None:
         """A match corrected by ``correction`` (base_link); ``seen``: share along x and y that the scan decided."""
         if abs(correction.yaw) < LEARNT_TURN_MAX:
-            self.turn = _bounded(self.turn + BIAS_GAIN * correction.yaw / seconds, TURN_BIAS_MAX)
+            self.turn = _bounded(self.turn + self._share("turn", correction.yaw, seconds, doubt.yaw), TURN_BIAS_MAX)
         if math.hypot(correction.x, correction.y) > LEARNT_WAY_MAX:
             return
         turned = Pose(yaw=moved.yaw).compose(Pose(correction.x, correction.y))
         if abs(moved.x) > LEARNT_WAY_MIN and seen[0] > LEARNT_MIN:
-            self.scale_x = _bounded(self.scale_x + BIAS_GAIN * turned.x / moved.x, SCALE_BIAS_MAX)
+            learnt = self._share("scale_x", turned.x, moved.x, doubt.way)
+            self.scale_x = _bounded(self.scale_x + learnt, SCALE_BIAS_MAX)
         if abs(moved.y) > LEARNT_WAY_MIN and seen[1] > LEARNT_MIN:
-            self.scale_y = _bounded(self.scale_y + BIAS_GAIN * turned.y / moved.y, SCALE_BIAS_MAX)
+            learnt = self._share("scale_y", turned.y, moved.y, doubt.way)
+            self.scale_y = _bounded(self.scale_y + learnt, SCALE_BIAS_MAX)
+
+    def _share(self, name: str, correction: float, step: float, doubt: float) -> float:
+        """Return the part of a correction after a step (s or m) that is learnt; it is better known from now on."""
+        gain = self._unknown[name] / (self._unknown[name] + doubt / step**2)
+        self._unknown[name] *= 1.0 - gain
+        return max(gain, BIAS_GAIN) * correction / step
 
 
 def _bounded(value: float, most: float) -> float:

@@ -29,7 +29,7 @@ from roboglot.autonomy.slam.matcher import (
     places,
     search,
 )
-from roboglot.autonomy.slam.odometry_noise import LearntBias, LearntNoise
+from roboglot.autonomy.slam.odometry_noise import Doubt, LearntBias, LearntNoise
 from roboglot.autonomy.slam.painting import paint
 from roboglot.autonomy.slam.scan_points import ScanPoints
 from roboglot.autonomy.slam.slip import SlipWatch
@@ -182,7 +182,7 @@ class Slam:
         moved = self._step if 0.0 < seconds < GAP_MAX else None
         self._matched_odometry, self._matched_at = odometry, event.stamp
         self._way += way
-        belief.covariance = self.noise.spread(belief.covariance, way, turn)
+        belief.covariance = self.bias.spread(self.noise.spread(belief.covariance, way, turn), moved or Pose(), seconds)
         if belief.map.scans:
             self._correct(scan, odometry, event.stamp, moved, seconds)
         else:
@@ -284,7 +284,10 @@ class Slam:
             return
         c, s = abs(math.cos(here.yaw)), abs(math.sin(here.yaw))
         seen_x, seen_y = (1.0 - after[k, k] / prior[k, k] for k in (0, 1))
-        self.bias.learn(moved, seconds, here.relative_to(before), (c * seen_x + s * seen_y, s * seen_x + c * seen_y))
+        seen = c * seen_x + s * seen_y, s * seen_x + c * seen_y
+        newest = self.noise.newest
+        doubt = Doubt(float(max(after[0, 0], after[1, 1])) + newest.way, float(after[2, 2]) + newest.yaw)
+        self.bias.learn(moved, seconds, here.relative_to(before), seen, doubt)
 
     def _judge(self, best: Match, scan: ScanPoints, odometry: Pose, stamp: float, usual: float) -> None:
         """Ask the map whether the scan can have been taken there; look everywhere when it fits worse than ``usual``."""
