@@ -12,6 +12,7 @@ from roboglot.access.tunnel.heartbeat import (
     LOST_AFTER,
     QUICK_PERIOD,
     QUIET_AFTER,
+    QUIET_ALONE_AFTER,
     Heartbeat,
 )
 from roboglot.config import RobotConfig
@@ -79,6 +80,23 @@ def test_a_silence_that_ends_is_no_loss_and_a_long_one_is() -> None:
     assert looks(heart, 1.0, 1.2)[0] is None
     heart.look(LOST_AFTER + 1.0, drives=True)
     assert heart.look(LOST_AFTER + 1.0, drives=True).lost
+
+
+def test_beats_beside_the_tunnel_excuse_its_silence_for_a_while() -> None:
+    heart, now, quiet = Heartbeat(0.0), 0.0, list[float]()
+    while now < 1.5:
+        now += QUICK_PERIOD
+        heart.hear_beside(now)
+        if heart.look(now, drives=True).quiet:
+            quiet.append(now)
+    assert quiet
+    assert QUIET_ALONE_AFTER <= quiet[0] < QUIET_ALONE_AFTER + 0.1
+
+
+def test_beats_beside_do_not_keep_a_dead_tunnel() -> None:
+    heart = Heartbeat(0.0)
+    heart.hear_beside(LOST_AFTER)
+    assert heart.look(LOST_AFTER, drives=False).lost
 
 
 @pytest.mark.parametrize("body", ["universal", "robomaster_ep"])

@@ -6,7 +6,8 @@ import asyncio
 import contextlib
 import json
 import socket
-from collections.abc import AsyncIterator
+import ssl
+from collections.abc import AsyncIterator, Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +16,7 @@ import pytest
 
 from roboglot.access import audit
 from roboglot.access.store import FILE, AccessStore, Grant
-from roboglot.access.tunnel import heartbeat
+from roboglot.access.tunnel import connector, heartbeat
 from roboglot.access.tunnel import tunnel as carrying
 from roboglot.access.tunnel.connector import Connector, KnownGateways, NotTrusted, Refused
 from roboglot.access.tunnel.frames import Kind, encode, read_frame
@@ -52,9 +53,9 @@ async def connected(runtime: Runtime, token: str, folder: Path, robot: str = "a"
     """The robot's ports at HERE, while inside."""
     assert runtime._gateway is not None
     known = KnownGateways(folder / "gateways.json")
-    connector = Connector("127.0.0.1", runtime._gateway.port, robot, token, HERE, known)
+    link = Connector("127.0.0.1", runtime._gateway.port, robot, token, HERE, known)
     opened: asyncio.Future[list[int]] = asyncio.get_running_loop().create_future()
-    running = asyncio.ensure_future(connector.run(lambda ports, _fingerprint, _new: opened.set_result(ports)))
+    running = asyncio.ensure_future(link.run(lambda ports, _fingerprint, _new: opened.set_result(ports)))
     await asyncio.wait([opened, running], return_when=asyncio.FIRST_COMPLETED)  # type: ignore[type-var]
     if running.done():
         await running
@@ -196,3 +197,72 @@ async def test_frames_of_strangers_end_the_connection(gateway: tuple[Runtime, st
                 while (await read_frame(reader)).kind in (Kind.WELCOME, Kind.PING, Kind.CLOSE):
                     pass
         writer.close()
+
+
+async def until(condition: Callable[[], object]) -> None:
+    async with asyncio.timeout(10.0):
+        while not condition():  # noqa: ASYNC110 - other tasks work on it
+            await asyncio.sleep(0.01)
+
+
+async def test_a_second_connection_carries_beats_and_comes_again(
+    gateway: tuple[Runtime, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(connector, "BESIDE_AGAIN", 0.0)
+    runtime, _ = gateway
+    assert runtime._gateway is not None
+    tunnels = runtime._gateway._tunnels
+    async with connected(*gateway, tmp_path):
+        [tunnel] = tunnels.values()
+        await until(lambda: tunnel._beside)
+        first, tunnel._heart._heard_beside = tunnel._beside, 0.0
+        assert first is not None
+        await until(lambda: tunnel._heart._heard_beside)  # a beat has come by it
+        first.end("lost on the way")
+        await until(lambda: tunnel._beside not in (None, first))
+        assert list(tunnels.values()) == [tunnel]
+        second = tunnel._beside
+    await until(lambda: not tunnels and second and second.lost.done())
+
+
+async def test_other_programs_here_do_not_pass_for_a_tunnel(gateway: tuple[Runtime, str], tmp_path: Path) -> None:
+    runtime, _ = gateway
+    assert runtime.guard is not None
+    async with connected(*gateway, tmp_path):
+        [own] = runtime.guard.tunnels
+        stranger = httpx.AsyncHTTPTransport(local_address=own)
+        async with httpx.AsyncClient(base_url=f"http://{ADDRESS}:1448", transport=stranger) as client:
+            assert (await client.get(POSE)).status_code == 401
+
+
+async def test_a_tunnel_takes_no_address_where_others_listen(gateway: tuple[Runtime, str], tmp_path: Path) -> None:
+    runtime, _ = gateway
+    assert runtime.guard is not None
+    taken = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    with contextlib.suppress(OSError):  # another test may have it: then it is taken, too
+        taken.bind(("127.64.0.1", 8981))
+        taken.listen()
+    async with connected(*gateway, tmp_path):
+        assert list(runtime.guard.tunnels) != ["127.64.0.1"]
+    taken.close()
+
+
+@pytest.mark.parametrize(
+    ("greeting", "kind"),
+    [({"beats": "0" * 32}, Kind.REFUSED), ({"beats": 7}, None), ({"robot": "a", "token": "no"}, Kind.REFUSED)],
+)
+async def test_without_the_key_nothing_beats(
+    gateway: tuple[Runtime, str], greeting: dict[str, object], kind: Kind | None
+) -> None:
+    runtime, _ = gateway
+    assert runtime._gateway is not None
+    context = ssl.create_default_context()
+    context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
+    reader, writer = await asyncio.open_connection("127.0.0.1", runtime._gateway.port, ssl=context)
+    writer.write(encode(Kind.HELLO, 0, json.dumps(greeting).encode()))
+    async with asyncio.timeout(10.0):
+        if kind is None:
+            assert await reader.read() == b""
+        else:
+            assert (await read_frame(reader)).kind is kind
+    writer.transport.abort()

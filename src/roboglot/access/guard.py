@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple, TypeVar
+from weakref import WeakValueDictionary
 
 from roboglot.access import audit
 from roboglot.access.book import LOCAL, Book, Rights
@@ -45,10 +46,15 @@ BURST_SECONDS = 2.0  # of bytes that may come at once
 
 
 class Tunnelled(NamedTuple):
-    """Who is at the other end of a tunnel, and the host that it came from."""
+    """Who is at the other end of a tunnel, and the host that it came from.
+
+    ``calls``: the tunnel's open connections by their local port. Other programs on this machine may call from the same
+    loopback address, but not from one of these ports.
+    """
 
     who: str
     host: str
+    calls: WeakValueDictionary[int, asyncio.Protocol]
 
 
 class Guard:
@@ -116,7 +122,7 @@ class Guard:
         if proof is not NO_PROOF:
             return self._proofs.get(proof.value) if proof.kind is HTTP else self._certified(proof)
         host = host_of(address)
-        if (tunnelled := self.tunnels.get(host)) is not None:
+        if (tunnelled := self.tunnels.get(host)) is not None and port_of(address) in tunnelled.calls:
             return tunnelled.who
         if self._book.has(host, Kind.ADDRESS):
             return host
@@ -234,6 +240,12 @@ def host_of(address: str) -> str:
     """The host of "10.0.0.7:40312", "[::1]:40312", or of the same after "ipv4:" or "ipv6:", as gRPC has it."""
     text = address.removeprefix("ipv4:").removeprefix("ipv6:").replace("%5B", "[").replace("%5D", "]")
     return text.rpartition(":")[0].strip("[]").removeprefix("::ffff:")
+
+
+def port_of(address: str) -> int:
+    """The port at the end of an address; 0 where there is none."""
+    port = address.rpartition(":")[2]
+    return int(port) if port.isascii() and port.isdecimal() else 0
 
 
 def _basic(value: str) -> tuple[str, str]:

@@ -9,8 +9,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import itertools
-import json
 import logging
+import secrets
+import socket
 import ssl
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -19,6 +20,8 @@ from ipaddress import IPv4Address
 from pathlib import Path
 from typing import cast
 from weakref import WeakValueDictionary
+
+import msgspec
 
 from roboglot.access.guard import Guard, Tunnelled
 from roboglot.access.tunnel.busy_poll import BusyPoll
@@ -42,7 +45,7 @@ TUNNELS_MAX = 256
 TUNNELS_OF_ONE_MAX = 64  # of one identity
 CONNECTIONS_MAX = 512  # tunnels, and connections that are not yet tunnels
 HELLO_SECONDS_MAX = 5.0
-FIRST_ADDRESS = IPv4Address("127.64.0.1")
+FIRST_ADDRESS, ADDRESSES = IPv4Address("127.64.0.1"), 4 * TUNNELS_MAX  # of tunnels; other gateways may have some
 PORTS_WITHIN = range(1, 1024)  # of connections within the process: the kernel gives others
 BROADCASTS = ("127.255.255.255", "255.255.255.255")
 
@@ -58,6 +61,23 @@ class Ports:
     callbacks: tuple[int, ...]
 
 
+class Hello(msgspec.Struct, frozen=True):
+    """What a client wants: a robot, or to beat over a second connection of a tunnel (``beats``: its key)."""
+
+    robot: str = ""
+    token: str = ""
+    beats: str = ""
+
+
+class Welcome(msgspec.Struct, frozen=True):
+    """What a client is let in to: ports, and the key of its second connection."""
+
+    tcp: tuple[int, ...]
+    callbacks: tuple[int, ...]
+    broadcasts: tuple[int, ...]
+    beats: str
+
+
 class Gateway:
     """Listens from ``start`` to ``close``. ``certificate`` and ``key`` are read at the start."""
 
@@ -69,6 +89,7 @@ class Gateway:
         self._addresses: dict[str, str] = {}  # of tunnels, and whose they are
         self._connections = Connections(CONNECTIONS_MAX)
         self._sessions: set[asyncio.Task[None]] = set()
+        self._tunnels: dict[str, Tunnel] = {}  # by the key of their beats
 
     async def start(self) -> None:
         """Listen. Raises OSError, ssl.SSLError."""
@@ -116,15 +137,19 @@ class Gateway:
         peer = link.transport.get_extra_info("peername") or ("", 0)
         async with asyncio.timeout(HELLO_SECONDS_MAX):
             frame = await link.first()
-        name, token = _hello(frame.payload) if frame.kind is Kind.HELLO else ("", "")
+        wish = _hello(frame.payload) if frame.kind is Kind.HELLO else Hello()
+        if wish.beats:
+            await self._beat(wish.beats, link)
+            return
+        name, token = wish.robot, wish.token
         who = await self._guard.admit(f"{peer[0]}:{peer[1]}", Proof(ProofKind.HTTP, f"Bearer {token}"))
         found = self._robots.get(name)
         if found is None or not self._guard.may(who, name, Right.SEE):
             raise Unknown(f"{who} has no right to see a robot {name!r}")
         robot, ports = found
-        with self._address(who, str(peer[0])) as own:
+        with self._address(who, str(peer[0]), ports.callbacks) as own:
             log.info("%s drives robot %s through a tunnel from %s", who, name, peer[0])
-            calls = _Calls(robot, ports, own)
+            calls = _Calls(robot, ports, own, self._guard.tunnels[own].calls)
             tunnel = Tunnel(
                 link,
                 first=2,
@@ -133,24 +158,38 @@ class Gateway:
                 quiet=lambda: _stop(robot, own),
                 drives=lambda: next(_driven(robot, own), None) is not None,
             )
+            key = secrets.token_hex(16)
+            self._tunnels[key] = tunnel
             leave = robot.admission.on_lost(lambda lost: link.end("rights were lost") if lost == who else None)
             try:
                 async with _listening(tunnel, robot, ports, own):
-                    words = {"tcp": ports.tcp, "callbacks": ports.callbacks, "broadcasts": ports.broadcasts}
-                    link.send(Kind.WELCOME, 0, json.dumps(words).encode())
+                    words = Welcome(ports.tcp, ports.callbacks, ports.broadcasts, key)
+                    link.send(Kind.WELCOME, 0, msgspec.json.encode(words))
                     await tunnel.run()
             finally:
+                del self._tunnels[key]
                 leave()
 
+    async def _beat(self, key: str, link: Link) -> None:
+        """Serve the second connection of a tunnel; its key came with the greeting of the first."""
+        if (tunnel := self._tunnels.get(key)) is None:
+            raise Unknown("there is no such tunnel")
+        await tunnel.beat_over(link)
+
     @contextlib.contextmanager
-    def _address(self, who: str, host: str) -> Iterator[str]:
-        """A loopback address for one tunnel, at which the guard knows ``who``."""
+    def _address(self, who: str, host: str, callbacks: tuple[int, ...]) -> Iterator[str]:
+        """A loopback address for one tunnel, at which the guard knows ``who``.
+
+        No other gateway on this machine listens there at any of the ports ``callbacks``.
+        """
         mine = sum(each == who for each in self._addresses.values())
         if len(self._addresses) >= TUNNELS_MAX or mine >= TUNNELS_OF_ONE_MAX:
             raise Unknown(f"{mine} tunnels of {who} are open, and {len(self._addresses)} together: no more")
-        own = next(a for n in range(TUNNELS_MAX) if (a := str(FIRST_ADDRESS + n)) not in self._addresses)
+        free = (a for n in range(ADDRESSES) if (a := str(FIRST_ADDRESS + n)) not in self._addresses)
+        if (own := next((a for a in free if _is_free(a, callbacks)), None)) is None:
+            raise Unknown(f"other programs listen at all of {FIRST_ADDRESS} to {FIRST_ADDRESS + ADDRESSES - 1}")
         self._addresses[own] = who
-        self._guard.tunnels[own] = Tunnelled(who, host)
+        self._guard.tunnels[own] = Tunnelled(who, host, WeakValueDictionary())
         try:
             yield own
         finally:
@@ -188,22 +227,20 @@ def _stop(robot: Robot, own: str) -> None:
         action.cancel("its client is out of reach")
 
 
-def _hello(payload: bytes) -> tuple[str, str]:
-    """Robot and token. Raises BadFrame."""
+def _hello(payload: bytes) -> Hello:
+    """Read a greeting. Raises BadFrame."""
     try:
-        wish = json.loads(payload)
-        return str(wish["robot"]), str(wish["token"])
-    except (ValueError, KeyError, TypeError):
+        return msgspec.json.decode(payload, type=Hello)
+    except msgspec.MsgspecError:
         raise BadFrame("this is no client of ours") from None
 
 
 class _Calls:
     """One tunnel's connections to the robot's ports."""
 
-    def __init__(self, robot: Robot, ports: Ports, own: str) -> None:
-        self._robot, self._ports, self._own = robot, ports, own
+    def __init__(self, robot: Robot, ports: Ports, own: str, calls: WeakValueDictionary[int, asyncio.Protocol]) -> None:
+        self._robot, self._ports, self._own, self._open = robot, ports, own, calls
         self._numbers = itertools.cycle(PORTS_WITHIN)
-        self._open = WeakValueDictionary[int, asyncio.Protocol]()
 
     async def connect(self, port: int, protocol: Callable[[], asyncio.Protocol]) -> object:
         """Within the process where the door lets us, else (gRPC) over loopback. Raises OSError."""
@@ -211,8 +248,7 @@ class _Calls:
             raise OSError(f"{port} is none of the robot's ports")
         address = self._ports.address
         if (offered := self._robot.admission.offered(port)) is None:
-            loop = asyncio.get_running_loop()
-            return await loop.create_connection(protocol, address, port, local_addr=(self._own, 0))
+            return await self._call(protocol(), address, port)
         server, door = offered
         if not server.is_serving():
             raise ConnectionRefusedError(f"nothing listens at {port} now")
@@ -220,6 +256,32 @@ class _Calls:
         stream = self._open[number] = protocol()
         join(stream, door(), (self._own, number), (address, port))
         return None
+
+    async def _call(self, stream: asyncio.Protocol, address: str, port: int) -> object:
+        """Over loopback; the guard knows the port that it comes from before the door sees it."""
+        caller = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        try:
+            caller.setblocking(False)
+            caller.bind((self._own, 0))
+            self._open[caller.getsockname()[1]] = stream
+            loop = asyncio.get_running_loop()
+            await loop.sock_connect(caller, (address, port))
+            return await loop.create_connection(lambda: stream, sock=caller)
+        except BaseException:
+            caller.close()
+            raise
+
+
+def _is_free(address: str, ports: tuple[int, ...]) -> bool:
+    """Whether nothing listens at these ports of a loopback address."""
+    for port in ports:
+        with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind((address, port))
+            except OSError:
+                return False
+    return True
 
 
 @contextlib.asynccontextmanager

@@ -9,6 +9,7 @@ IDLE_PERIOD = 0.05  # s between two looks while no one drives
 QUICK_PERIOD = 0.0125  # s between two beats while the client drives: what TCP lost is missed by those behind it
 QUICK_SECONDS = 0.5  # that an end goes on with it after the other did
 QUIET_AFTER = 0.3  # s of silence after which the client is as good as gone: what it drives by hand stops
+QUIET_ALONE_AFTER = 1.0  # s of silence of the tunnel itself that beats beside it excuse: what it carries comes late
 QUIET_LOOKS = 3  # at once, one after another: the loop has read its sockets between them, whatever its order
 HELD_UP = 0.1  # s between two looks: this end was held up, perhaps the other end by the same, so it may speak first
 LOST_AFTER = 5.0  # s of silence that the tunnel and its connections bear: lines that lose packets come back
@@ -27,7 +28,7 @@ class Heartbeat:
     """``hear`` at everything that comes; ``look`` again after each look's pause. Times are in s, from any zero."""
 
     def __init__(self, now: float) -> None:
-        self.heard = self._looked = now
+        self.heard = self._heard_beside = self._looked = now
         self.quick_until = 0.0
         """The other end has asked for quick beats until then."""
         self._said = now - PING_PERIOD
@@ -40,6 +41,10 @@ class Heartbeat:
         if quick:
             self.quick_until = now + QUICK_SECONDS
 
+    def hear_beside(self, now: float) -> None:
+        """The other end is there, as its second connection shows."""
+        self._heard_beside = now
+
     def look(self, now: float, drives: bool) -> Look:
         """``drives``: the client has the robot move."""
         quick = drives or now < self.quick_until
@@ -49,11 +54,12 @@ class Heartbeat:
         if now - self._looked > HELD_UP:
             self._patient_until = now + QUICK_PERIOD
         self._looked = now
-        silent = now - self.heard
+        alone = now - self.heard
+        silent = max(now - max(self.heard, self._heard_beside), alone - QUIET_ALONE_AFTER + QUIET_AFTER)
         self._looks = self._looks + 1 if silent >= QUIET_AFTER and now >= self._patient_until else 0
         pause = QUICK_PERIOD if quick else IDLE_PERIOD
         if 0 < self._looks < QUIET_LOOKS:
             pause = 0.0
         elif silent < QUIET_AFTER:
             pause = min(pause, QUIET_AFTER - silent)
-        return Look(beat, self._looks == QUIET_LOOKS, silent >= LOST_AFTER, pause)
+        return Look(beat, self._looks == QUIET_LOOKS, alone >= LOST_AFTER, pause)

@@ -44,6 +44,7 @@ class Tunnel:
         drives: Callable[[], bool] = lambda: False,
     ) -> None:
         self._link = link
+        self._beside: Link | None = None  # carries beats alone: what one connection loses, the other still shows
         self._next = first
         self._opened, self._datagram, self._quiet, self._drives = opened, datagram, quiet, drives
         self._streams: dict[int, Stream] = {}
@@ -67,7 +68,19 @@ class Tunnel:
             for stream in tuple(self._streams.values()):
                 stream.abort()
             self._link.end("it was closed here")
+            if self._beside is not None:
+                self._beside.end("its tunnel ended")
             await asyncio.gather(beat, *self._opening, return_exceptions=True)
+
+    async def beat_over(self, link: Link) -> None:
+        """Show over a second connection too that both ends are there, until it is lost or another takes its place."""
+        if self._beside is not None:
+            self._beside.end("another took its place")
+        self._beside = link
+        link.follow(self._take_beat, lambda _crowded: None)
+        await asyncio.shield(link.lost)
+        if self._beside is link:
+            self._beside = None
 
     def accept(self, port: int) -> Callable[[], asyncio.Protocol]:
         """Return what a server of this end makes for each connection: it is carried to ``port`` of the other end."""
@@ -102,12 +115,18 @@ class Tunnel:
             drives = self._drives()
             look = self._heart.look(self._loop.time(), drives)
             if look.beat:
-                self._link.send(Kind.PING, 0, QUICK if drives else b"")
+                for link in (self._link, self._beside) if self._beside else (self._link,):
+                    link.send(Kind.PING, 0, QUICK if drives else b"")
             if look.quiet:
                 self._quiet()
             if look.lost:
                 self._link.end("the other end is silent")
             await asyncio.sleep(look.pause)
+
+    def _take_beat(self, kind: Kind, _number: int, _payload: bytes) -> None:
+        if kind is not Kind.PING:
+            raise BadFrame("only beats come by this connection")
+        self._heart.hear_beside(self._loop.time())
 
     def _take(self, kind: Kind, number: int, payload: bytes) -> None:
         self._heart.heard = self._loop.time()
