@@ -1,4 +1,4 @@
-"""Claim: a robot that is driven through `roboglot connect` at 0.3 m/s stands within 0.5 s of the tunnel's loss.
+"""Claim: a robot that is driven through `roboglot connect` at 0.5 m/s stands within 0.5 s of the tunnel's loss.
 
 Robot and gateway are here, `roboglot connect` and the vendor's client beyond a network device whose packets can be
 held back, so that neither end's TCP hears of it. The client drives by the text protocol. Times are from the fault until
@@ -33,14 +33,14 @@ from roboglot.runtime import Runtime
 from roboglot.testing.bad_line import BadLine
 
 ROBOT, HERE, PORT = "127.0.98.1", "127.0.98.2", 50090
-SPEED = 0.3  # m/s
+SPEED = 0.5  # m/s
 TURNING = 0.5  # rad/s, on the spot: away from walls
 STOPPED = 0.02  # m/s
 CLAIMED = 0.5  # s
 PATIENCE = 8.0  # s
 TIMES = 8  # of each row
 LOSSY_SECONDS = 240.0
-BODIES = ("universal", "robomaster_ep")
+BODIES = ("universal", "robomaster_ep", "cyberdog2")
 
 
 @dataclass

@@ -20,6 +20,7 @@ from roboglot.fleet import build_fleet
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.legs import Legs
 from roboglot.model.geometry import Twist
 from roboglot.storage.database import Database
 
@@ -99,20 +100,34 @@ def test_beats_beside_do_not_keep_a_dead_tunnel() -> None:
     assert heart.look(LOST_AFTER, drives=False).lost
 
 
-@pytest.mark.parametrize("body", ["universal", "robomaster_ep"])
-async def test_silence_and_brakes_together_stay_below_half_a_second(body: str) -> None:
+@pytest.mark.parametrize(
+    ("body", "speed"), [("universal", 0.6), ("robomaster_ep", 1.0), ("cyberdog2", 0.5), ("hermes", 0.4)]
+)
+async def test_silence_and_brakes_together_stay_below_half_a_second(body: str, speed: float) -> None:
     clock, database = LockstepClock(), Database(":memory:")
     fleet = build_fleet("empty", [RobotConfig("a", body)], clock=clock, seed=1, database=database)
     await fleet.start(wait=True)
-    robot = fleet.robots["a"]
-    action = robot[Driving].drive(Twist(x=0.3), source="by hand")
-    await clock.advance(1.0)
-    assert robot[Base].velocity.x == pytest.approx(0.3, abs=0.02)
-    action.cancel("its client is out of reach")
-    spent = 0.0
-    while abs(robot[Base].velocity.x) > 0.02:
-        await clock.advance(0.01)
-        spent += 0.01
+    robot, truth = fleet.robots["a"], fleet.world.truth
+
+    async def shift() -> float:
+        """Drive on for 20 ms; m/s that it really moves."""
+        before = truth.pose_of("a")
+        await clock.advance(0.02)
+        return before.distance_to(truth.pose_of("a")) / 0.02
+
+    action = robot[Driving].drive(Twist(x=speed), source="by hand")
+    await clock.advance(3.0 if Legs in robot else 1.0)
+    assert await shift() == pytest.approx(speed, abs=0.1 * speed)
+    action.cancel("its client is out of reach", hard=True)
+    spent = 0.02
+    while await shift() > 0.02:
+        spent += 0.02
     assert QUIET_AFTER + spent <= STANDS_WITHIN - MARGIN
+    assert abs(robot[Base].velocity.x) < 0.02
+    robot[Driving].drive(Twist(x=speed), source="by hand")
+    await clock.advance(0.06)
+    began = robot[Base].velocity.x
+    await clock.advance(0.02)
+    assert robot[Base].velocity.x - began <= 1.01 * 0.02 * robot[Base].limits.linear_acceleration, "as gently as ever"
     await fleet.close()
     database.close()

@@ -179,6 +179,10 @@ def test_another_certificate_is_not_trusted(tmp_path: Path) -> None:
     assert known.check("gateway.example:50090", b"one") == (fingerprint, False)
     with pytest.raises(NotTrusted, match="another certificate"):
         known.check("gateway.example:50090", b"two")
+    assert [path.name for path in tmp_path.iterdir()] == ["gateways.json"]
+    (tmp_path / "gateways.json").write_text('{"gateway.exam')
+    with pytest.raises(NotTrusted, match="cannot be read"):
+        known.check("gateway.example:50090", b"one")
 
 
 async def test_frames_of_strangers_end_the_connection(gateway: tuple[Runtime, str]) -> None:

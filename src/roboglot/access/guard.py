@@ -383,7 +383,7 @@ class RobotAdmission(Admission):
         self._note(who, "", "", "rights", "lost", "revoked, changed or at their end")
         for action in self._robot.actions.running():
             if cut and action.identity == who:
-                action.cancel(f"{who} may no longer drive")
+                action.cancel(f"{who} may no longer drive", hard=True)
         if cut and Lease in self._robot and self._robot[Lease].is_of(who):
             self._releasing = asyncio.ensure_future(self._robot[Lease].release())
         for listener in tuple(self._listeners):

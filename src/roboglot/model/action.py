@@ -59,6 +59,7 @@ class Action:
         self.error: RobotError | None = None
         self.paused = False
         self.hands_over = False  # what takes its place goes on from its motion: it need not stand still first
+        self.brakes_hard = False  # it is cancelled because no one minds it any more: as fast as the base can
         self.started_at = self.ended_at = owner.clock.time()
         self._failure: RobotError | None = None  # why it is being aborted from outside
         self._owner = owner
@@ -83,10 +84,14 @@ class Action:
         if await self.done() is not ActionStatus.SUCCEEDED:
             raise self.error.again() if self.error else Busy(f"{self.name} was cancelled")
 
-    def cancel(self, reason: str = "") -> None:
-        """Ask it to stop; it ends CANCELED as soon as it has braked. Nothing happens if it has ended."""
+    def cancel(self, reason: str = "", *, hard: bool = False) -> None:
+        """Ask it to stop; it ends CANCELED as soon as it has braked. Nothing happens if it has ended.
+
+        ``hard``: brake as in an emergency, because the client is lost or may no longer drive.
+        """
         if self.status.ended or self.status is ActionStatus.CANCELING:
             return
+        self.brakes_hard = hard
         self.error = Busy(reason) if reason else None
         self._move_to(ActionStatus.CANCELING)
         if self._task:

@@ -7,6 +7,7 @@ import contextlib
 import hashlib
 import json
 import logging
+import os
 import socket
 import ssl
 from collections.abc import Callable
@@ -45,7 +46,10 @@ class KnownGateways:
     def check(self, gateway: str, certificate: bytes) -> tuple[str, bool]:
         """The fingerprint, and whether it is new here. Raises NotTrusted."""
         shown = hashlib.sha256(certificate).hexdigest()
-        known = json.loads(self._path.read_text()) if self._path.exists() else {}
+        try:
+            known = json.loads(self._path.read_text()) if self._path.exists() else {}
+        except ValueError as error:
+            raise NotTrusted(f"{self._path} cannot be read ({error}): remove it to begin anew") from None
         if (kept := known.get(gateway)) == shown:
             return shown, False
         if kept is not None:
@@ -54,7 +58,9 @@ class KnownGateways:
                 f" remove its line from {self._path}"
             )
         self._path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-        self._path.write_text(json.dumps({**known, gateway: shown}, indent=1))
+        beside = self._path.with_name(f"{self._path.name}.{os.getpid()}")  # others may read it meanwhile
+        beside.write_text(json.dumps({**known, gateway: shown}, indent=1))
+        beside.replace(self._path)
         return shown, True
 
 

@@ -224,7 +224,7 @@ def _driven(robot: Robot, own: str) -> Iterator[Action]:
 def _stop(robot: Robot, own: str) -> None:
     for action in tuple(_driven(robot, own)):
         log.warning("a tunnel is silent: %s of %s stops", action.name, action.client)
-        action.cancel("its client is out of reach")
+        action.cancel("its client is out of reach", hard=True)
 
 
 def _hello(payload: bytes) -> Hello:

@@ -63,7 +63,10 @@ async def braking_at_the_end(robot: Robot, action: Action) -> AsyncIterator[None
     except asyncio.CancelledError:
         if action.hands_over and action.status is ActionStatus.CANCELING:
             raise
-        robot[Base].set_velocity(STILL)
+        if action.brakes_hard:
+            robot[Base].brake_hard()
+        else:
+            robot[Base].set_velocity(STILL)
         if action.status is ActionStatus.CANCELING:  # otherwise the loop is closing and its clock may not move again
             await stand_still(robot)
         raise

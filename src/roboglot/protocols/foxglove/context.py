@@ -66,7 +66,7 @@ class Context:
             self.topics.leave(self)
         for action in self.robot.actions.running():
             if action.source == self.source:
-                action.cancel("its client is gone")
+                action.cancel("its client is gone", hard=True)
         for task in tuple(self._following):
             task.cancel()
 

@@ -105,13 +105,13 @@ class Context:
         if self.profile.as_robots and Odometry in self.robot:
             self.origin = self.robot[Odometry].reading.pose
 
-    def end(self, reason: str) -> list[Action]:
-        """Leave SDK mode; returns the actions that were cancelled and may still be braking."""
+    def end(self, reason: str, *, hard: bool = False) -> list[Action]:
+        """Leave SDK mode; returns the actions that were cancelled and may still be braking (``hard``: all they can)."""
         if not self.active:
             return []
         stopping = [action for action in self.robot.actions.running() if action.source.startswith(f"{self._name} ")]
         for action in stopping:
-            action.cancel(reason)
+            action.cancel(reason, hard=hard)
         self.active = False
         self.pushes.reset()
         for part in self._parts.values():
@@ -134,7 +134,7 @@ class Context:
         """Stop what ``name`` commanded: it is gone. What others commanded goes on."""
         for action in self.robot.actions.running():
             if action.source == f"{self._name} {name}":
-                action.cancel("its client is gone")
+                action.cancel("its client is gone", hard=True)
 
     def part(self, kind: type[P]) -> P:
         """The chapter's own part, made when it is first needed."""
@@ -154,7 +154,7 @@ class Context:
     def leave(self, member: Hashable) -> None:
         """``member`` is gone; the last one ends the session."""
         if self._members.pop(member, None) is not None and not self._members:
-            self.end("its client is gone")
+            self.end("its client is gone", hard=True)
 
     def send(self, datagram: bytes) -> None:
         """A push to every client's host."""

@@ -33,7 +33,7 @@ class HullSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 class BaseSection(Struct, frozen=True, forbid_unknown_fields=True):
     """Four mecanum wheels at the corners of ``wheel_base`` x ``track``, or one driven wheel at each side, ``track``
-    apart; top speeds and accelerations.
+    apart; top speeds and accelerations. ``braking``: in an emergency, m/s2.
     """
 
     speed: Positive
@@ -44,6 +44,7 @@ class BaseSection(Struct, frozen=True, forbid_unknown_fields=True):
     wheel_base: Positive
     track: Positive
     traction: Positive
+    braking: Positive | None = None
     drive: Literal["mecanum", "differential"] = "mecanum"
 
 

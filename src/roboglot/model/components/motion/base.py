@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from roboglot.model.components.component import Component
 from roboglot.model.errors import Blocked, Refused
-from roboglot.model.geometry import Twist
+from roboglot.model.geometry import STILL, Twist
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,6 +62,10 @@ class Base(Component):
     @abstractmethod
     def set_velocity(self, twist: Twist) -> None:
         """Drive at ``twist`` (base_link; cut to the limits, reached by the limits' accelerations)."""
+
+    def brake_hard(self) -> None:
+        """Stop as fast as the drive can, beyond the limits' accelerations; a drive that has but one way stops so."""
+        self.set_velocity(STILL)
 
     @abstractmethod
     def set_wheel_speeds(self, speeds: WheelSpeeds) -> None:

@@ -48,6 +48,8 @@ class SimulatedBase(Base):
         self._carried = False
         self._dead: frozenset[str] = frozenset()
         self._free = False
+        self._hardest = max(1.0, (section.braking or 0.0) / section.acceleration)  # of the accelerations, in a pinch
+        self._haste = 1.0  # of the accelerations that it takes now
         self._walkable: Callable[[Twist], Twist] = _any
         self.steer: float | None = None  # rad/s; a turn rate that takes the place of the commanded one
 
@@ -59,6 +61,11 @@ class SimulatedBase(Base):
             twist = Twist(twist.x, 0.0, twist.yaw)
         self.check_free(twist)
         self._target, self._carried = self._walkable(twist.clamped(self.limits.twist)), False
+        self._take_time()
+
+    def brake_hard(self) -> None:
+        self.set_velocity(STILL)
+        self._haste = self._hardest
 
     def set_wheel_speeds(self, speeds: WheelSpeeds) -> None:
         if not all(map(math.isfinite, _four(speeds))):
@@ -70,6 +77,7 @@ class SimulatedBase(Base):
         top = limit.x + self._lever * limit.yaw
         over = max(1.0, body.speed / limit.x, abs(body.yaw) / limit.yaw, fastest / top)
         self._target, self._carried = WheelSpeeds(*(wheel / over for wheel in _four(speeds))), False
+        self._take_time()
 
     @property
     def wheel_speeds(self) -> WheelSpeeds:
@@ -201,6 +209,11 @@ class SimulatedBase(Base):
             self._wheels = self._wheels_of(self._twist)
         self._hull.drive(self.velocity if self._dead else self._twist, seconds)
 
+    def _take_time(self) -> None:
+        """Brake hard no more, unless it is to stand still."""
+        if self._target not in (STILL, NO_WHEELS):
+            self._haste = 1.0
+
     def _refuse_if_locked(self, moving: bool) -> None:
         if moving and self._locks:
             raise next(iter(self._locks.values()))
@@ -226,8 +239,8 @@ class SimulatedBase(Base):
         return Twist(c * vx + s * vy, (c * vy - s * vx) if self._mecanum else 0.0, turn)
 
     def _nearer(self, target: Twist, seconds: float) -> Twist:
-        now, linear = self._twist, self.limits.linear_acceleration * seconds
-        angular = self.limits.angular_acceleration * seconds
+        now, linear = self._twist, self._haste * self.limits.linear_acceleration * seconds
+        angular = self._haste * self.limits.angular_acceleration * seconds
         dx, dy, dyaw = target.x - now.x, target.y - now.y, target.yaw - now.yaw
         way = math.hypot(dx, dy)
         if way <= linear and abs(dyaw) <= angular:
@@ -236,7 +249,7 @@ class SimulatedBase(Base):
         return Twist(now.x + dx * part, now.y + dy * part, now.yaw + max(-angular, min(angular, dyaw)))
 
     def _nearer_wheels(self, target: WheelSpeeds, seconds: float) -> WheelSpeeds:
-        step = self.limits.linear_acceleration * seconds / self._radius
+        step = self._haste * self.limits.linear_acceleration * seconds / self._radius
         pairs = zip(_four(self._wheels), _four(target), strict=True)
         return WheelSpeeds(*(now + max(-step, min(step, goal - now)) for now, goal in pairs))
 
