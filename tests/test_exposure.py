@@ -13,6 +13,8 @@ import pytest
 
 from roboglot.cli.screen import warn_if_open
 from roboglot.config import Config, RobotConfig, load_config
+from roboglot.protocols.foxglove.config import FoxgloveConfig
+from roboglot.protocols.ros2.config import Ros2Config
 from roboglot.runtime import Runtime
 
 LISTENS = "0A"  # TCP's state in /proc/net/tcp
@@ -62,3 +64,7 @@ def test_what_is_open_is_said_in_red(capsys: pytest.CaptureFixture[str], monkeyp
     assert "\x1b[31m" in said
     assert "robot a is open to everyone on every network" in said
     assert "robot b" not in said
+    assert "block programs, Foxglove; CyberDog 2 gRPC asks for a certificate" in said
+    robots = (RobotConfig("a", "universal", "0.0.0.0"),)
+    warn_if_open(Config(robots=robots, doors={"ros2": Ros2Config(enabled=True), "foxglove": FoxgloveConfig(False)}))
+    assert "block programs, ROS 2; CyberDog" in capsys.readouterr().err

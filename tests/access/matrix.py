@@ -22,7 +22,8 @@ from roboglot.wire.cyberdog.channel import ROBOT_NAME
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import GrpcAppStub
 
-ADDRESS = f"127.0.95.{100 + int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0')[2:])}"  # one for each process
+WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
+ADDRESS = f"127.0.95.{100 + WORKER}"  # one for each process
 
 
 SUBPROTOCOL = Subprotocol("foxglove.websocket.v1")

@@ -27,10 +27,10 @@ from roboglot.protocols.cyberdog.certificates import export_client
 from roboglot.runtime import Runtime
 from roboglot.testing.bad_line import BadLine
 from tests.access.line import bad_line
-from tests.access.matrix import ADDRESS, frame_states
+from tests.access.matrix import ADDRESS, WORKER, frame_states
 from tests.protocols.robomaster.clients.test_robomasterpy import TOUR, check, listen
 
-HERE = "127.0.96.2"
+HERE = f"127.0.96.{100 + WORKER}"
 
 
 @contextlib.asynccontextmanager

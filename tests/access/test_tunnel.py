@@ -25,9 +25,9 @@ from roboglot.config import AccessConfig, RobotConfig, load_config
 from roboglot.model.clock import LockstepClock
 from roboglot.operations import Right
 from roboglot.runtime import Runtime
-from tests.access.matrix import ADDRESS
+from tests.access.matrix import ADDRESS, WORKER
 
-HERE = "127.0.96.1"
+HERE = f"127.0.96.{1 + WORKER}"
 POSE = "/api/core/slam/v1/localization/pose"
 
 
@@ -145,6 +145,19 @@ async def test_a_silent_end_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     assert quiet.is_set()
     writers[0].close()
     server.close()
+
+
+async def test_no_server_beside_the_client_is_reached_but_the_app(gateway: tuple[Runtime, str], tmp_path: Path) -> None:
+    """An MQTT broker on the client's machine is none of the gateway's business."""
+    runtime, _ = gateway
+    assert runtime.guard is not None
+    async with connected(*gateway, tmp_path):
+        [own] = runtime.guard.tunnels
+        for port in (1883, 7447):
+            with pytest.raises(ConnectionRefusedError):
+                await asyncio.open_connection(own, port)
+        _, writer = await asyncio.open_connection(own, 8981)
+        writer.close()
 
 
 async def test_strangers_get_no_tunnel(gateway: tuple[Runtime, str], tmp_path: Path) -> None:

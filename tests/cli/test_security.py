@@ -17,6 +17,8 @@ from roboglot.cli.checks.security import DAY, UNUSED_DAYS, examine_security
 from roboglot.config import AccessConfig, Config, RobotConfig, TlsConfig
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.certificates import ensure_certificates
+from roboglot.protocols.foxglove.config import FoxgloveConfig
+from roboglot.protocols.ros2.config import Ros2Config
 from roboglot.protocols.slamware.config import SlamwareConfig
 
 DRIVE, ADMIN = frozenset({Right.DRIVE}), frozenset({Right.ADMIN})
@@ -40,6 +42,11 @@ def test_a_default_start_has_no_weak_spot(data: Path) -> None:
     assert weak(config) == {}
     seen = [finding.seen for finding in examine_security(config)]
     assert any("127.0.0.1:1448 for programs on this machine" in each for each in seen)
+    assert not any("127.0.0.1:7447" in each for each in seen)
+    opened = replace(config, doors={"ros2": Ros2Config(enabled=True), "foxglove": FoxgloveConfig(enabled=False)})
+    seen = [finding.seen for finding in examine_security(opened)]
+    assert any("127.0.0.1:7447" in each for each in seen)
+    assert not any("127.0.0.1:8765" in each for each in seen)
 
 
 def test_what_is_open_is_named(data: Path) -> None:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import base64
-import binascii
 import logging
 import threading
 import time
@@ -16,6 +14,7 @@ from weakref import WeakValueDictionary
 
 from roboglot.access import audit
 from roboglot.access.book import LOCAL, Book, Rights
+from roboglot.access.callers import basic_of, host_of, port_of
 from roboglot.access.rights import NOTHING
 from roboglot.access.secrets import password_fits, token_hash
 from roboglot.access.store import FILE, AccessStore, Grant, Kind
@@ -185,12 +184,12 @@ class Guard:
         scheme, _, rest = proof.value.partition(" ")
         if scheme.lower() == "bearer":
             return self._book.by_token(token_hash(rest.strip()))
-        name, secret = _basic(proof.value)
+        name, secret = basic_of(proof.value)
         return name if secret and self._book.by_token(token_hash(secret)) == name else None
 
     async def _by_password(self, proof: Proof, host: str) -> str | None:
         """Who has this password; what is wrong counts against the host and the name. Raises LockedOut."""
-        name, password = _basic(proof.value)
+        name, password = basic_of(proof.value)
         if not self._tries.take(host):
             raise LockedOut("too many wrong passwords and tokens from your address: wait a minute")
         if not name:
@@ -234,30 +233,6 @@ class Guard:
             self.reload()
         except Exception:
             log.exception("the list of who may do what could not be read: it stays as it was")
-
-
-def host_of(address: str) -> str:
-    """The host of "10.0.0.7:40312", "[::1]:40312", or of the same after "ipv4:" or "ipv6:", as gRPC has it."""
-    text = address.removeprefix("ipv4:").removeprefix("ipv6:").replace("%5B", "[").replace("%5D", "]")
-    return text.rpartition(":")[0].strip("[]").removeprefix("::ffff:")
-
-
-def port_of(address: str) -> int:
-    """The port at the end of an address; 0 where there is none."""
-    port = address.rpartition(":")[2]
-    return int(port) if port.isascii() and port.isdecimal() else 0
-
-
-def _basic(value: str) -> tuple[str, str]:
-    """Name and password of a header "Basic …"; empty if it is none."""
-    scheme, _, rest = value.partition(" ")
-    if scheme.lower() != "basic":
-        return "", ""
-    try:
-        name, _, password = base64.b64decode(rest.strip(), validate=True).decode().partition(":")
-    except (binascii.Error, UnicodeDecodeError):
-        return "", ""
-    return name, password
 
 
 class RobotAdmission(Admission):

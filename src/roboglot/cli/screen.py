@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from roboglot.config import Config
+from roboglot.protocols import DOORS
 from roboglot.protocols.door import Endpoint
 
 
@@ -21,9 +22,15 @@ def warn_if_open(config: Config) -> None:
         where = "every network of this machine" if everywhere else f"the network of {robot.address}"
         console.print(
             f"[bold red]INSECURE[/][red]: robot {robot.name} is open to everyone on {where}: anyone there may drive it,"
-            " see and hear through it, run programs on it and change its maps and settings (Slamware REST, RoboMaster"
-            " text, block programs; CyberDog gRPC asks for a certificate of the data folder)[/]"
+            f" see and hear through it, run programs on it and change its maps and settings ({_open_doors(config)})[/]"
         )
+
+
+def _open_doors(config: Config) -> str:
+    """Name what takes anyone's commands, and what asks for something by itself."""
+    listening = [door for door in DOORS if door.listens(config)]
+    asking = [f"{door.title} asks for {door.asks}" for door in listening if door.asks]
+    return "; ".join([", ".join(door.title for door in listening if not door.asks), *asking])
 
 
 def announce(config: Config, endpoints: Mapping[str, Sequence[Endpoint]], page: str = "") -> None:

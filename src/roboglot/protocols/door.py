@@ -99,12 +99,18 @@ class Site:
 
 
 class PortKind(Enum):
-    """TCP: the robot listens. PUSH and BROADCAST: clients take datagrams. APP: the app listens, and the robot dials."""
+    """TCP: the robot listens. PUSH and BROADCAST: clients take datagrams. APP: the app listens, and the robot dials.
+
+    ROUTER: the robot listens, without saying whose clients come. BROKER: a server of the site, which the robot dials.
+    Tunnels carry neither of these two.
+    """
 
     TCP = auto()
     PUSH = auto()
     BROADCAST = auto()
     APP = auto()
+    ROUTER = auto()
+    BROKER = auto()
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +158,8 @@ class DoorType:
 
     ``config`` is the type of its section in the configuration, a dataclass whose defaults suffice. ``contracts`` are
     the yardsticks of coverage; the first one's keys are those of ``table``, the operations that clients may ask for.
-    ``provides``: it leaves something at the site for the other doors, so it is opened before them.
+    ``provides``: it leaves something at the site for the other doors, so it is opened before them. ``asks``: what it
+    demands of every client by itself; empty: nothing.
     """
 
     name: str
@@ -164,10 +171,16 @@ class DoorType:
     open: Callable[[Any, Site], Door]
     options: tuple[Option, ...] = ()
     provides: bool = False
+    asks: str = ""
 
     def section(self, config: Config) -> Any:
         """Return the door's own settings, the defaults where the configuration has no such section."""
         return config.doors.get(self.name) or self.config()
+
+    def listens(self, config: Config) -> bool:
+        """Whether clients reach it at a robot's address."""
+        reached = any(port.kind in (PortKind.TCP, PortKind.ROUTER) for port in self.ports)
+        return reached and bool(getattr(self.section(config), "enabled", True))
 
     def numbers(self, config: Config, kind: PortKind = PortKind.TCP) -> dict[str, int]:
         """Return the ports of this kind by their labels."""

@@ -17,6 +17,7 @@ from roboglot.cli.checks.listeners import holder_of
 from roboglot.config import Config, is_loopback
 from roboglot.operations import Right
 from roboglot.protocols import DOORS
+from roboglot.protocols.door import PortKind
 
 UNUSED_DAYS = 30
 DAY = 86400.0  # s
@@ -47,7 +48,9 @@ def _listeners(config: Config) -> Iterator[Finding]:
         (f"robot {robot.name}, {label}", robot.address, number)
         for robot in config.robots
         for door in DOORS
-        for label, number in door.numbers(config).items()
+        if door.listens(config)
+        for kind in (PortKind.TCP, PortKind.ROUTER)
+        for label, number in door.numbers(config, kind).items()
     ]
     if config.console.enabled:
         places.append(("console", config.console.address, config.console.port))

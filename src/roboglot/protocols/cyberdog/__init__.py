@@ -49,6 +49,7 @@ DOOR = DoorType(
     table=_table,
     ports=(PortSetting("CyberDog", "port"), PortSetting("CyberDog app", "app_port", PortKind.APP)),
     open=_open,
+    asks="a certificate of the data folder",
     options=(
         Option("--app", "app", "HOST:PORT of the CyberDog app to call; else the one that called last."),
         Option("--plaintext", "plaintext", "CyberDog without TLS, on loopback only.", True),

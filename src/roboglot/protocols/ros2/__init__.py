@@ -43,7 +43,7 @@ DOOR = DoorType(
         Contract("ros2_messages", lambda: contract("ros2_messages"), _messages),
     ),
     table=_table,
-    ports=(PortSetting("ROS 2 over Zenoh", "port", PortKind.APP),),
+    ports=(PortSetting("ROS 2 over Zenoh", "port", PortKind.ROUTER),),
     open=_open,
     options=(Option("--ros2", "enabled", "Publish the robots' topics for ROS 2 with rmw_zenoh.", True),),
 )

@@ -44,7 +44,7 @@ DOOR = DoorType(
         Contract("vda5050_messages", lambda: contract("vda5050_messages"), _messages),
     ),
     table=_table,
-    ports=(PortSetting("VDA 5050 broker", "port", PortKind.APP),),
+    ports=(PortSetting("VDA 5050 broker", "port", PortKind.BROKER),),
     open=_open,
     options=(
         Option("--vda5050", "broker", "HOST or HOST:PORT of the MQTT broker where a VDA 5050 fleet control is."),

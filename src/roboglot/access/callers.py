@@ -1,0 +1,30 @@
+"""What a client shows of itself, taken apart: its address, and the header with its name. Knows no rights."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+
+
+def host_of(address: str) -> str:
+    """The host of "10.0.0.7:40312", "[::1]:40312", or of the same after "ipv4:" or "ipv6:", as gRPC has it."""
+    text = address.removeprefix("ipv4:").removeprefix("ipv6:").replace("%5B", "[").replace("%5D", "]")
+    return text.rpartition(":")[0].strip("[]").removeprefix("::ffff:")
+
+
+def port_of(address: str) -> int:
+    """The port at the end of an address; 0 where there is none."""
+    port = address.rpartition(":")[2]
+    return int(port) if port.isascii() and port.isdecimal() else 0
+
+
+def basic_of(value: str) -> tuple[str, str]:
+    """Name and password of a header "Basic …"; empty if it is none."""
+    scheme, _, rest = value.partition(" ")
+    if scheme.lower() != "basic":
+        return "", ""
+    try:
+        name, _, password = base64.b64decode(rest.strip(), validate=True).decode().partition(":")
+    except (binascii.Error, UnicodeDecodeError):
+        return "", ""
+    return name, password
