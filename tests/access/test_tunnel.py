@@ -9,6 +9,7 @@ import socket
 import ssl
 from collections.abc import AsyncIterator, Callable
 from dataclasses import replace
+from ipaddress import ip_address
 from pathlib import Path
 
 import httpx
@@ -252,16 +253,16 @@ async def test_other_programs_here_do_not_pass_for_a_tunnel(gateway: tuple[Runti
             assert (await client.get(POSE)).status_code == 401
 
 
-async def test_a_tunnel_takes_no_address_where_others_listen(gateway: tuple[Runtime, str], tmp_path: Path) -> None:
+async def test_a_tunnel_takes_no_address_where_others_listen(
+    gateway: tuple[Runtime, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     runtime, _ = gateway
     assert runtime.guard is not None
-    taken = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-    with contextlib.suppress(OSError):  # another test may have it: then it is taken, too
-        taken.bind(("127.64.0.1", 8981))
-        taken.listen()
-    async with connected(*gateway, tmp_path):
-        assert list(runtime.guard.tunnels) != ["127.64.0.1"]
-    taken.close()
+    first = ip_address(ADDRESS.replace("127.0.95", "127.65.0"))  # of this test's process alone
+    monkeypatch.setattr("roboglot.access.tunnel.gateway.FIRST_ADDRESS", first)
+    with socket.create_server((str(first), 8981)):
+        async with connected(*gateway, tmp_path):
+            assert list(runtime.guard.tunnels) == [str(first + 1)]
 
 
 @pytest.mark.parametrize(

@@ -88,10 +88,10 @@ async def driven(served: Served, page: Page) -> None:
     await page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 20)
     await page.mouse.down()
     await until(lambda: any(action.name == "drive" for action in served.robot.actions.running()))
-    for _ in range(10):
-        await asyncio.sleep(0.09)  # so that the page sends again before the robot's time goes on
-        await served.clock.advance(0.08)
-    assert speed_of(served) > 0.1
+    async with asyncio.timeout(20.0):
+        while speed_of(served) <= 0.1:
+            await asyncio.sleep(0.09)  # so that the page sends again before the robot's time goes on
+            await served.clock.advance(0.08)
 
 
 async def test_a_click_on_the_map_brings_the_robot_there(served: Served, open_console: Open) -> None:

@@ -7,6 +7,7 @@ nothing was under way is made anew. Knows no robot.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import copy
 import functools
 import re
@@ -156,6 +157,8 @@ class PostgreSQL:
         self._threads.shutdown()
         self._readers.shutdown()
         for connection in self._opened:
+            with contextlib.suppress(psycopg.Error):  # the server would free the robots only when it hears of the end
+                connection.execute("SELECT pg_advisory_unlock_all()")
             connection.close()
 
 

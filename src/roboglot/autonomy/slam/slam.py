@@ -14,10 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.autonomy.computing import compute_soon
+from roboglot.autonomy.slam.adding import Adding
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.certainty import ALL_POINTS, Support, supported
 from roboglot.autonomy.slam.contest import contested
 from roboglot.autonomy.slam.displacement import DisplacementWatch
+from roboglot.autonomy.slam.excursion import Excursions
 from roboglot.autonomy.slam.loops import LoopCloser
 from roboglot.autonomy.slam.matcher import (
     FREE,
@@ -30,12 +32,10 @@ from roboglot.autonomy.slam.matcher import (
     search,
 )
 from roboglot.autonomy.slam.odometry_noise import Doubt, LearntBias, LearntNoise
-from roboglot.autonomy.slam.painting import paint
-from roboglot.autonomy.slam.scan_points import ScanPoints
+from roboglot.autonomy.slam.scan_points import ECHO_SHARE_MIN, ScanPoints
 from roboglot.autonomy.slam.slip import SlipWatch
 from roboglot.autonomy.slam.trajectory import Trajectory, TrajectoryPoint
 from roboglot.autonomy.slam.whereabouts import Whereabouts
-from roboglot.model.components.mapping.annotations import Annotations, AreaKind, MapAnnotations
 from roboglot.model.components.mapping.localization import Region
 from roboglot.model.events import LoopClosed, LostReason, PoseJumped, RecoveryMeans, RobotDisplaced, ScanTaken
 from roboglot.model.geometry import Pose, wrap_angle
@@ -62,8 +62,6 @@ SILENCE_PERIOD = 0.5  # s between two looks at whether scans come
 STILL, STILL_YAW = 0.002, math.radians(0.1)  # less than this between scans is standing
 STILL_PERIOD = 0.5  # s between two matches while standing
 STANDING_PERIOD = 10.0  # s between two steps of the trajectory while standing
-ADD_AFTER, ADD_AFTER_YAW, ADD_PERIOD = 0.15, math.radians(12.0), 1.0  # m, rad, s between scans added to the map
-FILL_AFTER, FILL_AFTER_YAW = 0.4, math.radians(20.0)
 LOST_QUALITY, LOST_PERIOD = 0.4, 1.0  # below this it looks around, once in so many seconds
 WIDE, NARROW = (0.5, math.radians(20.0)), (0.2, math.radians(5.0))  # m, rad around the belief that are searched
 DOUBT_SHARE, DOUBT_SIGMAS = 0.85, 3.0  # a worse fit than usual, or a pose so far from odometry's: match without it
@@ -80,9 +78,7 @@ class Slam:
         self._belief = belief
         self._matched_odometry: Pose | None = None
         self._step = Pose()  # what odometry moved since the last match, in base_link then
-        self._matched_at = self._added_at = self._searched_at = -math.inf
-        self._added: Pose | None = None
-        self._filled: Pose | None = None
+        self._matched_at = self._searched_at = -math.inf
         self._agreement = self._known = 1.0
         self._contradicted = False  # whether the newest match was dropped for what the wheels say
         self._newest: ScanTaken | None = None
@@ -94,6 +90,8 @@ class Slam:
         self._slip, self._displacement = SlipWatch(robot.description.radius), DisplacementWatch()
         self._trajectory, self._trajectory_map = Trajectory(), belief.map
         self._loops, self._way = LoopCloser(belief), 0.0  # m driven
+        self._adding = Adding(robot, belief, self._loops)
+        self._excursions = Excursions(belief, self.noise, lambda scan, pose: self._adding.paint(scan, pose, self._way))
         listen = robot.events.listen
         self._listeners = [listen(ScanTaken, self._take), listen(PoseJumped, self._jumped)]
         self._timer = robot.clock.call_later(SILENCE_PERIOD, self._listen)
@@ -164,8 +162,12 @@ class Slam:
     def _take(self, event: ScanTaken) -> None:
         belief, odometry, self._newest = self._belief, event.odometry, event
         self._straighten(odometry, event.stamp)
+        if np.isnan(event.scan.ranges).mean() > 1.0 - ECHO_SHARE_MIN:
+            belief.quality *= 1.0 - QUALITY_GAIN
+            return  # a covered lidar sends scans that say nothing: as if it sent none
         if self.whereabouts.hear(event.stamp) and belief.map.scans and belief.localizing:
             belief.covariance = belief.covariance + BLIND
+            self._excursions.forget()
             self.whereabouts.lose(LostReason.NO_SCANS, event.stamp)
         last = self._matched_odometry or odometry
         way, turn = odometry.distance_to(last), abs(wrap_angle(odometry.yaw - last.yaw))
@@ -188,8 +190,11 @@ class Slam:
         else:
             belief.quality = self._agreement = self._known = 1.0  # the first scan defines the map
             self.whereabouts.begin()
-        if belief.mapping and self._is_due(belief.map_to_odom.compose(odometry), event.stamp):
-            self._add(scan, belief.map_to_odom.compose(odometry), event.stamp)
+        pose = belief.map_to_odom.compose(odometry)
+        if belief.mapping and self._may_add and self._adding.is_due(pose, event.stamp):
+            self._adding.add(scan, pose, event.stamp, self._way)
+        sure = self._may_add and self._agreement >= TRUSTED and self._known > NEW_GROUND
+        self._excursions.take(scan, odometry, self._step, turn, sure=sure)
         self._follow_way(event.stamp, odometry, drives=way >= STILL or turn >= STILL_YAW)
 
     def _follow_way(self, stamp: float, odometry: Pose, *, drives: bool) -> None:
@@ -350,42 +355,13 @@ class Slam:
         found = fit(belief.map, scan, start, FREE)
         return found if found.fit >= best.fit else best
 
-    def _is_due(self, pose: Pose, stamp: float) -> bool:
-        """Whether a scan taken at ``pose`` adds something new to the map, and may."""
-        if not self._belief.map.scans:
+    @property
+    def _may_add(self) -> bool:
+        """Whether the newest scan may be added to the map."""
+        if not self._belief.map.scans or not self._belief.localizing:
             return True
-        if self._belief.localizing and (
-            not self.whereabouts.sure
-            or self._contradicted
-            or self._way < self._mapped_from
-            or (self._agreement < AGREEMENT_TO_MAP and self._known > NEW_GROUND)
-        ):
-            return False
-        if self._added is None:
-            return True
-        moved = (
-            pose.distance_to(self._added) >= ADD_AFTER or abs(wrap_angle(pose.yaw - self._added.yaw)) >= ADD_AFTER_YAW
-        )
-        return moved or stamp - self._added_at >= ADD_PERIOD - 1e-6
-
-    def _is_new_ground(self, pose: Pose) -> bool:
-        """Whether the gaps between rays are worth clearing here: they need not be at every step."""
-        last = self._filled if self._belief.map.scans > 1 else None
-        if last and pose.distance_to(last) < FILL_AFTER and abs(wrap_angle(pose.yaw - last.yaw)) < FILL_AFTER_YAW:
-            return False
-        self._filled = pose
-        return True
-
-    def _add(self, scan: ScanPoints, pose: Pose, stamp: float) -> None:
-        belief = self._belief
-        drawn = self._robot[MapAnnotations].current if MapAnnotations in self._robot else Annotations()
-        maintained = drawn.areas_of(AreaKind.MAINTENANCE)
-        paint(belief.map, scan, pose, fill=self._is_new_ground(pose), maintained=maintained)
-        self._added, self._added_at = pose, stamp
-        belief.revision += 1
-        if not belief.localizing or maintained:
-            return
-        self._loops.note(scan, pose, self._way)
+        fits = self._agreement >= AGREEMENT_TO_MAP or self._known <= NEW_GROUND
+        return self.whereabouts.sure and not self._contradicted and self._way >= self._mapped_from and fits
 
     def _straighten(self, odometry: Pose, stamp: float) -> None:
         """Go on with what a closed loop needs; when it is done, the robot stands elsewhere on a better map."""
@@ -394,7 +370,7 @@ class Slam:
         if straightened is None:
             return
         belief.move_to(straightened, odometry)
-        self._added = self._filled = straightened
+        self._adding.shift(straightened)
         shift = straightened.distance_to(pose)
         self._robot.events.publish(LoopClosed(stamp=stamp, shift=shift, moved=self._loops.moved))
         self._robot.events.publish(PoseJumped(stamp=stamp, pose=straightened))
