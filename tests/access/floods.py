@@ -8,7 +8,9 @@ import resource
 import socket
 import ssl
 import struct
+import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -18,6 +20,7 @@ TLS_PORTS = (1448, 50052, 50053, GATEWAY)
 ALL_PORTS = (*TLS_PORTS, 40921, 40922, 40923, 40925)
 PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
 TRIES_AT_ONCE = 50
+CLIENTS = 8  # of OpenSSL, at once
 POSE = "/api/core/slam/v1/localization/pose"
 
 
@@ -76,6 +79,28 @@ def log_ins(robot: str, count: int, _: Path) -> None:
         line.close()
 
 
+def renegotiations(robot: str, count: int, _: Path) -> None:
+    """New handshakes (TLS 1.2) and new keys (TLS 1.3) within connections, by OpenSSL's own client."""
+    kinds = (("R", "-tls1_2"), ("K", "-tls1_3"))
+    clients: dict[int, tuple[bytes, subprocess.Popen[bytes]]] = {}
+    for number in range(count):
+        place = number % CLIENTS
+        letter, client = clients.get(place, (b"", None))
+        if client is None or client.poll() is not None:
+            wanted, version = kinds[place % 2]
+            host = f"{robot}:{TLS_PORTS[0]}"
+            command = ["openssl", "s_client", version, "-bind", f"{HOSTILE}:0", "-connect", host]
+            letter, client = wanted.encode() + b"\n", subprocess.Popen(command, stdin=-1, stdout=-3, stderr=-3)
+            clients[place] = letter, client
+        assert client.stdin is not None
+        with contextlib.suppress(OSError):
+            client.stdin.write(letter)
+            client.stdin.flush()
+        time.sleep(0.0005)  # s_client takes one letter of each piece that it reads
+    for _letter, client in clients.values():
+        client.kill()
+
+
 def rapid_reset(robot: str, count: int, phone: Path) -> None:
     """HTTP/2 streams that are taken back as soon as they are opened, by an app whose certificate is good."""
     context = ssl.create_default_context(cafile=str(phone / "ca-cert.pem"))
@@ -116,8 +141,9 @@ FLOODS: dict[str, Callable[[str, int, Path], None]] = {
     "log-ins": log_ins,
     "rapid reset": rapid_reset,
 }
+BY_TOOLS: dict[str, Callable[[str, int, Path], None]] = {"renegotiations": renegotiations}  # not there everywhere
 
 
 if __name__ == "__main__":
     resource.setrlimit(resource.RLIMIT_NOFILE, (resource.getrlimit(resource.RLIMIT_NOFILE)[1],) * 2)
-    FLOODS[sys.argv[1]](sys.argv[2], int(sys.argv[3]), Path(sys.argv[4]))
+    (FLOODS | BY_TOOLS)[sys.argv[1]](sys.argv[2], int(sys.argv[3]), Path(sys.argv[4]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import shutil
 import socket
 import ssl
 from collections.abc import AsyncIterator
@@ -115,6 +116,32 @@ def test_nothing_is_renegotiated(tmp_path: Path) -> None:
     context = server_context(*ensure_site(tmp_path, {"127.0.0.1"}))
     assert context.options & ssl.OP_NO_RENEGOTIATION
     assert context.minimum_version >= ssl.TLSVersion.TLSv1_2
+
+
+@pytest.mark.skipif(not shutil.which("openssl"), reason="OpenSSL's own client is not installed")
+async def test_a_client_that_asks_for_new_keys_again_and_again_is_cut_off(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Python's client cannot ask. Each answer would wait for a client that reads nothing."""
+    monkeypatch.setattr(layer, "REPLIES_MAX", 200)
+    async with port(tmp_path) as (number, _):
+        client = await asyncio.create_subprocess_exec(
+            "openssl", "s_client", "-tls1_3", "-connect", f"127.0.0.1:{number}", stdin=-1, stdout=-3, stderr=-3
+        )
+        assert client.stdin is not None
+        try:
+            async with asyncio.timeout(20.0):
+                with contextlib.suppress(ConnectionError):
+                    while client.returncode is None:
+                        client.stdin.write(b"K\n")
+                        await client.stdin.drain()
+                        await asyncio.sleep(0.002)
+                await client.wait()
+        finally:
+            if client.returncode is None:
+                client.kill()
+                await client.wait()
+        assert Echo.opened == 1
 
 
 def test_a_certificate_lasts_until_a_name_is_added(tmp_path: Path) -> None:

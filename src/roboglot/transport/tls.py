@@ -24,6 +24,7 @@ seldom = Seldom(log)
 HANDSHAKE_SECONDS_MAX = 5.0
 HANDSHAKE_BYTES_MAX = 64 * 1024  # from the client, until the handshake is over
 RECORD_MAX = 16 * 1024  # bytes that one record carries
+REPLIES_MAX = 16 * 1024  # bytes of TLS's own on one connection, in answer to the peer: refused handshakes, new keys
 HELLO = 0x16  # the first byte of a TLS connection: a handshake record
 
 Factory = Callable[[], asyncio.Protocol]
@@ -60,6 +61,7 @@ class TlsEnd(asyncio.Protocol):
         self._gone: Callable[[], bool]
         self._encrypted: Callable[[bytes | bytearray | memoryview], int]
         self._received = 0
+        self._replied = 0
         self._host = ""
         self._patience: asyncio.TimerHandle | None = None
 
@@ -164,6 +166,15 @@ class TlsEnd(asyncio.Protocol):
             self._end()
             return
         if self._outgoing.pending:
+            self._reply()
+
+    def _reply(self) -> None:
+        """Send what TLS itself answers; a peer that asks again and again, and perhaps reads nothing, is cut off."""
+        self._replied += self._outgoing.pending
+        if self._replied > REPLIES_MAX:
+            seldom.warning(self._host, "%s cut off: too many new keys or handshakes in a connection", self._host)
+            self._transport.abort()
+        else:
             self._flush()
 
     def _end(self) -> None:
