@@ -287,4 +287,16 @@ def test_repeated_rows_are_counted(tmp_path: Path) -> None:
         kept.note(audit.Entry(number * 0.02, "anna", "", "a", "robomaster", "chassis speed", "done"))
     kept.close()
     rows = [entry for _, entry in audit.read(tmp_path / "audit.db")]
-    assert [(row.at, row.repeats) for row in rows] == [(0.0, 0), (1.0, 49)]
+    assert [(row.at, row.repeats) for row in rows] == [(0.0, 0), (1.0, 49), (1.98, 48)]
+    assert sum(1 + row.repeats for row in rows) == 100, "each is counted, also the last"
+
+
+def test_the_audit_counts_what_is_pushed_out_by_other_things(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(audit, "KINDS_MAX", 3)
+    kept = audit.Audit(tmp_path / "audit.db")
+    for number in range(60):
+        kept.note(audit.Entry(number * 0.001, "anna", "", "a", "slamware", f"op {number // 10}", "done"))
+    kept.close()
+    rows = [entry for _, entry in audit.read(tmp_path / "audit.db")]
+    assert {row.operation: row.repeats for row in rows} == {f"op {number}": 8 for number in range(6)}
+    assert len(rows) == 12

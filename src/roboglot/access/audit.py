@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 FILE = "audit.db"  # in the data folder
 WAITING_MAX = 10_000  # rows that wait for the disk; then they are dropped, and a row says how many
 TEXT_MAX = 300  # characters of one field
-REPEATED_WITHIN = 1.0  # s: the same again so soon is counted with the next row of its kind
+REPEATED_WITHIN = 1.0  # s: the same again so soon is counted, and the count written then
 KINDS_MAX = 1024  # different rows whose repetitions are counted
 _SCHEMA = """
 CREATE TABLE IF NOT EXISTS audit (
@@ -51,6 +51,14 @@ class Entry(NamedTuple):
     repeats: int = 0
 
 
+class _Kind(NamedTuple):
+    """Same things that came one after another: when a row was written, how many came since, and the last of them."""
+
+    written: float
+    repeats: int
+    last: Entry
+
+
 class BrokenChain(ValueError):
     """A row is missing or was changed."""
 
@@ -61,7 +69,8 @@ class Audit:
     def __init__(self, path: Path) -> None:
         self._queue: queue.SimpleQueue[Entry | None] = queue.SimpleQueue()
         self._path = path
-        self._last: dict[tuple[str, ...], tuple[float, int]] = {}
+        self._kinds: dict[tuple[str, ...], _Kind] = {}
+        self._lock = threading.Lock()
         self._dropped = 0
         _open(path).close()  # an unusable file is found now, not in the thread
         self._thread = threading.Thread(target=self._write, name="audit", daemon=True)
@@ -71,31 +80,55 @@ class Audit:
         """Keep it. The same within REPEATED_WITHIN is only counted: a joystick sends 50 commands a second."""
         host = entry.address.rpartition(":")[0]  # another connection of it is not another kind
         key = (entry.who, host, *entry[3:8])
-        at, repeats = self._last.get(key, (-math.inf, 0))
-        if entry.at - at < REPEATED_WITHIN:
-            self._last[key] = at, repeats + 1
-            return
-        if len(self._last) >= KINDS_MAX:
-            self._last.pop(next(iter(self._last)))
-        self._last[key] = entry.at, 0
+        with self._lock:
+            kind = self._kinds.get(key)
+            if kind is not None and entry.at - kind.written < REPEATED_WITHIN:
+                self._kinds[key] = _Kind(kind.written, kind.repeats + 1, entry)
+                return
+            if kind is None and len(self._kinds) >= KINDS_MAX:
+                self._put_repeats(self._kinds.pop(next(iter(self._kinds))))
+            self._kinds[key] = _Kind(entry.at, 0, entry)
+            self._put(entry._replace(repeats=kind.repeats if kind else 0))
+
+    def close(self) -> None:
+        """Write what waits, then close the file."""
+        self._settle(math.inf)
+        self._queue.put(None)
+        self._thread.join(5.0)
+
+    def _settle(self, until: float) -> None:
+        """Write what was only counted, if nothing of its kind came for a while."""
+        with self._lock:
+            for key, kind in self._kinds.items():
+                if kind.repeats and until - kind.written >= REPEATED_WITHIN:
+                    self._put_repeats(kind)
+                    self._kinds[key] = _Kind(kind.last.at, 0, kind.last)
+
+    def _put_repeats(self, kind: _Kind) -> None:
+        if kind.repeats:
+            self._put(kind.last._replace(repeats=kind.repeats - 1))
+
+    def _put(self, entry: Entry) -> None:
         if self._queue.qsize() >= WAITING_MAX:
             self._dropped += 1
             return
         if self._dropped:
             lost, self._dropped = self._dropped, 0
             self._queue.put(Entry(entry.at, "", "", "", "", "audit", "dropped", f"{lost} rows: the disk is too slow"))
-        self._queue.put(entry._replace(repeats=repeats))
-
-    def close(self) -> None:
-        """Write what waits, then close the file."""
-        self._queue.put(None)
-        self._thread.join(5.0)
+        self._queue.put(entry)
 
     def _write(self) -> None:
         with contextlib.closing(_open(self._path)) as connection:
             last = connection.execute("SELECT hash FROM audit ORDER BY number DESC LIMIT 1").fetchone()
             digest = last[0] if last else ""
-            while (entry := self._queue.get()) is not None:
+            while True:
+                try:
+                    entry = self._queue.get(timeout=REPEATED_WITHIN)
+                except queue.Empty:
+                    self._settle(now())
+                    continue
+                if entry is None:
+                    return
                 try:
                     digest = _append(connection, entry, digest)
                 except sqlite3.Error as error:
