@@ -50,8 +50,8 @@ async def test_what_was_seen_while_lost_is_joined_to_the_map(tour: Tour) -> None
     news: list[LocalizationLost | LocalizationRecovered] = []
     await tour.go((12.0, 9.8))
     await tour.go((8.0, 9.8))
-    for kind in (LocalizationLost, LocalizationRecovered):
-        tour.robot.events.listen(kind, news.append)
+    tour.robot.events.listen(LocalizationLost, news.append)
+    tour.robot.events.listen(LocalizationRecovered, news.append)
     through_the_door = len(walls_in(tour, ROOM))
     tour.world.hands.place("a", Pose(4.0, 14.5, math.radians(-90.0)))
     await tour.clock.advance(3.0)
