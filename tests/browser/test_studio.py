@@ -271,6 +271,34 @@ async def test_a_key_pressed_without_a_link_counts_when_it_is_back(studio: Open,
     await context.close()
 
 
+async def test_a_page_asks_again_for_a_robot_that_cannot_be_programmed_yet(studio: Open, browser: Any) -> None:
+    context = await browser.new_context(locale="en-US")
+    asked: list[str] = []
+
+    async def route(link: Any) -> None:
+        server = link.connect_to_server()
+
+        def hear(text: str) -> None:
+            message = json.loads(text)
+            if message["type"] == "open":
+                asked.append(message["robot"])
+                if len(asked) <= 2:  # as while the robot's programs are not there yet
+                    link.send(json.dumps({"type": "opened", "robot": message["robot"], "error": "it starts"}))
+                    return
+            server.send(text)
+
+        link.on_message(hear)
+
+    await context.route_web_socket("**/studio", route)
+    page = await loaded(await studio(context), COUNTING)
+    await page.wait_for_selector("text=This robot cannot be programmed at the moment: it starts")
+    await page.keyboard.press("F5")  # kept until the robot is there
+    await until(page, "studio.runner.printed.value.some(e => e.text === '12')")
+    assert await page.query_selector(".banner.warn") is None
+    assert len(asked) == 3
+    await context.close()
+
+
 async def test_a_change_of_language_and_look_loses_nothing(studio: Open) -> None:
     page = await loaded(await studio(), COUNTING)
     asked: list[str] = []

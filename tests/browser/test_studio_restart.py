@@ -1,4 +1,4 @@
-"""The server is killed while a program runs: the page comes back to the program held at its block, and steps on."""
+"""The server is killed: the page comes back to the program held at its block; it opens and edits without a server."""
 
 from __future__ import annotations
 
@@ -111,4 +111,34 @@ async def test_a_killed_server_gives_the_program_back(server: tuple[str, Life], 
     await until(page, "studio.runner.phase.value === 'idle'")
     texts = "studio.runner.printed.value.filter(e => e.level === 'print').map(e => e.text).join()"
     assert await page.evaluate(texts) == "7,end"
+    await context.close()
+
+
+async def test_pages_open_and_keep_programs_while_the_server_is_away(server: tuple[str, Life], browser: Any) -> None:
+    url, start = server
+    first = await start()
+    context = await browser.new_context()
+    page = await context.new_page()
+    await page.goto(f"{url}/studio/")
+    await until(page, READY)
+    await page.evaluate("navigator.serviceWorker.ready.then(() => undefined)")
+    first.kill()
+    await first.wait()
+    await page.reload()
+    await until(page, "window.studio && studio.editor.workspace && document.querySelector('.banner.bad')")
+    await page.evaluate("language => { localStorage.language = language; }", "zh")
+    await page.evaluate("state => { studio.editor.load(state); studio.editor.changes.value += 1; }", HALTED)
+    await until(page, "studio.editor.code.value.includes('end')")
+    await page.reload()
+    await until(page, "window.studio?.editor.workspace?.getBlockById('end')")
+    assert await page.evaluate("document.documentElement.lang") == "zh-CN"
+    await start()
+    await until(page, "!document.querySelector('.banner.bad')")
+    other = await (await browser.new_context()).new_page()  # another device has it
+    await other.goto(f"{url}/studio/")
+    await until(other, READY)
+    await until(page, "studio.program.value.id && document.querySelector('.stored').textContent.includes('机器人')")
+    await other.click("text=Programs")
+    await other.wait_for_selector("dialog li >> text=Open")
+    await other.context.close()
     await context.close()

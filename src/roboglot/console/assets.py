@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import gzip
 import hashlib
+import json
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -24,6 +25,7 @@ TYPES = {
     ".cur": "image/x-icon",
 }
 _COMMENT = re.compile(rb"^(?://.*|/\*\*.*\*/)$", re.MULTILINE)
+STUDIO_FILES = "/studio/files.json"  # what the studio's service worker keeps for the time without a server
 _INLINE = re.compile(rb'<script type="importmap">(.*?)</script>', re.DOTALL)
 
 
@@ -62,11 +64,22 @@ def _tag(plain: bytes) -> str:
     return f'"{hashlib.sha256(plain).hexdigest()[:24]}"'
 
 
+@cache
+def _studio_files() -> Asset:
+    """The list of what the studio needs: its files and those it shares with the console, and two answers."""
+    console = ("/views/", "/app.js", "/index.html", "/studio/index.html")
+    paths = [path for path in _paths() if path not in ("/", "/studio") and not path.startswith(console)]
+    plain = json.dumps([*paths, "/api/blocks", "/api/lessons"]).encode()
+    return Asset(TYPES[".json"], plain, gzip.compress(plain, 9, mtime=0), _tag(plain))
+
+
 class Assets:
     """All files below ``web``, by path ("/app.js"); "/" is the page itself. Each is read when it is first asked for."""
 
     def find(self, path: str) -> Asset | None:
         """The file at ``path``."""
+        if path == STUDIO_FILES:
+            return _studio_files()
         found = _paths().get(path)
         return None if found is None else _read(found)
 

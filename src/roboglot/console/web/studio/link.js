@@ -4,7 +4,9 @@ import { current } from "../link.js";
 
 export const online = signal(/** @type {"opening" | "open" | "lost"} */ ("opening"));
 export const opened = signal(/** @type {any} */ (null)); // what the server said of the robot
-const RETRY = 1000; // ms
+export const unopened = signal(""); // why the robot cannot be programmed, now
+const RETRY = 1000, RETRY_MAX = 8000; // ms
+let refusals = 0, retry = 0;
 let socket = /** @type {WebSocket | null} */ (null);
 let next = 1;
 const waiting = /** @type {Map<number | string, {resolve: (v: any) => void, reject: (e: Error) => void}>} */ (new Map());
@@ -22,6 +24,7 @@ export function connect() {
     if (socket !== made) return;
     online.value = "lost";
     opened.value = null;
+    clearTimeout(retry);
     for (const { reject } of waiting.values()) reject(new Error("lost"));
     waiting.clear();
     setTimeout(connect, RETRY);
@@ -58,9 +61,19 @@ export function frame(fields) {
 /** Debug as on the door's /debug. @param {object} wish */
 export async function debug(wish) { return JSON.parse((await ask({ type: "debug", text: JSON.stringify(wish) })).text); }
 
+/** Whether the robot can be programmed; if not, ask again: programs may come after the page. @param {any} message */
+function answered(message) {
+  if (message.robot !== current.value) return false; // another was chosen meanwhile
+  unopened.value = message.error ?? "";
+  opened.value = message.error ? null : message;
+  clearTimeout(retry);
+  if (message.error) retry = window.setTimeout(open, Math.min(RETRY * 2 ** refusals++, RETRY_MAX)); else refusals = 0;
+  return !message.error;
+}
+
 /** @param {any} message */
 function receive(message) {
-  if (message.type === "opened") opened.value = message;
+  if (message.type === "opened" && !answered(message)) return;
   if (message.type === "frame") {
     const frame = JSON.parse(message.text);
     settle(frame.feedback?.id ?? frame.response?.id ?? "", frame);

@@ -1,17 +1,17 @@
 // The frame of the studio: header, what runs the program, blocks or text, panels beside them.
 import { render } from "preact";
 import { useEffect, useRef } from "preact/hooks";
-import { effect, signal } from "@preact/signals";
+import { computed, effect, signal } from "@preact/signals";
 import { Button, Icon, html, kept, language, loadWords, notice, say, t, theme } from "../base.js";
 import { choose, command, connect as connectRobot, current, hello, status } from "../link.js";
 import { loadTable } from "./blocks.js";
 import { Group } from "./class.js";
 import { Keys, Library, Schedule, shown } from "./dialogs.js";
 import * as editor from "./editor.js";
-import { connect, online, open } from "./link.js";
+import { connect, online, open, opened, unopened } from "./link.js";
 import { Missions, allowHere, loadMissions } from "./missions.js";
 import { Output, Python, RobotPanel, TextEditor, Values } from "./panels.js";
-import { body, changed, list, program, rename, restore, stored } from "./program.js";
+import { body, changed, handOver, list, program, rename, restore, stored } from "./program.js";
 import * as runner from "./runner.js";
 
 const TABS = { python: Python, output: Output, values: Values, robot: RobotPanel, missions: Missions, group: Group };
@@ -62,6 +62,7 @@ function Bar() {
 
 function Banner() {
   if (online.value === "lost" || status.value === "lost") return html`<div class="banner bad" role="alert">${t("link.gone")}</div>`;
+  if (unopened.value) return html`<div class="banner warn" role="status">${t("studio.unopened", { why: unopened.value })}</div>`;
   if (runner.others.value.length) return html`<div class="banner warn" role="status">${t("studio.others")}${runner.others.value.map((id) => html`<${Button} label=${t("studio.stop")} onClick=${() => runner.operate("shutdown", id)} />`)}</div>`;
   return null;
 }
@@ -107,6 +108,7 @@ function App() {
     <div class=${`notice ${notice.value.bad ? "bad" : ""}`} role="status" aria-live="polite">${notice.value.text}</div>`;
 }
 
+const AWAY_AFTER = 2000; // ms until files are kept for the time without a server: the page itself comes first
 await Promise.all([loadWords("/words", "/studio/words"), loadTable()]);
 render(html`<${App} />`, document.getElementById("app"));
 connectRobot();
@@ -115,7 +117,9 @@ let timer = 0;
 effect(() => { void editor.changes.value; if (editor.changes.peek()) changed(); });
 effect(() => { void editor.code.value; void body.value; clearTimeout(timer); timer = window.setTimeout(runner.check, 350); });
 effect(() => { void editor.breaks.value; void runner.textBreaks.value; runner.tellStops(); });
-effect(() => { if (current.value && online.value === "open") { open(); list().then(() => editor.modules.value.length && editor.remake()).catch(() => undefined); } });
+effect(() => { if (current.value && online.value === "open") open(); });
+const robot = computed(() => opened.value?.robot ?? "");
+effect(() => { if (robot.value) list().then(() => editor.modules.value.length && editor.remake()).then(handOver).catch(() => undefined); });
 effect(() => { void language.value; runner.show(); });
 let shownId = program.peek().id;
 effect(() => {
@@ -129,4 +133,5 @@ effect(() => {
 loadMissions().catch(() => undefined);
 addEventListener("pagehide", () => { if (editor.changes.peek()) changed(); });
 document.title = t("studio");
+setTimeout(() => navigator.serviceWorker?.register("/studio/worker.js").catch(() => undefined), AWAY_AFTER); // on https and this machine
 Object.assign(window, { studio: { editor, runner, program, say } }); // for tests and the benchmark

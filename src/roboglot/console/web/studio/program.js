@@ -3,7 +3,7 @@ import { signal } from "@preact/signals";
 import { kept, say, t } from "../base.js";
 import * as editor from "./editor.js";
 import { newId } from "./blocks.js";
-import { ask, frame, online } from "./link.js";
+import { ask, frame, opened } from "./link.js";
 
 const PREFIX = "studio.program.", VERSIONS_MAX = 20, VERSION_EVERY = 60_000, SAVE_AFTER = 1500; // ms
 export const body = signal(""); // of a program that is text
@@ -13,6 +13,7 @@ export const program = signal(/** @type {{id: string, name: string, kind: "block
 export const stored = signal(/** @type {"" | "browser" | "robot"} */ (""));
 export const listed = signal(/** @type {any[]} */ ([]));
 const last = kept("studio.last", "");
+const UNSENT = "studio.unsent"; // ids of programs that the robot does not have as they stand here
 
 function newIdSafe() { return Math.random().toString(36).slice(2, 12); }
 function pick({ id, name, kind, lesson }) { return { id, name, kind, lesson }; }
@@ -38,8 +39,16 @@ let timer = 0, versionAt = 0;
 /** Something was changed: keep it in the browser at once, on the robot soon. */
 export function changed() {
   keep();
+  note(program.value.id, true);
   clearTimeout(timer);
-  timer = window.setTimeout(saveToRobot, SAVE_AFTER);
+  timer = window.setTimeout(() => saveToRobot(), SAVE_AFTER);
+}
+
+const unsent = () => { try { return JSON.parse(localStorage.getItem(UNSENT) ?? "[]"); } catch { return []; } };
+/** @param {string} id @param {boolean} due */
+function note(id, due) {
+  const others = unsent().filter((/** @type {string} */ one) => one !== id);
+  try { localStorage.setItem(UNSENT, JSON.stringify(due ? [...others, id] : others)); } catch { /* full: keep() says so */ }
 }
 
 function keep() {
@@ -58,10 +67,10 @@ function keep() {
 
 export function versions() { try { return JSON.parse(localStorage.getItem(`studio.versions.${program.value.id}`) ?? "[]"); } catch { return []; } }
 
-/** The frame that saves it. */
-export const saveFrame = () => frame({
-  type: "task", operate: "save", target_id: [program.value.id], describe: (program.value.name || t("studio.untitled")).replaceAll('"""', "'"), style: style(),
-  mode: "single", condition: "now", body: python() });
+/** The frame that saves a program. @param {any} [of] as ``whole`` makes it */
+export const saveFrame = (of = whole()) => frame({
+  type: "task", operate: "save", target_id: [of.id], describe: (of.name || t("studio.untitled")).replaceAll('"""', "'"),
+  style: of.id === program.value.id ? style() : JSON.stringify(of.style ?? { roboglot: { kind: "text" } }), mode: "single", condition: "now", body: of.body });
 
 /** Whether the robot has exactly this program, and it is right: then it need not be saved and checked before it runs. */
 export async function isStored() {
@@ -69,12 +78,26 @@ export async function isStored() {
   return Boolean(found) && found.body === python() && found.style === style() && found.state !== "error" && found.mode === "single" && found.condition === "now";
 }
 
-async function saveToRobot() {
-  if (online.value !== "open" || !python().trim()) return;
+async function saveToRobot(of = whole()) {
+  if (!opened.value) return; // handed over when the robot is there
+  if (!of.body.trim()) { note(of.id, false); return; }
   try {
-    const { feedback } = await saveFrame();
-    if (feedback.state === 0 || feedback.state === 23) stored.value = "robot"; // what is wrong is kept, too
+    const { feedback } = await saveFrame(of);
+    if (feedback.state !== 0 && feedback.state !== 23) return; // what is wrong is kept, too
+    const now = read(of.id);
+    if (now && now.saved > of.saved && now.body !== of.body) return; // changed again meanwhile
+    note(of.id, false);
+    if (of.id === program.value.id) stored.value = "robot";
   } catch { /* the browser has it */ }
+}
+
+/** Hand over what was written while the robot was away. */
+export async function handOver() {
+  for (const id of unsent()) {
+    if (opened.value?.running.includes(id)) continue; // after its next change
+    const of = id === program.value.id ? whole() : read(id);
+    if (of) await saveToRobot(of); else note(id, false);
+  }
 }
 
 /** @param {Partial<{name: string, lesson: string}>} change */
