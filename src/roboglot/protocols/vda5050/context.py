@@ -14,11 +14,13 @@ from typing import Any
 from roboglot.model.admission import Forbidden, Right
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.base import Base
+from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.geometry import Point
 from roboglot.model.robot import Robot
 from roboglot.operations import Operation
 from roboglot.protocols.vda5050.error_book import ErrorBook
 from roboglot.protocols.vda5050.errors import Rejected
+from roboglot.protocols.vda5050.maps import Maps
 from roboglot.protocols.vda5050.order_book import ACTIONS_KEPT_MAX, ActionState, ActionStatus, OrderBook
 from roboglot.protocols.vda5050.order_check import check_order
 from roboglot.protocols.vda5050.performing import Performer
@@ -39,9 +41,10 @@ class Context:
     def __init__(
         self, robot: Robot, version: Version, map_id: str, send_factsheet: Callable[[], Awaitable[None]]
     ) -> None:
-        self.robot, self.version, self.map_id = robot, version, map_id
+        self.robot, self.version = robot, version
+        self.maps = Maps(robot, map_id)
         self.send_factsheet = send_factsheet
-        self.book = OrderBook()
+        self.book = OrderBook(measure=self._metres)
         self.instant: dict[str, ActionState] = {}
         self.paused = False
         self.hibernating = False  # heard by the door: no states, and nothing is taken but stopHibernation
@@ -54,6 +57,14 @@ class Context:
         self._tasks: set[asyncio.Future[None]] = set()
         self._route = Route(self)
         self._performer = Performer(self)
+
+    @property
+    def map_id(self) -> str:
+        """The mapId of the map in use."""
+        return self.maps.in_use
+
+    def _metres(self) -> float:
+        return self.robot[Odometry].reading.distance if Odometry in self.robot else 0.0
 
     def touch(self) -> None:
         """Have the state sent."""
@@ -202,7 +213,7 @@ class Context:
 
     def set_last_node(self, node_id: str) -> None:
         """Note the node where people placed the robot."""
-        self.book.last_node, self.book.last_sequence = node_id, 0
+        self.book.place_at(node_id, 0)
 
     async def close(self) -> None:
         """Stop what fleet control had the robot do."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 
 from roboglot.operations import Right
-from roboglot.protocols.vda5050.chapters import actions, loads, messages, power, sensing  # noqa: F401 - fill the table
+from roboglot.protocols.vda5050.chapters import actions, loads, maps, messages, power, sensing  # noqa: F401 - fill the table
 from roboglot.protocols.vda5050.context import Context
 from roboglot.protocols.vda5050.errors import Rejected
 from roboglot.protocols.vda5050.table import TABLE

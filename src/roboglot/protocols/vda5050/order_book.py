@@ -57,6 +57,8 @@ class OrderBook:
     cancelled: bool = False
     canceling: bool = False
     last: Order | None = None
+    measure: Callable[[], float] = lambda: 0.0  # m that the robot has driven in its life
+    placed_at: float | None = None  # what it measured at the last node
 
     @property
     def idle(self) -> bool:
@@ -79,7 +81,7 @@ class OrderBook:
             self.actions.clear()
             self.order_id, self.cancelled = order.order_id, False
             self.nodes, self.edges = [], []
-            self.last_node, self.last_sequence = "", 0
+            self.last_node, self.last_sequence, self.placed_at = "", 0, None
             self._extend(order, order.nodes)
         else:
             if order.order_update_id == self.update_id and self.last is not None:
@@ -144,7 +146,16 @@ class OrderBook:
         """Note that the robot is at ``node``, and all before it are behind."""
         self.nodes = [left for left in self.nodes if left.sequence_id > node.sequence_id]
         self.edges = [left for left in self.edges if left.sequence_id > node.sequence_id]
-        self.last_node, self.last_sequence = node.node_id, node.sequence_id
+        self.place_at(node.node_id, node.sequence_id)
+
+    def place_at(self, node_id: str, sequence_id: int) -> None:
+        """Note that the robot is at that node."""
+        self.last_node, self.last_sequence, self.placed_at = node_id, sequence_id, self.measure()
+
+    @property
+    def way_since_node(self) -> float | None:
+        """Metres driven since the last node; None if there was none."""
+        return None if self.placed_at is None else self.measure() - self.placed_at
 
     def drop_rest(self) -> None:
         """Forget what is left, as cancelOrder wants; actions that wait fail."""

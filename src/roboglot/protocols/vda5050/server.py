@@ -79,6 +79,7 @@ class Vda5050Door:
             with explaining("the VDA 5050 door", "vda5050"):
                 import aiomqtt  # noqa: F401 - said now rather than at the first try
             self._task = asyncio.get_running_loop().create_task(self._dial())
+            self._context.run_beside(self._context.maps.follow())
 
     async def close(self) -> None:
         """Say OFFLINE, and stop what fleet control began."""
@@ -176,6 +177,7 @@ class Vda5050Door:
         if self._rests:
             self._rests = False
             await self._send_connection("ONLINE")
+        await context.maps.look()
         state = self._state()
         if context.changed.is_set() or self._sent != _coarse(state) or now - self._sent_at >= STATE_PERIOD:
             context.changed.clear()
@@ -190,7 +192,7 @@ class Vda5050Door:
             if self._rests:
                 continue
             async with self._surviving("visualization"):
-                place = vocabulary.position(self._robot, self._version, self._config.map)
+                place = vocabulary.position(self._robot, self._version, self._context.map_id)
                 refers = (
                     {"referenceStateHeaderId": self._headers.get("state", 1) - 1} if self._version.new_words else {}
                 )
@@ -219,9 +221,10 @@ class Vda5050Door:
         instant = vocabulary.action_states(context.instant.values(), version)
         return {
             **vocabulary.progress(context.book),
-            **vocabulary.position(robot, version, self._config.map),
+            **vocabulary.position(robot, version, self._context.map_id),
             **vocabulary.velocity(robot),
             **vocabulary.loads(robot, context.load),
+            **context.maps.listed(),
             "driving": vocabulary.is_driving(robot),
             "paused": context.paused,
             "newBaseRequest": context.needs_base,
@@ -296,7 +299,7 @@ def _level(text: str) -> str:
 
 def _coarse(state: Mapping[str, Any]) -> dict[str, Any]:
     """Return what counts as a change: all but where it is, how fast, and small changes of the charge."""
-    fine = ("agvPosition", "mobileRobotPosition", "velocity", "powerSupply", "batteryState")
+    fine = ("agvPosition", "mobileRobotPosition", "velocity", "powerSupply", "batteryState", "distanceSinceLastNode")
     battery = state.get("powerSupply") or state.get("batteryState") or {}
     charge = battery.get("stateOfCharge", battery.get("batteryCharge", 0.0))
     kept = {key: value for key, value in state.items() if key not in fine}

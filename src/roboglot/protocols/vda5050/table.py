@@ -30,6 +30,8 @@ AT_NODES = frozenset(
         "drop",
         "detectObject",
         "finePositioning",
+        "enableMap",
+        "deleteMap",
     }
 )
 INSTANT = frozenset(
@@ -47,6 +49,8 @@ INSTANT = frozenset(
         "stopHibernation",
         "shutdown",
         "logReport",
+        "enableMap",
+        "deleteMap",
         "initPosition",
         "initializePosition",
         "startCharging",
@@ -62,6 +66,8 @@ FIELDS = (
     "order.edges.maximumSpeed",
     "order.edges.maximumHeight",
     "state.loads",
+    "state.maps",
+    "state.distanceSinceLastNode",
 )
 
 

@@ -109,7 +109,9 @@ def loads(robot: Robot, known: Mapping[str, str]) -> dict[str, Any]:
 
 def progress(book: OrderBook) -> dict[str, object]:
     """Return what is left of the order."""
+    way = book.way_since_node
     return {
+        **({} if way is None else {"distanceSinceLastNode": round(way, 3)}),
         "orderId": book.order_id,
         "orderUpdateId": book.update_id,
         "lastNodeId": book.last_node,

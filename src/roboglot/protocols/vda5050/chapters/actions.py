@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.map_library import MapLibrary
 from roboglot.model.components.motion.docking import Docking
-from roboglot.model.errors import InvalidGoal
+from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.geometry import Pose
 from roboglot.operations import Right
 from roboglot.protocols.vda5050.context import SOURCE, Context
@@ -81,9 +82,14 @@ async def initialize_position(
     lastNodeId: Id = "",  # noqa: N803
 ) -> str:
     """Set where the robot is in its map."""
-    if mapId != context.map_id:
+    if mapId == context.map_id:
+        context.robot[Localization].set_pose(Pose(x, y, theta))
+    elif MapLibrary not in context.robot or mapId not in await context.robot[MapLibrary].names():
         raise InvalidGoal(f"there is no map {mapId!r}; the robot's map is {context.map_id!r}")
-    context.robot[Localization].set_pose(Pose(x, y, theta))
+    elif context.book.nodes:
+        raise Refused(f"order {context.book.order_id} is being driven in {context.map_id!r}")
+    else:
+        context.maps.use(await context.maps.kept(mapId, ""), Pose(x, y, theta))
     context.set_last_node(lastNodeId)
     return ""
 

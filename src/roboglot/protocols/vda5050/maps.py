@@ -1,0 +1,95 @@
+"""Which maps fleet control can name: those that the robot keeps, and the one in use."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.map_library import MapLibrary, StoredMap
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.errors import NotFound
+from roboglot.model.events.mapping import MapReplaced
+from roboglot.model.geometry import Pose
+from roboglot.model.map_loading import known_dock, load_map
+from roboglot.model.maps import OccupancyGrid
+from roboglot.model.robot import Robot
+
+LOOK_PERIOD = 2.0  # s of robot time: how old the list of kept maps may be
+
+
+class Maps:
+    """The maps of one robot. ``own`` is the mapId of what it made itself, or another client loaded."""
+
+    def __init__(self, robot: Robot, own: str) -> None:
+        self._robot, self._own = robot, own
+        self.in_use = own
+        self._names: tuple[str, ...] = ()
+        self._looked_at = float("-inf")
+        self._loads = 0  # of our own, that MapReplaced has not come of yet
+
+    async def look(self) -> None:
+        """Read the names of the kept maps, if that is long ago."""
+        now = self._robot.clock.time()
+        if MapLibrary in self._robot and now - self._looked_at >= LOOK_PERIOD:
+            self._looked_at = now
+            self._names = tuple(await self._robot[MapLibrary].names())
+
+    async def follow(self) -> None:
+        """Note, for ever, when another client has the robot use another map."""
+        with self._robot.events.subscribe(MapReplaced) as replaced:
+            while True:
+                event = await replaced.next()
+                if self._loads:
+                    self._loads -= 1
+                elif event.origin is None:
+                    self.in_use = self._own
+
+    async def kept(self, name: str, version: str) -> StoredMap:
+        """Return a map of the library. Raises NotFound, also for a version: one map is kept of each name."""
+        if version:
+            raise NotFound(f"there is no version {version!r}: maps here have none, mapVersion is empty")
+        return await self._robot[MapLibrary].get(name)
+
+    def use(self, stored: StoredMap, pose: Pose) -> None:
+        """Use a map from now on, with the robot at ``pose`` in it. Raises what ``Mapping.load`` raises."""
+        self._load(stored, pose)
+        self.in_use = stored.name
+
+    async def change(self, stored: StoredMap) -> None:
+        """Use a map, and find the robot in it; where that fails, the map in use stays, and why is raised."""
+        robot = self._robot
+        grid, pose = robot[Mapping].grid, robot[Localization].pose
+        copied = OccupancyGrid(grid.log_odds.copy(), grid.resolution, grid.origin)
+        before = StoredMap(self.in_use, copied, 0.0, dock=known_dock(robot))
+        self._load(stored, pose)
+        try:
+            action = robot[Localization].relocalize(source="vda5050")
+            try:
+                await action.succeeded()
+            finally:
+                action.cancel("fleet control cancelled it")
+        except BaseException:
+            self._load(before, pose)
+            raise
+        self.in_use = stored.name
+
+    async def remove(self, name: str) -> None:
+        """Forget a kept map. Raises NotFound."""
+        await self._robot[MapLibrary].remove(name)
+        self._looked_at = float("-inf")
+
+    def listed(self) -> dict[str, Any]:
+        """Return the state's ``maps``; nothing for a robot that keeps none."""
+        if MapLibrary not in self._robot:
+            return {}
+        names = dict.fromkeys((self.in_use, *self._names))
+        states = {name: "ENABLED" if name == self.in_use else "DISABLED" for name in names}
+        return {"maps": [{"mapId": name, "mapVersion": "", "mapStatus": status} for name, status in states.items()]}
+
+    def _load(self, stored: StoredMap, pose: Pose) -> None:
+        self._loads += 1
+        try:
+            load_map(self._robot, stored, pose)
+        except BaseException:
+            self._loads -= 1
+            raise
