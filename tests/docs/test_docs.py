@@ -39,6 +39,18 @@ def test_there_are_pages() -> None:
     assert {"README.md", "docs/architecture.md", "docs/protocols/slamware.md"} <= set(NAMES)
 
 
+DOORS = [page for page in PAGES if page.parent.name == "protocols" and ".zh" not in page.suffixes]
+
+
+@pytest.mark.parametrize("door", DOORS, ids=lambda page: page.stem)
+def test_every_door_has_its_page_in_chinese_with_the_same_programs(door: Path) -> None:
+    chinese = door.with_name(f"{door.stem}.zh.md")
+    assert chinese.exists(), chinese
+    known = set(blocks(door, "python", "js", "go"))
+    assert set(blocks(chinese, "python", "js", "go")) <= known, chinese
+    assert f"({door.name})" in chinese.read_text(), "it leads to the page that is more detailed"
+
+
 @every_page
 def test_local_links_lead_somewhere(page: Path) -> None:
     for link in LINK.findall(FENCE.sub("", page.read_text())):
