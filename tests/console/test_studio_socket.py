@@ -91,6 +91,22 @@ async def test_a_program_is_saved_run_halted_and_stepped_by_blocks(shown: Shown)
         await studio.until(lambda m: m["type"] == "frame" and "stop task" in m["text"])
 
 
+async def test_a_page_lights_only_the_blocks_of_its_own_program(shown: Shown) -> None:
+    async with page(shown) as mine, page(shown) as theirs, page(shown) as every:
+        await mine.say(type="open", robot="a", program="t")
+        await theirs.say(type="open", robot="a", program="other")
+        await mine.kind("opened")
+        await theirs.kind("opened")
+        body = "cyberdog.task.block('one')\nprint(1)\n"
+        await mine.frame(**SAVE, id="1", body=body)
+        await mine.frame(type="task", operate="run", target_id=["t"], id="2", mode="single", condition="now")
+        for one in (mine, theirs, every):
+            await one.until(lambda m: m["type"] == "frame" and "stop task" in m["text"])
+        heard = [[m["type"] for m in one.heard if '"begin"' in m.get("text", "") or m["type"] == "log"]
+                 for one in (mine, theirs, every)]  # fmt: skip
+        assert heard == [["frame", "log"], [], ["frame", "log"]]
+
+
 async def test_what_is_wrong_is_said_while_typing(shown: Shown) -> None:
     async with page(shown) as studio:
         await studio.say(type="check", id=1, body="cyberdog.motion.trun(90)\n")

@@ -14,6 +14,7 @@ import re
 import time
 from collections import deque
 from collections.abc import Awaitable, Callable
+from functools import lru_cache
 from typing import Annotated, Any
 
 import msgspec
@@ -45,9 +46,10 @@ Id = Annotated[str, msgspec.Meta(max_length=ID_MAX)]
 
 
 class Open(msgspec.Struct, tag="open", tag_field="type"):
-    """Which robot the page programs from now on."""
+    """Which robot the page programs from now on, and what it shows: of other programs it hears only begin and end."""
 
     robot: str
+    program: Id = ""  # of all
 
 
 class Frame(msgspec.Struct, tag="frame", tag_field="type"):
@@ -79,6 +81,12 @@ class Fetch(msgspec.Struct, tag="fetch", tag_field="type"):
     log: bool = True
 
 
+@lru_cache(maxsize=8)
+def _framed(text: str) -> str:
+    """A frame as it goes to pages; the same goes to many of them."""
+    return msgspec.json.encode({"type": "frame", "text": text}).decode()
+
+
 Message = Open | Frame | Debug | Check | Fetch | TrialWish | TrialEnd | Member
 _decode = msgspec.json.Decoder(Message).decode
 
@@ -91,6 +99,7 @@ class Session:
     def __init__(self, desk: Desk, classroom: Classroom, send: Send) -> None:
         self._desk, self._send = desk, send
         self._programs: Programs | None = None
+        self._shown = ""  # the program; empty: all
         self._leaving: list[Callable[[], None]] = []
         self._waiting: deque[dict[str, Any]] = deque()
         self._due = asyncio.Event()
@@ -114,7 +123,8 @@ class Session:
                 message = self._waiting.popleft()
                 if message is self._light:
                     self._light = None
-                await self._send(msgspec.json.encode(message).decode())
+                frame = message["type"] == "frame"
+                await self._send(_framed(message["text"]) if frame else msgspec.json.encode(message).decode())
 
     def tell(self, message: dict[str, Any]) -> None:
         """Send a message when its turn comes."""
@@ -141,6 +151,8 @@ class Session:
         """A report of a task. Of blocks that begin quickly one after the other only the newest counts."""
         if (block := _BLOCK.search(text)) is None:
             self.answer(text)
+        elif self._shown and f'"target_id": "{self._shown}"' not in text:
+            pass  # the page that shows it lights it
         elif block[1] == "begin":
             if self._light is None or self._waiting[-1] is not self._light:
                 self._light = {"type": "frame"}
@@ -161,7 +173,7 @@ class Session:
             raise ValueError("too many messages")
         message = _decode(text)
         if isinstance(message, Open):
-            self._open(message.robot)
+            self._open(message)
             return
         if len(self._pending) >= PENDING_MAX:
             self.tell({"type": "refused", "why": "too much is being answered"})
@@ -170,8 +182,10 @@ class Session:
         self._pending.add(task)
         task.add_done_callback(self._pending.discard)
 
-    def _open(self, name: str) -> None:
+    def _open(self, wish: Open) -> None:
+        name = wish.robot
         self._leave()
+        self._shown = wish.program
         try:
             self._desk.view(name, "program")
             programs = self._desk.studio.programs.get(name)
@@ -237,9 +251,12 @@ class Session:
     # -- out -----------------------------------------------------------------------------------------------------------
 
     def _logged(self, task: str, entry: LogEntry) -> None:
-        self.tell({"type": "log", **_entry(task, entry)})
+        if self._shown in ("", task):
+            self.tell({"type": "log", **_entry(task, entry)})
 
     def _noticed(self, insight: Insight) -> None:
+        if self._shown not in ("", insight.task):
+            return
         kind = "reading" if isinstance(insight, Reading) else "variables"
         self.tell({"type": kind, **dataclasses.asdict(insight)})
 

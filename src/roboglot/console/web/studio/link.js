@@ -6,7 +6,7 @@ export const online = signal(/** @type {"opening" | "open" | "lost"} */ ("openin
 export const opened = signal(/** @type {any} */ (null)); // what the server said of the robot
 export const unopened = signal(""); // why the robot cannot be programmed, now
 const RETRY = 1000, RETRY_MAX = 8000; // ms
-let refusals = 0, retry = 0;
+let refusals = 0, retry = 0, shown = "";
 let socket = /** @type {WebSocket | null} */ (null);
 let next = 1;
 const waiting = /** @type {Map<number | string, {resolve: (v: any) => void, reject: (e: Error) => void}>} */ (new Map());
@@ -18,7 +18,7 @@ export function listen(listener) { listeners.add(listener); return () => listene
 export function connect() {
   const made = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/studio`);
   socket = made;
-  made.onopen = () => { online.value = "open"; open(); };
+  made.onopen = () => { online.value = "open"; };
   made.onmessage = ({ data }) => receive(JSON.parse(data));
   made.onclose = () => {
     if (socket !== made) return;
@@ -31,8 +31,11 @@ export function connect() {
   };
 }
 
-/** Say which robot is programmed. */
-export function open() { if (current.value) send({ type: "open", robot: current.value }); }
+/** Say which robot is programmed, and which program is shown. @param {string} [program] */
+export function open(program = shown) {
+  shown = program;
+  if (current.value) send({ type: "open", robot: current.value, program });
+}
 
 /** @param {object} message */
 export function send(message) {
@@ -67,7 +70,7 @@ function answered(message) {
   unopened.value = message.error ?? "";
   opened.value = message.error ? null : message;
   clearTimeout(retry);
-  if (message.error) retry = window.setTimeout(open, Math.min(RETRY * 2 ** refusals++, RETRY_MAX)); else refusals = 0;
+  if (message.error) retry = window.setTimeout(() => open(), Math.min(RETRY * 2 ** refusals++, RETRY_MAX)); else refusals = 0;
   return !message.error;
 }
 

@@ -117,7 +117,7 @@ let timer = 0;
 effect(() => { void editor.changes.value; if (editor.changes.peek()) changed(); });
 effect(() => { void editor.code.value; void body.value; clearTimeout(timer); timer = window.setTimeout(runner.check, 350); });
 effect(() => { void editor.breaks.value; void runner.textBreaks.value; runner.tellStops(); });
-effect(() => { if (current.value && online.value === "open") open(); });
+effect(() => { if (current.value && online.value === "open") open(program.peek().id); });
 const robot = computed(() => opened.value?.robot ?? "");
 effect(() => { if (robot.value) list().then(() => editor.modules.value.length && editor.remake()).then(handOver).catch(() => undefined); });
 effect(() => { void language.value; runner.show(); });
@@ -128,7 +128,7 @@ effect(() => {
   if (id === shownId) return;
   shownId = id;
   runner.forget();
-  open(); // the answer says what runs
+  open(id); // the answer says what runs
 });
 loadMissions().catch(() => undefined);
 addEventListener("pagehide", () => { if (editor.changes.peek()) changed(); });
