@@ -15,7 +15,10 @@ from tests.browser.served import Served, until
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 AXE = (Path(__file__).parent / "vendor" / "axe.min.js").read_text("utf-8")
-READY = "window.studio && studio.editor.workspace && document.querySelector('.button.main:enabled')"
+READY = (  # or its program runs already
+    "window.studio && studio.editor.workspace"
+    " && (document.querySelector('.button.main:enabled') || studio.runner.phase.value === 'running')"
+)
 Page = Any
 Open = Callable[..., Awaitable[Page]]
 
@@ -269,6 +272,17 @@ async def test_a_key_pressed_without_a_link_counts_when_it_is_back(studio: Open,
     broken.clear()
     await until(page, f"{held} === 'say'")
     await context.close()
+
+
+async def test_answers_are_shown_in_plain_words(studio: Open) -> None:
+    page = await studio()
+    done = "(state (code 0, describe success), response (motion_id 304, result True, code 0, order_process_bar 100))"
+    words = "import('/studio/bubbles.js').then(m => m.inWords(%s))"
+    told = {done: "✓ done", "(state (code 0, describe success))": "✓ done",
+            "(state (code 0, describe success), data (range 0.8))": "data (range 0.8)",
+            done.replace("True", "False"): done.replace("True", "False")[35:-1],
+            "(state (code 7, describe busy))": "(state (code 7, describe busy))", "0.8": "0.8"}  # fmt: skip
+    assert {raw: await page.evaluate(words % json.dumps(raw)) for raw in told} == told
 
 
 async def test_a_page_asks_again_for_a_robot_that_cannot_be_programmed_yet(studio: Open, browser: Any) -> None:

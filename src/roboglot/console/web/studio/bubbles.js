@@ -1,4 +1,5 @@
 // Values in bubbles at their blocks: what a function answered there, what the variables of a block hold.
+import { t } from "../base.js";
 import * as editor from "./editor.js";
 
 const NS = "http://www.w3.org/2000/svg", LONG = 40, PAD = 6, HEIGHT = 22; // characters, workspace units
@@ -8,6 +9,16 @@ let due = false;
 
 /** Python's name of a variable. @param {string} name */
 const pythonic = (name) => encodeURI(name.replaceAll(" ", "_")).replace(/\W/g, "_").replace(/^(\d)/, "my_$1");
+
+const SUCCESS = "(state (code 0, describe success)";
+const DONE = /^(, response \((motion_id -?\d+, )?result True, code 0(, order_process_bar -?\d+)?\))?\)$/;
+
+/** An answer without what says only that it was done. @param {string} value */
+export function inWords(value) {
+  if (!value.startsWith(SUCCESS)) return value;
+  const rest = value.slice(SUCCESS.length);
+  return DONE.test(rest) ? t("studio.answer.done") : rest.replace(/^, (.*)\)$/s, "$1");
+}
 
 /** What a function answered at a block. @param {string} id @param {string} value */
 export function answered(id, value) { put(id, value); }
@@ -25,11 +36,12 @@ export function clear() { shown.clear(); soon(); }
 
 /** @param {string} id @param {string} text */
 function put(id, text) {
-  const short = text.length > LONG ? `${text.slice(0, LONG - 1)}…` : text;
-  if (!id || shown.get(id) === short) return;
-  shown.set(id, short);
+  if (!id || shown.get(id) === text) return;
+  shown.set(id, text);
   soon();
 }
+
+const short = (/** @type {string} */ text) => (text.length > LONG ? `${text.slice(0, LONG - 1)}…` : text);
 
 function soon() {
   if (due) return;
@@ -42,7 +54,7 @@ export function draw() {
   for (const old of document.querySelectorAll(".blocklyBlockCanvas .value-bubble")) if (!shown.has(/** @type {any} */ (old).dataset.of)) old.remove();
   for (const [id, text] of shown) {
     const root = editor.workspace?.getBlockById(id)?.getSvgRoot();
-    if (root) bubble(root, id, text);
+    if (root) bubble(root, id, short(inWords(text)));
   }
 }
 

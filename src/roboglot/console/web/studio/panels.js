@@ -5,6 +5,7 @@ import { Button, html, language, t } from "../base.js";
 import { MapView } from "../map.js";
 import { command, current, state } from "../link.js";
 import { blocksOfLines } from "./blocks.js";
+import { inWords } from "./bubbles.js";
 import * as editor from "./editor.js";
 import { body, continueAsText, program } from "./program.js";
 import { failure, lit, phase, printed, problems, readings, textBreaks, variables } from "./runner.js";
@@ -85,7 +86,7 @@ export function Values() {
   return html`<h3>${t("studio.variables")}</h3>
     ${held.length ? html`<dl class="values">${held.map(([name, text]) => html`<div key=${name}><dt>${name}</dt><dd>${text}</dd></div>`)}</dl>` : html`<p class="muted">${t("studio.variables.none")}</p>`}
     <h3>${t("studio.readings")}</h3>
-    ${readings.value.length ? html`<ol class="readings">${readings.value.map((r) => html`<li key=${r.key}><button type="button" onClick=${() => r.block && editor.focus(r.block)}>${r.function.replace("cyberdog.", "")}</button><span>${r.value}</span></li>`)}</ol>` : html`<p class="muted">${t("studio.readings.none")}</p>`}`;
+    ${readings.value.length ? html`<ol class="readings">${readings.value.map((r) => html`<li key=${r.key}><button type="button" onClick=${() => r.block && editor.focus(r.block)}>${r.function.replace("cyberdog.", "")}</button><span title=${r.value}>${inWords(r.value)}</span></li>`)}</ol>` : html`<p class="muted">${t("studio.readings.none")}</p>`}`;
 }
 
 const film = signal(false);
