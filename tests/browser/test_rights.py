@@ -24,7 +24,7 @@ from roboglot.runtime import Runtime
 from roboglot.transport.limiter import Limiter
 from tests.browser.served import ADDRESS
 
-pytestmark = pytest.mark.asyncio(loop_scope="module")
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 PASSWORD, LOGINS = "a long password", 3
 PATIENCE = 15_000  # ms
 HOSTS = {"a": ADDRESS.replace(".91.", ".94."), "b": ADDRESS.replace(".91.", ".95.")}
@@ -70,7 +70,7 @@ class Guarded:
         self.runtime.guard._tries = Limiter(1e-9, LOGINS, lambda: 0.0)
 
 
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
+@pytest_asyncio.fixture(scope="module", loop_scope="session")
 async def guarded(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Guarded]:
     data = tmp_path_factory.mktemp("guarded")
     base = load_config(None, {"data": str(data), "world": "empty", "lockstep": True})
@@ -90,24 +90,12 @@ async def guarded(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Gua
     monkeypatch.undo()
 
 
-@pytest_asyncio.fixture(loop_scope="module", scope="module")
-async def chromium() -> AsyncIterator[Any]:
-    from playwright import async_api
-
-    from tests.browser.conftest import CHROMIUM, OPTIONS
-
-    async with async_api.async_playwright() as playwright:
-        opened = await playwright.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
-        yield opened
-        await opened.close()
-
-
-@pytest_asyncio.fixture(loop_scope="module")
-async def open_page(chromium: Any, guarded: Guarded) -> AsyncIterator[Open]:
+@pytest_asyncio.fixture(loop_scope="session")
+async def open_page(browser: Any, guarded: Guarded) -> AsyncIterator[Open]:
     contexts = []
 
     async def open_it(path: str = "/") -> Page:
-        context = await chromium.new_context(viewport={"width": 1280, "height": 800})
+        context = await browser.new_context(viewport={"width": 1280, "height": 800})
         contexts.append(context)
         await context.add_init_script("localStorage.language = 'en'")
         page = await context.new_page()
