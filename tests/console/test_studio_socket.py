@@ -6,6 +6,7 @@ import asyncio
 import json
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -19,6 +20,7 @@ from roboglot.programs.language import check
 from roboglot.wire.contracts import contract
 from tests.console.conftest import Shown
 
+ATTACKS = sorted((Path(__file__).parent.parent / "programs" / "attacks").rglob("*.py"))
 SAVE = {"type": "task", "operate": "save", "target_id": ["t"], "mode": "single", "condition": "now", "describe": "t"}
 
 
@@ -162,6 +164,28 @@ async def test_what_is_no_message_closes_the_page_and_nothing_else(shown: Shown,
                 await socket.recv()
         await other.say(type="check", id=1, body="x = 1\n")
         assert (await other.kind("checked"))["problems"] == []
+
+
+@pytest.mark.parametrize("folder", sorted({path.parent for path in ATTACKS}), ids=lambda folder: str(folder.name))
+async def test_a_hostile_program_is_judged_through_the_page_as_anywhere(shown: Shown, folder: Path) -> None:
+    async with page(shown) as studio:
+        for path in (path for path in ATTACKS if path.parent == folder):
+            body = path.read_text("utf-8")
+            feedback = (await studio.frame(**SAVE, id=path.stem, body=body))["feedback"]
+            assert (feedback["state"] == 0) == (check(body, ability_set().names()) == []), path
+        if feedback["state"]:  # the last one: what was refused does not run, either
+            wish = {"type": "task", "operate": "run", "target_id": ["t"], "mode": "single", "condition": "now"}
+            assert (await studio.frame(**wish, id="run"))["feedback"]["state"] != 0
+
+
+@pytest.mark.parametrize(
+    "text", ["{", "[" * 100_000, "NaN", '{"type": 7}', '{"type": "task", "target_id": [["t"]]}', "\x00"]
+)
+async def test_a_hostile_frame_is_refused_and_the_page_stays(shown: Shown, text: str) -> None:
+    async with page(shown) as studio:
+        await studio.say(type="frame", text=text)
+        await studio.say(type="check", id=1, body="x = 1\n")
+        assert (await studio.kind("checked"))["problems"] == []
 
 
 async def flood(studio: Page) -> None:
