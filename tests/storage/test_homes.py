@@ -19,7 +19,8 @@ from roboglot.runtime import Runtime
 from roboglot.storage import residence as timing
 from roboglot.storage.homes import Homes, Occupied
 from roboglot.storage.opening import open_database
-from roboglot.storage.residence import HOLD, LEASE, Residence, holder_of
+from roboglot.storage.residence import HOLD, LEASE, PERIOD, Residence, holder_of
+from roboglot.storage.silence import GAP_MAX, Silence
 from roboglot.storage.transactions import DatabaseError, Transactions
 from tests.storage.postgresql_server import PostgreSQLServer, needs_postgresql
 
@@ -181,3 +182,96 @@ async def test_a_robot_that_another_program_took_stands_and_refuses(tmp_path: Pa
         await runtime.close()
     assert (await homes.all())["a"].holder == "another"
     database.close()
+
+
+NOTICED = 3.0  # s after which deploy/kuberay's cluster takes a node for dead
+STARTED = 2.0  # s that Ray then needs for a shard's process
+BACK_MAX = 10.0
+
+
+async def watched(silence: Silence, watch: Watch, seconds: float) -> list[str]:
+    """Look every period; return what was freed."""
+    freed, end = list[str](), watch.now + seconds
+    while watch.now < end:
+        freed += await silence.look()
+        watch.now += PERIOD
+    return freed
+
+
+async def test_robots_of_a_dead_shard_are_back_within_ten_seconds(database: Transactions, watch: Watch) -> None:
+    old, new = home(database, "old", watch), home(database, "new", watch)
+    silence = Silence(Homes(database), ["a", "b"], watch)
+    await old.take()
+    assert await watched(silence, watch, PERIOD) == []
+    await old.renew()
+    died = watch.now
+    assert await watched(silence, watch, NOTICED + STARTED) == ["a", "b"]
+    assert old.why_not("a")  # before another may have it
+    await new.take()
+    assert watch.now - died <= NOTICED + STARTED + PERIOD
+    assert watch.now - died < BACK_MAX
+    assert {(h.holder, h.epoch) for h in (await Homes(database).all()).values()} == {("new", 2)}
+    await old.renew()
+    assert "another program" in old.why_not("a")
+
+
+async def test_a_program_that_waits_takes_robots_when_they_are_freed(
+    database: Transactions, watch: Watch, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old, new, homes = home(database, "old", watch), home(database, "new", watch), Homes(database)
+    await old.take()
+    began = watch.now
+
+    async def freed_meanwhile(seconds: float) -> None:
+        watch.now += seconds
+        if watch.now - began > 1.0:
+            await homes.free((await homes.all()).values())
+
+    monkeypatch.setattr(timing.asyncio, "sleep", freed_meanwhile)
+    await new.take()
+    assert watch.now - began <= 1.0 + 2 * PERIOD
+    assert not new.why_not("a")
+
+
+async def test_only_silence_that_was_watched_frees(database: Transactions, watch: Watch) -> None:
+    old, homes = home(database, "old", watch), Homes(database)
+    silence = Silence(homes, ["a"], watch)
+    await old.take()
+    for _ in range(20):  # it renews, if late
+        await silence.look()
+        watch.now += HOLD
+        await old.renew()
+        assert await silence.look() == []
+    await watched(silence, watch, LEASE - 2 * PERIOD)
+    watch.now += GAP_MAX + PERIOD  # the registry was away, for the program perhaps, too
+    assert await watched(silence, watch, LEASE) == []
+    assert await watched(silence, watch, 2 * PERIOD) == ["a"]
+    assert (await homes.all())["b"].holder == "old"  # another fleet's
+
+
+async def test_a_renewal_that_comes_before_the_freeing_keeps_the_robot(database: Transactions, watch: Watch) -> None:
+    old, homes = home(database, "old", watch), Homes(database)
+    await old.take()
+    seen = (await homes.all()).values()
+    await old.renew()
+    assert await homes.free(seen) == []
+    assert {h.holder for h in (await homes.all()).values()} == {"old"}
+
+
+async def test_a_freed_robot_goes_back_to_its_program_if_no_other_had_it(database: Transactions, watch: Watch) -> None:
+    lost = list[str]()
+    old, other = home(database, "old", watch, lost.append), home(database, "other", watch)
+    homes = Homes(database)
+    await old.take()
+    watch.now += HOLD
+    old.look()
+    await homes.free((await homes.all()).values())
+    await old.renew()
+    assert not old.why_not("a")
+    assert {(h.holder, h.epoch) for h in (await homes.all()).values()} == {("old", 2)}
+    await homes.free((await homes.all()).values())
+    await other.take()
+    await other.close()  # what the robot stored then is not what the old program has in memory
+    await old.renew()
+    assert "another program" in old.why_not("a")
+    assert lost == ["a", "b", "a", "b"]

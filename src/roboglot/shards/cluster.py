@@ -10,6 +10,7 @@ import hashlib
 import logging
 import os
 import shutil
+import sqlite3
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
@@ -23,8 +24,12 @@ from roboglot.extras import explaining
 from roboglot.hosting.exclusive import lock_folder
 from roboglot.shards.actor import Condition, ShardActor
 from roboglot.shards.messages import Beat
-from roboglot.shards.plan import FleetPlan, save
+from roboglot.shards.plan import FleetPlan, ShardPlan, save
 from roboglot.shards.supervisor import LOG_FILE, LOG_MAX, Shard, State
+from roboglot.storage.homes import Homes
+from roboglot.storage.opening import open_registry
+from roboglot.storage.residence import LEASE
+from roboglot.storage.silence import Silence
 
 with explaining("--on", "fleet"):
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # nothing leaves the machine unasked
@@ -112,6 +117,7 @@ class ClusterFleet:
         self._actors: dict[str, Actor] = {}
         self._nodes: dict[str, str] = {}
         self._watch: asyncio.Task[None] | None = None
+        self._silence: asyncio.Task[None] | None = None
         self._changed = asyncio.Event()
         self._loop = asyncio.get_running_loop()
 
@@ -132,6 +138,7 @@ class ClusterFleet:
         for shard in self.shards.values():
             await asyncio.to_thread(self._begin, shard)
         passed = time.monotonic() - began
+        self._silence = self._loop.create_task(_free_the_silent(self.plan), name="watch over silent homes")
         self._watch = self._loop.create_task(self._look_always(), name="looks at shards")
         try:
             await asyncio.wait_for(self.until(lambda: all(map(_settled, self.shards.values()))), START_MAX)
@@ -142,8 +149,10 @@ class ClusterFleet:
 
     async def close(self) -> None:
         """Stop all shards unless they are to stay, and release the folder."""
-        if self._watch is not None:
-            self._watch.cancel()
+        tasks = [task for task in (self._watch, self._silence) if task is not None]
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
         if not self._lasting:
             await asyncio.gather(*(self._end(shard) for shard in self.shards.values()))
         os.close(self._lock)
@@ -277,9 +286,28 @@ def _keep(path: Path, lines: list[str]) -> None:
             file.write("\n".join([*lines, ""]))
 
 
+async def _free_the_silent(plan: FleetPlan) -> None:
+    """Free the homes of shards that died, while Ray starts them again. Without it they would wait for it themselves."""
+    if not (where := _registry_of(plan.shards[0])):
+        return
+    try:
+        database = await asyncio.to_thread(open_registry, where)
+    except (ValueError, OSError, sqlite3.Error) as error:
+        log.warning("robots of a dead shard are free %g s later: the registry cannot be opened here: %s", LEASE, error)
+        return
+    try:
+        await Silence(Homes(database), [robot for shard in plan.shards for robot in shard.robots]).look_always()
+    finally:
+        database.close()
+
+
+def _registry_of(shard: ShardPlan) -> str:
+    return str(shard.settings.get("registry") or shard.settings.get("database") or "")
+
+
 def _refuse_unfenced(plan: FleetPlan) -> None:
     for shard in plan.shards[:1]:  # they differ in names and addresses only
-        if not (shard.settings.get("registry") or shard.settings.get("database")):
+        if not _registry_of(shard):
             raise ValueError(
                 "a fleet on a cluster needs `database` or `registry` in its --template: without one, a robot could run"
                 " on two machines when the network splits"

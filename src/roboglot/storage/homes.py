@@ -6,7 +6,7 @@ clock of its own: no machine's date matters.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from roboglot.storage.transactions import Connection, Transactions
@@ -70,6 +70,32 @@ class Homes:
         query = "UPDATE robot_home SET holder='' WHERE holder=? AND robot=? AND epoch=?"
         rows = [(holder, robot, epochs[robot]) for robot in sorted(epochs)]
         await self._database.run(lambda connection: connection.executemany(query, rows))
+
+    async def free(self, silent: Collection[Home]) -> list[str]:
+        """Release those homes that are still exactly so; return their robots."""
+        query = "UPDATE robot_home SET holder='' WHERE robot=? AND holder=? AND epoch=? AND renewals=?"
+
+        def work(connection: Connection) -> list[str]:
+            return [
+                home.robot
+                for home in sorted(silent, key=lambda home: home.robot)
+                if connection.execute(query, (home.robot, home.holder, home.epoch, home.renewals)).rowcount == 1
+            ]
+
+        return await self._database.run(work)
+
+    async def take_back(self, epochs: Mapping[str, int], holder: str) -> dict[str, int]:
+        """Give ``holder`` those robots again that were freed and that no other had since; return their new epochs."""
+        query = "UPDATE robot_home SET holder=?, epoch=epoch+1, renewals=0 WHERE robot=? AND holder='' AND epoch=?"
+
+        def work(connection: Connection) -> dict[str, int]:
+            return {
+                robot: epochs[robot] + 1
+                for robot in sorted(epochs)
+                if connection.execute(query, (holder, robot, epochs[robot])).rowcount == 1
+            }
+
+        return await self._database.run(work)
 
     async def all(self) -> dict[str, Home]:
         """Return every robot's last home by name."""

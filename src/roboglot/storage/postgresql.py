@@ -142,8 +142,9 @@ class PostgreSQL:
     def _connect(self) -> psycopg.Connection[Any]:
         limits = (
             f"-c statement_timeout={STATEMENT_MAX}s -c idle_in_transaction_session_timeout={IDLE_MAX}s"
-            # The server notices within ten seconds that a machine is gone, and frees its robots.
-            " -c tcp_keepalives_idle=4 -c tcp_keepalives_interval=2 -c tcp_keepalives_count=3"
+            # The server notices within five seconds that a machine is gone, also one that it was just sending to, and
+            # frees its robots: as soon as another node can have started their shard.
+            " -c tcp_keepalives_idle=2 -c tcp_keepalives_interval=1 -c tcp_keepalives_count=3 -c tcp_user_timeout=5s"
         )
         connection = psycopg.connect(
             self._url, autocommit=True, connect_timeout=CONNECT_MAX, options=limits, application_name="roboglot"

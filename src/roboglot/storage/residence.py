@@ -73,19 +73,28 @@ class Residence:
                 self._epochs = await self._homes.take(self._addresses, self._holder, silent)
             except Occupied as others:
                 log.info("robots %s are held by another program: waiting %g s for a sign of it", others, LEASE)
-                await self._pass(LEASE)
-                began = self._now()
-                self._epochs = await self._homes.take(self._addresses, self._holder, others.homes)
+                began = await self._wait_for(others.homes)
         except Occupied as others:
             raise OSError(f"another program runs robot {others}") from None
         except DatabaseError as error:
             raise OSError(f"the registry of robots: {error}") from None
         self._until = began + HOLD
 
-    async def _pass(self, seconds: float) -> None:
-        end = self._now() + seconds
-        while (left := end - self._now()) > 0:  # noqa: ASYNC110 - timers may be early
-            await asyncio.sleep(left)
+    async def _wait_for(self, held: Mapping[str, Home]) -> float:
+        """Take the robots when they are released, or have shown no sign for ``LEASE`` s; return when that began.
+
+        Raises Occupied, DatabaseError.
+        """
+        end = self._now() + LEASE
+        while (left := end - self._now()) > 0:
+            await asyncio.sleep(min(PERIOD, left))
+            began = self._now()
+            with contextlib.suppress(Occupied):
+                self._epochs = await self._homes.take(self._addresses, self._holder, {})
+                return began
+        began = self._now()
+        self._epochs = await self._homes.take(self._addresses, self._holder, held)
+        return began
 
     def keep(self) -> None:
         """Renew from now on."""
@@ -109,7 +118,15 @@ class Residence:
         """Renew once. Raises DatabaseError."""
         began = self._now()
         held = await self._homes.renew(self._holder)
-        self._elsewhere |= {robot for robot, epoch in self._epochs.items() if held.get(robot) != epoch}
+        missing = {
+            robot: epoch
+            for robot, epoch in self._epochs.items()
+            if held.get(robot) != epoch and robot not in self._elsewhere
+        }
+        if missing:
+            taken_back = await self._homes.take_back(missing, self._holder)
+            self._epochs |= taken_back
+            self._elsewhere |= missing.keys() - taken_back.keys()
         self._until = began + HOLD
         self.look()
 

@@ -1,0 +1,67 @@
+"""Watch over robots' homes: frees those whose program shows no sign any more, so that the next one need not wait.
+
+A program that starts on a robot's home would wait ``LEASE`` s for a sign of the old one, after the time in which the
+cluster noticed its end and started the new one. Who watches all the while waits meanwhile.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+
+from roboglot.storage.homes import Home, Homes
+from roboglot.storage.residence import LEASE, PERIOD, uptime
+from roboglot.storage.transactions import DatabaseError
+
+log = logging.getLogger(__name__)
+GAP_MAX = 2.0  # s without a look, after which silence is counted anew
+
+
+@dataclass(frozen=True, slots=True)
+class _Sight:
+    """A home as it was first seen, and when."""
+
+    home: Home
+    since: float
+
+
+class Silence:
+    """Of the programs that run ``robots``. Counts by this machine's uptime.
+
+    The registry may have been out of reach for the programs too while it was for us: such a time counts for none.
+    """
+
+    def __init__(self, homes: Homes, robots: Collection[str], now: Callable[[], float] = uptime) -> None:
+        self._homes, self._robots, self._now = homes, frozenset(robots), now
+        self._seen: dict[str, _Sight] = {}
+        self._looked = -float("inf")
+
+    async def look(self) -> list[str]:
+        """Look once; return the robots that were freed. Raises DatabaseError."""
+        began = self._now()
+        homes = await self._homes.all()
+        ended = self._now()
+        if ended - self._looked > GAP_MAX:
+            self._seen.clear()
+        self._looked = ended
+        held = {robot: homes[robot] for robot in self._robots & homes.keys() if homes[robot].holder}
+        self._seen = {
+            robot: sight if (sight := self._seen.get(robot)) and sight.home == home else _Sight(home, ended)
+            for robot, home in held.items()
+        }
+        silent = [sight.home for sight in self._seen.values() if began - sight.since >= LEASE]
+        freed = await self._homes.free(silent) if silent else []
+        for robot in freed:
+            log.warning("robot %s is free: its program showed no sign for %g s", robot, LEASE)
+        return freed
+
+    async def look_always(self) -> None:
+        """Look again and again, also when the registry cannot be reached."""
+        while True:
+            try:
+                await self.look()
+            except DatabaseError as error:
+                log.warning("the registry of robots cannot be reached: %s", error)
+            await asyncio.sleep(PERIOD)
