@@ -291,6 +291,8 @@ class Runtime:
         if self.guard is not None and self.config.access.gateway:
             self._gateway = self._build_gateway(self.guard)
             await self._gateway.start()
+            if self._residence is not None:
+                await self._residence.announce(self._gateway.reached_at(), self._gateway.certificate())
         if self.console is not None:
             self.console.open()
         await self.fleet.start(wait=self.config.lockstep)

@@ -3,40 +3,52 @@
 from __future__ import annotations
 
 import asyncio
-import errno
 import itertools
 import os
+import sqlite3
 import sys
-from collections.abc import Coroutine
+from collections.abc import Coroutine, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from functools import partial
 from ipaddress import IPv4Address, IPv4Network
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from roboglot.access.tunnel.connector import Connector, KnownGateways, NotTrusted, Refused
+from roboglot.access.tunnel.connector import AnnouncedGateway, KnownGateways, NotTrusted, Refused
+from roboglot.access.tunnel.dialling import Dialling, OnePlace, Place, Places, Unusable
 from roboglot.config import is_loopback
 from roboglot.hosting.logs import set_up_logging
+from roboglot.hosting.visible import visible
+
+if TYPE_CHECKING:
+    from roboglot.storage.whereabouts import Whereabouts
 
 PORT = 50090
-AGAIN_AFTER = 1.0  # s
 ROBOTS_MAX = 100
 
 
 def command(
-    gateway: Annotated[str, typer.Argument(help="HOST or HOST:PORT of the robots' gateway ([access] gateway there).")],
+    gateway: Annotated[
+        str, typer.Argument(help="HOST or HOST:PORT of the robots' gateway ([access] gateway there).")
+    ] = "",
     robot: Annotated[list[str] | None, typer.Option(help="Its name there; repeat for more. Default: a.")] = None,
     token_file: Annotated[Path | None, typer.Option(help="A file with the token; else ROBOGLOT_TOKEN.")] = None,
     address: Annotated[str, typer.Option(help="Of this machine, for the first robot; the others follow.")] = "",
     address_range: Annotated[
         str, typer.Option(help="A network to take the addresses from: 127.0.1.0/24, or one of AnyIP: 10.99.0.0/24.")
     ] = "",
+    registry: Annotated[
+        str, typer.Option(help="Instead of a gateway: the registry's URL or file; follows robots that move.")
+    ] = "",
     once: Annotated[bool, typer.Option("--once", help="End when a tunnel is lost.")] = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Log every connection.")] = False,
 ) -> None:
     """Open robots' vendor ports here, and carry them over one TLS connection each to the gateway."""
     set_up_logging(verbose)
-    host, _, port = gateway.rpartition(":") if gateway.rpartition(":")[2].isdigit() else (gateway, "", str(PORT))
+    if bool(gateway) == bool(registry):
+        sys.exit("roboglot connect: which robots: those of a gateway, or those of a --registry?")
     try:
         token = token_file.read_text() if token_file else os.environ.get("ROBOGLOT_TOKEN", "")
         names = robot or ["a"]
@@ -48,16 +60,12 @@ def command(
     for place in places:
         if not is_loopback(place):
             print(f"roboglot connect: everyone who reaches {place} uses your token", file=sys.stderr)
-    known = KnownGateways(_settings() / "gateways.json")
-    connectors = {
-        (name, place): Connector(host.strip("[]"), int(port), name, token.strip(), place, known)
-        for name, place in zip(names, places, strict=True)
-    }
+    where = registered(registry) if registry else _one(gateway)
     try:
-        _run(_keep_all(connectors, once))
+        _run(_keep_all(where, dict(zip(names, places, strict=True)), token.strip(), once=once))
     except KeyboardInterrupt:
         sys.exit(130)
-    except (NotTrusted, Refused, Unusable) as refused:
+    except (NotTrusted, Refused, Unusable, OSError, ValueError, sqlite3.Error) as refused:
         sys.exit(f"roboglot connect: {refused}")
 
 
@@ -69,10 +77,6 @@ def _run(work: Coroutine[Any, Any, None]) -> None:
         asyncio.run(work)
     else:
         uvloop.run(work)
-
-
-class Unusable(Exception):
-    """The address or a port of it cannot be had; another try would fare no better."""
 
 
 def addresses(count: int, first: str, network: str) -> list[str]:
@@ -90,51 +94,68 @@ def addresses(count: int, first: str, network: str) -> list[str]:
     return [str(host) for host in hosts]
 
 
-async def _keep_all(connectors: dict[tuple[str, str], Connector], once: bool) -> None:
-    tasks = [
-        asyncio.ensure_future(_keep(connector, name, place, once)) for (name, place), connector in connectors.items()
-    ]
-    try:
-        await asyncio.gather(*tasks)
-    finally:
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
-
-
-async def _keep(connector: Connector, robot: str, address: str, once: bool) -> None:
-    """Dial again whenever the tunnel is lost."""
-
-    def ready(ports: list[int], fingerprint: str, new: bool) -> None:
-        first = "; seen for the first time: compare it with `roboglot doctor --security` there" if new else ""
-        print(f"gateway {fingerprint}{first}", file=sys.stderr)
-        print(f"ready: robot {robot} on {address}, ports {', '.join(map(str, ports))}", flush=True)
-
-    while True:
+async def _keep_all(places: AbstractContextManager[Places], robots: dict[str, str], token: str, *, once: bool) -> None:
+    """Keep each robot's ports on its address."""
+    with places as known:
+        tasks = [
+            asyncio.ensure_future(Dialling(known, name, token, address, partial(_ready, address), _say).keep(once=once))
+            for name, address in robots.items()
+        ]
         try:
-            await connector.run(ready)
-        except (NotTrusted, Refused):
-            raise
-        except (OSError, TimeoutError, asyncio.IncompleteReadError) as error:
-            if unusable := _unusable(error, address):
-                raise Unusable(unusable) from None
-            print(f"roboglot connect: robot {robot}: {error or type(error).__name__}", file=sys.stderr)
-        if once:
-            return
-        await asyncio.sleep(AGAIN_AFTER)
+            await asyncio.gather(*tasks)
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
 
 
-def _unusable(error: BaseException, address: str) -> str:
-    """Why this address cannot be listened at, and what to do; empty: that is not what went wrong."""
-    match getattr(error, "errno", None):
-        case errno.EADDRNOTAVAIL:
-            network = IPv4Network(f"{address}/24", strict=False)
-            return f"{address} is no address of this machine; as root: ip route add local {network} dev lo"
-        case errno.EADDRINUSE:
-            return f"{error}; --address chooses another one"
-        case errno.EACCES:
-            return str(error)
-    return ""
+def _ready(address: str, robot: str, ports: list[int], fingerprint: str, new: bool) -> None:
+    first = "; seen for the first time: compare it with `roboglot doctor --security` there" if new else ""
+    print(f"gateway {fingerprint}{first}", file=sys.stderr)
+    print(f"ready: robot {robot} on {address}, ports {', '.join(map(str, ports))}", flush=True)
+
+
+def _say(line: str) -> None:
+    print(f"roboglot connect: {visible(line)}", file=sys.stderr)
+
+
+class _Registered:
+    """Places by the registry of robots' homes, which knows each gateway's certificate."""
+
+    def __init__(self, whereabouts: Whereabouts) -> None:
+        self._whereabouts = whereabouts
+
+    async def of(self, robot: str) -> Place | None:
+        """Return its gateway. Raises OSError."""
+        found = await self._whereabouts.of(robot)
+        if found is None:
+            return None
+        return Place(found.host, found.port, AnnouncedGateway(found.certificate), found.epoch)
+
+    async def moved(self, robot: str, place: Place) -> None:
+        """Return when the registry has another one."""
+        await self._whereabouts.moved(robot, place.epoch)
+
+
+@contextmanager
+def registered(registry: str) -> Iterator[Places]:
+    """Find robots by a registry: a PostgreSQL server's URL, or a file. Raises OSError, ValueError, sqlite3.Error."""
+    from roboglot.storage.homes import Homes
+    from roboglot.storage.opening import read_registry
+    from roboglot.storage.whereabouts import Whereabouts
+
+    database = read_registry(registry)
+    try:
+        yield _Registered(Whereabouts(Homes(database)))
+    finally:
+        database.close()
+
+
+def _one(gateway: str) -> AbstractContextManager[Places]:
+    """Return the one gateway that was named."""
+    host, _, port = gateway.rpartition(":") if gateway.rpartition(":")[2].isdigit() else (gateway, "", str(PORT))
+    known = KnownGateways(_settings() / "gateways.json")
+    return nullcontext(OnePlace(Place(host.strip("[]"), int(port), known)))
 
 
 def _settings() -> Path:

@@ -6,7 +6,7 @@ clock of its own: no machine's date matters.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from roboglot.storage.transactions import Connection, Transactions
@@ -14,13 +14,18 @@ from roboglot.storage.transactions import Connection, Transactions
 
 @dataclass(frozen=True, slots=True)
 class Home:
-    """One robot's home: its program, the address of its doors, and how often the program renewed it."""
+    """One robot's home: its program, the address of its doors, and how often the program renewed it.
+
+    ``gateway``: HOST:PORT where `roboglot connect` reaches it, empty: nowhere; ``certificate``: its SHA-256 there.
+    """
 
     robot: str
     holder: str
     address: str
     epoch: int
     renewals: int
+    gateway: str = ""
+    certificate: str = ""
 
 
 class Occupied(Exception):
@@ -65,6 +70,17 @@ class Homes:
 
         return await self._database.run(work)
 
+    async def announce(self, holder: str, gateway: str, certificate: str) -> None:
+        """Say where clients reach the robots that ``holder`` has."""
+        query = "UPDATE robot_home SET gateway=?, certificate=? WHERE holder=?"
+        values = (gateway, certificate, holder)
+        await self._database.run(lambda connection: connection.execute(query, values).rowcount)
+
+    async def of(self, robot: str) -> Home | None:
+        """Return a robot's last home, if it ever had one."""
+        homes = await self._database.read(lambda connection: _rows(connection, "WHERE robot=?", (robot,)))
+        return homes.get(robot)
+
     async def release(self, holder: str, epochs: Mapping[str, int]) -> None:
         """Let others have these robots at once, except those that have a later epoch."""
         query = "UPDATE robot_home SET holder='' WHERE holder=? AND robot=? AND epoch=?"
@@ -106,7 +122,7 @@ def _take(connection: Connection, robot: str, address: str, holder: str, silent:
     """Return the new epoch; 0 if another has it."""
     epoch, renewals = (silent.epoch, silent.renewals) if silent else (-1, -1)
     taken = connection.execute(
-        "UPDATE robot_home SET holder=?, address=?, epoch=epoch+1, renewals=0"
+        "UPDATE robot_home SET holder=?, address=?, epoch=epoch+1, renewals=0, gateway='', certificate=''"
         " WHERE robot=? AND (holder='' OR holder=? OR (epoch=? AND renewals=?))",
         (holder, address, robot, holder, epoch, renewals),
     )
@@ -121,5 +137,10 @@ def _take(connection: Connection, robot: str, address: str, holder: str, silent:
 
 
 def _all(connection: Connection) -> dict[str, Home]:
-    rows = connection.execute("SELECT robot, holder, address, epoch, renewals FROM robot_home ORDER BY robot")
+    return _rows(connection, "ORDER BY robot")
+
+
+def _rows(connection: Connection, which: str, values: Sequence[str] = ()) -> dict[str, Home]:
+    columns = "robot, holder, address, epoch, renewals, gateway, certificate"
+    rows = connection.execute(f"SELECT {columns} FROM robot_home {which}", values)
     return {row[0]: Home(*row) for row in rows}

@@ -37,10 +37,13 @@ class PostgreSQL:
     ``robots``: those that this program alone may write. Everything is then written in the order of the calls, over one
     connection that holds a lock of the server's for each of them: no other program gets it before the connection is
     lost, and nothing is written by one that has lost it. ``in_place``: ``run`` waits in place, for a lockstep clock.
+    ``only_read``: tables stay as they are, and writing fails.
     """
 
-    def __init__(self, url: str, *, robots: Collection[str] = (), in_place: bool = False) -> None:
-        self._url, self._robots, self._in_place = url, tuple(robots), in_place
+    def __init__(
+        self, url: str, *, robots: Collection[str] = (), in_place: bool = False, only_read: bool = False
+    ) -> None:
+        self._url, self._robots, self._in_place, self._only_read = url, tuple(robots), in_place, only_read
         connections = 1 if robots else CONNECTIONS_MAX
         self._disk: Disk | None = None
         self._own = threading.local()
@@ -53,7 +56,7 @@ class PostgreSQL:
         )
         self._readers = ThreadPoolExecutor(max_workers=1, thread_name_prefix="database reader")
         try:
-            self._threads.submit(self._transact, _migrate).result()
+            self._threads.submit(self._transact, _is_there if only_read else _migrate).result()
         except BaseException as error:
             self.close()
             if isinstance(error, DatabaseError):
@@ -104,7 +107,7 @@ class PostgreSQL:
             raise DatabaseError(str(error)) from error
 
     def _committed(self, work: Callable[[Connection], T], *, read_only: bool) -> T:
-        connection = self._begin(b"BEGIN READ ONLY" if read_only else b"BEGIN")
+        connection = self._begin(b"BEGIN READ ONLY" if read_only or self._only_read else b"BEGIN")
         try:
             result = work(_Statements(connection))
             connection.execute("COMMIT")
@@ -220,6 +223,11 @@ def _restored(row: Sequence[Any]) -> tuple[Any, ...]:
         else value
         for value in row
     )
+
+
+def _is_there(connection: Connection) -> None:
+    """Raise DatabaseError if this is no database of ours, or of an earlier program."""
+    connection.execute("SELECT gateway FROM robot_home WHERE robot=''")
 
 
 def _migrate(connection: Connection) -> None:

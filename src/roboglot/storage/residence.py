@@ -96,6 +96,13 @@ class Residence:
         self._epochs = await self._homes.take(self._addresses, self._holder, held)
         return began
 
+    async def announce(self, gateway: str, certificate: str) -> None:
+        """Say in the registry where `roboglot connect` reaches these robots. Raises OSError."""
+        try:
+            await self._homes.announce(self._holder, gateway, certificate)
+        except DatabaseError as error:
+            raise OSError(f"the registry of robots: {error}") from None
+
     def keep(self) -> None:
         """Renew from now on."""
         loop = asyncio.get_running_loop()

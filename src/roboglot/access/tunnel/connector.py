@@ -13,7 +13,7 @@ import ssl
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Protocol, cast
 
 from roboglot.access.tunnel.busy_poll import BusyPoll
 from roboglot.access.tunnel.frames import Kind
@@ -35,6 +35,13 @@ class NotTrusted(ConnectionError):
 
 class Refused(ConnectionError):
     """The gateway does not let this client in; the message says why."""
+
+
+class Trust(Protocol):
+    """Decides whether a gateway is the one that is meant."""
+
+    def check(self, gateway: str, certificate: bytes) -> tuple[str, bool]:
+        """The fingerprint, and whether it is new here. Raises NotTrusted."""
 
 
 class KnownGateways:
@@ -64,10 +71,24 @@ class KnownGateways:
         return shown, True
 
 
+class AnnouncedGateway:
+    """The fingerprint that the registry of robots has of a gateway: no other is believed."""
+
+    def __init__(self, fingerprint: str) -> None:
+        self._fingerprint = fingerprint
+
+    def check(self, gateway: str, certificate: bytes) -> tuple[str, bool]:
+        """The fingerprint, which is never new. Raises NotTrusted."""
+        shown = hashlib.sha256(certificate).hexdigest()
+        if shown != self._fingerprint:
+            raise NotTrusted(f"{gateway} shows another certificate ({shown}) than the registry has of it")
+        return shown, False
+
+
 class Connector:
     """Opens the robot's ports at ``address`` and carries them to the gateway; ``run`` ends when the tunnel is lost."""
 
-    def __init__(self, gateway: str, port: int, robot: str, token: str, address: str, known: KnownGateways) -> None:
+    def __init__(self, gateway: str, port: int, robot: str, token: str, address: str, known: Trust) -> None:
         self._gateway, self._port, self._robot, self._token = gateway, port, robot, token
         self._address, self._known = address, known
 

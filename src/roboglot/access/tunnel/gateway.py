@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import hashlib
 import itertools
 import logging
 import secrets
@@ -47,6 +48,8 @@ CONNECTIONS_MAX = 512  # tunnels, and connections that are not yet tunnels
 HELLO_SECONDS_MAX = 5.0
 FIRST_ADDRESS, ADDRESSES = IPv4Address("127.64.0.1"), 4 * TUNNELS_MAX  # of tunnels; other gateways may have some
 PORTS_WITHIN = range(1, 1024)  # of connections within the process: the kernel gives others
+EVERYWHERE = ("", "0.0.0.0", "::")
+ELSEWHERE = {socket.AF_INET: "192.0.2.1", socket.AF_INET6: "2001:db8::1"}  # of RFC 5737, RFC 3849: no machine's
 BROADCASTS = ("127.255.255.255", "255.255.255.255")
 
 
@@ -104,6 +107,20 @@ class Gateway:
             lambda: _Entry(self._guard, self._connections, encrypted), self._host, self.port
         )
         self.port = self._server.sockets[0].getsockname()[1]
+
+    def reached_at(self) -> str:
+        """Return HOST:PORT for clients; for a gateway on all addresses, the one of this machine's default route."""
+        host = self._host
+        if host in EVERYWHERE:
+            kind = socket.AF_INET6 if ":" in host else socket.AF_INET
+            with socket.socket(kind, socket.SOCK_DGRAM) as probe:
+                probe.connect((ELSEWHERE[kind], 9))  # sends nothing
+                host = probe.getsockname()[0]
+        return f"[{host}]:{self.port}" if ":" in host else f"{host}:{self.port}"
+
+    def certificate(self) -> str:
+        """Return the SHA-256 of its certificate, as clients see it."""
+        return hashlib.sha256(ssl.PEM_cert_to_DER_cert(_first(self._tls[0].read_text()))).hexdigest()
 
     async def close(self) -> None:
         """End all tunnels."""
@@ -225,6 +242,12 @@ def _stop(robot: Robot, own: str) -> None:
     for action in tuple(_driven(robot, own)):
         log.warning("a tunnel is silent: %s of %s stops", action.name, action.client)
         action.cancel("its client is out of reach", hard=True)
+
+
+def _first(chain: str) -> str:
+    """Return the first certificate of a file, which is the server's own."""
+    end = "-----END CERTIFICATE-----"
+    return f"{chain.partition(end)[0]}{end}"
 
 
 def _hello(payload: bytes) -> Hello:

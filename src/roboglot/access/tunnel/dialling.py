@@ -1,0 +1,151 @@
+"""A robot's ports kept on an address of this machine: dials again when a tunnel is lost, or when the robot moved."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+from collections.abc import Callable
+from dataclasses import dataclass
+from ipaddress import IPv4Network
+from typing import Protocol
+
+from roboglot.access.tunnel.connector import Connector, NotTrusted, Refused, Trust
+
+AGAIN_AFTER = 1.0  # s
+SOON = 0.5  # s between two questions where a robot is that nothing runs now
+
+
+class Unusable(Exception):
+    """The address or a port of it cannot be had; another try would fare no better."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A gateway. ``epoch`` is another after each move of the robot."""
+
+    host: str
+    port: int
+    trust: Trust
+    epoch: int = 0
+
+
+class Places(Protocol):
+    """Knows behind which gateway a robot is."""
+
+    async def of(self, robot: str, /) -> Place | None:
+        """Return where it is; None: nowhere just now. Raises OSError."""
+
+    async def moved(self, robot: str, place: Place, /) -> None:
+        """Return when it is no longer at this place."""
+
+
+class OnePlace:
+    """All robots behind one gateway, for good."""
+
+    def __init__(self, place: Place) -> None:
+        self._place = place
+
+    async def of(self, _robot: str, /) -> Place:
+        """Return the gateway."""
+        return self._place
+
+    async def moved(self, _robot: str, _place: Place, /) -> None:
+        """Wait for ever."""
+        await asyncio.Event().wait()
+
+
+class Dialling:
+    """Of one robot. ``ready`` and ``say`` report to the user: open ports, and one line about what failed."""
+
+    def __init__(
+        self,
+        places: Places,
+        robot: str,
+        token: str,
+        address: str,
+        ready: Callable[[str, list[int], str, bool], None],
+        say: Callable[[str], None],
+    ) -> None:
+        self._places, self._robot, self._token, self._address = places, robot, token, address
+        self._ready, self._say = ready, say
+        self._said = ""
+
+    async def keep(self, *, once: bool = False) -> None:
+        """Keep the ports open; ``once``: until the tunnel is lost. Raises NotTrusted, Refused, Unusable."""
+        while True:
+            place = await self._find()
+            moved = await self._carry(place)
+            if once:
+                return
+            if not moved:
+                await asyncio.sleep(AGAIN_AFTER)
+
+    async def _find(self) -> Place:
+        while True:
+            try:
+                if place := await self._places.of(self._robot):
+                    self._said = ""
+                    return place
+                self._say_once("no gateway is known that leads to it now")
+            except OSError as error:
+                self._say_once(str(error))
+            await asyncio.sleep(SOON)
+
+    async def _carry(self, place: Place) -> bool:
+        """Carry the ports until the tunnel is lost or the robot moved: which of these is returned."""
+        connector = Connector(place.host, place.port, self._robot, self._token, self._address, place.trust)
+        running = asyncio.ensure_future(
+            connector.run(lambda ports, shown, new: self._ready(self._robot, ports, shown, new))
+        )
+        moving = asyncio.ensure_future(self._places.moved(self._robot, place))
+        try:
+            await asyncio.wait([running, moving], return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in (running, moving):
+                task.cancel()
+            (outcome, _) = await asyncio.gather(running, moving, return_exceptions=True)
+        if isinstance(outcome, asyncio.CancelledError):
+            self._say(f"robot {self._robot}: it moved")
+            return True
+        return await self._lost(outcome, place)
+
+    async def _lost(self, outcome: object, place: Place) -> bool:
+        """Report how a tunnel ended; True: the robot moved meanwhile."""
+        match outcome:
+            case NotTrusted() | Refused():
+                if await self._is_there(place):
+                    raise outcome
+                return True
+            case OSError() | TimeoutError() | asyncio.IncompleteReadError():
+                if unusable := _unusable(outcome, self._address):
+                    raise Unusable(unusable) from None
+                self._say(f"robot {self._robot}: {outcome or type(outcome).__name__}")
+            case BaseException():
+                raise outcome
+        return False
+
+    async def _is_there(self, place: Place) -> bool:
+        """Whether a gateway that refused us is still the robot's."""
+        try:
+            now = await self._places.of(self._robot)
+        except OSError:
+            return True
+        return now is not None and (now.host, now.port, now.epoch) == (place.host, place.port, place.epoch)
+
+    def _say_once(self, why: str) -> None:
+        if why != self._said:
+            self._said = why
+            self._say(f"robot {self._robot}: {why}")
+
+
+def _unusable(error: BaseException, address: str) -> str:
+    """Why this address cannot be listened at, and what to do; empty: that is not what went wrong."""
+    match getattr(error, "errno", None):
+        case errno.EADDRNOTAVAIL:
+            network = IPv4Network(f"{address}/24", strict=False)
+            return f"{address} is no address of this machine; as root: ip route add local {network} dev lo"
+        case errno.EADDRINUSE:
+            return f"{error}; --address chooses another one"
+        case errno.EACCES:
+            return str(error)
+    return ""
