@@ -259,7 +259,8 @@ class Slam:
     def _contested(self, best: Match, scan: ScanPoints, before: Pose, prior: NDArray[np.float64]) -> Match | None:
         """Where odometry puts the robot while things that move around it would mislead the match."""
         way = math.hypot(self._step.x, self._step.y)
-        if self._is_unsure or way > CONTESTED_WAY_MAX or abs(self._step.yaw) > CONTESTED_TURN_MAX:
+        lost = self._belief.search or self._belief.in_doubt  # scans that fit badly are no reason to ask the wheels less
+        if lost or way > CONTESTED_WAY_MAX or abs(self._step.yaw) > CONTESTED_TURN_MAX:
             return None
         return contested(self._belief.map, scan, before, best, prior, way)
 
