@@ -35,13 +35,8 @@ async def test_ten_robots_leave_one_corridor() -> None:
     assert outcome.arrived >= 4
 
 
-ASTRAY = pytest.mark.xfail(
-    reason="a dog of this convoy succeeds 0.28 m beside its goal: docs/autonomy.md", strict=False
-)
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [*range(2, 8), pytest.param(8, marks=ASTRAY)])
+@pytest.mark.parametrize("seed", [*range(2, 9), 20, 21])
 async def test_no_robot_of_a_convoy_believes_to_stand(seed: int) -> None:
     outcome = await leave(seed, seconds=40.0)
     assert not outcome.sure_but_astray

@@ -31,6 +31,7 @@ CROWDED, CROWDED_CLOSE = 0.02, 0.975  # with more than so much set aside, so muc
 CLOSE_PER_HIDDEN = 4.0  # how much more of it for each share of rays that pass through walls
 EXACT, EXACT_HIDDEN = 0.965, 0.004  # share of points close to surfaces from which a place outdoes …
 OUTDONE = 0.08  # … others with so much less
+PAINTED, PAINTED_SHARE, PAINTED_POINTS = 12.0, 0.8, 200  # weight of a surface; share of the points near such ones
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,6 +139,15 @@ def look_at(grid: EvidenceGrid, scan: ScanPoints, pose: Pose) -> Look:
         exact=float((close & rest).sum()) / count,
         crossing=float((crossing & rest).sum()) / count,
     )
+
+
+def is_well_painted(grid: EvidenceGrid, scan: ScanPoints, pose: Pose) -> bool:
+    """Whether nearly all of ``scan`` lies on surfaces that many scans have shown, not on what may drive along."""
+    points, corner = np.ascontiguousarray(scan.points[:: max(1, len(scan.points) // PAINTED_POINTS)]), grid.corner
+    sensor = np.array((scan.sensor.x, scan.sensor.y))
+    x, y = pose.x - corner.x, pose.y - corner.y
+    off, weight = gaps(grid.surface, grid.evidence, points, x, y, pose.yaw, sensor, RESOLUTION).T
+    return bool(np.count_nonzero((off < INLIER) & (weight >= PAINTED)) >= PAINTED_SHARE * len(points))
 
 
 def _said(grid: EvidenceGrid, scan: ScanPoints, pose: Pose, points: NDArray[np.float64]) -> NDArray[np.uint8]:

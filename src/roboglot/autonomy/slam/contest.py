@@ -1,12 +1,14 @@
 """Odometry against the scan, where they contradict: in a crowd that moves along, most points say that the robot stands.
 
 A world that stands still speaks with one voice. Where the points that tell both poses apart do not, some of them lie on
-things that move, and the wheels are believed. Needs the kernels.
+things that move, and the wheels are believed. Robots that drive ahead drag matches back by millimetres a step, which no
+single step shows: hence the way of the last second is judged too. Needs the kernels.
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +27,51 @@ MAD, NOISES = 1.48, 1.5  # standard deviation by a median; how many of them a co
 FITS = 0.04  # m off a surface at most of a point that speaks for a pose
 ONE_VOICE = 0.9  # share of those points that must speak for the scan's pose
 VOTES_MIN = 4  # points for odometry, or it has no say
+WAY_MAX, TURN_MAX = 0.3, 0.3  # m, rad: a longer step of odometry is no witness against a scan
+PAST = 1.0  # s over which the wheels are asked again
+PAST_TURN_MAX = 2.0  # rad turned meanwhile at most
+
+
+class WheelWitness:
+    """Asks the wheels about every match: over the newest step, and over the last second."""
+
+    def __init__(self) -> None:
+        # stamp, where the wheels alone put base_link, where it was believed to be (map), m driven
+        self._past: deque[tuple[float, Pose, Pose, float]] = deque()
+        self._wheels = Pose()
+
+    def forget(self) -> None:
+        """The pose was set, or is in doubt: the wheels know nothing of that."""
+        self._past.clear()
+
+    def note(self, stamp: float, pose: Pose, way: float) -> None:
+        """The robot is believed to have been at ``pose`` (map), after ``way`` m."""
+        while self._past and stamp - self._past[0][0] > PAST:
+            self._past.popleft()
+        self._past.append((stamp, self._wheels, pose, way))
+
+    def contest(
+        self, grid: EvidenceGrid, scan: ScanPoints, before: Pose, best: Match, prior: NDArray[np.float64], step: Pose
+    ) -> Match | None:
+        """Where the wheels put the robot, if they are believed rather than the ``best`` match; else None.
+
+        They say ``before`` (``prior``: its covariance) after the newest ``step`` (base_link before it).
+        """
+        way = math.hypot(step.x, step.y)
+        if way > WAY_MAX or abs(step.yaw) > TURN_MAX:
+            self.forget()
+            return None
+        driven = contested(grid, scan, before, best, prior, way)
+        if not self._past:
+            return driven
+        self._wheels = self._wheels.compose(before.relative_to(self._past[-1][2]))
+        _, wheels, pose, way_then = self._past[0]
+        moved = self._wheels.relative_to(wheels)
+        if driven is not None or abs(moved.yaw) > PAST_TURN_MAX:
+            return driven
+        by_wheels = pose.compose(moved)
+        far = Pose(by_wheels.x, by_wheels.y, before.yaw)
+        return contested(grid, scan, far, best, prior, self._past[-1][3] - way_then + way)
 
 
 def contested(

@@ -59,17 +59,21 @@ class LearntNoise:
         prior: NDArray[np.float64],
         posterior: NDArray[np.float64],
         direction: float,
+        *,
+        rising: bool = True,
     ) -> None:
         """A match moved the pose by ``correction`` (m, m, rad) from ``prior`` to ``posterior`` (covariances).
 
         The robot drove in ``direction`` (rad, in map): errors across it come from turning, and say nothing of the way.
+        Only if ``rising`` may the way be trusted less than before.
         """
         c, s = math.cos(direction), math.sin(direction)
         before, (way, around) = self._before, self._described
         correction_along = c * correction[0] + s * correction[1]
-        self.way_factor = _learnt(
+        factor = _learnt(
             self.way_factor, correction_along, _along(prior, c, s), _along(posterior, c, s), _along(before, c, s), way
         )
+        self.way_factor = factor if rising else min(factor, self.way_factor)
         self.yaw_factor = _learnt(
             self.yaw_factor, correction[2], float(prior[2, 2]), float(posterior[2, 2]), float(before[2, 2]), around
         )

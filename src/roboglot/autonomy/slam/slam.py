@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from roboglot.autonomy.computing import compute_soon
 from roboglot.autonomy.slam.adding import Adding
 from roboglot.autonomy.slam.belief import Belief
-from roboglot.autonomy.slam.certainty import ALL_POINTS, Support, supported
-from roboglot.autonomy.slam.contest import contested
+from roboglot.autonomy.slam.certainty import ALL_POINTS, Support, is_well_painted, supported
+from roboglot.autonomy.slam.contest import WheelWitness
 from roboglot.autonomy.slam.displacement import DisplacementWatch
 from roboglot.autonomy.slam.excursion import Excursions
 from roboglot.autonomy.slam.loops import LoopCloser
@@ -65,7 +65,7 @@ STANDING_PERIOD = 10.0  # s between two steps of the trajectory while standing
 LOST_QUALITY, LOST_PERIOD = 0.4, 1.0  # below this it looks around, once in so many seconds
 WIDE, NARROW = (0.5, math.radians(20.0)), (0.2, math.radians(5.0))  # m, rad around the belief that are searched
 DOUBT_SHARE, DOUBT_SIGMAS = 0.85, 3.0  # a worse fit than usual, or a pose so far from odometry's: match without it
-CONTESTED_WAY_MAX, CONTESTED_TURN_MAX = 0.3, 0.3  # m, rad: a longer step of odometry is no witness against a scan
+LEARNS_AFTER = 1.0  # m after a contradiction from which corrections say something of odometry again
 DISPLACED_QUALITY = 0.15  # of a robot that was shoved, until the next scans
 JUMP, JUMP_YAW = 0.2, math.radians(10.0)  # corrections beyond this are reported as a jump
 
@@ -81,6 +81,7 @@ class Slam:
         self._matched_at = self._searched_at = -math.inf
         self._agreement = self._known = 1.0
         self._contradicted = False  # whether the newest match was dropped for what the wheels say
+        self._witness, self._learns_from = WheelWitness(), 0.0  # m driven
         self._newest: ScanTaken | None = None
         self.noise, self.bias = LearntNoise(belief.odometry.noise), LearntBias()
         self.whereabouts = Whereabouts(belief, robot.events)
@@ -145,6 +146,7 @@ class Slam:
         """The next scans show whether a pose that someone gave is right."""
         self._displacement.forget(event.stamp)
         if event.given:
+            self._witness.forget()
             self.whereabouts.be_given(event.stamp)
 
     @property
@@ -155,6 +157,7 @@ class Slam:
     def believe(self, found: Match, odometry: Pose, means: RecoveryMeans = RecoveryMeans.WHOLE_MAP) -> None:
         """The robot was found to have been there when odometry said ``odometry``."""
         self._belief.move_to(found.pose, odometry)
+        self._witness.forget()
         self._belief.covariance, self._belief.search = found.covariance, False
         self._belief.quality, self._agreement = found.quality, found.agreement
         self.whereabouts.find(means, self._newest.stamp if self._newest else self._robot.clock.time())
@@ -191,6 +194,7 @@ class Slam:
             belief.quality = self._agreement = self._known = 1.0  # the first scan defines the map
             self.whereabouts.begin()
         pose = belief.map_to_odom.compose(odometry)
+        self._witness.note(event.stamp, pose, self._way)
         if belief.mapping and self._may_add and self._adding.is_due(pose, event.stamp):
             self._adding.add(scan, pose, event.stamp, self._way)
         sure = self._may_add and self._agreement >= TRUSTED and self._known > NEW_GROUND
@@ -248,7 +252,8 @@ class Slam:
             return
         shoved = self._check_displaced(before, best, prior, stamp)
         if shoved is None and driven is None:
-            self._learn(before, best, prior, moved, seconds)
+            still = self._way >= self._learns_from and is_well_painted(belief.map, scan, best.pose)
+            self._learn(before, best, prior, moved, seconds, still=still)
         belief.covariance = prior if driven else best.covariance
         belief.move_to(best.pose, odometry)
         if shoved is not None:
@@ -258,11 +263,13 @@ class Slam:
 
     def _contested(self, best: Match, scan: ScanPoints, before: Pose, prior: NDArray[np.float64]) -> Match | None:
         """Where odometry puts the robot while things that move around it would mislead the match."""
-        way = math.hypot(self._step.x, self._step.y)
-        lost = self._belief.search or self._belief.in_doubt  # scans that fit badly are no reason to ask the wheels less
-        if lost or way > CONTESTED_WAY_MAX or abs(self._step.yaw) > CONTESTED_TURN_MAX:
+        if self._belief.search or self._belief.in_doubt:  # scans that only fit badly are no reason to ask it less
+            self._witness.forget()
             return None
-        return contested(self._belief.map, scan, before, best, prior, way)
+        driven = self._witness.contest(self._belief.map, scan, before, best, prior, self._step)
+        if driven is not None:
+            self._learns_from = self._way + LEARNS_AFTER
+        return driven
 
     def _check_displaced(self, before: Pose, best: Match, prior: NDArray[np.float64], stamp: float) -> float | None:
         """How far something else than its wheels has moved the robot; None if nothing did, as far as scans tell."""
@@ -278,19 +285,21 @@ class Slam:
         self.whereabouts.be_displaced(stamp)
         self._robot.events.publish(RobotDisplaced(stamp=stamp, distance=shoved))
 
-    def _learn(self, before: Pose, best: Match, prior: NDArray[np.float64], moved: Pose | None, seconds: float) -> None:
-        """What the correction from ``before`` says of odometry."""
+    def _learn(
+        self, before: Pose, best: Match, prior: NDArray[np.float64], moved: Pose | None, seconds: float, *, still: bool
+    ) -> None:
+        """What the correction from ``before`` says of odometry; only if all around is ``still``, how bad it is."""
         if best.agreement < TRUSTED or best.known < KNOWN_SURE * best.points:
             return  # what is wrong here may be the match
         here, after = best.pose, best.covariance
         off = (here.x - before.x, here.y - before.y, wrap_angle(here.yaw - before.yaw))
         step = self._step
-        self.noise.learn(off, prior, after, here.yaw - step.yaw + math.atan2(step.y, step.x))
+        self.noise.learn(off, prior, after, here.yaw - step.yaw + math.atan2(step.y, step.x), rising=still)
         if moved is None or self._belief.lost is not None:
             return
         c, s = abs(math.cos(here.yaw)), abs(math.sin(here.yaw))
         seen_x, seen_y = (1.0 - after[k, k] / prior[k, k] for k in (0, 1))
-        seen = c * seen_x + s * seen_y, s * seen_x + c * seen_y
+        seen = (c * seen_x + s * seen_y, s * seen_x + c * seen_y) if self._way >= self._learns_from else (0.0, 0.0)
         newest = self.noise.newest
         doubt = Doubt(float(max(after[0, 0], after[1, 1])) + newest.way, float(after[2, 2]) + newest.yaw)
         self.bias.learn(moved, seconds, here.relative_to(before), seen, doubt)
@@ -371,6 +380,7 @@ class Slam:
         if straightened is None:
             return
         belief.move_to(straightened, odometry)
+        self._witness.forget()
         self._adding.shift(straightened)
         shift = straightened.distance_to(pose)
         self._robot.events.publish(LoopClosed(stamp=stamp, shift=shift, moved=self._loops.moved))
