@@ -13,7 +13,7 @@ class Claims:
 
     def at_most(self, name: str, value: float, limit: float, unit: str) -> None:
         """A figure that should be small."""
-        self._tell(name, value, limit, unit, limit / value if value else float("inf"), "<=")
+        self._tell(name, value, limit, unit, limit / value if value > 0 else float("inf"), "<=")
 
     def at_least(self, name: str, value: float, limit: float, unit: str) -> None:
         """A figure that should be large."""

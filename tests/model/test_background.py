@@ -1,9 +1,12 @@
 """Work beside the event loop."""
 
 import asyncio
+import gc
+import importlib
 import subprocess
 import sys
 import threading
+from pathlib import Path
 
 import pytest
 
@@ -44,3 +47,19 @@ async def test_cancelled_loading_ends_without_a_word(caplog: pytest.LogCaptureFi
     with pytest.raises(asyncio.CancelledError):
         await loading
     assert not caplog.records
+
+
+async def test_no_collection_walks_what_was_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "heavy_library.py").write_text("CYCLES = [[] for _ in range(20_000)]\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    gc.freeze()
+    before = gc.get_freeze_count()
+    try:
+        await load(lambda: importlib.import_module("heavy_library"))
+        assert gc.get_freeze_count() - before > 20_000
+        frozen = gc.get_freeze_count()
+        await load(lambda: importlib.import_module("heavy_library"))
+        assert gc.get_freeze_count() <= frozen, "what is not new leaves garbage to be collected"
+    finally:
+        gc.unfreeze()
+        del sys.modules["heavy_library"]

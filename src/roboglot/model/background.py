@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import os
+import sys
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -30,8 +32,11 @@ async def load(job: Callable[[], R]) -> R:
 
     def work() -> None:
         result.set_running_or_notify_cancel()  # from here on it cannot be cancelled
+        modules = len(sys.modules)
         try:
             found = job()
+            if len(sys.modules) > modules:
+                gc.freeze()
         except BaseException as error:  # noqa: BLE001
             result.set_exception(error)
         else:
