@@ -291,8 +291,10 @@ def parse_robot(text: str) -> RobotConfig:
     if "://" not in body:
         body, colon, where = body.partition(":")
         start = _start(text, where) if colon else None
-    if not (name.isidentifier() and equals and body):
+    if not (name and equals and body):
         raise ValueError(f"a robot is name=body or name=URL, both with @address or without, not {text!r}")
+    if not name.isidentifier():
+        raise ValueError(f"a robot's name is letters, digits and _, and begins with no digit: not {name!r}")
     return RobotConfig(name, body, address, start)
 
 

@@ -8,6 +8,7 @@ from collections.abc import AsyncIterator, Iterator
 from dataclasses import replace
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from typing import Any
 
 import pytest
 import pytest_asyncio
@@ -17,7 +18,7 @@ from roboglot.model.clock import LockstepClock
 from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.visual.config import VisualConfig
 from roboglot.runtime import Runtime
-from tests.browser.served import ADDRESS, FRIEND, REBOUND, STRANGER, Served
+from tests.browser.served import ADDRESS, FRIEND, PAGE_PATIENCE, REBOUND, STRANGER, OpenConsole, Page, Served
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 OPTIONS = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
@@ -105,3 +106,27 @@ async def browser(site: int) -> AsyncIterator[async_api.Browser]:
         )
         yield opened
         await opened.close()
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def open_console(browser: Any, served: Served) -> AsyncIterator[OpenConsole]:
+    """Open the console as someone, in a browser of their own; it must say nothing bad on its own console."""
+    opened, said = [], []
+
+    async def open_it(person: str = "anna", view: str = "live", language: str = "en", **options: Any) -> Page:
+        context = await browser.new_context(**({"viewport": {"width": 1280, "height": 800}} | options))
+        opened.append(context)
+        await context.add_init_script(f"localStorage.person = '{person}'; localStorage.language = '{language}'")
+        page = await context.new_page()
+        page.set_default_timeout(PAGE_PATIENCE)
+        page.on("pageerror", lambda error: said.append(str(error)))
+        page.on("console", lambda message: said.append(message.text) if message.type == "error" else None)
+        assert served.runtime.console is not None
+        await page.goto(f"{served.runtime.console.address}/#/{view}")
+        await page.wait_for_selector("nav")
+        return page
+
+    yield open_it
+    for context in opened:
+        await context.close()
+    assert [line for line in said if "ERR_CONNECTION" not in line] == []

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import time
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +15,12 @@ from roboglot.runtime import Runtime
 
 ADDRESS = f"127.0.91.{1 + int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0')[2:])}"  # one for each process
 PATIENCE = 60.0  # s of the machine's time
+PAGE_PATIENCE = 15_000  # ms of the machine's time until a page shows something
 STRANGER, FRIEND, REBOUND = "evil.example", "studio.example", "rebound.example"
+
+
+Page = Any
+OpenConsole = Callable[..., Awaitable[Page]]
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import re
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,6 @@ from urllib.error import HTTPError
 from urllib.request import Request, urlopen
 
 import pytest
-import pytest_asyncio
 
 from roboglot.config import ConsoleConfig, RobotConfig, load_config, with_addresses
 from roboglot.model.components.mapping.map_library import MapLibrary
@@ -22,51 +21,13 @@ from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.components.system.lease import Lease
 from roboglot.recording.reader import read_recording
 from roboglot.runtime import Runtime
-from tests.browser.served import ADDRESS, Served
+from tests.browser.served import ADDRESS, OpenConsole, Page, Served
+from tests.browser.served import PAGE_PATIENCE as PATIENCE
 from tests.browser.served import until as until_page
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
-Page = Any
-Open = Callable[..., Awaitable[Page]]
-PATIENCE = 15_000  # ms of the machine's time until a page shows something
-AXE = (Path(__file__).parent / "vendor" / "axe.min.js").read_text(encoding="utf-8")
-VIEWS = {
-    "live": ("state", "drive", "actions", "plots"),
-    "world": ("people", "faults", "drawn", "clock"),
-    "robots": (),
-    "class": (),
-}
 SHOWS_PICTURES = """() => document.querySelector('.screen video')?.videoWidth > 0
     || document.querySelector('.screen img')?.naturalWidth > 0"""
-SMALL_TARGETS = """() => [...document.querySelectorAll('button, a, select, input')]
-    .filter(e => e.offsetParent && e.type !== 'range')
-    .filter(e => { const b = e.getBoundingClientRect(); return b.width && (b.height < 44 || b.width < 44); })
-    .filter(e => !e.classList.contains('line'))
-    .map(e => e.outerHTML.slice(0, 80))"""
-
-
-@pytest_asyncio.fixture(loop_scope="session")
-async def open_console(browser: Any, served: Served) -> AsyncIterator[Open]:
-    """Open the console as someone, in a browser of their own; it must say nothing bad on its own console."""
-    opened, said = [], []
-
-    async def open_it(person: str = "anna", view: str = "live", language: str = "en", **options: Any) -> Page:
-        context = await browser.new_context(**({"viewport": {"width": 1280, "height": 800}} | options))
-        opened.append(context)
-        await context.add_init_script(f"localStorage.person = '{person}'; localStorage.language = '{language}'")
-        page = await context.new_page()
-        page.set_default_timeout(PATIENCE)
-        page.on("pageerror", lambda error: said.append(str(error)))
-        page.on("console", lambda message: said.append(message.text) if message.type == "error" else None)
-        assert served.runtime.console is not None
-        await page.goto(f"{served.runtime.console.address}/#/{view}")
-        await page.wait_for_selector("nav")
-        return page
-
-    yield open_it
-    for context in opened:
-        await context.close()
-    assert [line for line in said if "ERR_CONNECTION" not in line] == []
 
 
 async def until(condition: Callable[[], bool]) -> None:
@@ -94,7 +55,7 @@ async def driven(served: Served, page: Page) -> None:
             await served.clock.advance(0.08)
 
 
-async def test_a_click_on_the_map_brings_the_robot_there(served: Served, open_console: Open) -> None:
+async def test_a_click_on_the_map_brings_the_robot_there(served: Served, open_console: OpenConsole) -> None:
     page = await open_console()
     before = served.runtime.fleet.world.truth.pose_of("a")
     await page.wait_for_selector("text=Scan fits map")
@@ -109,7 +70,7 @@ async def test_a_click_on_the_map_brings_the_robot_there(served: Served, open_co
     await page.wait_for_selector(".badge.succeeded")
 
 
-async def test_the_robot_stands_when_the_driving_page_is_killed(served: Served, open_console: Open) -> None:
+async def test_the_robot_stands_when_the_driving_page_is_killed(served: Served, open_console: OpenConsole) -> None:
     page = await open_console()
     await page.click("#tab-drive")
     await driven(served, page)
@@ -118,7 +79,7 @@ async def test_the_robot_stands_when_the_driving_page_is_killed(served: Served, 
     assert speed_of(served) < 0.02
 
 
-async def test_the_robot_stands_when_the_pad_falls_silent(served: Served, open_console: Open) -> None:
+async def test_the_robot_stands_when_the_pad_falls_silent(served: Served, open_console: OpenConsole) -> None:
     page = await open_console()
     await page.click("#tab-drive")
     await driven(served, page)
@@ -128,7 +89,7 @@ async def test_the_robot_stands_when_the_pad_falls_silent(served: Served, open_c
     assert speed_of(served) < 0.02
 
 
-async def test_escape_stops_and_letting_go_does(served: Served, open_console: Open) -> None:
+async def test_escape_stops_and_letting_go_does(served: Served, open_console: OpenConsole) -> None:
     page = await open_console()
     await page.click("#tab-drive")
     await driven(served, page)
@@ -144,7 +105,7 @@ async def test_escape_stops_and_letting_go_does(served: Served, open_console: Op
     assert served.robot.actions.running() == []
 
 
-async def test_a_gamepad_drives_and_stops(served: Served, open_console: Open) -> None:
+async def test_a_gamepad_drives_and_stops(served: Served, open_console: OpenConsole) -> None:
     page = await open_console()
     await page.evaluate("""() => { window.stick = [0, 0, 0, 0];
         navigator.getGamepads = () => [null, { axes: window.stick }]; }""")
@@ -162,7 +123,7 @@ async def test_a_gamepad_drives_and_stops(served: Served, open_console: Open) ->
     assert speed_of(served) < 0.02
 
 
-async def test_a_recording_is_begun_marked_and_ended(served: Served, open_console: Open) -> None:
+async def test_a_recording_is_begun_marked_and_ended(served: Served, open_console: OpenConsole) -> None:
     page = await open_console()
     page.on("dialog", lambda dialog: asyncio.ensure_future(dialog.accept("it bumped")))
     await page.click("#tab-actions")
@@ -188,7 +149,7 @@ def rest(served: Served, x: float) -> tuple[int, str]:
         return error.code, error.read().decode()
 
 
-async def test_two_browsers_and_a_rest_client_contend_for_control(served: Served, open_console: Open) -> None:
+async def test_two_browsers_and_a_rest_client_contend_for_control(served: Served, open_console: OpenConsole) -> None:
     anna, ben = await open_console("anna"), await open_console("ben")
     await anna.click("text=Take control")
     await anna.wait_for_selector("text=You alone move this robot.")
@@ -211,7 +172,7 @@ async def test_two_browsers_and_a_rest_client_contend_for_control(served: Served
     await ben.wait_for_selector("text=/slamware .* moves it/")
 
 
-async def test_plots_show_the_robots_speed_and_battery(served: Served, open_console: Open) -> None:
+async def test_plots_show_the_robots_speed_and_battery(served: Served, open_console: OpenConsole) -> None:
     page = await open_console()
     await page.click("#tab-plots")
     for _ in range(4):
@@ -224,7 +185,7 @@ async def test_plots_show_the_robots_speed_and_battery(served: Served, open_cons
         assert re.search(r": [\d.]+ ", said), said
 
 
-async def test_the_wire_shows_requests_and_why_they_fail(served: Served, open_console: Open) -> None:
+async def test_the_wire_shows_requests_and_why_they_fail(served: Served, open_console: OpenConsole) -> None:
     page = await open_console(view="wire")
     await until(lambda: served.robot.tap.watched)
     reader, writer = await asyncio.open_connection(ADDRESS, 40923)
@@ -240,7 +201,7 @@ async def test_the_wire_shows_requests_and_why_they_fail(served: Served, open_co
     await page.wait_for_selector("text=Copy as nc")
 
 
-async def test_a_paused_wire_goes_back_to_the_first_message(served: Served, open_console: Open) -> None:
+async def test_a_paused_wire_goes_back_to_the_first_message(served: Served, open_console: OpenConsole) -> None:
     page = await open_console(view="wire")
     await until(lambda: served.robot.tap.watched)
     for number in range(900):
@@ -258,7 +219,7 @@ async def test_a_paused_wire_goes_back_to_the_first_message(served: Served, open
     assert await page.locator("text=Earlier ones").count() == 0
 
 
-async def test_hands_break_and_mend_the_robot(served: Served, open_console: Open) -> None:
+async def test_hands_break_and_mend_the_robot(served: Served, open_console: OpenConsole) -> None:
     page = await open_console(view="world")
     await page.click("#tab-faults")
     await page.select_option("form select", "emergency_stop")
@@ -272,7 +233,7 @@ async def test_hands_break_and_mend_the_robot(served: Served, open_console: Open
     await served.clock.advance(0.2)
 
 
-async def test_languages_and_themes_change_while_it_runs(served: Served, open_console: Open) -> None:
+async def test_languages_and_themes_change_while_it_runs(served: Served, open_console: OpenConsole) -> None:
     page = await open_console(language="en")
     await page.wait_for_selector("text=Take control")
     await page.click("text=中文")
@@ -301,17 +262,7 @@ async def test_the_floor_that_is_shown_is_chosen(tmp_path: Path, browser: Any) -
     await runtime.close()
 
 
-@pytest.mark.parametrize("view", ["live", "wire", "world", "robots", "class"])
-async def test_a_phone_shows_all_of_it_and_can_touch_it(served: Served, open_console: Open, view: str) -> None:
-    page = await open_console(view=view, viewport={"width": 360, "height": 740}, has_touch=True, is_mobile=True)
-    await page.wait_for_selector("main > :not(.empty)")
-    assert await page.evaluate("document.documentElement.scrollWidth <= innerWidth")
-    stop = await page.locator(".stop").bounding_box()
-    assert stop["x"] + stop["width"] <= 360
-    assert await page.evaluate(SMALL_TARGETS) == []
-
-
-async def test_a_lost_connection_is_said_and_bridged(served: Served, open_console: Open) -> None:
+async def test_a_lost_connection_is_said_and_bridged(served: Served, open_console: OpenConsole) -> None:
     page = await open_console()
     await page.wait_for_selector("text=Take control")
     assert served.runtime.console is not None
@@ -321,7 +272,7 @@ async def test_a_lost_connection_is_said_and_bridged(served: Served, open_consol
     await page.wait_for_selector(".link.good")
 
 
-async def test_a_map_is_saved_by_its_name_and_seen_in_the_grid(served: Served, open_console: Open) -> None:
+async def test_a_map_is_saved_by_its_name_and_seen_in_the_grid(served: Served, open_console: OpenConsole) -> None:
     page = await open_console(view="world")
     page.on("dialog", lambda dialog: asyncio.ensure_future(dialog.accept("hall")))
     await served.clock.advance(2.0)  # so that there is a map
@@ -338,7 +289,7 @@ async def test_a_map_is_saved_by_its_name_and_seen_in_the_grid(served: Served, o
             await asyncio.sleep(0.05)
 
 
-async def test_the_camera_shows_pictures_and_what_is_in_them(served: Served, open_console: Open) -> None:
+async def test_the_camera_shows_pictures_and_what_is_in_them(served: Served, open_console: OpenConsole) -> None:
     page = await open_console()
     await page.click("#tab-drive")
     await page.click("text=Show the camera")
@@ -362,23 +313,3 @@ async def test_the_camera_shows_pictures_and_what_is_in_them(served: Served, ope
     assert len(film) > 1000
     await page.click("text=Close the camera")
     await page.wait_for_selector(".screen", state="detached")
-
-
-@pytest.mark.parametrize("theme", ["dark", "light"])
-async def test_axe_finds_nothing_serious(theme: str, served: Served, open_console: Open) -> None:
-    await served.clock.advance(1.0)
-    page = await open_console(color_scheme=theme)
-    await page.evaluate(AXE)
-    for view, tabs in VIEWS.items():
-        await page.click(f"nav a[href='#/{view}']")
-        for tab in tabs or ("",):
-            if tab:
-                await page.click(f"#tab-{tab}")
-            await page.wait_for_selector("main > :not(.empty)")
-            found = await page.evaluate("axe.run(document, { resultTypes: ['violations'] })")
-            serious = [
-                (violation["id"], [node["html"][:120] for node in violation["nodes"][:3]])
-                for violation in found["violations"]
-                if violation["impact"] in ("serious", "critical")
-            ]
-            assert serious == [], (view, tab, theme)

@@ -188,7 +188,7 @@ async def test_a_token_signs_in_and_its_rotation_signs_out(guarded: Guarded, ope
     await page.fill("input[name=token]", token)
     await page.click("form .main")
     await page.wait_for_selector("text=Scan fits map")
-    assert await page.locator("header option").all_inner_texts() == ["Robot b"]
+    assert await page.locator("header option").all_inner_texts() == ["b"]
     guarded.store.rotate("cell7")
     guarded.runtime.guard.reload()  # type: ignore[union-attr]
     await page.wait_for_selector(".sign")
@@ -263,7 +263,7 @@ async def test_pupils_join_by_a_code_and_the_teacher_leads(guarded: Guarded, ope
         assert await page.locator("nav >> text=Class").count() == 0
         pupils.append(page)
     shown = [await page.locator("header option").all_inner_texts() for page in pupils]
-    assert sorted(shown) == [["Robot a"], ["Robot b"]]
+    assert sorted(shown) == [["a"], ["b"]]
     assert await pupils[0].evaluate("fetch('/api/class').then((r) => r.status)") == 403
     record = "fetch('/api/recording', {method: 'POST', body: '{\"do\": \"start\"}'}).then((r) => r.status)"
     assert await pupils[0].evaluate(record) == 403

@@ -46,9 +46,9 @@ function Header() {
   const robots = hello.value?.robots ?? [];
   return html`<header>
     <a class="brand" href="#/live"><img src="/icon.svg" alt="" width="28" height="28" /><b>roboglot</b></a>
-    ${robots.length > 0 && html`<label class="robot"><span class="unseen">${t("robot")}</span>
+    ${robots.length > 0 && html`<label class="robot"><span>${t("robot")}</span>
       <select value=${current.value} onChange=${(e) => choose(e.target.value)}>
-        ${robots.map((r) => html`<option value=${r.name}>${t("robot.named", { name: r.name })}</option>`)}
+        ${robots.map((r) => html`<option>${r.name}</option>`)}
       </select></label>`}
     <${Link} /><${Charge} /><${Pace} />${recording.value && html`<span class="chip bad" title=${t("record")}>● REC</span>`}
     <span class="grow"></span><${Person} />

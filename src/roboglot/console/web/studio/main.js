@@ -29,8 +29,8 @@ function Header() {
   const looks = ["plain", "contrast", "dyslexia"];
   return html`<header>
     <a class="brand" href="/" title=${t("studio.console")}><img src="/icon.svg" alt="" width="28" height="28" /><b>${t("studio")}</b></a>
-    <label class="robot"><span class="unseen">${t("robot")}</span>
-      <select value=${current.value} onChange=${(e) => { choose(e.target.value); open(); }}>${robots.map((r) => html`<option value=${r.name}>${t("robot.named", { name: r.name })}</option>`)}</select></label>
+    <label class="robot"><span>${t("robot")}</span>
+      <select value=${current.value} onChange=${(e) => { choose(e.target.value); open(); }}>${robots.map((r) => html`<option>${r.name}</option>`)}</select></label>
     <label class="name"><span class="unseen">${t("studio.name")}</span><input value=${program.value.name} placeholder=${t("studio.untitled")} maxlength="60" onChange=${(e) => rename({ name: e.target.value })} /></label>
     <span class="stored muted" role="status">${stored.value && t(`studio.stored.${stored.value}`)}</span>
     <span class="grow"></span>

@@ -23,10 +23,11 @@ async function draw(verb, values) { if ((await command(verb, values)) !== undefi
 
 const put = (verb) => ({ drag: arrow, drop, done: (from, to) => { drop(); changeWorld(verb, { ...inWorld(from, to), floor: floor() }); } });
 
+const chosenPerson = () => { const names = Object.keys(truth.value?.people ?? {}); return names.includes(someone.value) ? someone.value : names[0]; };
 const WORLD_TOOLS = {
   box: put("add_box"),
   visitor: put("add_person"),
-  person: { drag: arrow, drop, done: (from) => { drop(); const { x, y } = inWorld(from, null); const person = someone.value || Object.keys(truth.value?.people ?? {})[0];
+  person: { drag: arrow, drop, done: (from) => { drop(); const { x, y } = inWorld(from, null), person = chosenPerson();
     if (person) changeWorld("move_person", { person, x, y }); else say(t("people.none"), true); } },
   move: { drag: arrow, drop, done: (from, to) => { drop(); changeWorld("place_robot", { robot: current.value, ...inWorld(from, to), floor: floor() }); } },
 };
@@ -46,6 +47,7 @@ function rectangle([x0, y0], [x1, y1]) {
 
 function People() {
   const names = Object.keys(truth.value?.people ?? {}), boxes = Object.keys(truth.value?.boxes ?? {});
+  const chosen = chosenPerson();
   return html`<div class="card"><h3>${t("robot.hands")}</h3><div class="buttons">
       <${Button} label=${t("hands.push")} verb="push" onClick=${() => changeWorld("push", { robot: current.value, x: 8 })} />
       <${Button} label=${t("hands.lift")} verb="lift" onClick=${() => changeWorld("lift", { robot: current.value, up: true })} />
@@ -53,10 +55,10 @@ function People() {
       <${Button} label=${t("hands.plug")} verb="plug_in" onClick=${() => changeWorld("plug_in", { robot: current.value, wire: true })} />
       <${Button} label=${t("hands.unplug")} verb="plug_in" onClick=${() => changeWorld("plug_in", { robot: current.value, wire: false })} /></div></div>
     <div class="card"><h3>${t("people")}</h3>${names.length ? html`<ul class="list">${names.map((name) => html`<li>
-      <${Button} label=${name} on=${(someone.value || names[0]) === name} onClick=${() => { someone.value = name; tool.value = "person"; }} />
+      <${Button} label=${name} on=${chosen === name} onClick=${() => { someone.value = name; tool.value = "person"; }} />${chosen === name && html`
       <${Button} label=${t("people.resume")} verb="resume_person" onClick=${() => changeWorld("resume_person", { person: name })} />
       <${Button} label=${t("say")} verb="person_says" onClick=${() => { const text = prompt(t("say.text")); if (text) changeWorld("person_says", { person: name, text }); }} />
-      <${Button} label=${t("remove")} verb="remove_person" onClick=${() => changeWorld("remove_person", { person: name })} /></li>`)}</ul>` : html`<p class="muted">${t("people.none")}</p>`}</div>
+      <${Button} label=${t("remove")} verb="remove_person" onClick=${() => changeWorld("remove_person", { person: name })} />`}</li>`)}</ul>` : html`<p class="muted">${t("people.none")}</p>`}</div>
     <div class="card"><h3>${t("boxes")}</h3>${boxes.length ? html`<ul class="list">${boxes.map((number) => html`<li><span>${t("box.number", { number })}</span>
       <${Button} label=${t("remove")} verb="remove_box" onClick=${() => changeWorld("remove_box", { number: Number(number) })} /></li>`)}</ul>` : html`<p class="muted">${t("boxes.none")}</p>`}</div>`;
 }

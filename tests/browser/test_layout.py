@@ -1,0 +1,76 @@
+"""How the console looks: all of it can be seen, touched and read aloud, on a phone as on a big screen."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.browser.served import OpenConsole, Served
+
+pytestmark = pytest.mark.asyncio(loop_scope="session")
+AXE = (Path(__file__).parent / "vendor" / "axe.min.js").read_text(encoding="utf-8")
+VIEWS = {
+    "live": ("state", "drive", "actions", "plots"),
+    "world": ("people", "faults", "drawn", "clock"),
+    "robots": (),
+    "class": (),
+}
+SMALL_TARGETS = """() => [...document.querySelectorAll('button, a, select, input')]
+    .filter(e => e.offsetParent && e.type !== 'range')
+    .filter(e => { const b = e.getBoundingClientRect(); return b.width && (b.height < 44 || b.width < 44); })
+    .filter(e => !e.classList.contains('line'))
+    .map(e => e.outerHTML.slice(0, 80))"""
+
+COVERED_OR_CUT = """() => {
+    const pen = document.createElement('canvas').getContext('2d');
+    const width = (e, text) => { pen.font = getComputedStyle(e).font; return pen.measureText(text).width; };
+    const bad = [], blame = (what, e) => bad.push(`${what}: ${e.outerHTML.slice(0, 90)}`);
+    for (const e of document.querySelectorAll('button, a, select, input, h2, h3')) {
+        const b = e.getBoundingClientRect(), x = b.x + b.width / 2, y = b.y + b.height / 2;
+        const top = document.elementFromPoint(x, y), pane = e.closest('.panel, main, nav, header');
+        if (!e.checkVisibility() || b.width < 2 || !top) continue;
+        const shown = pane?.getBoundingClientRect();
+        if (shown && (y < shown.top || y > shown.bottom)) continue; // scrolled away
+        if (!e.contains(top) && !top.contains(e) && !top.closest('label')) blame('covered', e);
+        const room = e.clientWidth - parseFloat(getComputedStyle(e).paddingLeft);
+        if (e.matches('select') && width(e, e.selectedOptions[0]?.text ?? '') > room) blame('cut', e);
+        if (e.matches('button, a, h2, h3') && e.scrollWidth > e.clientWidth + 1 && e.clientWidth) blame('cut', e);
+    }
+    return bad;
+}"""
+
+
+@pytest.mark.parametrize("view", ["live", "wire", "world", "robots", "class"])
+async def test_a_phone_shows_all_of_it_and_can_touch_it(served: Served, open_console: OpenConsole, view: str) -> None:
+    page = await open_console(view=view, viewport={"width": 360, "height": 740}, has_touch=True, is_mobile=True)
+    await page.wait_for_selector("main > :not(.empty)")
+    assert await page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    for language in ("EN", "中文"):
+        if await (other := page.locator(f"header >> text={language}")).count():
+            await other.click()
+        await page.wait_for_selector(f"html[lang={'en' if language == 'EN' else 'zh-CN'}]")
+        assert await page.evaluate(COVERED_OR_CUT) == []
+    stop = await page.locator(".stop").bounding_box()
+    assert stop["x"] + stop["width"] <= 360
+    assert await page.evaluate(SMALL_TARGETS) == []
+
+
+@pytest.mark.parametrize("theme", ["dark", "light"])
+async def test_axe_finds_nothing_serious(theme: str, served: Served, open_console: OpenConsole) -> None:
+    await served.clock.advance(1.0)
+    page = await open_console(color_scheme=theme)
+    await page.evaluate(AXE)
+    for view, tabs in VIEWS.items():
+        await page.click(f"nav a[href='#/{view}']")
+        for tab in tabs or ("",):
+            if tab:
+                await page.click(f"#tab-{tab}")
+            await page.wait_for_selector("main > :not(.empty)")
+            found = await page.evaluate("axe.run(document, { resultTypes: ['violations'] })")
+            serious = [
+                (violation["id"], [node["html"][:120] for node in violation["nodes"][:3]])
+                for violation in found["violations"]
+                if violation["impact"] in ("serious", "critical")
+            ]
+            assert serious == [], (view, tab, theme)
