@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import io
+import wave as wave_module
 from types import SimpleNamespace
 from typing import Any
+from urllib.request import urlopen
 
 import numpy as np
 import pytest
@@ -58,6 +61,21 @@ async def test_a_page_hears_what_the_robot_hears(shown: Shown) -> None:
     finally:
         passing.cancel()
         await peer.close()
+
+
+async def test_sound_comes_as_an_endless_wav_file(shown: Shown) -> None:
+    wave = 8000 * np.sin(2 * np.pi * PITCH / SAMPLE_RATE * np.arange(60 * SAMPLE_RATE))
+    shown.robot[Speaker].play(Sound("tone", wave.astype(np.int16)))
+    playing = await asyncio.to_thread(urlopen, f"{shown.url}/api/robots/a/sound.wav")
+    file = bytearray()
+    while len(file) < 44 + SAMPLE_RATE:
+        await shown.clock.advance(0.02)
+        file += await asyncio.to_thread(playing.read1)
+    playing.close()
+    with wave_module.open(io.BytesIO(file)) as sound:
+        assert (sound.getframerate(), sound.getnchannels(), sound.getsampwidth()) == (SAMPLE_RATE, 1, 2)
+    samples = np.frombuffer(file[44 : 44 + SAMPLE_RATE], np.int16).astype(float)
+    assert pitch_of(samples) == pytest.approx(PITCH, rel=0.05)
 
 
 async def test_a_page_that_asks_for_pictures_alone_gets_no_sound(shown: Shown) -> None:

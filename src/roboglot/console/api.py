@@ -9,7 +9,7 @@ from typing import TypeVar
 import msgspec
 
 from roboglot.console import drawings, program_runs
-from roboglot.console.camera import Calls, send_film, send_photo
+from roboglot.console.camera import Calls, send_film, send_photo, send_sound
 from roboglot.console.copies import FORMS, LABELS, copy
 from roboglot.console.desk import CLIENT, Desk
 from roboglot.console.http import Problem, Receive, Scope, Send, answer, answer_json, read_json
@@ -103,7 +103,7 @@ class Api:
                 await answer_json(send, [self._summary(name) for name in self._desk.visible])
             case "GET", ["robots", name]:
                 await answer_json(send, self._summary(name) | self._desk.view(name).state())
-            case "GET", ["robots", name, "camera.jpg" | "camera.mjpeg" | "map.png" | "map.zip" as file]:
+            case "GET", ["robots", name, "camera.jpg" | "camera.mjpeg" | "sound.wav" | "map.png" | "map.zip" as file]:
                 await self._send_file(self._desk.view(name).robot, file, receive, send)
             case "GET", ["robots", name, "wire", number]:
                 await answer_json(send, self._exchange(name, number))
@@ -157,6 +157,8 @@ class Api:
                 await send_photo(robot, send)
             case "camera.mjpeg":
                 await send_film(robot, receive, send)
+            case "sound.wav":
+                await send_sound(robot, receive, send)
             case "map.png":
                 picture = await asyncio.to_thread(thumbnail, robot[Mapping].grid, robot[Localization].pose)
                 await answer(send, 200, b"image/png", picture, [(b"cache-control", b"no-store")])

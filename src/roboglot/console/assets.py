@@ -94,6 +94,7 @@ class Assets:
         digest = base64.b64encode(hashlib.sha256(inline[1] if inline else b"").digest()).decode()
         return (
             f"default-src 'none'; script-src 'self' 'sha256-{digest}'; style-src 'self'; img-src 'self' blob: data:; "
+            "media-src 'self'; "
             "connect-src 'self'; font-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; "
             "frame-ancestors 'none'"
         ).encode()

@@ -1,10 +1,11 @@
-"""The robot's camera for pages: photos, motion JPEG, video with sound by WebRTC, what the robot makes out in it."""
+"""What the robot sees, hears and makes out, for pages: photos, motion JPEG, WAV, video with sound by WebRTC."""
 
 from __future__ import annotations
 
 import asyncio
 import importlib
 import logging
+import struct
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import partial
@@ -19,17 +20,24 @@ from roboglot.model import background
 from roboglot.model.admission import Right
 from roboglot.model.components.sensing.camera import Camera
 from roboglot.model.components.sensing.detector import Detector
+from roboglot.model.components.sensing.microphone import Microphone
 from roboglot.model.components.sensing.vision import Vision
 from roboglot.model.errors import Busy
 from roboglot.model.feed import Viewer
 from roboglot.model.perception import Box
 from roboglot.model.robot import Robot
+from roboglot.model.sound import SAMPLE_RATE
 
 if TYPE_CHECKING:
     from roboglot.media.webrtc import VideoCall
 
 log = logging.getLogger(__name__)
 BOUNDARY = b"roboglot-frame"
+SIZE_UNKNOWN = 0xFFFFFFFF  # of a WAV file: players read on
+ENDLESS_WAV = struct.pack(  # one channel of 16 bits
+    "<4sI4s4sIHHIIHH4sI",
+    *(b"RIFF", SIZE_UNKNOWN, b"WAVE", b"fmt ", 16, 1, 1, SAMPLE_RATE, 2 * SAMPLE_RATE, 2, 16, b"data", SIZE_UNKNOWN),
+)
 ENDED = ("failed", "closed", "blind")  # states of a call that is over
 
 
@@ -57,6 +65,23 @@ async def send_film(robot: Robot, receive: Receive, send: Send) -> None:
                 picture = await background.beside(partial(jpeg, frame, JPEG_QUALITY))
                 head = b"--%s\r\ncontent-type: image/jpeg\r\ncontent-length: %d\r\n\r\n" % (BOUNDARY, len(picture))
                 await send({"type": "http.response.body", "body": head + picture + b"\r\n", "more_body": True})
+        finally:
+            gone.cancel()
+
+
+async def send_sound(robot: Robot, receive: Receive, send: Send) -> None:
+    """Send what the microphone hears as a WAV file without an end, until the client goes."""
+    gone = asyncio.ensure_future(_left(receive))
+    with robot[Microphone].subscribe() as viewer:
+        gone.add_done_callback(lambda _: viewer.close())
+        headers = [(b"content-type", b"audio/wav"), (b"cache-control", b"no-store")]
+        await send({"type": "http.response.start", "status": 200, "headers": headers})
+        await send({"type": "http.response.body", "body": ENDLESS_WAV, "more_body": True})
+        try:
+            async for block in viewer:
+                if not robot.admission.may(Right.SEE):  # it was revoked meanwhile
+                    break
+                await send({"type": "http.response.body", "body": block.samples.tobytes(), "more_body": True})
         finally:
             gone.cancel()
 

@@ -27,6 +27,7 @@ READS = {
     "/api/robots/{name}": "Everything the page shows of one robot",
     "/api/robots/{name}/camera.jpg": "A picture of this moment",
     "/api/robots/{name}/camera.mjpeg": "Pictures, one after the other",
+    "/api/robots/{name}/sound.wav": "What the microphone hears, without an end",
     "/api/robots/{name}/map.zip": "The map as map_server of ROS reads it: a yaml file and a pgm image",
     "/api/robots/{name}/rehearse": "POST {steps} tries a plan in a copy of the world: how it ends, what it would touch",
     "/api/robots/{name}/program": "The script's program: its state and its log; POST {source} saves and runs another",

@@ -24,6 +24,7 @@ from roboglot.model.components.motion.legs import Legs
 from roboglot.model.components.motion.navigation import Navigation
 from roboglot.model.components.sensing.camera import Camera
 from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.microphone import Microphone
 from roboglot.model.components.system.firmware import Firmware
 from roboglot.model.components.system.health import Health
 from roboglot.model.components.system.lease import Lease
@@ -45,6 +46,7 @@ PARTS = {  # by which a page decides what panels there are
     "light": Light,
     "localization": Localization,
     "mapping": Mapping,
+    "microphone": Microphone,
     "navigation": Navigation,
     "speaker": Speaker,
 }

@@ -1,8 +1,8 @@
-// The camera: live video with sound by WebRTC, motion JPEG where that fails, with what the robot makes out drawn over it.
+// The camera: live video with sound by WebRTC, motion JPEG and WAV where that fails, with what the robot makes out drawn over it.
 import { useEffect, useRef } from "preact/hooks";
 import { signal, useSignal } from "@preact/signals";
 import { Button, html, robotWord, say, t } from "../base.js";
-import { current, seen, want } from "../link.js";
+import { current, seen, state, want } from "../link.js";
 
 const FILM_RATE = 15; // pictures a second
 const FILM_MAX = 600_000; // ms
@@ -77,8 +77,14 @@ function Picture({ robot }) {
     want({ seen: true });
     return () => { filming.value?.(); gone = true; hears.value = false; peer?.close(); want({ seen: false }); };
   }, [robot]);
-  return html`<div class="screen">${plain.value ? html`<img src=${`/api/robots/${robot}/camera.mjpeg`} alt=${t("camera.alt")} />`
+  return html`<div class="screen">${plain.value ? html`<img src=${`/api/robots/${robot}/camera.mjpeg`} alt=${t("camera.alt")} />${state.value?.parts.includes("microphone") && html`<audio src=${`/api/robots/${robot}/sound.wav`} autoplay muted=${!loud.value} onPlaying=${() => { hears.value = true; }}></audio>`}`
     : html`<video ref=${video} autoplay playsinline muted=${!loud.value} aria-label=${t("camera.alt")}></video>`}<${Boxes} /></div>`;
+}
+
+/** What is heard beside a picture; a browser that cannot tap it films in silence. @param {Element} screen @returns {MediaStreamTrack[]} */
+function heard(screen) {
+  const sound = /** @type {any} */ (screen.querySelector("video, audio"));
+  return (sound?.srcObject ?? sound?.captureStream?.() ?? sound?.mozCaptureStream?.())?.getAudioTracks() ?? [];
 }
 
 /** Film what is on the screen until it is called again; then the file is saved. @param {Element} screen @param {string} robot */
@@ -92,7 +98,7 @@ function film(screen, robot) {
     context?.drawImage(picture, 0, 0);
   };
   draw();
-  const recorder = new MediaRecorder(canvas.captureStream(FILM_RATE)), parts = /** @type {Blob[]} */ ([]);
+  const recorder = new MediaRecorder(new MediaStream([...canvas.captureStream(FILM_RATE).getTracks(), ...heard(screen)])), parts = /** @type {Blob[]} */ ([]);
   const timer = setInterval(draw, 1000 / FILM_RATE);
   const late = setTimeout(() => { if (filming.value) filming.value(); }, FILM_MAX);
   filmed.value = 0;
