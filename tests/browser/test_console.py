@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -250,6 +251,32 @@ async def test_hands_break_and_mend_the_robot(served: Served, open_console: Open
     await page.click("text=Mend")
     await until(lambda: len(served.runtime.fleet.world.hands.faults) == 0)
     await served.clock.advance(0.2)
+
+
+async def test_what_stands_in_the_world_is_dragged_elsewhere(served: Served, open_console: OpenConsole) -> None:
+    hands = served.runtime.fleet.world.hands
+    before = hands.robots[0].pose
+    page = await open_console(view="world")
+    box = await page.locator("main canvas").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2  # where the robot is
+    page.on("dialog", lambda dialog: asyncio.ensure_future(dialog.accept("23")))
+    await page.click("[aria-label=Tag], [title=Tag]")
+    await page.mouse.click(x + 150, y)
+    await until(lambda: len(hands.tags) == 1)
+    hung = hands.tags[0]
+    assert (hung.kind, hung.text) == ("april", "23")
+    await page.wait_for_selector("text=23")
+    await page.click("[aria-label=Carry], [title=Carry]")
+    await page.mouse.move(x + 150, y)
+    await page.mouse.down()
+    await page.mouse.move(x + 150, y + 150, steps=4)
+    await page.mouse.up()
+    await until(lambda: hands.tags[0].pose != hung.pose)
+    moved = hands.tags[0].pose
+    assert hung.pose.distance_to(before) * math.sqrt(2) == pytest.approx(moved.distance_to(before), rel=0.1)
+    assert hands.robots[0].pose == before
+    await page.click("li:has-text('23') >> text=Remove")
+    await until(lambda: not hands.tags)
 
 
 async def test_languages_and_themes_change_while_it_runs(served: Served, open_console: OpenConsole) -> None:

@@ -25,6 +25,7 @@ from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.components.sensing.microphone import Microphone
 from roboglot.model.components.system.lease import Lease
 from roboglot.model.errors import Unconnected
 from roboglot.model.geometry import Point, Pose
@@ -88,12 +89,20 @@ async def test_the_world_is_changed_by_hand(shown: Shown) -> None:
     assert status == 200
     assert world["boxes"][str(box["result"])][:2] == [3.0, 2.0]
     assert world["floors"][0]["walls"]
+    await shown.ask("/api/world/move_box", {"number": box["result"], "x": 2, "y": 2})
+    _, tag = await shown.ask("/api/world/add_tag", {"text": "5", "x": 3, "y": 1, "yaw": 1.5})
+    await shown.ask("/api/world/move_tag", {"number": tag["result"], "x": 2, "y": 1})
+    _, world = await shown.ask("/api/world")
+    assert world["boxes"][str(box["result"])][:2] == [2.0, 2.0]
+    assert world["tags"][str(tag["result"])] == [2.0, 1.0, 1.5, 0, "5"]
+    assert (await shown.ask("/api/world/move_box", {"number": 15, "x": 2, "y": 2}))[0] == 404
+    await shown.ask("/api/world/remove_tag", {"number": tag["result"]})
     await shown.ask("/api/world/remove_box", {"number": box["result"]})
     await shown.ask("/api/world/place_robot", {"robot": "a", "x": 4, "y": 3})
     _, fault = await shown.ask("/api/world/inject_fault", {"kind": "low_battery", "robot": "a"})
     await shown.clock.advance(1.0)
     _, world = await shown.ask("/api/world")
-    assert world["boxes"] == {}
+    assert (world["boxes"], world["tags"]) == ({}, {})
     assert world["robots"]["a"][:2] == [4.0, 3.0]
     assert [f["number"] for f in world["faults"]] == fault["result"]
     _, state = await shown.ask("/api/robots/a")
@@ -153,6 +162,16 @@ async def test_maps_are_kept_loaded_exported_and_forgotten(shown: Shown) -> None
     assert (await shown.ask("/api/robots/a/load_map", {"map": "cellar"}))[0] == 404
     assert (await shown.ask("/api/robots/a/remove_map", {"map": "hall"}))[0] == 200
     assert (await shown.ask("/api/robots/a/maps", {}))[1]["result"] == []
+
+
+async def test_a_sound_made_by_hand_is_heard(shown: Shown) -> None:
+    with shown.robot[Microphone].subscribe() as heard:
+        x, y, *_ = (await shown.ask("/api/world"))[1]["robots"]["a"]
+        wish = {"x": x + 1, "y": y, "sound": "tone", "frequency": 440, "seconds": 1}
+        assert (await shown.ask("/api/world/make_sound", wish))[0] == 200
+        await shown.clock.advance(0.5)
+        assert max(int(abs(block.samples).max()) for block in heard.drain()) > 1000
+    assert (await shown.ask("/api/world/make_sound", wish | {"seconds": 31}))[0] == 400
 
 
 async def test_the_world_is_saved_as_it_stands(shown: Shown, tmp_path: Path) -> None:

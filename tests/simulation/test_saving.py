@@ -28,6 +28,8 @@ async def test_what_hands_did_is_in_the_file(tmp_path: Path) -> None:
     world = World(load_world("playground"), [RobotPlacement("a", "universal")], clock=LockstepClock())
     hands = world.hands
     hands.add_obstacle(Pose(2.0, 1.5, math.pi / 6), (0.5, 0.3, 0.8))
+    hands.move_obstacle(hands.obstacles[0].number, Pose(2.5, 1.5, 0.0), 0)
+    hands.add_tag("12", Pose(1.0, 2.0, math.pi / 2), height=0.5, size=0.2)
     hands.place("a", Pose(3.0, 2.0, 1.0))
     person = hands.people[0]
     hands.person(person.name).place(1.5, 1.0, 45.0)
@@ -38,7 +40,9 @@ async def test_what_hands_did_is_in_the_file(tmp_path: Path) -> None:
     robot = again.hands.robots[0].pose
     assert (robot.x, robot.y, robot.yaw) == pytest.approx((3.0, 2.0, 1.0), abs=1e-3)
     box = load_world(str(path)).floors[0].furniture[-1]
-    assert box.at == (2.0, 1.5)
+    assert (box.at, box.size) == ((2.5, 1.5), (0.5, 0.3, 0.8))
+    tag = load_world(str(path)).floors[0].tags[-1]
+    assert (tag.text, tag.at, tag.facing, tag.height, tag.size) == ("12", (1.0, 2.0), 90.0, 0.5, 0.2)
     standing = next(p for p in again.hands.people if p.name == person.name).pose
     assert (standing.x, standing.y, math.degrees(standing.yaw)) == pytest.approx((1.5, 1.0, 45.0), abs=1e-3)
 

@@ -50,6 +50,7 @@ def truth_of(stage: Stage) -> dict[str, object]:
         "people": {p.name: [*words.pose(p.pose), p.floor] for p in stage.people},
         "things": {t.name: [*words.pose(t.pose), t.floor] for t in stage.things},
         "boxes": {str(b.number): [*words.pose(b.pose), b.floor, *b.size[:2]] for b in stage.obstacles},
+        "tags": {str(t.number): [*words.pose(t.pose), t.floor, t.text] for t in stage.tags},
         "faults": [
             {"number": f.number, "kind": f.kind, "robot": f.robot, "options": words.plain(dict(f.options))}
             for f in stage.faults

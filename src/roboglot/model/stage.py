@@ -16,7 +16,7 @@ from typing import Any
 from roboglot.model.components.interaction.armor import PlatePlace
 from roboglot.model.components.sensing.touch import TouchKind
 from roboglot.model.geometry import Point, Pose, Vector3
-from roboglot.model.perception import Emotion, Gesture, Sport
+from roboglot.model.perception import Emotion, Gesture, Sport, TagKind
 from roboglot.model.sound import Sound
 
 
@@ -37,6 +37,19 @@ class Obstacle:
     pose: Pose
     size: tuple[float, float, float]
     floor: int
+
+
+@dataclass(frozen=True, slots=True)
+class HungTag:
+    """A printed code that hands hung up: ``pose`` with +x out of it, ``height`` of its middle, m."""
+
+    number: int
+    kind: TagKind
+    text: str
+    pose: Pose
+    floor: int
+    height: float
+    size: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,6 +175,11 @@ class Stage(ABC):
 
     @property
     @abstractmethod
+    def tags(self) -> Sequence[HungTag]:
+        """Printed codes that were hung up in the world and hang there still."""
+
+    @property
+    @abstractmethod
     def floors(self) -> Sequence[FloorPlan]:
         """The building as it was described, the lowest floor first."""
 
@@ -246,6 +264,34 @@ class Stage(ABC):
     @abstractmethod
     def remove_obstacle(self, number: int) -> None:
         """Take a box away again."""
+
+    @abstractmethod
+    def move_obstacle(self, number: int, pose: Pose, floor: int) -> None:
+        """Put a box elsewhere."""
+
+    @abstractmethod
+    def add_tag(
+        self,
+        text: str,
+        pose: Pose,
+        floor: int = 0,
+        *,
+        kind: TagKind = TagKind.APRIL,
+        height: float = 0.4,
+        size: float = 0.16,
+    ) -> int:
+        """Hang an AprilTag (``text``: its number) or a QR code there, +x of ``pose`` out of it; return its number.
+
+        Raises ValueError for what no such code can say, and for too many.
+        """
+
+    @abstractmethod
+    def move_tag(self, number: int, pose: Pose, floor: int) -> None:
+        """Hang a code elsewhere."""
+
+    @abstractmethod
+    def remove_tag(self, number: int) -> None:
+        """Take a code down."""
 
     @abstractmethod
     def make_sound(self, sound: Sound, at: Point, floor: int = 0, loudness: float = 1.0) -> None:

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from roboglot.model.components.sensing.camera import Camera
+from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Pose
+from roboglot.model.perception import TagKind
 from tests.simulation.perceiving import lab
 
 cv2 = pytest.importorskip("cv2")
@@ -33,6 +35,49 @@ async def test_tags_on_walls_docks_and_shelves():
         low, high = quad.min(axis=0), quad.max(axis=0)
         assert (low + high) / 2 == pytest.approx((box.x, box.y), abs=0.004)
         assert high - low == pytest.approx((box.width, box.height), rel=0.08)
+
+
+async def test_tags_that_hands_hang_up_and_move():
+    detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(APRIL))
+    with lab() as room:
+        hands, read = room.world.hands, {}
+        for text in [*map(str, range(40)), "7"]:  # more than are kept to be drawn
+            number = hands.add_tag(text, Pose(4.0, 5.3, np.pi), size=0.3)
+            if text in ("7", "39"):
+                (seen,) = await room.see("tags")
+                corners, numbers, _ = detector.detectMarkers(await picture(room))
+                assert str(numbers.item()) == seen.text == text
+                read[text] = corners[0][0].mean(axis=0) / (1280, 720)
+                assert read[text] == pytest.approx((seen.box.x, seen.box.y), abs=0.004)
+            else:
+                await picture(room)
+            hands.remove_tag(number)
+        assert await room.see("tags") == []
+        number = hands.add_tag("roboglot", Pose(4.0, 5.3, np.pi), kind=TagKind.QR, size=0.3)
+        hands.move_tag(number, Pose(4.0, 4.9, np.pi), 0)
+        (seen,) = await room.see("tags")
+    assert (seen.kind, seen.text) == (TagKind.QR, "roboglot")
+    assert seen.box.x > read["7"][0] + 0.05
+
+
+def test_only_tags_that_exist_can_be_hung_up():
+    with lab() as room:
+        hands = room.world.hands
+        for text, kind in (("587", TagKind.APRIL), ("x", TagKind.APRIL), ("", TagKind.QR), ("x" * 107, TagKind.QR)):
+            with pytest.raises(ValueError, match=r"AprilTag|QR"):
+                hands.add_tag(text, Pose(4, 5), kind=kind)
+        with pytest.raises(ValueError, match="no place"):
+            hands.add_tag("1", Pose(40, 5))
+        with pytest.raises(ValueError, match="large"):
+            hands.add_tag("1", Pose(4, 5), size=3.0)
+        for number in range(16):
+            hands.add_tag(str(number), Pose(4, 5))
+        with pytest.raises(ValueError, match="16"):
+            hands.add_tag("1", Pose(4, 5))
+        with pytest.raises(NotFound):
+            hands.remove_tag(16)
+        with pytest.raises(NotFound):
+            hands.move_tag(16, Pose(4, 5), 0)
 
 
 async def test_a_qr_code_can_be_read():

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import msgspec
 
 from roboglot.console.verbs.robots import Meters, Name, Radians, Text
-from roboglot.model.geometry import Pose, Vector3
+from roboglot.model.geometry import Point, Pose, Vector3
+from roboglot.model.perception import TagKind
+from roboglot.model.sound import claps, tone
 from roboglot.model.stage import Stage
 from roboglot.operations import OperationTable, Right
 
 Floor = Annotated[int, msgspec.Meta(ge=0, le=200)]
 PersonName = Annotated[str, msgspec.Meta(max_length=50)]
+TagText = Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
 Extent = Annotated[float, msgspec.Meta(gt=0.01, le=20)]
 Seed = Annotated[int, msgspec.Meta(ge=0, le=2**31 - 1)]
 Newtons = Annotated[float, msgspec.Meta(ge=-500, le=500)]  # N s
@@ -75,6 +78,61 @@ async def add_box(
 async def remove_box(stage: Stage, *, number: int) -> None:
     """Take a box away."""
     stage.remove_obstacle(number)
+
+
+@WORLD_VERBS.on("move_box")
+async def move_box(
+    stage: Stage, *, number: int, x: Meters, y: Meters, yaw: Radians | None = None, floor: Floor = 0
+) -> None:
+    """Put a box elsewhere; without ``yaw`` it stays turned as it is."""
+    box = next((each for each in stage.obstacles if each.number == number), None)
+    stage.move_obstacle(number, Pose(x, y, yaw if yaw is not None else box.pose.yaw if box else 0.0), floor)
+
+
+@WORLD_VERBS.on("add_tag")
+async def add_tag(
+    stage: Stage,
+    *,
+    text: TagText,
+    x: Meters,
+    y: Meters,
+    yaw: Radians = 0.0,
+    kind: TagKind = TagKind.APRIL,
+    height: Extent = 0.4,
+    floor: Floor = 0,
+) -> int:
+    """Hang an AprilTag (its number) or a QR code there, facing ``yaw``; the answer is the number that removes it."""
+    return stage.add_tag(text, Pose(x, y, yaw), floor, kind=kind, height=height)
+
+
+@WORLD_VERBS.on("move_tag")
+async def move_tag(
+    stage: Stage, *, number: int, x: Meters, y: Meters, yaw: Radians | None = None, floor: Floor = 0
+) -> None:
+    """Hang a code elsewhere; without ``yaw`` it faces where it did."""
+    tag = next((each for each in stage.tags if each.number == number), None)
+    stage.move_tag(number, Pose(x, y, yaw if yaw is not None else tag.pose.yaw if tag else 0.0), floor)
+
+
+@WORLD_VERBS.on("remove_tag")
+async def remove_tag(stage: Stage, *, number: int) -> None:
+    """Take a code down."""
+    stage.remove_tag(number)
+
+
+@WORLD_VERBS.on("make_sound")
+async def make_sound(
+    stage: Stage,
+    *,
+    x: Meters,
+    y: Meters,
+    sound: Literal["claps", "tone"] = "claps",
+    frequency: Annotated[float, msgspec.Meta(ge=20, le=20_000)] = 1000.0,
+    seconds: Annotated[float, msgspec.Meta(gt=0, le=30)] = 2.0,
+    floor: Floor = 0,
+) -> None:
+    """Have two claps, or a tone of ``frequency`` Hz for ``seconds``, be heard from there."""
+    stage.make_sound(claps() if sound == "claps" else tone(frequency, seconds), Point(x, y), floor)
 
 
 @WORLD_VERBS.on("add_person")

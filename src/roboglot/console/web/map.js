@@ -88,6 +88,10 @@ function paintTruth(chart, c) {
     const [w, d] = [b[4] / 2, b[5] / 2];
     chart.line([[-w, -d], [w, -d], [w, d], [-w, d]].map((p) => into(map, outOf(b, p))), { fill: c.box, stroke: c.ink, width: 1, closed: true });
   }
+  for (const [, p] of on(truth.value.tags)) {
+    chart.line([[0, -0.12], [0, 0.12]].map((q) => into(map, outOf(p, q))), { stroke: c.ink, width: 4 });
+    chart.text(into(map, p), p[4], c.ink, 10);
+  }
   for (const [, p] of on(truth.value.things)) chart.dot(into(map, p), 4, { fill: c.box });
   for (const [name, p] of on(truth.value.people)) {
     chart.dot(into(map, p), Math.max(6, 0.25 * chart.camera.scale), { fill: c.person });

@@ -9,11 +9,14 @@ import math
 from collections import defaultdict
 from typing import Any
 
+from roboglot.model.errors import NotFound
 from roboglot.simulation.building.blueprint import Solid
+from roboglot.simulation.building.cards import PrintedTag
 from roboglot.simulation.world.description import WorldDescription
 
 OBSTACLES_MAX = 16
 PASSENGERS_MAX = 4
+TAGS_MAX = 16  # that hands hang up
 SHELF_PARTS = 5  # four legs and the board
 AWAY = (0.0, 0.0, -50.0)  # where what is not there waits
 
@@ -25,6 +28,8 @@ class Props:
         self._model, self._data, self._elevations = model, data, elevations
         self.solids: dict[str, tuple[int, Solid]] = {}
         self.revisions: dict[int, int] = defaultdict(int)  # per floor, counts changes
+        self.tags: dict[int, tuple[int, PrintedTag]] = {}
+        """Printed codes that hands hung up, by number: floor and code; nothing collides with them."""
 
     def put(self, key: str, floor: int, solid: Solid) -> None:
         """Have the box stand there, from now on or instead of where it was."""
@@ -47,6 +52,19 @@ class Props:
             self._touched(before[0], None)
             self._collide(key, False)
             self._data.mocap_pos[self._model.body(key).mocapid[0]] = AWAY
+
+    def hang(self, tag: PrintedTag, floor: int) -> int:
+        """Hang a printed code there; return its number. Raises ValueError when too many hang."""
+        number = next((n for n in range(TAGS_MAX) if n not in self.tags), None)
+        if number is None:
+            raise ValueError(f"no more than {TAGS_MAX} tags can be hung up in a world")
+        self.tags[number] = floor, tag
+        return number
+
+    def take_down(self, number: int) -> None:
+        """Take a printed code away. Raises NotFound."""
+        if self.tags.pop(number, None) is None:
+            raise NotFound(f"no tag {number} was hung up")
 
     def elevation(self, floor: int) -> float:
         """Of a floor's surface, m."""

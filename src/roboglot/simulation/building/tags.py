@@ -1,37 +1,19 @@
-"""Where printed codes are: on walls for ever, on docks and shelves wherever those stand. Truth, world frame."""
+"""Where printed codes are: on walls for ever, on docks and shelves wherever those stand, and where hands hung them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from roboglot.model.geometry import Pose
 from roboglot.model.perception import TagKind
 from roboglot.simulation.building.blueprint import DOCK_DEPTH
+from roboglot.simulation.building.cards import Card, PrintedTag
 from roboglot.simulation.building.props import SHELF_PARTS, Props
 from roboglot.simulation.world.description import Floor, WorldDescription
 
 DOCK_TAG_SIZE, DOCK_TAG_HEIGHT = 0.12, 0.3  # m
 SHELF_TAG_SIZE, SHELF_TAG_HEIGHT = 0.16, 0.35
-
-
-@dataclass(frozen=True, slots=True)
-class Card:
-    """A flat square: ``pose`` in world, +x out of it; the ``height`` of its middle above the floor, m."""
-
-    pose: Pose
-    height: float
-    size: float
-
-
-@dataclass(frozen=True, slots=True)
-class PrintedTag:
-    """A card and what is printed on it."""
-
-    kind: TagKind
-    text: str
-    card: Card
 
 
 def fixed_tags(floor: Floor) -> Iterator[PrintedTag]:
@@ -41,7 +23,8 @@ def fixed_tags(floor: Floor) -> Iterator[PrintedTag]:
 
 
 def moving_tags(world: WorldDescription, props: Props, floor: int) -> Iterator[PrintedTag]:
-    """Those on the docks' fronts and between the shelves' hind legs."""
+    """Those on the docks' fronts and between the shelves' hind legs, and those that were hung up; world frame."""
+    yield from (tag for level, tag in props.tags.values() if level == floor)
     for number, storey in enumerate(world.floors):
         for index, dock in enumerate(storey.docks):
             where = props.solids.get(f"dock {number} {index}")

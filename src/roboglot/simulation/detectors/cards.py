@@ -8,7 +8,8 @@ import numpy as np
 
 from roboglot.model.geometry import Pose
 from roboglot.model.perception import Box, Colour, MarkerSeen, TagKind, TagSeen
-from roboglot.simulation.building.tags import Card, fixed_tags, moving_tags
+from roboglot.simulation.building.cards import Card
+from roboglot.simulation.building.tags import fixed_tags, moving_tags
 from roboglot.simulation.detectors.glance import Floats, Glance
 
 SLANT = math.radians(65)  # how far a card may be turned away

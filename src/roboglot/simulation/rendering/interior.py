@@ -15,7 +15,8 @@ from roboglot.simulation.building.blueprint import (
     Solid,
     holes_of,
 )
-from roboglot.simulation.building.tags import PrintedTag, fixed_tags
+from roboglot.simulation.building.cards import PrintedTag
+from roboglot.simulation.building.tags import fixed_tags
 from roboglot.simulation.people import figure
 from roboglot.simulation.rendering.figures import SHIRTS, person
 from roboglot.simulation.rendering.floor_plan import Plan

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import threading
+from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from enum import IntEnum
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +17,7 @@ from roboglot.simulation.building.printed_codes import april, qr
 
 SIZE = 256
 SMALLEST = 2
+SPARES_MAX = 32  # symbols that are asked for later; more than can hang at a time
 CODE = "code "
 Mask = NDArray[np.uint32]
 
@@ -45,11 +48,29 @@ class Masks:
         names = list(dict.fromkeys(symbols))
         self._symbols = {name: len(Texture) + number for number, name in enumerate(names)}
         surfaces = [_PAINTERS[texture] for texture in Texture]
+        self._spare: OrderedDict[str, int] = OrderedDict()  # asked for later, the oldest first
+        self._growing = threading.Lock()
         self.rows: Mask = np.stack([*(_surface(painter) for painter in surfaces), *(_symbol(name) for name in names)])
 
     def symbol(self, name: str) -> int:
-        """The texture that shows a marker's symbol. KeyError if it was not asked for at the start."""
-        return self._symbols[name]
+        """Return the texture that shows a marker's symbol; one that was not asked for at the start gets a spare row."""
+        known = self._symbols.get(name)
+        return self._spare_row(name) if known is None else known
+
+    def _spare_row(self, name: str) -> int:
+        """Rows that are drawn with now stay as they are: other threads may draw."""
+        with self._growing:
+            if name in self._spare:
+                self._spare.move_to_end(name)
+            elif len(self._spare) < SPARES_MAX:
+                self._spare[name] = len(self.rows)
+                self.rows = np.concatenate((self.rows, _symbol(name)[None]))
+            else:
+                _, row = self._spare.popitem(last=False)
+                rows = self.rows.copy()
+                rows[row] = _symbol(name)
+                self.rows, self._spare[name] = rows, row
+            return self._spare[name]
 
 
 @cache
@@ -57,7 +78,7 @@ def _surface(painter: Callable[[], NDArray[np.float64]]) -> Mask:
     return _with_copies(painter())
 
 
-@cache
+@lru_cache(maxsize=64)  # of worlds, and of tags that people think of
 def _symbol(name: str) -> Mask:
     match name:
         case "heart":

@@ -164,12 +164,19 @@ def _radio_problems(floor: Floor, where: str) -> Iterator[str]:
             yield f"{where}.gadgets[{i}].wearer = {gadget.wearer}, but the floor has {len(floor.people)} people"
 
 
+def tag_problem(kind: TagKind, text: str) -> str:
+    """Return why such a code cannot say ``text``; empty if it can."""
+    if kind is TagKind.APRIL and not (text.isdecimal() and text.isascii() and int(text) <= APRIL_MAX):
+        return f"an AprilTag has a number from 0 to {APRIL_MAX}"
+    if kind is TagKind.QR and not 0 < len(text.encode()) <= QR_BYTES_MAX:
+        return f"a QR code holds 1 to {QR_BYTES_MAX} bytes here"
+    return ""
+
+
 def _tag_problems(floor: Floor, where: str) -> Iterator[str]:
     for i, tag in enumerate(floor.tags):
-        if tag.kind is TagKind.APRIL and not (tag.text.isdecimal() and int(tag.text) <= APRIL_MAX):
-            yield f"{where}.tags[{i}].text = {tag.text!r}, but an AprilTag has a number from 0 to {APRIL_MAX}"
-        if tag.kind is TagKind.QR and len(tag.text.encode()) > QR_BYTES_MAX:
-            yield f"{where}.tags[{i}].text has more than the {QR_BYTES_MAX} bytes that a QR code holds here"
+        if problem := tag_problem(tag.kind, tag.text):
+            yield f"{where}.tags[{i}].text = {tag.text!r}, but {problem}"
 
 
 def _ground_problems(floor: Floor, where: str) -> Iterator[str]:

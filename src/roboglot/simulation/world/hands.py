@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,8 +15,10 @@ from roboglot.model.components.interaction.armor import PlatePlace
 from roboglot.model.components.sensing.touch import Touch, TouchKind
 from roboglot.model.errors import NotFound, Refused
 from roboglot.model.geometry import Point, Pose, Vector3
+from roboglot.model.perception import TagKind
 from roboglot.model.sound import Sound
-from roboglot.model.stage import ActiveFault, FaultKind, FloorPlan, Obstacle, Placed, Stage
+from roboglot.model.stage import ActiveFault, FaultKind, FloorPlan, HungTag, Obstacle, Placed, Stage
+from roboglot.simulation.building.cards import Card, PrintedTag
 from roboglot.simulation.building.outline import plan_of
 from roboglot.simulation.components.energy.battery import SimulatedBattery
 from roboglot.simulation.components.interaction.armor import SimulatedArmor
@@ -23,6 +26,7 @@ from roboglot.simulation.components.sensing.adapter import SimulatedSensorAdapte
 from roboglot.simulation.components.sensing.touch import SimulatedTouch
 from roboglot.simulation.people.stage_people import Actor
 from roboglot.simulation.sound.sound import Source
+from roboglot.simulation.world.description_checks import tag_problem
 from roboglot.simulation.world.environment import Environment
 from roboglot.simulation.world.placing import Places
 from roboglot.simulation.world.population import Population
@@ -30,6 +34,10 @@ from roboglot.simulation.world.saving import snapshot, world_toml
 
 if TYPE_CHECKING:
     from roboglot.simulation.faults.faults import Faults
+
+
+TAG_HEIGHT_MAX = 5.0  # m
+TAG_SIZE_MIN, TAG_SIZE_MAX = 0.02, 2.0  # m, as in world files
 
 
 class Hands(Stage):
@@ -69,6 +77,13 @@ class Hands(Stage):
     def obstacles(self) -> Sequence[Obstacle]:
         boxes = self._physics.obstacles.items()
         return [Obstacle(number, solid.pose, solid.size, floor) for number, (floor, solid) in boxes]
+
+    @property
+    def tags(self) -> Sequence[HungTag]:
+        return [
+            HungTag(number, tag.kind, tag.text, tag.card.pose, floor, tag.card.height, tag.card.size)
+            for number, (floor, tag) in self._physics.props.tags.items()
+        ]
 
     @property
     def floors(self) -> Sequence[FloorPlan]:
@@ -159,6 +174,40 @@ class Hands(Stage):
 
     def remove_obstacle(self, number: int) -> None:
         self._physics.remove_obstacle(number)
+
+    def move_obstacle(self, number: int, pose: Pose, floor: int) -> None:
+        self._check_inside(pose, floor)
+        self._physics.move_obstacle(number, pose, floor)
+
+    def add_tag(
+        self,
+        text: str,
+        pose: Pose,
+        floor: int = 0,
+        *,
+        kind: TagKind = TagKind.APRIL,
+        height: float = 0.4,
+        size: float = 0.16,
+    ) -> int:
+        self._check_inside(pose, floor)
+        if problem := tag_problem(kind, text):
+            raise ValueError(f"{problem}, not {text[:50]!r}")
+        if not (0.0 <= height <= TAG_HEIGHT_MAX and TAG_SIZE_MIN < size <= TAG_SIZE_MAX):
+            raise ValueError(
+                f"a tag is {TAG_SIZE_MIN} to {TAG_SIZE_MAX} m large and hangs up to {TAG_HEIGHT_MAX} m high"
+            )
+        return self._physics.props.hang(PrintedTag(kind, text, Card(pose, height, size)), floor)
+
+    def move_tag(self, number: int, pose: Pose, floor: int) -> None:
+        self._check_inside(pose, floor)
+        props = self._physics.props
+        if number not in props.tags:
+            raise NotFound(f"no tag {number} was hung up")
+        tag = props.tags[number][1]
+        props.tags[number] = floor, replace(tag, card=replace(tag.card, pose=pose))
+
+    def remove_tag(self, number: int) -> None:
+        self._physics.props.take_down(number)
 
     def make_sound(self, sound: Sound, at: Point, floor: int = 0, loudness: float = 1.0) -> None:
         self._environment.air.emit(Source(sound, at, floor, self._clock.time(), loudness))

@@ -143,6 +143,13 @@ class Physics:
         self.props.put(f"obstacle {number}", *self.obstacles[number])
         return number
 
+    def move_obstacle(self, number: int, pose: Pose, floor: int) -> None:
+        """Put a box elsewhere. Raises NotFound."""
+        if number not in self.obstacles:
+            raise NotFound(f"there is no obstacle {number}")
+        self.obstacles[number] = floor, Solid(Kind.FURNITURE, pose, self.obstacles[number][1].size)
+        self.props.put(f"obstacle {number}", *self.obstacles[number])
+
     def remove_obstacle(self, number: int) -> None:
         """Put it away."""
         if self.obstacles.pop(number, None) is None:

@@ -13,7 +13,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from roboglot.simulation.people.people import Walker
-from roboglot.simulation.world.description import Box, Floor, Person, Spot, Start, Thing, WorldDescription
+from roboglot.simulation.world.description import Box, Floor, Person, Spot, Start, Tag, Thing, WorldDescription
 from roboglot.simulation.world.environment import Environment
 from roboglot.simulation.world.population import Population
 
@@ -40,6 +40,18 @@ def _floor_now(number: int, floor: Floor, population: Population, environment: E
         for level, solid in population.physics.obstacles.values()
         if level == number
     ]
+    tags = [
+        Tag(
+            at=(_rounded(tag.card.pose.x), _rounded(tag.card.pose.y)),
+            text=tag.text,
+            kind=tag.kind,
+            facing=_degrees(tag.card.pose.yaw),
+            height=_rounded(tag.card.height),
+            size=_rounded(tag.card.size),
+        )
+        for level, tag in population.physics.props.tags.values()
+        if level == number
+    ]
     here = [walker for walker in population.walkers if walker.floor == number]
     people = tuple(_person_now(walker.person, walker) for walker in here)
     where = {id(walker.person): index for index, walker in enumerate(here)}
@@ -48,7 +60,15 @@ def _floor_now(number: int, floor: Floor, population: Population, environment: E
         for gadget in floor.gadgets
     )
     things = tuple(_thing_now(thing, environment) for thing in floor.things)
-    return replace(floor, furniture=(*floor.furniture, *boxes), people=people, gadgets=gadgets, things=things, like="")
+    return replace(
+        floor,
+        furniture=(*floor.furniture, *boxes),
+        tags=(*floor.tags, *tags),
+        people=people,
+        gadgets=gadgets,
+        things=things,
+        like="",
+    )
 
 
 def _person_now(person: Person, walker: Walker) -> Person:

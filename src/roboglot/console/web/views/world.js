@@ -13,6 +13,7 @@ const shape = signal(/** @type {any} */ (null));
 const tab = signal("people");
 const kind = signal("low_battery");
 const someone = signal("");
+const REACH = 0.5; // m from the middle of what is taken
 
 const facing = (from, to) => (to ? Math.atan2(to[1] - from[1], to[0] - from[0]) : 0);
 const arrow = (from, to) => { shape.value = { arrow: [from, Math.hypot(to[0] - from[0], to[1] - from[1]) > 0.15 ? to : null] }; };
@@ -24,12 +25,31 @@ async function draw(verb, values) { if ((await command(verb, values)) !== undefi
 const put = (verb) => ({ drag: arrow, drop, done: (from, to) => { drop(); changeWorld(verb, { ...inWorld(from, to), floor: floor() }); } });
 
 const chosenPerson = () => { const names = Object.keys(truth.value?.people ?? {}); return names.includes(someone.value) ? someone.value : names[0]; };
+
+/** What stands within reach of a place in the world, and how it is put elsewhere. */
+function under({ x, y }) {
+  const numbered = (name) => ({ number: Number(name), floor: floor() });
+  const kinds = { boxes: { verb: "move_box", what: numbered }, tags: { verb: "move_tag", what: numbered },
+    things: { verb: "move_thing", what: (thing) => ({ thing }) }, people: { verb: "place_person", what: (person) => ({ person }) } };
+  let nearest = null, best = REACH;
+  for (const [group, { verb, what }] of Object.entries(kinds)) for (const [name, p] of Object.entries(truth.value?.[group] ?? {})) {
+    const away = Math.hypot(p[0] - x, p[1] - y);
+    if (p[3] === floor() && away < best) { best = away; nearest = { verb, what: what(name) }; }
+  }
+  return nearest;
+}
+
 const WORLD_TOOLS = {
   box: put("add_box"),
   visitor: put("add_person"),
   person: { drag: arrow, drop, done: (from) => { drop(); const { x, y } = inWorld(from, null), person = chosenPerson();
     if (person) changeWorld("move_person", { person, x, y }); else say(t("people.none"), true); } },
-  move: { drag: arrow, drop, done: (from, to) => { drop(); changeWorld("place_robot", { robot: current.value, ...inWorld(from, to), floor: floor() }); } },
+  tag: { drag: arrow, drop, done: (from, to) => { drop(); const text = prompt(t("tag.text"), "0");
+    if (text) changeWorld("add_tag", { text, kind: /^\d+$/.test(text) ? "april" : "qr", ...inWorld(from, to), floor: floor() }); } },
+  sound: { drag: arrow, drop, done: (from) => { drop(); const { x, y } = inWorld(from, null); changeWorld("make_sound", { x, y, floor: floor() }); } },
+  move: { drag: arrow, drop, done: (from, to) => { drop(); const held = to && under(inWorld(from, null));
+    if (held) { const { x, y } = inWorld(to, null); changeWorld(held.verb, { ...held.what, x, y }); }
+    else changeWorld("place_robot", { robot: current.value, ...inWorld(from, to), floor: floor() }); } },
 };
 const MAP_TOOLS = {
   place: { drag: arrow, drop, done: (from, to) => { drop(); const name = prompt(t("place.name")); if (name) draw("add_place", { name, x: from[0], y: from[1], yaw: facing(from, to) }); } },
@@ -37,8 +57,8 @@ const MAP_TOOLS = {
   track: { drag: (from, to) => { shape.value = { line: [from, to] }; }, drop, done: (from, to) => { drop(); if (to) draw("add_line", { kind: "track", start: from, end: to }); } },
   area: { drag: (from, to) => { shape.value = { rectangle: [from, to] }; }, drop, done: (from, to) => { drop(); if (to) draw("add_area", rectangle(from, to)); } },
 };
-const NEEDS = { box: "add_box", visitor: "add_person", person: "move_person", move: "place_robot", place: "add_place", wall: "add_line", track: "add_line", area: "add_area" };
-const ICONS = { box: "box", visitor: "person", person: "route", move: "move", place: "place", wall: "wall", track: "route", area: "fit" };
+const NEEDS = { box: "add_box", tag: "add_tag", sound: "make_sound", visitor: "add_person", person: "move_person", move: "place_robot", place: "add_place", wall: "add_line", track: "add_line", area: "add_area" };
+const ICONS = { box: "box", tag: "keys", sound: "bolt", visitor: "person", person: "route", move: "move", place: "place", wall: "wall", track: "route", area: "fit" };
 
 function rectangle([x0, y0], [x1, y1]) {
   const middle = (y0 + y1) / 2;
@@ -46,7 +66,7 @@ function rectangle([x0, y0], [x1, y1]) {
 }
 
 function People() {
-  const names = Object.keys(truth.value?.people ?? {}), boxes = Object.keys(truth.value?.boxes ?? {});
+  const names = Object.keys(truth.value?.people ?? {}), boxes = Object.keys(truth.value?.boxes ?? {}), tags = Object.entries(truth.value?.tags ?? {});
   const chosen = chosenPerson();
   return html`<div class="card"><h3>${t("robot.hands")}</h3><div class="buttons">
       <${Button} label=${t("hands.push")} verb="push" onClick=${() => changeWorld("push", { robot: current.value, x: 8 })} />
@@ -60,7 +80,9 @@ function People() {
       <${Button} label=${t("say")} verb="person_says" onClick=${() => { const text = prompt(t("say.text")); if (text) changeWorld("person_says", { person: name, text }); }} />
       <${Button} label=${t("remove")} verb="remove_person" onClick=${() => changeWorld("remove_person", { person: name })} />`}</li>`)}</ul>` : html`<p class="muted">${t("people.none")}</p>`}</div>
     <div class="card"><h3>${t("boxes")}</h3>${boxes.length ? html`<ul class="list">${boxes.map((number) => html`<li><span>${t("box.number", { number })}</span>
-      <${Button} label=${t("remove")} verb="remove_box" onClick=${() => changeWorld("remove_box", { number: Number(number) })} /></li>`)}</ul>` : html`<p class="muted">${t("boxes.none")}</p>`}</div>`;
+      <${Button} label=${t("remove")} verb="remove_box" onClick=${() => changeWorld("remove_box", { number: Number(number) })} /></li>`)}</ul>` : html`<p class="muted">${t("boxes.none")}</p>`}</div>
+    <div class="card"><h3>${t("tags")}</h3>${tags.length ? html`<ul class="list">${tags.map(([number, p]) => html`<li><span>${p[4]}</span>
+      <${Button} label=${t("remove")} verb="remove_tag" onClick=${() => changeWorld("remove_tag", { number: Number(number) })} /></li>`)}</ul>` : html`<p class="muted">${t("tags.none")}</p>`}</div>`;
 }
 
 function Faults() {

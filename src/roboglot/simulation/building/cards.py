@@ -1,0 +1,26 @@
+"""Flat squares in the world, and what is printed on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from roboglot.model.geometry import Pose
+from roboglot.model.perception import TagKind
+
+
+@dataclass(frozen=True, slots=True)
+class Card:
+    """A flat square: ``pose`` in world, +x out of it; the ``height`` of its middle above the floor, m."""
+
+    pose: Pose
+    height: float
+    size: float
+
+
+@dataclass(frozen=True, slots=True)
+class PrintedTag:
+    """A card and what is printed on it."""
+
+    kind: TagKind
+    text: str
+    card: Card
