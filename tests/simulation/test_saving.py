@@ -10,6 +10,7 @@ import pytest
 
 from roboglot.model.clock import LockstepClock
 from roboglot.model.geometry import Pose, Vector3
+from roboglot.simulation.world.description import Box
 from roboglot.simulation.world.saving import world_toml
 from roboglot.simulation.world.world import RobotPlacement, World
 from roboglot.simulation.world.world_files import WORLDS, load_world
@@ -40,6 +41,7 @@ async def test_what_hands_did_is_in_the_file(tmp_path: Path) -> None:
     robot = again.hands.robots[0].pose
     assert (robot.x, robot.y, robot.yaw) == pytest.approx((3.0, 2.0, 1.0), abs=1e-3)
     box = load_world(str(path)).floors[0].furniture[-1]
+    assert isinstance(box, Box)
     assert (box.at, box.size) == ((2.5, 1.5), (0.5, 0.3, 0.8))
     tag = load_world(str(path)).floors[0].tags[-1]
     assert (tag.text, tag.at, tag.facing, tag.height, tag.size) == ("12", (1.0, 2.0), 90.0, 0.5, 0.2)
