@@ -85,18 +85,8 @@ def main() -> None:
     """``roboglot COMMAND …``; the commands' own options come from Typer."""
     _tolerate_plain_terminals()
     name = sys.argv[1] if len(sys.argv) > 1 else "--help"
-    if name in ("--help", "-h"):
-        _print_usage()
-        return
-    if name == "--version":
-        from roboglot.cli.about import about
-
-        print("\n".join(about()))
-        return
-    if name not in COMMANDS:
-        sys.exit(f"roboglot: there is no command {name!r}; there are {', '.join(COMMANDS)}")
     try:
-        _run(name)
+        _obey(name)
     except ImportError as missing:
         words = explained(missing, f"roboglot {name}", EXTRAS.get(name, ""))
         if words is None:
@@ -107,6 +97,21 @@ def main() -> None:
     except BrokenPipeError:  # the reader of our output has gone, as with `| head`
         sys.stderr.close()
         sys.exit(1)
+
+
+def _obey(name: str) -> None:
+    if name in ("--help", "-h"):
+        _print_usage()
+    elif name == "--version":
+        from roboglot.cli.about import about
+
+        print("\n".join(about()))
+    elif name in COMMANDS:
+        app = loaded(name)
+        sys.argv[:2] = [f"roboglot {name}"]
+        app(prog_name=f"roboglot {name}")
+    else:
+        sys.exit(f"roboglot: there is no command {name!r}; there are {', '.join(COMMANDS)}")
 
 
 def _tolerate_plain_terminals() -> None:
@@ -121,12 +126,6 @@ def _print_usage() -> None:
     for command, meaning in COMMANDS.items():
         print(f"  {command:10} {meaning}")
     print("\nroboglot COMMAND --help lists the options of a command.")
-
-
-def _run(name: str) -> None:
-    app = loaded(name)
-    sys.argv[:2] = [f"roboglot {name}"]
-    app()
 
 
 def loaded(name: str) -> typer.Typer:

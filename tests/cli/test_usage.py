@@ -1,0 +1,24 @@
+"""What the command says of itself, however it is called, and to readers that go."""
+
+import subprocess
+import sys
+
+import pytest
+
+
+def ended(*arguments: str, reader: str = "cat") -> "subprocess.CompletedProcess[str]":
+    """Run ``python -m roboglot`` with its output going to ``reader``; its own status comes last."""
+    line = f"{sys.executable} -m roboglot {' '.join(arguments)} | {reader}; exit ${{PIPESTATUS[0]}}"
+    return subprocess.run(["bash", "-c", line], capture_output=True, text=True, check=False, timeout=60)
+
+
+@pytest.mark.parametrize("name", ["up", "access"])
+def test_usage_names_the_command_as_it_is_installed(name: str) -> None:
+    done = ended(name, "--nonsense")
+    assert done.returncode == 2
+    assert f"Usage: roboglot {name} " in done.stderr
+
+
+@pytest.mark.parametrize("words", [("--help",), ("--version",), ("coverage",)])
+def test_a_reader_that_goes_is_no_error_worth_a_traceback(words: tuple[str, ...]) -> None:
+    assert ended(*words, reader="true").stderr == ""
