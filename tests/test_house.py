@@ -2,6 +2,7 @@
 
 import ast
 import re
+import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from functools import cache
@@ -161,3 +162,17 @@ def _reach(graph: Mapping[str, set[str]], begin: set[str]) -> set[str]:
 def test_untyped_places_become_fewer() -> None:
     """Lines of src with ``Any``; may only shrink."""
     assert sum(len(re.findall(r"^.*\bAny\b.*$", path.read_text(), re.MULTILINE)) for path in SOURCES) <= ANY_MAX
+
+
+def test_the_layers_in_the_docs_are_those_that_are_enforced() -> None:
+    """The page lists each package once, from top to bottom, as import-linter has them."""
+    page = (ROOT / "docs" / "architecture.md").read_text().partition("## Layers")[2].partition("\n## ")[0]
+    listed = [
+        re.findall(r"`(\w+)`", line.partition("**: ")[0]) for line in page.splitlines() if line.startswith("- **")
+    ]
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
+    layers = next(contract for contract in contracts if contract["id"] == "layers")["layers"]
+    rank = {package: number for number, layer in enumerate(layers) for package in layer.split(" | ")}
+    packages = [package for line in listed for package in line]
+    assert sorted(packages) == sorted(rank)
+    assert [rank[package] for package in packages] == sorted(rank.values())
