@@ -84,13 +84,15 @@ def run_process() -> NoReturn:
 def main() -> None:
     """``roboglot COMMAND …``; the commands' own options come from Typer."""
     _tolerate_plain_terminals()
-    name = sys.argv[1] if len(sys.argv) > 1 else "--help"
+    arguments = sys.argv[1:] or ["--help"]
+    name = arguments[0]
     try:
         _obey(name)
     except ImportError as missing:
         words = explained(missing, f"roboglot {name}", EXTRAS.get(name, ""))
         if words is None:
             raise
+        _run_with_extra(name, arguments)
         sys.exit(words)
     except KeyboardInterrupt:  # before the command has handlers of its own
         sys.exit(130)
@@ -112,6 +114,14 @@ def _obey(name: str) -> None:
         app(prog_name=f"roboglot {name}")
     else:
         sys.exit(f"roboglot: there is no command {name!r}; there are {', '.join(COMMANDS)}")
+
+
+def _run_with_extra(name: str, arguments: list[str]) -> None:
+    """Run the command again with its extra where that leaves nothing behind; return where it would."""
+    from roboglot.cli import throwaway
+
+    if name in EXTRAS and (command := throwaway.runner()):
+        throwaway.run_again(command, EXTRAS[name], arguments)
 
 
 def _tolerate_plain_terminals() -> None:

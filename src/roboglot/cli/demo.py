@@ -14,6 +14,7 @@ import typer
 
 from roboglot.cli.checks.listeners import holder_of
 from roboglot.config import Config
+from roboglot.extras import MissingExtra, in_words
 from roboglot.protocols import DOORS
 from roboglot.testing.process import NotUp
 
@@ -28,7 +29,7 @@ def command(
 ) -> None:
     """Four independent clients, one after the other, drive the same robot; all four say where it is."""
     if missing := [package for package in PACKAGES if find_spec(package) is None]:
-        sys.exit(f"roboglot demo needs {', '.join(missing)}: pip install 'roboglot[demo]'")
+        raise MissingExtra(in_words("roboglot demo", missing, "demo"))
     if problem := _obstacle(address, out):
         sys.exit(f"roboglot demo: {problem}")
     os.environ.setdefault("GRPC_VERBOSITY", "ERROR")  # a robot that hangs up is no news to this phone
