@@ -60,25 +60,30 @@ function defineFunction(f, value) {
   };
 }
 
-/** A module of one's own as a block. @param {{id: string, condition: string, describe: string}} module */
+/** A module of one's own as blocks, without and with what it returns. @param {{id: string, condition: string, describe: string}} module @returns {string[]} */
 export function defineModule({ condition, describe }) {
   const [, name, inside] = /^\s*(\w+)\s*\(([^)]*)\)/.exec(condition) ?? [];
-  if (!name) return "";
+  if (!name) return [];
   const parameters = inside.split(",").map((text) => text.split("=")[0].trim()).filter(Boolean);
-  const type = `module ${name}`;
-  Blocks[type] = {
-    init() {
-      this.appendDummyInput().appendField(name);
-      for (const p of parameters) this.appendValueInput(p).appendField(p);
-      this.setInputsInline(true);
-      this.setPreviousStatement(true);
-      this.setNextStatement(true);
-      this.setStyle("procedure_blocks");
-      this.setTooltip(describe);
-    },
-  };
-  python.forBlock[type] = (block) => `${name}(${parameters.map((p) => python.valueToCode(block, p, Order.NONE) || "None").join(", ")})\n`;
-  return type;
+  return [false, true].map((value) => {
+    const type = `${value ? "value " : ""}module ${name}`;
+    Blocks[type] = {
+      init() {
+        this.appendDummyInput().appendField(name);
+        for (const p of parameters) this.appendValueInput(p).appendField(p);
+        this.setInputsInline(true);
+        if (value) this.setOutput(true, null);
+        else { this.setPreviousStatement(true); this.setNextStatement(true); }
+        this.setStyle("procedure_blocks");
+        this.setTooltip(describe);
+      },
+    };
+    python.forBlock[type] = (block) => {
+      const code = `${name}(${parameters.map((p) => python.valueToCode(block, p, Order.NONE) || "None").join(", ")})`;
+      return value ? [code, Order.FUNCTION_CALL] : `${code}\n`;
+    };
+    return type;
+  });
 }
 
 /** The Python of a parameter that nothing is put into. @param {any} p */

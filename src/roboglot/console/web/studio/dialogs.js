@@ -4,6 +4,7 @@ import { useEffect, useRef } from "preact/hooks";
 import { Button, html, say, t } from "../base.js";
 import * as editor from "./editor.js";
 import { frame } from "./link.js";
+import { openModule, removeModule } from "./modules.js";
 import { changed, download, fresh, list, listed, openStored, program, python, remove, saveFrame, show, upload, versions } from "./program.js";
 import { catchUp, operate } from "./runner.js";
 
@@ -38,7 +39,9 @@ export function Library() {
       <label class="button">${t("studio.file.open")}<input type="file" class="unseen" accept=".json,.py,.txt" onChange=${async (e) => { try { await upload(e.target.files[0]); close(); } catch (error) { say(t("studio.file.bad", { why: error.message }), true); } }} /></label></div>
     <h3>${t("studio.on.robot")}</h3>
     ${listed.value.length ? html`<ul class="rows">${listed.value.map((item) => html`<${Row} key=${item.id} item=${item} />`)}</ul>` : html`<p class="muted">${t("studio.on.robot.none")}</p>`}
-    ${editor.modules.value.length > 0 && html`<h3>${t("studio.toolbox.modules")}</h3><ul class="rows">${editor.modules.value.map((m) => html`<li><span class="grow"><b>${m.condition}</b><small>${m.describe}</small></span></li>`)}</ul>`}
+    ${editor.modules.value.length > 0 && html`<h3>${t("studio.toolbox.modules")}</h3><ul class="rows">${editor.modules.value.map((m) => html`<li><span class="grow"><b>${m.condition}</b><small>${m.describe}</small></span>
+      <${Button} label=${t("studio.open")} onClick=${() => openModule(m).then(close, (error) => say(error.message, true))} />
+      <${Button} kind="danger" label=${t("studio.delete")} onClick=${() => { if (confirm(t("studio.delete.sure", { name: m.condition }))) removeModule(m).catch((error) => say(error.message, true)); }} /></li>`)}</ul>`}
     <h3>${t("studio.file.save")}</h3>
     <div class="buttons"><${Button} label=${t("studio.file.json")} onClick=${() => download("json")} /><${Button} label=${t("studio.file.py")} onClick=${() => download("py")} />
       ${program.value.kind === "blocks" && html`<${Button} label=${t("studio.file.style")} onClick=${() => download("style")} />`}</div>

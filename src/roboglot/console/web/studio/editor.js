@@ -34,7 +34,7 @@ export function remake() {
   Blockly.setLocale(Blockly.messages[language.value] ?? Blockly.messages.en);
   Blockly.Msg.PROCEDURES_HUE = "#a33b5e";
   workspace = Blockly.inject(place, {
-    toolbox: toolbox(modules.value.map(defineModule).filter(Boolean), allowed), renderer: "zelos", theme: theme(look.value), media: "/studio/vendor/media/", sounds: false,
+    toolbox: toolbox(modules.value.flatMap(defineModule), allowed), renderer: "zelos", theme: theme(look.value), media: "/studio/vendor/media/", sounds: false,
     trashcan: true, comments: true, maxTrashcanContents: 20, move: { scrollbars: true, drag: true, wheel: true },
     zoom: { controls: true, wheel: false, pinch: true, startScale: place.clientWidth < 600 ? 0.65 : 0.8, maxScale: 2, minScale: 0.3 },
   });
@@ -121,7 +121,18 @@ export const isEmpty = () => !workspace || workspace.getAllBlocks(false).length 
 /** Show only what a mission allows, or everything. @param {string[] | null} types */
 export function allow(types) {
   allowed = types && new Set(types);
-  if (workspace) workspace.updateToolbox(toolbox(modules.value.map(defineModule).filter(Boolean), allowed));
+  showModules();
+}
+
+/** The modules that there are now, in the toolbox. */
+export function showModules() { if (workspace) workspace.updateToolbox(toolbox(modules.value.flatMap(defineModule), allowed)); }
+
+/** Blocks to look at, in `element`. @param {HTMLElement} element @param {any} state */
+export function picture(element, state) {
+  const made = Blockly.inject(element, { readOnly: true, renderer: "zelos", theme: theme(look.value), media: "/studio/vendor/media/", sounds: false,
+    move: { scrollbars: true, drag: true }, zoom: { controls: false, startScale: 0.65 } });
+  Blockly.serialization.workspaces.load(state, made);
+  return made;
 }
 
 /** Light one block and no other. @param {string} id @param {boolean} [look] bring it into view */

@@ -9,6 +9,7 @@ import { Group } from "./class.js";
 import { Keys, Library, Schedule, shown } from "./dialogs.js";
 import * as editor from "./editor.js";
 import { connect, online, open, opened, unopened } from "./link.js";
+import { Inside } from "./modules.js";
 import { Missions, allowHere, loadMissions } from "./missions.js";
 import { Output, Python, RobotPanel, TextEditor, Values } from "./panels.js";
 import { body, changed, handOver, list, program, rename, restore, stored } from "./program.js";
@@ -70,7 +71,8 @@ function Banner() {
 function Blocks() {
   const place = useRef(null);
   useEffect(() => { editor.mount(place.current); restore(); runner.check(); }, []);
-  return html`<div class="workspace" ref=${place} hidden=${program.value.kind !== "blocks"}></div>${program.value.kind === "text" && html`<${TextEditor} />`}`;
+  return html`<div class="workspace" ref=${place} hidden=${program.value.kind !== "blocks"}></div>${program.value.kind === "text" && html`<${TextEditor} />`}
+    ${program.value.kind === "blocks" && html`<${Inside} name=${runner.phase.value === "idle" ? "" : runner.module.value} block=${runner.lit.value} />`}`;
 }
 
 function Side() {

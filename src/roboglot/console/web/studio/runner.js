@@ -5,6 +5,7 @@ import { blocksOfLines } from "./blocks.js";
 import * as bubbles from "./bubbles.js";
 import * as editor from "./editor.js";
 import { ask, debug, frame, listen, online, opened } from "./link.js";
+import { learn, ownerOf } from "./modules.js";
 import { isStored, program, python, saveFrame } from "./program.js";
 
 const LINES_MAX = 500, READINGS_MAX = 40;
@@ -49,6 +50,7 @@ async function runNow(step) {
   if (phase.value !== "idle") return undefined;
   if (!python().trim()) { say(t("studio.empty")); return undefined; }
   phase.value = "starting";
+  learn(python());
   began = performance.now();
   printed.value = []; readings.value = []; variables.value = {}; failure.value = null; bubbles.clear();
   try {
@@ -126,6 +128,7 @@ export async function catchUp() {
 
 /** What was missed of the program while the page was away. */
 async function rejoin() {
+  await learn(python());
   const { log, where } = await ask({ type: "fetch", program: program.value.id });
   printed.value = log.slice(-LINES_MAX).map(entry);
   phase.value = where.state === "suspend" ? "paused" : "running";
@@ -151,7 +154,7 @@ function draw() {
   requestAnimationFrame(() => {
     frameDue = false;
     const known = editor.light(phase.value === "idle" ? "" : lit.value, phase.value === "paused");
-    if (!known && lit.value && !module.value && program.value.kind === "blocks") module.value = "…";
+    if (!known && lit.value && !module.value && program.value.kind === "blocks") module.value = ownerOf(lit.value) || "…";
   });
 }
 
