@@ -28,7 +28,9 @@ COVERED_OR_CUT = """() => {
     const bad = [], blame = (what, e) => bad.push(`${what}: ${e.outerHTML.slice(0, 90)}`);
     for (const e of document.querySelectorAll('button, a, select, input, h2, h3')) {
         const b = e.getBoundingClientRect(), x = b.x + b.width / 2, y = b.y + b.height / 2;
-        const top = document.elementFromPoint(x, y), pane = e.closest('.panel, main, nav, header');
+        const top = document.elementFromPoint(x, y);
+        let pane = e.parentElement;
+        while (pane && !/auto|scroll/.test(getComputedStyle(pane).overflowY)) pane = pane.parentElement;
         if (!e.checkVisibility() || b.width < 2 || !top) continue;
         const shown = pane?.getBoundingClientRect();
         if (shown && (y < shown.top || y > shown.bottom)) continue; // scrolled away

@@ -43,13 +43,13 @@ async def kept_as_module(page: Page) -> None:
     block = page.locator("[data-id=def] > .blocklyPath").first
     await block.click(button="right", position={"x": 12, "y": 12})
     await page.click("text=Keep as a module")
+    await until(page, "!studio.editor.code.value.includes('def ')")
     await until(page, "studio.editor.modules.value.some(m => m.condition.startsWith('double'))")
 
 
 async def test_a_function_becomes_a_module_that_is_lit_inside(studio: Open, opened: Served) -> None:
     page = await loaded(await studio(), DOUBLE)
     await kept_as_module(page)
-    await until(page, "!studio.editor.code.value.includes('def ')")
     assert "double(21)" in await page.evaluate("studio.editor.code.value")
     await page.click("text=Run")
     await until(page, "studio.runner.lit.value === 'inner'")
@@ -66,7 +66,6 @@ async def test_a_function_becomes_a_module_that_is_lit_inside(studio: Open, open
 async def test_stepping_goes_through_the_blocks_of_a_module(studio: Open, opened: Served) -> None:
     page = await loaded(await studio(), DOUBLE)
     await kept_as_module(page)
-    await until(page, "!studio.editor.code.value.includes('def ')")
     await page.keyboard.press("F8")
     await phase(page, "paused")
     assert await page.evaluate("studio.runner.lit.value") == "say"
@@ -89,7 +88,6 @@ async def test_a_module_is_opened_changed_and_deleted(studio: Open, opened: Serv
     await page.evaluate("studio.editor.workspace.getBlockById('sum').setFieldValue('MULTIPLY', 'OP')")
     await until(page, "studio.editor.code.value.includes('x * x')")
     await kept_as_module(page)
-    await until(page, "!studio.editor.code.value.includes('def ')")
     await page.click("text=Programs")
     await row.locator("text=Open").click()
     await until(page, "studio.editor.code.value.includes('x * x')")
