@@ -1,8 +1,10 @@
 """Settings for all tests: examples are the same in every run, and a slow machine is no failure."""
 
+import contextlib
 import fcntl
 import functools
 import gc
+import importlib
 import importlib.util
 import inspect
 import re
@@ -12,6 +14,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -56,6 +59,21 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     return bool(BUILDS_A_WORLD.search(text) or STARTS_A_PROCESS.search(text)) or None
 
 
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Have each worker rewrite the assertions of its share of files, not every one those of all.
+
+    The others find them in the cache. What cannot be imported is reported when it is collected.
+    """
+    worker: dict[str, Any] = getattr(session.config, "workerinput", {})
+    if not worker or not all((TESTS.parent / argument).is_dir() for argument in session.config.args):
+        return
+    files = sorted(file for argument in session.config.args for file in (TESTS.parent / argument).rglob("test_*.py"))
+    for file in files[int(worker["workerid"].removeprefix("gw")) :: worker["workercount"]]:
+        if file.is_relative_to(TESTS) and not pytest_ignore_collect(file, session.config):
+            with contextlib.suppress(Exception, pytest.skip.Exception):
+                importlib.import_module(".".join(file.relative_to(TESTS.parent).with_suffix("").parts))
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Set the markers that follow from where a test stands and from the fixtures that it uses."""
@@ -63,31 +81,42 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         folder = item.path.relative_to(TESTS).parts[0]
         if folder in PROCESSES or folder.endswith(".py"):
             item.add_marker("process")
-        sources = _sources(item)
-        if WORLDS & set(getattr(item, "fixturenames", ())) or any(map(BUILDS_A_WORLD.search, sources)):
-            item.add_marker("simulated")
-        if any(map(STARTS_A_PROCESS.search, sources)):
-            item.add_marker("process")
+        traits = set.union(_file_traits(item.path), *map(_traits, _fixtures(item)))
+        if WORLDS & set(getattr(item, "fixturenames", ())):
+            traits.add("simulated")
+        for trait in sorted(traits):
+            item.add_marker(trait)
 
 
-def _sources(item: pytest.Item) -> list[str]:
-    """What a test is made of: its file, the helpers that it imports, and its fixtures."""
-    text = _text(item.path)
-    helpers = [TESTS.parent / f"{name.replace('.', '/')}.py" for name in HELPERS.findall(text)]
-    found = [text, *(_text(path) for path in helpers if path.name != "conftest.py" and path.is_file())]
+def _fixtures(item: pytest.Item) -> set[Callable[..., object]]:
+    """The functions of ours that make a test's fixtures."""
     known = getattr(getattr(item, "_fixtureinfo", None), "name2fixturedefs", {})
     made_by = {definition.func for definitions in known.values() for definition in definitions}
-    return found + [_source(function) for function in made_by if function.__module__.startswith("tests.")]
+    return {function for function in made_by if function.__module__.startswith("tests.")}
+
+
+@functools.cache
+def _file_traits(path: Path) -> set[str]:
+    """What a file of tests and the helpers that it imports are marked with."""
+    text = _text(path)
+    helpers = [TESTS.parent / f"{name.replace('.', '/')}.py" for name in HELPERS.findall(text)]
+    texts = [text, *(_text(helper) for helper in helpers if helper.name != "conftest.py" and helper.is_file())]
+    return set.union(*map(_traits_of, texts))
+
+
+@functools.cache
+def _traits(function: Callable[..., object]) -> set[str]:
+    return _traits_of(inspect.getsource(function))
+
+
+def _traits_of(source: str) -> set[str]:
+    simulated, process = BUILDS_A_WORLD.search(source), STARTS_A_PROCESS.search(source)
+    return {trait for trait, found in (("simulated", simulated), ("process", process)) if found}
 
 
 @functools.cache
 def _text(path: Path) -> str:
     return path.read_text(encoding="utf-8")
-
-
-@functools.cache
-def _source(function: Callable[..., object]) -> str:
-    return inspect.getsource(function)
 
 
 def pytest_collection_finish() -> None:

@@ -16,6 +16,7 @@ NAVIGATION = (
     "distance",
     "graph",
     "obstacles",
+    "depth",
     "matching",
     "occupancy",
     "touring",
@@ -24,7 +25,7 @@ NAVIGATION = (
     "relocation",
     "smoothing",
 )
-MODULES = (*NAVIGATION, "raster_shading", "raster", "sweep", "raster_rooms")
+MODULES = (*NAVIGATION, "raster_shading", "raster", "sweep", "rays", "raster_rooms")
 
 
 @contextmanager

@@ -7,9 +7,15 @@ faster.
 
 from __future__ import annotations
 
-from functools import partial
-from typing import Any
+from collections.abc import Callable
+from typing import TypeVar
 
 from numba import njit
 
-kernel: Any = partial(njit, cache=True, nogil=True, no_cfunc_wrapper=True)
+F = TypeVar("F", bound=Callable[..., object])
+
+
+def kernel(signature: str | None = None, **options: object) -> Callable[[F], F]:
+    """Compile a function for this signature (None: for what it is called with); ``options`` are Numba's."""
+    compiled: Callable[[F], F] = njit(signature, cache=True, nogil=True, no_cfunc_wrapper=True, **options)
+    return compiled

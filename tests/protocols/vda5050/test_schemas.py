@@ -5,31 +5,39 @@
 
 from __future__ import annotations
 
+import functools
 import json
 from pathlib import Path
 from typing import Any
 
-import jsonschema
 import pytest
 from hypothesis import given, settings
-from vda5050.validation import SchemaValidator
 
 from tests.protocols.vda5050.conftest import Opened
 from tests.protocols.vda5050.orders import action, encoded, instant, order, valid_orders
 
 FOLDER = Path(__file__).with_name("schemas")
-OFFICIAL = SchemaValidator()
-OWN = {
-    file.stem: jsonschema.Draft202012Validator(json.loads(file.read_text()), format_checker=jsonschema.FormatChecker())
-    for file in FOLDER.glob("*.json")
-}
+
+
+@functools.cache
+def validators() -> tuple[Any, dict[str, Any]]:
+    """Those of 2.1 and of 3.0; made when they are used, since other workers of the suite only collect this file."""
+    import jsonschema
+    from vda5050.validation import SchemaValidator
+
+    checker = jsonschema.FormatChecker()
+    schemas = {file.stem: json.loads(file.read_text()) for file in FOLDER.glob("*.json")}
+    ours = {name: jsonschema.Draft202012Validator(schema, format_checker=checker) for name, schema in schemas.items()}
+    return SchemaValidator(), ours
 
 
 def complaints(version: str, name: str, message: dict[str, Any]) -> list[str]:
     """What the schema has against a message."""
+    official, ours = validators()
     if version == "2.1":
-        return OFFICIAL.errors(name, message)
-    return [f"{error.json_path}: {error.message}" for error in OWN[name].iter_errors(message)]
+        found: list[str] = official.errors(name, message)
+        return found
+    return [f"{error.json_path}: {error.message}" for error in ours[name].iter_errors(message)]
 
 
 @pytest.mark.parametrize(("version", "number"), [("2.1", "2.1.0"), ("3.0", "3.0.0")])

@@ -6,6 +6,7 @@ Floors and ramps are no obstacles: only what rises more steeply than a wheel cou
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -17,9 +18,6 @@ from roboglot.model.components.sensing.depth_camera import DepthCamera, DepthIma
 from roboglot.model.components.sensing.time_of_flight import TimeOfFlight, ZoneDistances
 from roboglot.model.robot import Robot
 
-LOW, FLOOR = 0.10, 0.04  # m above the floor: what is lower is stepped over; is floor, for sure
-STEEP = 0.7  # rise per way from which a surface is a wall
-NEAR = 2.5  # m from base_link within which depth is precise enough
 GRASP, GRASP_SIDE = 0.6, 0.12  # m ahead and aside where what the gripper holds is
 
 Points = NDArray[np.float64]
@@ -38,46 +36,39 @@ class LowSight:
     """Looks when asked, at what the sensors measure then."""
 
     def __init__(self, robot: Robot) -> None:
-        self._robot = robot
+        from roboglot.kernels.depth import sort_out  # it takes Numba
+
+        self._robot, self._height = robot, robot.description.height
+        self._sort_out: Callable[[Points, Points, Points, float], tuple[Points, Points]] = sort_out
 
     def look(self) -> LowView:
         """All sensors together; nothing for a robot without any."""
-        robot, grids = self._robot, list[Points]()
+        robot, views = self._robot, list[tuple[Points, Points]]()
         if DepthCamera in robot and (image := robot[DepthCamera].image) is not None:
-            grids.append(_depth_grid(image))
+            views.append(self._in_image(image))
         if TimeOfFlight in robot:
             eyes = robot[TimeOfFlight]
-            zones = [_zone_grid(eyes.reading(name)) for name in eyes.names]
-            grids += [np.stack(zones)] if len({grid.shape for grid in zones}) == 1 else zones
-        if not grids:
+            views += [self._in_zones(eyes.reading(name)) for name in eyes.names]
+        if not views:
             return LowView(NONE, NONE)
-        seen = [_sorted_out(grid, robot.description.height) for grid in grids]
-        obstacles = np.concatenate([view.obstacles for view in seen])
+        obstacles = np.concatenate([standing for standing, _ in views])
         if Gripper in robot and robot[Gripper].status is not GripperStatus.OPEN:
             held = (obstacles[:, 0] > 0.0) & (obstacles[:, 0] < GRASP) & (np.abs(obstacles[:, 1]) < GRASP_SIDE)
             obstacles = obstacles[~held]
         outside = np.hypot(obstacles[:, 0], obstacles[:, 1]) > robot.description.radius
-        return LowView(obstacles[outside], np.concatenate([view.floor for view in seen]))
+        return LowView(obstacles[outside], np.concatenate([floor for _, floor in views]))
 
+    def _in_image(self, image: DepthImage) -> tuple[Points, Points]:
+        """What stands and what is floor in the picture of a depth camera."""
+        rays = _rays(image.depths.shape, image.width, image.height, image.attitude.pitch)
+        mount = np.array((image.mount.x, image.mount.y, image.mount.z))
+        return self._sort_out(rays, image.depths.astype(np.float64), mount, self._height)
 
-def _sorted_out(grid: Points, height: float) -> LowView:
-    """What of ``grid`` (any number of sensors, rows from above, columns, x y z; NaN: no echo) stands, what is floor."""
-    away, z = np.hypot(grid[..., 0], grid[..., 1]), grid[..., 2]
-    upper, beside = z[..., :-1, :], away[..., :-1, :]
-    with np.errstate(invalid="ignore"):
-        rise, way = upper - z[..., 1:, :], beside - away[..., 1:, :]  # each against what is seen right below
-        stands = (rise > STEEP * np.maximum(way, 0.0)) & (upper > LOW) & (upper < height) & (beside < NEAR)
-        floor = (np.abs(z) < FLOOR) & (away < NEAR)
-    return LowView(grid[..., :-1, :, :][stands][:, :2], grid[floor][:, :2])
-
-
-def _depth_grid(image: DepthImage) -> Points:
-    """Every pixel's place in base_link."""
-    depths = np.where(np.isfinite(image.depths), image.depths, np.nan).astype(np.float64)
-    mount = np.array((image.mount.x, image.mount.y, image.mount.z))
-    rays = _rays(image.depths.shape, image.width, image.height, image.attitude.pitch)
-    grid: Points = rays * depths[..., None] + mount
-    return grid
+    def _in_zones(self, reading: ZoneDistances) -> tuple[Points, Points]:
+        """The same in the zones of a time-of-flight sensor."""
+        rays = reading.rays.astype(np.float64).reshape(*reading.distances.shape, 3)
+        eye = np.array((reading.eye.x, reading.eye.y, reading.eye.z))
+        return self._sort_out(rays, reading.distances.astype(np.float64), eye, self._height)
 
 
 @lru_cache(maxsize=64)
@@ -89,13 +80,4 @@ def _rays(shape: tuple[int, int], width: float, height: float, pitch: float) -> 
     left, up = np.meshgrid(across, down)
     c, s = math.cos(pitch), math.sin(pitch)
     rays: Points = np.stack((c + s * up, left, c * up - s), axis=-1)
-    rays.setflags(write=False)
     return rays
-
-
-def _zone_grid(reading: ZoneDistances) -> Points:
-    """Every zone's place in base_link."""
-    ways = np.where(np.isfinite(reading.distances), reading.distances, np.nan).astype(np.float64)
-    rays = reading.rays.astype(np.float64).reshape(*ways.shape, 3)
-    grid: Points = rays * ways[..., None] + np.array((reading.eye.x, reading.eye.y, reading.eye.z))
-    return grid

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -58,7 +58,8 @@ class Sight:
         self._terrain = [floor.relief for floor in world.floors]
         self._dark: dict[tuple[int, float, float], tuple[Rows, Rows]] = {}  # by floor, height and share
         self._moving: dict[tuple[int, float], Rows] = {}  # what stands round and moves, by floor and height
-        self._cast, self.blur = _sweep, blur
+        self._cast: Callable[..., Distances] = _sweep
+        self.blur: Callable[..., NDArray[np.float32]] = blur
         self._edges: dict[tuple[int, float], tuple[int, Rows]] = {}  # by floor and height, with the props' revision
 
     def load_kernel(self) -> None:

@@ -181,10 +181,11 @@ class World:
             await self._loading
 
     async def _load_kernels(self) -> None:
-        """Have the lidars use the compiled kernel; compile it first, in a process of its own, where it is not."""
-        with contextlib.suppress(KernelsUnavailable):  # autonomy reports it; lidars go on without
-            await compile_beside(("sweep",))
+        """Have the sensors use the compiled kernels; missing ones are compiled first, in a process of their own."""
+        with contextlib.suppress(KernelsUnavailable):  # autonomy reports it; sensors go on without
+            await compile_beside(("sweep", "rays"))
             await load(self._environment.sight.load_kernel)
+            await load(self._environment.rays.load_kernel)
 
     def start(self) -> None:
         """Let time pass; needs the running loop."""

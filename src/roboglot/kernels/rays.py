@@ -1,0 +1,175 @@
+"""Rays in three dimensions against spheres, capsules, cylinders and boxes, exactly, as MuJoCo's own ray casting finds
+them, in a fraction of its time: what lies out of reach is left out once, what lies behind a hit is not looked at.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.kernels.compiled import kernel
+
+Floats = NDArray[np.float64]
+SPHERE, CAPSULE, CYLINDER, BOX = 2, 3, 5, 6  # as in MuJoCo's mjtGeom
+
+
+@kernel("float64(float64, float64, float64)")
+def _first(a: float, b: float, c: float) -> float:
+    """The smaller root that is not negative of a x^2 + 2 b x + c; inf if there is none."""
+    root = b * b - a * c
+    if root < 0.0 or a < 1e-15:
+        return np.inf
+    root = math.sqrt(root)
+    near, far = (-b - root) / a, (-b + root) / a
+    if near >= 0.0:
+        return near
+    return far if far >= 0.0 else np.inf
+
+
+@kernel("float64(float64, float64, float64, float64, float64, float64, float64, float64)")
+def _shell(x: float, y: float, z: float, dx: float, dy: float, dz: float, radius: float, half: float) -> float:
+    """Where a ray meets the round side of an upright cylinder, within ``half`` of its middle."""
+    a, b, c = dx * dx + dy * dy, x * dx + y * dy, x * x + y * y - radius * radius
+    root = b * b - a * c
+    if root < 0.0 or a < 1e-15:
+        return np.inf
+    root = math.sqrt(root)
+    near, far = (-b - root) / a, (-b + root) / a
+    if near >= 0.0 and abs(z + near * dz) <= half:
+        return near
+    return far if far >= 0.0 and abs(z + far * dz) <= half else np.inf
+
+
+@kernel("float64(float64, float64, float64, float64, float64, float64, float64, float64)")
+def _capsule(x: float, y: float, z: float, dx: float, dy: float, dz: float, radius: float, half: float) -> float:
+    """Where a ray meets an upright capsule: its side, or one of the two round ends beyond it."""
+    found = _shell(x, y, z, dx, dy, dz, radius, half)
+    for end in (-half, half):
+        a, b = dx * dx + dy * dy + dz * dz, x * dx + y * dy + (z - end) * dz
+        c = x * x + y * y + (z - end) * (z - end) - radius * radius
+        root = b * b - a * c
+        if root < 0.0:
+            continue
+        root = math.sqrt(root)
+        for along in ((-b - root) / a, (-b + root) / a):
+            if 0.0 <= along < found and (z + along * dz - end) * end >= 0.0:
+                found = along
+    return found
+
+
+@kernel("float64(float64, float64, float64, float64, float64, float64, float64, float64)")
+def _cylinder(x: float, y: float, z: float, dx: float, dy: float, dz: float, radius: float, half: float) -> float:
+    """Where a ray meets an upright cylinder: its side, or one of its flat ends."""
+    found = _shell(x, y, z, dx, dy, dz, radius, half)
+    if abs(dz) < 1e-15:
+        return found
+    for end in (-half, half):
+        along = (end - z) / dz
+        across_x, across_y = x + along * dx, y + along * dy
+        if 0.0 <= along < found and across_x * across_x + across_y * across_y <= radius * radius:
+            found = along
+    return found
+
+
+@kernel("float64(float64, float64, float64, float64, float64, float64, float64, float64, float64)")
+def _box(x: float, y: float, z: float, dx: float, dy: float, dz: float, sx: float, sy: float, sz: float) -> float:
+    """Where a ray meets a box of these half extents; from within, where it leaves it."""
+    near, far = -np.inf, np.inf
+    for at, way, half in ((x, dx, sx), (y, dy, sy), (z, dz, sz)):
+        if abs(way) < 1e-15:
+            if abs(at) > half:
+                return np.inf
+            continue
+        one, other = (-half - at) / way, (half - at) / way
+        near, far = max(near, min(one, other)), min(far, max(one, other))
+    if near > far or far < 0.0:
+        return np.inf
+    return near if near >= 0.0 else far
+
+
+@kernel(
+    "float64(int32, float64, float64, float64, float64, float64, float64, float64, float64, float64)",
+)
+def _along(
+    kind: int, x: float, y: float, z: float, dx: float, dy: float, dz: float, sx: float, sy: float, sz: float
+) -> float:
+    """How far a ray from (x, y, z) goes until it meets a solid of this kind, in the solid's own frame."""
+    if kind == BOX:
+        return _box(x, y, z, dx, dy, dz, sx, sy, sz)
+    if kind == CYLINDER:
+        return _cylinder(x, y, z, dx, dy, dz, sx, sy)
+    if kind == CAPSULE:
+        return _capsule(x, y, z, dx, dy, dz, sx, sy)
+    return _first(dx * dx + dy * dy + dz * dz, x * dx + y * dy + z * dz, x * x + y * y + z * z - sx * sx)
+
+
+@kernel("int64(int32[::1], float64[:,::1], float64[::1], float64[::1], float64, int64[::1], float64[::1])")
+def _reached(
+    kinds: NDArray[np.int32],
+    places: Floats,
+    bounds: Floats,
+    origin: Floats,
+    reach: float,
+    chosen: NDArray[np.int64],
+    nearest: Floats,
+) -> int:
+    """How many solids may be met: ``chosen`` gets their rows, ``nearest`` how near at least (m), the nearest first."""
+    count = 0
+    for i in range(len(kinds)):
+        if kinds[i] not in (SPHERE, CAPSULE, CYLINDER, BOX):
+            continue
+        x, y, z = origin[0] - places[i, 0], origin[1] - places[i, 1], origin[2] - places[i, 2]
+        square, bound = x * x + y * y + z * z, reach + bounds[i]
+        if square > bound * bound:
+            continue
+        away, place = math.sqrt(square) - bounds[i], count
+        while place > 0 and nearest[place - 1] > away:  # few are in reach
+            chosen[place], nearest[place] = chosen[place - 1], nearest[place - 1]
+            place -= 1
+        chosen[place], nearest[place] = i, away
+        count += 1
+    return count
+
+
+@kernel(
+    "float64[::1](int32[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[::1],"
+    " float64[::1], float64[:,::1], float64)"
+)
+def cast(
+    kinds: NDArray[np.int32],
+    places: Floats,
+    turns: Floats,
+    sizes: Floats,
+    bounds: Floats,
+    origin: Floats,
+    directions: Floats,
+    reach: float,
+) -> Floats:
+    """Distances (m) from ``origin`` along ``directions`` (k, 3; of length 1); inf where nothing is within ``reach``.
+
+    Solids by row: kind, middle (3), rotation into the world (9, row by row), half extents (3) and the radius of the
+    sphere around it, all as in MuJoCo's model. Rays pass through other kinds than the four.
+    """
+    chosen, nearest = np.empty(len(kinds), np.int64), np.empty(len(kinds))
+    count, found = _reached(kinds, places, bounds, origin, reach, chosen, nearest), np.empty(len(directions))
+    local = np.empty((count, 3))  # the origin, seen from each solid
+    for place in range(count):
+        i = chosen[place]
+        x, y, z = origin[0] - places[i, 0], origin[1] - places[i, 1], origin[2] - places[i, 2]
+        for axis in range(3):
+            local[place, axis] = turns[i, axis] * x + turns[i, 3 + axis] * y + turns[i, 6 + axis] * z
+    for k in range(len(directions)):
+        best, u, v, w = np.inf, directions[k, 0], directions[k, 1], directions[k, 2]
+        for place in range(count):
+            if nearest[place] > best:
+                break
+            i = chosen[place]
+            dx = turns[i, 0] * u + turns[i, 3] * v + turns[i, 6] * w
+            dy = turns[i, 1] * u + turns[i, 4] * v + turns[i, 7] * w
+            dz = turns[i, 2] * u + turns[i, 5] * v + turns[i, 8] * w
+            x, y, z = local[place, 0], local[place, 1], local[place, 2]
+            best = min(best, _along(kinds[i], x, y, z, dx, dy, dz, sizes[i, 0], sizes[i, 1], sizes[i, 2]))
+        found[k] = best if best <= reach else np.inf
+    return found

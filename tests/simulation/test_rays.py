@@ -1,0 +1,63 @@
+"""Compiled rays against MuJoCo's own as the judge: every shape, from outside and from within; and what they replace."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from roboglot.kernels.rays import cast
+from roboglot.model.clock import LockstepClock
+from roboglot.simulation.world.world import RobotPlacement, World
+from roboglot.simulation.world.world_files import load_world
+
+RAYS = 60
+KINDS = [mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER]
+KINDS.append(mujoco.mjtGeom.mjGEOM_BOX)
+
+
+def directions(random: np.random.Generator) -> np.ndarray:
+    ways = np.concatenate((random.standard_normal((RAYS - 6, 3)), np.eye(3), -np.eye(3)))
+    return ways / np.linalg.norm(ways, axis=1, keepdims=True)
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(0.3, 9.0))
+def test_every_shape_is_met_as_by_mujoco(seed: int, reach: float) -> None:
+    random = np.random.default_rng(seed)
+    spec = mujoco.MjSpec()
+    for number in range(24):
+        attitude = random.standard_normal(4) if number % 3 else (1.0, 0.0, 0.0, 0.0)
+        body = spec.worldbody.add_body(pos=random.uniform(-3, 3, 3), quat=attitude)
+        body.add_geom(type=KINDS[number % 4], size=random.uniform(0.1, 1.2, 3))
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    origin, ways = random.uniform(-3, 3, 3), directions(random)
+    found, expected = np.empty(RAYS, np.int32), np.empty(RAYS)
+    groups = np.ones(6, np.uint8)
+    mujoco.mj_multiRay(model, data, origin, ways.ravel(), groups, True, -1, found, expected, None, RAYS, 1e6)
+    expected[(found < 0) | (expected > reach)] = np.inf
+    solids = data.geom_xpos, data.geom_xmat, model.geom_size, model.geom_rbound
+    assert cast(model.geom_type, *solids, origin, ways, reach) == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "is_compiled"), [("office", True), ("obstacle_course", False)]
+)  # only MuJoCo knows ramps
+async def test_sensors_see_the_same_with_the_kernel(name: str, is_compiled: bool) -> None:
+    clock = LockstepClock()
+    robots = [RobotPlacement("a"), RobotPlacement("b")]
+    world = World(load_world(name), robots, clock=clock)
+    world.start()
+    await clock.advance(0.1)  # or the physics does not know yet where things are
+    hull, rays, ways = world._population.hull("a"), world._physics.rays, directions(np.random.default_rng(1))
+    origin = hull.x, hull.y, hull.elevation + 0.2
+    before = rays.cast(origin, ways, 4.0, hull)
+    rays.load_kernel()
+    assert (rays._kernel is not None) is is_compiled
+    assert rays.cast(origin, ways, 4.0, hull) == pytest.approx(before, abs=1e-9)
+    assert np.isfinite(before).any()
+    assert before.min() > 0.19  # the floor: it does not see itself
+    world.close()
