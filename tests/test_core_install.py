@@ -108,7 +108,7 @@ def test_version_says_what_is_there(core: Path) -> None:
     assert "numba" in lines["kernels"]
 
 
-def test_a_command_without_its_extra_is_one_sentence_with_the_remedy(core: Path) -> None:
+def test_command_without_its_extra_names_the_remedy(core: Path) -> None:
     for command, extra in (("up", "up"), ("demo", "demo"), ("coverage", "up"), ("certs", "cyberdog")):
         done = run(core, "-m", "roboglot", command, *(["DIR"] if command == "certs" else []))
         assert done.returncode == 1
@@ -117,7 +117,7 @@ def test_a_command_without_its_extra_is_one_sentence_with_the_remedy(core: Path)
         assert line.endswith(f"pip install 'roboglot[{extra}]'")
 
 
-def test_a_library_without_its_extra_is_one_sentence_with_the_remedy(core: Path) -> None:
+def test_library_without_its_extra_names_the_remedy(core: Path) -> None:
     done = run(core, "-c", "import roboglot.clients.cyberdog")
     assert done.stderr.splitlines()[-1].endswith(
         "roboglot.clients.cyberdog needs grpc, which is not installed: pip install 'roboglot[cyberdog]'"
@@ -159,7 +159,7 @@ asyncio.run(main())
     assert 0 <= int(done.stdout) <= 100
 
 
-def test_connect_asks_for_a_token_and_says_who_does_not_answer(core: Path) -> None:
+def test_connect_asks_for_a_token_and_reports_absence(core: Path) -> None:
     assert "a token is needed" in run(core, "-m", "roboglot", "connect", "127.0.0.1:1").stderr
     token = core.parent / "token"
     token.write_text("x" * 40)

@@ -36,7 +36,7 @@ async def test_deliveries_end_with_the_fleet(fleet: Fleet, robot: Robot, forward
     assert asyncio.all_tasks() <= before
 
 
-async def test_robots_start_where_the_configuration_says_and_others_keep_away() -> None:
+async def test_robots_start_where_configured_and_others_keep_away() -> None:
     database, wanted = Database(":memory:"), StartConfig(5.0, 5.0, 1.0)
     robots = [RobotConfig("a"), RobotConfig("b"), RobotConfig("c", start=wanted)]
     fleet = build_fleet("empty", robots, clock=LockstepClock(), seed=1, database=database)

@@ -14,6 +14,7 @@ ROOT = Path(__file__).parent.parent
 FILES_MAX = 25  # modules in a folder of src, pages, benchmarks
 LINES_MAX = 400  # of a module
 ANY_MAX = 875  # lines; may only shrink
+NAME_MAX = 8  # words of a test's name after "test"
 HOPS_MAX = 8  # files that a request enters
 FUNCTION_MAX = 50  # lines, without the docstring
 GENERATED = ("_pb2.py", "_pb2_grpc.py")
@@ -64,6 +65,12 @@ def test_no_function_is_long() -> None:
     assert long == {}
 
 
+def test_names_of_tests_are_short() -> None:
+    """A name says the behaviour, not its whole story: that stands in the docstring."""
+    names = {name for path in TESTS for name, _ in functions(path) if name.startswith("test_")}
+    assert {name for name in names if len(name.split("_")) - 1 > NAME_MAX} == set()
+
+
 @pytest.mark.parametrize("texts", [SOURCES, PAGES, TESTS], ids=["src", "docs", "tests"])
 def test_plain_words(texts: list[Path]) -> None:
     """The words of scripts/words.txt make a sentence be read twice; a few are data or another's own words."""
@@ -110,7 +117,7 @@ def defined(tree: ast.Module, name: str) -> list[ast.AST]:
 
 
 @pytest.mark.parametrize("walk", walks().values(), ids=list(walks()))
-def test_a_walk_in_the_docs_is_the_way_through_the_code(walk: list[tuple[str, str]]) -> None:
+def test_walk_in_docs_is_way_through_the_code(walk: list[tuple[str, str]]) -> None:
     """Each step is registered in a table or mentioned by a step before it or its own file, in eight files at most."""
     assert len(walk) > 5
     mentioned: set[str] = {walk[0][1]}
@@ -164,7 +171,7 @@ def test_untyped_places_become_fewer() -> None:
     assert sum(len(re.findall(r"^.*\bAny\b.*$", path.read_text(), re.MULTILINE)) for path in SOURCES) <= ANY_MAX
 
 
-def test_the_layers_in_the_docs_are_those_that_are_enforced() -> None:
+def test_layers_in_docs_are_those_that_are_enforced() -> None:
     """The page lists each package once, from top to bottom, as import-linter has them."""
     page = (ROOT / "docs" / "architecture.md").read_text().partition("## Layers")[2].partition("\n## ")[0]
     listed = [

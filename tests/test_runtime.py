@@ -46,7 +46,7 @@ async def until(condition: Callable[[], bool]) -> None:
             await asyncio.sleep(0.05)
 
 
-async def test_in_lockstep_no_time_passes_while_the_disk_is_waited_for(tmp_path: Path) -> None:
+async def test_no_lockstep_time_passes_while_the_disk_works(tmp_path: Path) -> None:
     started = Runtime(config(tmp_path / "data"))
     clock = started.clock
     assert isinstance(clock, LockstepClock)

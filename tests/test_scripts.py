@@ -53,7 +53,7 @@ def test_bash_and_python_write_the_same_stamp(clone: Path) -> None:
     assert (done.returncode, done.stdout, done.stderr) == (0, "went on\n", "")
 
 
-def test_kernels_are_compiled_again_when_their_source_is_newer(clone: Path) -> None:
+def test_kernels_are_recompiled_when_their_source_is_newer(clone: Path) -> None:
     (clone / ".venv/stamp-run").write_bytes(bootstrap.stamp(clone, "run"))
     os.utime(clone / ".venv/kernels", (1, 1))
     (clone / "src/roboglot/kernels/search.py").write_text("# newer\n")
@@ -63,7 +63,7 @@ def test_kernels_are_compiled_again_when_their_source_is_newer(clone: Path) -> N
 
 
 @pytest.mark.parametrize("changed", ["requirements/run.lock", "pyproject.toml"])
-def test_a_changed_file_asks_for_a_new_set_up(clone: Path, changed: str) -> None:
+def test_changed_file_asks_for_a_new_set_up(clone: Path, changed: str) -> None:
     (clone / ".venv/stamp-run").write_bytes(bootstrap.stamp(clone, "run"))
     with (clone / changed).open("a") as file:
         file.write("# more\n")
@@ -72,7 +72,7 @@ def test_a_changed_file_asks_for_a_new_set_up(clone: Path, changed: str) -> None
     assert "needs Python 3.11 to 3.14; tried /bin/false" in done.stderr
 
 
-def test_a_python_that_is_gone_asks_for_a_new_set_up(clone: Path) -> None:
+def test_missing_python_asks_for_a_new_set_up(clone: Path) -> None:
     (clone / ".venv/bin/python").unlink()
     (clone / ".venv/bin/python").symlink_to(clone / "gone")
     (clone / ".venv/stamp-run").write_bytes(bootstrap.stamp(clone, "run"))
@@ -167,7 +167,7 @@ def test_a_comment_or_a_tools_setting_does_not(locked: Path) -> None:
     assert locks.complaints(locked) == []
 
 
-def test_a_pin_that_only_one_lock_has_is_reported(locked: Path) -> None:
+def test_pin_that_only_one_lock_has_is_reported(locked: Path) -> None:
     dev = locked / "requirements/dev.lock"
     dev.write_text(dev.read_text().replace("\nrich==", "\nrich==0+"))
     assert [line for line in locks.complaints(locked) if "doesn't hold rich==" in line]

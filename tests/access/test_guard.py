@@ -41,7 +41,7 @@ async def status(auth: object = None, **headers: str) -> int:
         return (await client.get(POSE)).status_code
 
 
-async def test_tokens_and_passwords_let_in_and_others_do_not(runtime: Runtime, store: AccessStore) -> None:
+async def test_only_known_tokens_and_passwords_let_in(runtime: Runtime, store: AccessStore) -> None:
     token = store.add_machine("cell", [Grant("a", SEE)])
     store.add_person("anna", "correct horse", [Grant("*", SEE)])
     guard_of(runtime).reload()
@@ -291,7 +291,7 @@ def test_repeated_rows_are_counted(tmp_path: Path) -> None:
     assert sum(1 + row.repeats for row in rows) == 100, "each is counted, also the last"
 
 
-def test_the_audit_counts_what_is_pushed_out_by_other_things(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_audit_counts_entries_pushed_out_by_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(audit, "KINDS_MAX", 3)
     kept = audit.Audit(tmp_path / "audit.db")
     for number in range(60):

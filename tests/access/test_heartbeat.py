@@ -43,7 +43,7 @@ def looks(heart: Heartbeat, now: float, until: float, drives: bool = True) -> tu
 
 
 @given(st.floats(0.0, 1.0), st.booleans())
-def test_silence_is_noticed_at_its_time_and_not_before(last_heard: float, drives: bool) -> None:
+def test_silence_is_noticed_at_its_time(last_heard: float, drives: bool) -> None:
     heart, now = Heartbeat(0.0), 0.0
     while now < last_heard:
         now += heart.look(now, drives).pause + LATE
@@ -53,7 +53,7 @@ def test_silence_is_noticed_at_its_time_and_not_before(last_heard: float, drives
     assert QUIET_AFTER <= quiet - heart.heard + 1e-9 <= QUIET_AFTER + 6 * LATE
 
 
-def test_beats_come_often_while_someone_drives_and_seldom_else() -> None:
+def test_beats_come_often_only_while_someone_drives() -> None:
     assert looks(Heartbeat(0.0), 0.0, 1.0, drives=True)[1] >= 1 / (QUICK_PERIOD + 2 * LATE)
     assert looks(Heartbeat(0.0), 0.0, 1.0, drives=False)[1] <= 11
     asked = Heartbeat(0.0)
@@ -61,7 +61,7 @@ def test_beats_come_often_while_someone_drives_and_seldom_else() -> None:
     assert looks(asked, 0.0, 0.4, drives=False)[1] >= 0.4 / (QUICK_PERIOD + 2 * LATE)
 
 
-def test_an_end_that_was_held_up_reads_what_came_before_it_judges() -> None:
+def test_delayed_end_reads_earlier_beats_before_judging() -> None:
     heart = Heartbeat(0.0)
     assert not heart.look(IDLE_PERIOD, drives=True).quiet
     woken = IDLE_PERIOD + HELD_UP + 0.5  # the machine rested, and the other end's with it
@@ -74,7 +74,7 @@ def test_an_end_that_was_held_up_reads_what_came_before_it_judges() -> None:
     assert looks(heart, woken + QUICK_PERIOD, woken + 0.2)[0] is None
 
 
-def test_a_silence_that_ends_is_no_loss_and_a_long_one_is() -> None:
+def test_only_long_silence_is_a_loss() -> None:
     heart = Heartbeat(0.0)
     assert looks(heart, 0.0, 1.0)[0] is not None
     heart.hear(1.0)
@@ -83,7 +83,7 @@ def test_a_silence_that_ends_is_no_loss_and_a_long_one_is() -> None:
     assert heart.look(LOST_AFTER + 1.0, drives=True).lost
 
 
-def test_beats_beside_the_tunnel_excuse_its_silence_for_a_while() -> None:
+def test_beats_beside_tunnel_excuse_its_silence_for_while() -> None:
     heart, now, quiet = Heartbeat(0.0), 0.0, list[float]()
     while now < 1.5:
         now += QUICK_PERIOD
@@ -103,7 +103,7 @@ def test_beats_beside_do_not_keep_a_dead_tunnel() -> None:
 @pytest.mark.parametrize(
     ("body", "speed"), [("universal", 0.6), ("robomaster_ep", 1.0), ("cyberdog2", 0.5), ("hermes", 0.4)]
 )
-async def test_silence_and_brakes_together_stay_below_half_a_second(body: str, speed: float) -> None:
+async def test_silence_and_brakes_together_stay_below_half_second(body: str, speed: float) -> None:
     clock, database = LockstepClock(), Database(":memory:")
     fleet = build_fleet("empty", [RobotConfig("a", body)], clock=clock, seed=1, database=database)
     await fleet.start(wait=True)

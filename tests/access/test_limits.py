@@ -79,7 +79,7 @@ async def test_one_address_does_not_take_all_connections(data: Path, token: str,
         writer.close()
 
 
-async def test_bytes_of_one_client_are_limited_and_of_others_not(data: Path, token: str) -> None:
+async def test_bytes_are_limited_per_client(data: Path, token: str) -> None:
     access = AccessConfig(on=True, local=False, bytes=100_000)
     body = b" " * 900_000
     async with robots(data, access):

@@ -35,7 +35,7 @@ def test_frames_arrive_whole_however_they_are_cut(frames: list[tuple[Kind, int, 
 
 
 @given(st.binary(min_size=7, max_size=300))
-def test_what_is_no_frame_is_refused_at_its_first_byte(data: bytes) -> None:
+def test_no_frame_is_refused_at_its_first_byte(data: bytes) -> None:
     async def check() -> None:
         link = Link()
         link.follow(lambda *_frame: None, lambda _crowded: None)
@@ -88,7 +88,7 @@ async def test_a_half_closed_connection_is_answered() -> None:
     server.close()
 
 
-async def test_a_reader_that_rests_holds_up_the_sender_alone() -> None:
+async def test_reader_that_rests_holds_up_the_sender_alone() -> None:
     sent = 0
 
     async def pour(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -123,7 +123,7 @@ async def test_a_reader_that_rests_holds_up_the_sender_alone() -> None:
     server.close()
 
 
-async def test_while_the_client_drives_both_ends_show_often_that_they_are_there(
+async def test_both_ends_beat_often_while_the_client_drives(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(heartbeat, "PING_PERIOD", 1000.0)
@@ -147,7 +147,7 @@ async def test_while_the_client_drives_both_ends_show_often_that_they_are_there(
         assert not any(sent), "only the end that knows who drives asks for it"
 
 
-async def test_the_loop_stays_awake_for_a_moment_after_a_short_message(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_loop_stays_awake_for_moment_after_short_message(monkeypatch: pytest.MonkeyPatch) -> None:
     now, looks = 0.0, 0
 
     def time_passes() -> float:

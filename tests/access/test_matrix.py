@@ -255,9 +255,7 @@ async def test_programs_do_what_the_right_allows(runtime: Runtime) -> None:
             assert ("has no right" in words) == (right not in caller.rights), (caller.name, frame)
 
 
-async def test_the_wire_view_shows_every_row_that_goes_over_a_wire(
-    runtime: Runtime, reached: set[object], data: Path
-) -> None:
+async def test_wire_view_shows_every_row_on_a_wire(runtime: Runtime, reached: set[object], data: Path) -> None:
     """Asks every door everything, as one who may do all and as one who may only see, and reads the console's feed."""
     assert runtime.console is not None
     wire = runtime.console._desk.views["a"].wire

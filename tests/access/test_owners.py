@@ -22,7 +22,7 @@ async def each_minute(link: TextLink) -> None:
     assert [state for state, _ in states] == [0, 0], states
 
 
-async def test_a_task_has_its_owners_rights_and_ends_with_them(runtime: Runtime, store: AccessStore) -> None:
+async def test_task_has_its_owners_rights_until_they_end(runtime: Runtime, store: AccessStore) -> None:
     clock, robot = runtime.clock, runtime.fleet.robots["a"]
     assert isinstance(clock, LockstepClock)
     link = await open_frames(OWNER.address)

@@ -148,7 +148,7 @@ async def test_a_silent_end_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     server.close()
 
 
-async def test_no_server_beside_the_client_is_reached_but_the_app(gateway: tuple[Runtime, str], tmp_path: Path) -> None:
+async def test_no_server_beside_client_is_reached_but_app(gateway: tuple[Runtime, str], tmp_path: Path) -> None:
     """An MQTT broker on the client's machine is none of the gateway's business."""
     runtime, _ = gateway
     assert runtime.guard is not None
@@ -243,7 +243,7 @@ async def test_a_second_connection_carries_beats_and_comes_again(
     await until(lambda: not tunnels and second and second.lost.done())
 
 
-async def test_other_programs_here_do_not_pass_for_a_tunnel(gateway: tuple[Runtime, str], tmp_path: Path) -> None:
+async def test_other_programs_here_do_not_pass_for_tunnel(gateway: tuple[Runtime, str], tmp_path: Path) -> None:
     runtime, _ = gateway
     assert runtime.guard is not None
     async with connected(*gateway, tmp_path):

@@ -85,7 +85,7 @@ async def test_over_streamable_http(shown: Shown) -> None:
         await process.communicate()
 
 
-async def test_go_to_drives_there_and_tells_how_it_ended(shown: Shown) -> None:
+async def test_go_to_drives_there_and_reports_the_end(shown: Shown) -> None:
     async with tools(shown) as client:
         async with passing(shown):
             result = await call(client, "go_to", x=1.0, y=0.5)

@@ -28,7 +28,7 @@ async def fleet(clock: LockstepClock) -> AsyncIterator[Fleet]:
     database.close()
 
 
-async def test_inside_the_area_the_sensors_are_masked_and_outside_no_more(tour: Tour) -> None:
+async def test_sensors_are_masked_only_inside_the_area(tour: Tour) -> None:
     masks = tour.robot[SensorMasks]
     cliffs = {sensor.id for sensor in masks.sensors if sensor.kind is SensorKind.CLIFF}
     kept = next(sensor.id for sensor in masks.sensors if sensor.kind is SensorKind.BUMPER)

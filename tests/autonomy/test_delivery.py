@@ -67,7 +67,7 @@ def status_of(robot: Robot, order: Order) -> OrderStatus:
     return next(known.status for known in robot[Delivery].orders if known.id == order.id)
 
 
-async def test_orders_and_rules_survive_a_crash_and_go_on(tmp_path: Path) -> None:
+async def test_orders_and_rules_survive_crash_and_go_on(tmp_path: Path) -> None:
     file, image = tmp_path / "robot.db", tmp_path / "crashed.db"
     policy = Policy(work_mode=WorkMode.MANUAL, hours=((0, 3600),), delivery_speed=0.8, words={"mode": 0})
     template = RoundTemplate("k", "supply", (Operation("room", "load", 5),))
@@ -91,7 +91,7 @@ async def test_orders_and_rules_survive_a_crash_and_go_on(tmp_path: Path) -> Non
         assert (status_of(robot, first), status_of(robot, second)) == (OrderStatus.SUCCEEDED, OrderStatus.SUCCEEDED)
 
 
-async def test_it_holds_after_a_crash_while_people_load_it(tmp_path: Path) -> None:
+async def test_it_holds_after_crash_while_people_load_it(tmp_path: Path) -> None:
     file, image = tmp_path / "robot.db", tmp_path / "crashed.db"
     async with running(file) as (robot, clock):
         await robot[Places].put(ROOM)

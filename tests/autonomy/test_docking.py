@@ -57,7 +57,7 @@ async def test_where_no_dock_is_none_is_found(tour: Tour) -> None:
 
 
 @pytest.mark.world("empty")
-async def test_home_stays_where_it_is_when_the_map_begins_anew(tour: Tour) -> None:
+async def test_home_stays_when_the_map_begins_anew(tour: Tour) -> None:
     await tour.end_of(tour.robot[Driving].move_by(Pose(2.0, 1.0, 2.0)))
     tour.robot[Mapping].clear()
     await tour.clock.advance(1.0)
@@ -87,7 +87,7 @@ def _xy(tour: Tour, x: float, y: float) -> tuple[float, float]:
 
 @pytest.mark.parametrize("aside", [0.28, -0.28])
 @pytest.mark.world("office")
-async def test_a_dock_that_was_moved_a_little_is_found(tour: Tour, aside: float) -> None:
+async def test_dock_that_was_moved_a_little_is_found(tour: Tour, aside: float) -> None:
     await tour.go((20.0, 10.0))
     front = tour.world.building.docks[0][0]
     tour.world.building.move_dock(front.compose(Pose(0.05, aside, 0.1)), 0, 0)
@@ -100,7 +100,7 @@ async def test_a_dock_that_was_moved_a_little_is_found(tour: Tour, aside: float)
 
 
 @pytest.mark.world("office")
-async def test_undocking_leaves_the_contacts_and_the_dock_is_found_again(tour: Tour) -> None:
+async def test_undocking_leaves_contacts_and_dock_is_found_again(tour: Tour) -> None:
     docking = tour.robot[Docking]
     action = await tour.end_of(docking.undock())
     assert action.status is ActionStatus.SUCCEEDED, action.reason
@@ -135,7 +135,7 @@ async def test_an_unknown_dock_far_away_is_reported(tour: Tour) -> None:
 
 
 @pytest.mark.world("office")
-async def test_a_docked_robot_that_finds_itself_knows_its_dock(tour: Tour) -> None:
+async def test_docked_robot_that_finds_itself_knows_its_dock(tour: Tour) -> None:
     mapping, docking = tour.robot[Mapping], tour.robot[Docking]
     await tour.clock.advance(1.0)
     mapping.load(mapping.grid, Pose(3.0, 1.0, 0.5))  # not where it is
@@ -145,9 +145,7 @@ async def test_a_docked_robot_that_finds_itself_knows_its_dock(tour: Tour) -> No
 
 
 @pytest.mark.world("office")
-async def test_a_wrong_pose_leaves_the_dock_where_it_is_and_the_dock_mends_it(
-    tour: Tour, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_wrong_pose_keeps_dock_and_docking_corrects_it(tour: Tour, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("roboglot.autonomy.slam.slam.places", lambda *_: [])  # scans alone do not say where it is
     await tour.clock.advance(1.0)
     for wrong in (Pose(40.0, 40.0), Pose(3.0, 1.0, 0.5)):
@@ -159,9 +157,7 @@ async def test_a_wrong_pose_leaves_the_dock_where_it_is_and_the_dock_mends_it(
 
 
 @pytest.mark.world("office")
-async def test_the_dock_of_a_loaded_map_is_learnt_where_the_pose_is_confirmed(
-    tour: Tour, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_dock_of_loaded_map_is_learnt_when_localized(tour: Tour, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("roboglot.autonomy.slam.slam.places", lambda *_: [])
     mapping, docking = tour.robot[Mapping], tour.robot[Docking]
     await tour.clock.advance(1.0)
@@ -177,9 +173,7 @@ async def test_the_dock_of_a_loaded_map_is_learnt_where_the_pose_is_confirmed(
 
 
 @pytest.mark.world("office")
-async def test_a_lost_robot_that_is_put_on_its_dock_knows_where_it_is(
-    tour: Tour, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_lost_robot_put_on_its_dock_is_localized(tour: Tour, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("roboglot.autonomy.slam.slam.places", lambda *_: [])
     await tour.end_of(tour.robot[Docking].undock())
     tour.robot[Localization].set_pose(Pose(40.0, 40.0))

@@ -57,7 +57,7 @@ def test_skills_follow_from_parts() -> None:
     assert Docking not in seeing
 
 
-async def test_start_does_not_wait_for_kernels_and_navigation_does() -> None:
+async def test_navigation_waits_for_kernels_start_does_not() -> None:
     robot = robot_on(RealClock(50.0), Base, Odometry, Lidar)
     autonomy = Autonomy(robot)
     await autonomy.start(wait=False)

@@ -108,7 +108,7 @@ async def test_it_ends_square_before_the_first_step(
     assert dog.world.truth.pose_of("a").distance_to(here) < 0.002
 
 
-async def test_it_shifts_until_it_has_the_step_on_both_sides(stand: Make) -> None:
+async def test_shifts_until_the_step_is_on_both_sides(stand: Make) -> None:
     dog = await stand()
     await dog.put(0.6, 0.0, 0.5)  # 10 cm from the end of a flight 1.2 m wide
     action = dog.alignment.align(UP)
@@ -119,7 +119,7 @@ async def test_it_shifts_until_it_has_the_step_on_both_sides(stand: Make) -> Non
 
 
 @pytest.mark.parametrize("way", [UP, DOWN])
-async def test_where_no_step_is_it_refuses_and_moves_nothing(stand: Make, way: StairDirection) -> None:
+async def test_refuses_to_move_where_no_step_is(stand: Make, way: StairDirection) -> None:
     dog = await stand()
     dog.world.hands.place("a", Pose(2.0, 2.0, 0.0))
     await dog.clock.advance(0.3)
@@ -152,7 +152,7 @@ async def test_a_wall_is_no_step(stand: Make, gap: float) -> None:
     assert dog.world.truth.pose_of("a").distance_to(before) < 0.005
 
 
-async def test_without_the_lidar_it_believes_in_steps_whose_tread_it_sees(stand: Make) -> None:
+async def test_accepts_steps_by_their_tread_without_lidar(stand: Make) -> None:
     dog = await stand()
     dog.world.faults.inject("lidar_gone", robot="a")
     dog.world.hands.place("a", Pose(9.45, 1.5, 0.1))
@@ -230,7 +230,7 @@ async def test_held_fast_it_gives_up_in_time(stand: Make) -> None:
     assert dog.clock.time() < 40.0
 
 
-async def test_an_emergency_stop_ends_it_and_nothing_begins_after_it(stand: Make) -> None:
+async def test_nothing_begins_after_an_emergency_stop(stand: Make) -> None:
     dog = await stand()
     await dog.put(0.75, 15.0, 0.0)
     action = dog.alignment.align(UP)
@@ -253,7 +253,7 @@ async def test_who_lies_gets_up_first(stand: Make) -> None:
     assert dog.robot[Legs].posture is Posture.STANDING
 
 
-async def test_a_base_that_would_not_drive_refuses_at_once(stand: Make) -> None:
+async def test_base_that_would_not_drive_refuses_at_once(stand: Make) -> None:
     dog = await stand()
     await dog.put(0.7, 10.0, 0.0)
     dog.robot[Base].lock("test", "a cable")  # type: ignore[attr-defined]

@@ -43,7 +43,7 @@ def test_a_riser_is_found_where_it_is(distance: float, turn: float, height: floa
     assert edge.left + edge.right == pytest.approx(0.6, abs=0.06)
 
 
-def test_something_as_high_as_the_lidar_is_a_wall() -> None:
+def test_something_as_high_as_lidar_is_a_wall() -> None:
     face = placed(riser(0.15), 0.6, 0.1)
     along = np.linspace(-0.5, 0.5, 21)
     wall = placed(np.stack((np.zeros(21), along), axis=-1), 0.6, 0.1)
@@ -85,7 +85,7 @@ def test_a_drop_lies_between_floor_and_abyss(distance: float, turn: float) -> No
     assert edge.foot.yaw == pytest.approx(turn, abs=math.radians(3))
 
 
-def test_floor_and_abyss_that_are_mixed_are_no_edge() -> None:
+def test_mixed_floor_and_abyss_are_no_edge() -> None:
     points = np.random.default_rng(7).uniform((0.4, -0.3), (0.9, 0.3), (200, 2))
     assert find_drop(points[::2], points[1::2]) is None
     assert find_drop(points, np.empty((0, 2))) is None

@@ -29,13 +29,13 @@ def test_what_stands_alone_is_found_in_its_middle(x: float, y: float, radius: fl
     assert found.distance_to(Point(x, y)) < 0.1
 
 
-def test_a_wall_is_no_thing_and_neither_is_the_air() -> None:
+def test_wall_is_no_thing_and_neither_is_air() -> None:
     assert thing_at(WALL, Point(3.0, 0.0)) is None
     assert thing_at(WALL, Point(1.0, 0.0)) is None
     assert thing_at(np.empty((0, 2)), Point()) is None
 
 
-def test_a_thing_is_followed_from_scan_to_scan_even_along_a_wall() -> None:
+def test_thing_is_followed_across_scans_along_a_wall() -> None:
     at = Point(1.0, 0.0)
     for step in range(20):
         x, y = 1.0 + 0.08 * step, 0.05 * step
@@ -46,7 +46,7 @@ def test_a_thing_is_followed_from_scan_to_scan_even_along_a_wall() -> None:
     assert moved_thing(WALL, Point(0.0, 0.0)) is None  # it is gone
 
 
-def test_what_touches_a_wall_by_now_is_not_lost_in_it() -> None:
+def test_thing_that_touches_a_wall_is_kept() -> None:
     points = np.concatenate([WALL, round_thing(2.75, 0.0)])
     now = moved_thing(points, Point(2.7, 0.0))
     assert now

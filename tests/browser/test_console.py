@@ -75,7 +75,7 @@ async def driven(served: Served, page: Page) -> None:
             await served.clock.advance(0.08)
 
 
-async def test_a_click_on_the_map_brings_the_robot_there(served: Served, open_console: OpenConsole) -> None:
+async def test_click_on_the_map_brings_the_robot_there(served: Served, open_console: OpenConsole) -> None:
     page = await open_console()
     before = served.runtime.fleet.world.truth.pose_of("a")
     await page.wait_for_selector("text=Scan fits map")
@@ -90,7 +90,7 @@ async def test_a_click_on_the_map_brings_the_robot_there(served: Served, open_co
     await page.wait_for_selector(".badge.succeeded")
 
 
-async def test_the_robot_stands_when_the_driving_page_is_killed(served: Served, open_console: OpenConsole) -> None:
+async def test_robot_stands_when_the_driving_page_is_killed(served: Served, open_console: OpenConsole) -> None:
     page = await open_console()
     await page.click("#tab-drive")
     await driven(served, page)
@@ -169,7 +169,7 @@ def rest(served: Served, x: float) -> tuple[int, str]:
         return error.code, error.read().decode()
 
 
-async def test_two_browsers_and_a_rest_client_contend_for_control(served: Served, open_console: OpenConsole) -> None:
+async def test_two_browsers_and_rest_client_contend_for_control(served: Served, open_console: OpenConsole) -> None:
     anna, ben = await open_console("anna"), await open_console("ben")
     await anna.click("text=Take control")
     await anna.wait_for_selector("text=You alone move this robot.")
@@ -221,7 +221,7 @@ async def test_the_wire_shows_requests_and_why_they_fail(served: Served, open_co
     await page.wait_for_selector("text=Copy as nc")
 
 
-async def test_a_paused_wire_goes_back_to_the_first_message(served: Served, open_console: OpenConsole) -> None:
+async def test_paused_wire_goes_back_to_the_first_message(served: Served, open_console: OpenConsole) -> None:
     page = await open_console(view="wire")
     await until(lambda: served.robot.tap.watched)
     for number in range(900):
@@ -318,7 +318,7 @@ async def test_a_lost_connection_is_said_and_bridged(served: Served, open_consol
     await page.wait_for_selector(".link.good")
 
 
-async def test_a_map_is_saved_by_its_name_and_seen_in_the_grid(served: Served, open_console: OpenConsole) -> None:
+async def test_saved_map_is_seen_in_the_grid(served: Served, open_console: OpenConsole) -> None:
     page = await open_console(view="world")
     page.on("dialog", lambda dialog: asyncio.ensure_future(dialog.accept("hall")))
     await served.clock.advance(2.0)  # so that there is a map
@@ -335,7 +335,7 @@ async def test_a_map_is_saved_by_its_name_and_seen_in_the_grid(served: Served, o
             await asyncio.sleep(0.05)
 
 
-async def test_the_camera_shows_pictures_and_what_is_in_them(served: Served, open_console: OpenConsole) -> None:
+async def test_camera_shows_pictures_and_what_is_in_them(served: Served, open_console: OpenConsole) -> None:
     page = await open_console()
     await page.click("#tab-drive")
     wave = 8000 * np.sin(2 * np.pi * PITCH / SAMPLE_RATE * np.arange(60 * SAMPLE_RATE))

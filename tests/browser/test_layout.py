@@ -44,7 +44,7 @@ COVERED_OR_CUT = """() => {
 
 
 @pytest.mark.parametrize("view", ["live", "wire", "world", "robots", "class"])
-async def test_a_phone_shows_all_of_it_and_can_touch_it(served: Served, open_console: OpenConsole, view: str) -> None:
+async def test_phone_shows_and_can_touch_everything(served: Served, open_console: OpenConsole, view: str) -> None:
     page = await open_console(view=view, viewport={"width": 360, "height": 740}, has_touch=True, is_mobile=True)
     await page.wait_for_selector("main > :not(.empty)")
     assert await page.evaluate("document.documentElement.scrollWidth <= innerWidth")

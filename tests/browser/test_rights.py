@@ -167,7 +167,7 @@ async def test_signing_out_ends_the_session(guarded: Guarded, open_page: Open) -
     assert await page.evaluate("fetch('/api/robots').then((r) => r.status)") == 401
 
 
-async def test_the_header_of_a_phone_has_room_for_a_name(guarded: Guarded, open_page: Open) -> None:
+async def test_header_of_phone_has_room_for_a_name(guarded: Guarded, open_page: Open) -> None:
     guarded.add("a-person-with-a-long-name", "drive")
     page = await open_page()
     await page.set_viewport_size({"width": 360, "height": 740})
@@ -180,7 +180,7 @@ async def test_the_header_of_a_phone_has_room_for_a_name(guarded: Guarded, open_
         await page.screenshot(path=f"{folder}/phone.png")
 
 
-async def test_a_token_signs_in_and_its_rotation_signs_out(guarded: Guarded, open_page: Open) -> None:
+async def test_token_signs_in_and_its_rotation_signs_out(guarded: Guarded, open_page: Open) -> None:
     token = guarded.store.add_machine("cell7", [Grant("b", frozenset({Right.DRIVE}))])
     guarded.runtime.guard.reload()  # type: ignore[union-attr]
     page = await open_page()
@@ -233,7 +233,7 @@ async def test_a_driver_whose_right_is_revoked_stands(guarded: Guarded, open_pag
     assert robot.actions.running() == []
 
 
-async def test_a_right_that_becomes_less_leaves_the_page_with_what_is_left(guarded: Guarded, open_page: Open) -> None:
+async def test_reduced_right_leaves_the_page_with_the_rest(guarded: Guarded, open_page: Open) -> None:
     guarded.add("dora", "drive", "a")
     page = await open_page()
     await sign_in(page, "dora")
@@ -245,7 +245,7 @@ async def test_a_right_that_becomes_less_leaves_the_page_with_what_is_left(guard
     await page.wait_for_selector("button[aria-disabled=true]:has-text('Take control')")
 
 
-async def test_pupils_join_by_a_code_and_the_teacher_leads(guarded: Guarded, open_page: Open) -> None:
+async def test_pupils_join_by_code_and_the_teacher_leads(guarded: Guarded, open_page: Open) -> None:
     guarded.add("teacher", "admin")
     teacher = await open_page()
     await sign_in(teacher, "teacher")

@@ -103,7 +103,7 @@ async def printed(page: Page) -> list[str]:
     return found
 
 
-async def test_a_program_is_broken_stepped_and_run_to_its_end(studio: Open) -> None:
+async def test_program_halts_at_breakpoint_steps_and_runs_on(studio: Open) -> None:
     page = await loaded(await studio(), COUNTING)
     await page.evaluate("studio.editor.toggleBreak('say')")
     await page.keyboard.press("F5")
@@ -120,7 +120,7 @@ async def test_a_program_is_broken_stepped_and_run_to_its_end(studio: Open) -> N
     assert page.errors == []
 
 
-async def test_an_endless_program_is_stopped_and_found_again_after_the_page_died(studio: Open) -> None:
+async def test_endless_program_is_stopped_after_a_page_crash(studio: Open) -> None:
     page = await loaded(await studio(), FOREVER)
     await page.click("button.main")
     await until(page, "studio.runner.lit.value !== ''")
@@ -134,7 +134,7 @@ async def test_an_endless_program_is_stopped_and_found_again_after_the_page_died
     assert again.errors == []
 
 
-async def test_an_error_is_at_its_block_in_both_languages(studio: Open) -> None:
+async def test_error_is_at_its_block_in_both_languages(studio: Open) -> None:
     page = await studio()
     wrong = {"type": "math_arithmetic", "fields": {"OP": "DIVIDE"}, "inputs": {
         "A": number, "B": {"shadow": {"type": "math_number", "fields": {"NUM": 0}}}}}  # fmt: skip
@@ -149,7 +149,7 @@ async def test_an_error_is_at_its_block_in_both_languages(studio: Open) -> None:
     assert page.errors == []
 
 
-async def test_a_program_is_built_run_broken_stepped_and_mended_by_keyboard_alone(studio: Open) -> None:
+async def test_program_is_built_run_and_debugged_by_keyboard(studio: Open) -> None:
     page = await studio()
     for _ in range(30):
         await page.keyboard.press("Tab")
@@ -246,7 +246,7 @@ async def test_the_program_is_simulated_first(studio: Open, opened: Served) -> N
     assert page.errors == []
 
 
-async def test_a_key_pressed_without_a_link_counts_when_it_is_back(studio: Open, browser: Any) -> None:
+async def test_key_pressed_without_link_counts_after_reconnection(studio: Open, browser: Any) -> None:
     context = await browser.new_context(viewport={"width": 1400, "height": 900}, locale="en-US")
     links: list[Any] = []
     broken = asyncio.Event()
@@ -285,7 +285,7 @@ async def test_answers_are_shown_in_plain_words(studio: Open) -> None:
     assert {raw: await page.evaluate(words % json.dumps(raw)) for raw in told} == told
 
 
-async def test_a_page_asks_again_for_a_robot_that_cannot_be_programmed_yet(studio: Open, browser: Any) -> None:
+async def test_page_asks_again_until_a_robot_is_programmable(studio: Open, browser: Any) -> None:
     context = await browser.new_context(locale="en-US")
     asked: list[str] = []
 

@@ -52,7 +52,7 @@ async def engine() -> AsyncIterator[Engine]:
         yield engine
 
 
-async def test_each_function_is_called_with_the_values_of_its_block(played: dict[str, Any], engine: Engine) -> None:
+async def test_functions_are_called_with_their_block_s_values(played: dict[str, Any], engine: Engine) -> None:
     assert played["functions"] == len(list(contract("visual"))) == 169
     assert check(played["code"], ability_set().names()) == []
     run = await engine.start(played["code"], ability_set(), Limits())

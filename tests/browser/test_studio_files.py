@@ -18,7 +18,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples" / "programs"
 FILE = {"name": "f.py", "mimeType": "text/x-python"}
 
 
-async def test_examples_and_the_guides_programs_open_as_text_unchanged(studio: Open) -> None:
+async def test_examples_and_guides_programs_open_as_text_unchanged(studio: Open) -> None:
     page = await studio()
     files = await asyncio.to_thread(lambda: {path.name: path.read_text("utf-8") for path in EXAMPLES.glob("*.py")})
     guide = {f"guide{n}.py": text for n, (kind, text, _) in enumerate(shown("language.md")) if kind == "python"}
@@ -36,7 +36,7 @@ async def test_examples_and_the_guides_programs_open_as_text_unchanged(studio: O
 
 
 @pytest.mark.parametrize("wanted", ["For the app (style)", "Program"])
-async def test_a_program_of_blocks_comes_back_from_its_file(studio: Open, wanted: str) -> None:
+async def test_program_of_blocks_comes_back_from_its_file(studio: Open, wanted: str) -> None:
     page = await loaded(await studio(), COUNTING)
     await until(page, "studio.editor.code.value.includes('print')")
     code, state = await page.evaluate("[studio.editor.code.value, JSON.stringify(studio.editor.save())]")

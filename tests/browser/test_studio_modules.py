@@ -47,7 +47,7 @@ async def kept_as_module(page: Page) -> None:
     await until(page, "studio.editor.modules.value.some(m => m.condition.startsWith('double'))")
 
 
-async def test_a_function_becomes_a_module_that_is_lit_inside(studio: Open, opened: Served) -> None:
+async def test_function_becomes_a_module_that_is_lit_inside(studio: Open, opened: Served) -> None:
     page = await loaded(await studio(), DOUBLE)
     await kept_as_module(page)
     assert "double(21)" in await page.evaluate("studio.editor.code.value")

@@ -114,7 +114,7 @@ async def test_a_killed_server_gives_the_program_back(server: tuple[str, Life], 
     await context.close()
 
 
-async def test_pages_open_and_keep_programs_while_the_server_is_away(server: tuple[str, Life], browser: Any) -> None:
+async def test_pages_open_and_keep_programs_without_the_server(server: tuple[str, Life], browser: Any) -> None:
     url, start = server
     first = await start()
     context = await browser.new_context()

@@ -30,7 +30,7 @@ def test_verdicts() -> None:
     assert kind.judge(frozenset({Gimbal})) == "refused"
 
 
-def test_every_refused_request_is_listed_with_what_it_lacks(text: str) -> None:
+def test_refused_requests_are_listed_with_their_reason(text: str) -> None:
     section = text.partition("### What robomaster is refused on real robots")[2].partition("\n## ")[0]
     (row,) = [line for line in section.splitlines() if "`blaster.fire`" in line]
     assert row.endswith("| no Blaster |  | no Blaster |")

@@ -15,7 +15,7 @@ def call(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
 
 
-async def test_an_account_is_opened_and_its_token_reported_once(tmp_path: Path) -> None:
+async def test_account_is_opened_and_its_token_reported_once(tmp_path: Path) -> None:
     path = tmp_path / "cloud.db"
     ended = call("--data", str(path), "--account", "class 7b")
     assert ended.returncode == 0

@@ -20,7 +20,7 @@ ROBOTS, HERE = "127.0.97.1", "127.0.97.32/28"
 POSE = "api/core/slam/v1/localization/pose"
 
 
-def test_robots_of_a_gateway_are_on_addresses_of_a_range(tmp_path: Path) -> None:
+def test_robots_of_gateway_are_on_addresses_of_range(tmp_path: Path) -> None:
     data, config, known = tmp_path / "data", tmp_path / "robots.toml", tmp_path / "settings"
     store = AccessStore(data / FILE)
     token = store.add_machine("cell", [Grant("*", frozenset({Right.SEE}))])
@@ -85,7 +85,7 @@ def test_addresses_follow_one_another() -> None:
         addresses(1, "127.0.0.9", "10.99.0.0/24")
 
 
-def test_how_to_have_an_address_of_others_is_explained(tmp_path: Path) -> None:
+def test_how_to_have_address_of_others_is_explained(tmp_path: Path) -> None:
     data = tmp_path / "data"
     store = AccessStore(data / FILE)
     token = store.add_machine("cell", [Grant("*", frozenset({Right.SEE}))])

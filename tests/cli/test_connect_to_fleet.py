@@ -89,7 +89,7 @@ async def answers() -> bool:
         return (await client.get(NAME)).status_code == 200
 
 
-async def test_a_client_follows_its_robot_to_the_next_program(tmp_path: Path) -> None:
+async def test_client_follows_its_robot_to_the_next_program(tmp_path: Path) -> None:
     registry, client = str(tmp_path / "registry.db"), Client()
     async with contextlib.AsyncExitStack() as stack:
         async with program(tmp_path / "one", registry, HOMES[0]) as (_, token):
@@ -103,7 +103,7 @@ async def test_a_client_follows_its_robot_to_the_next_program(tmp_path: Path) ->
             assert await answers()
 
 
-async def test_a_client_leaves_a_program_that_lost_its_robot(tmp_path: Path) -> None:
+async def test_client_leaves_a_program_that_lost_its_robot(tmp_path: Path) -> None:
     """The old one lives on, cut off from the registry, and its tunnel too."""
     registry, client = str(tmp_path / "registry.db"), Client()
     async with program(tmp_path / "one", registry, HOMES[0]) as (_, token), client.connected(registry, token):
@@ -120,7 +120,7 @@ async def test_a_client_leaves_a_program_that_lost_its_robot(tmp_path: Path) -> 
         database.close()
 
 
-async def test_only_the_certificate_that_the_registry_has_is_believed(tmp_path: Path) -> None:
+async def test_only_certificate_that_the_registry_has_is_believed(tmp_path: Path) -> None:
     registry, client = str(tmp_path / "registry.db"), Client()
     async with program(tmp_path / "one", registry, HOMES[0]) as (runtime, token):
         database = open_registry(registry)
@@ -148,7 +148,7 @@ def server() -> Iterator[PostgreSQLServer]:
 
 
 @needs_postgresql
-async def test_a_client_needs_only_the_right_to_read_homes(server: PostgreSQLServer) -> None:
+async def test_client_needs_only_the_right_to_read_homes(server: PostgreSQLServer) -> None:
     database = open_registry(server.url)
     assert await Homes(database).take({"a": "10.0.0.1"}, "one", {}) == {"a": 1}
     with psycopg.connect(server.url, autocommit=True) as connection:

@@ -62,7 +62,7 @@ def test_a_demo_that_cannot_write_says_so_first() -> None:
     assert len(ended.stderr.splitlines()) == 1
 
 
-def test_a_demo_beside_a_running_robot_says_so_first(tmp_path: Path) -> None:
+def test_demo_beside_a_running_robot_says_so_first(tmp_path: Path) -> None:
     with socket.socket() as server:
         server.bind((ADDRESS, 1448))
         server.listen()

@@ -59,7 +59,7 @@ def test_a_written_map_is_read_again(tmp_path: Path) -> None:
     assert (tmp_path / "m.pgm").read_bytes().startswith(b"P5\n3 3\n255\n")
 
 
-def test_a_composite_map_without_a_grid_is_no_map() -> None:
+def test_composite_map_without_a_grid_is_no_map() -> None:
     with pytest.raises(BadMap):
         grid_in(encode_stcm(CompositeMap()))
 
@@ -77,7 +77,7 @@ async def test_files_there_and_back(tmp_path: Path) -> None:
 
 
 @pytest.mark.world("empty")
-async def test_a_robot_takes_a_ros_map_and_gives_its_own(robot: Robot, forward: Forward, tmp_path: Path) -> None:
+async def test_robot_takes_ros_map_and_gives_its_own(robot: Robot, forward: Forward, tmp_path: Path) -> None:
     await forward(seconds=1)
     door = SlamwareDoor(robot, "127.0.0.1", SlamwareConfig(port=0))
     await door.start()

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 
-def test_the_command_runs_beside_modules_of_the_same_names(tmp_path: Path) -> None:
+def test_command_runs_beside_modules_of_the_same_names(tmp_path: Path) -> None:
     for name in ("typer", "msgspec", "numpy"):
         (tmp_path / f"{name}.py").write_text("raise RuntimeError('not this one')\n", encoding="utf-8")
     done = subprocess.run(

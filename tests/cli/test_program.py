@@ -82,7 +82,7 @@ async def shell(tmp_path: Path) -> AsyncIterator[Shell]:
     database.close()
 
 
-async def test_run_shows_prints_and_blocks_and_the_log_keeps_them(shell: Shell) -> None:
+async def test_run_shows_prints_and_blocks_and_logs_them(shell: Shell) -> None:
     ran = await shell.call("run", shell.file("my-first program.py", HELLO))
     assert (ran.status, ran.out, ran.err.splitlines()) == (0, "hello\n狗\n", ["▶ greet", "■ greet"])
     listed = await shell.call("list")
@@ -158,7 +158,7 @@ async def test_a_cycle_waits_for_its_time(shell: Shell) -> None:
     assert "new_year  run_wait  cycle  0 0 1 1 *" in (await shell.call("list")).out
 
 
-async def test_a_task_is_suspended_recovered_shut_down_and_deleted(shell: Shell) -> None:
+async def test_task_is_suspended_recovered_shut_down_and_deleted(shell: Shell) -> None:
     process = await shell.begin("run", shell.file("t.py", "print('on')\nwhile True:\n    pass\n"))
     assert process.stdout
     assert await asyncio.wait_for(process.stdout.readline(), PATIENCE) == b"on\n"

@@ -42,7 +42,7 @@ def test_networks_are_expanded_within_bounds() -> None:
         list(expand(["nowhere"]))
 
 
-def test_what_scan_prints_can_be_copied_into_a_shell(
+def test_what_scan_prints_can_be_copied_into_shell(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     async def find(hosts: list[str], seconds: float) -> AsyncIterator[scan.Found]:
@@ -56,7 +56,7 @@ def test_what_scan_prints_can_be_copied_into_a_shell(
     assert line.endswith("--robot 'b=cyberdog://10.0.0.9?certs=DIR'")
 
 
-async def test_a_slamware_robot_is_recognised_and_others_are_not(door: SlamwareDoor, robot: Robot) -> None:
+async def test_slamware_robot_is_recognised_and_others_are_not(door: SlamwareDoor, robot: Robot) -> None:
     found = await slamware_at("127.0.0.1", door.port)
     assert found is not None
     assert found.url == f"slamware://127.0.0.1:{door.port}"

@@ -18,7 +18,7 @@ def environment_of(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(throwaway.AGAIN, raising=False)
 
 
-def test_uv_runs_it_again_from_its_own_cache_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_uv_runs_it_again_only_from_its_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("UV", "/usr/bin/uv")
     environment_of(tmp_path / "uv" / "archive-v0" / "x", monkeypatch)
     assert throwaway.runner() == ["/usr/bin/uv", "tool", "run", "--from"]
@@ -28,7 +28,7 @@ def test_uv_runs_it_again_from_its_own_cache_only(tmp_path: Path, monkeypatch: p
     assert throwaway.runner() == []
 
 
-def test_pipx_runs_it_again_but_not_what_it_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pipx_runs_it_again_only_if_not_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("UV", raising=False)
     pipx = tmp_path / "pipx"
     pipx.write_text("#!/bin/sh\n")

@@ -20,5 +20,5 @@ def test_usage_names_the_command_as_it_is_installed(name: str) -> None:
 
 
 @pytest.mark.parametrize("words", [("--help",), ("--version",), ("coverage",)])
-def test_a_reader_that_goes_is_no_error_worth_a_traceback(words: tuple[str, ...]) -> None:
+def test_reader_that_goes_is_no_error_worth_traceback(words: tuple[str, ...]) -> None:
     assert ended(*words, reader="true").stderr == ""

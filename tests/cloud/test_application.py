@@ -20,7 +20,7 @@ from roboglot.storage.database import Database
 from roboglot.wire.visual.cloud import CloudCode, parse_answer
 
 
-async def test_a_frame_that_never_ends_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_frame_that_never_ends_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(application, "BODY_SECONDS_MAX", 0.02)
     database = Database(":memory:")
     store = CloudStore(database)
@@ -82,7 +82,7 @@ REQUEST = b"POST /programs HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 2\r\n\
         (REQUEST + REQUEST + b"POST /programs HT", 2),
     ],
 )
-async def test_a_head_that_never_ends_is_not_waited_for(
+async def test_head_that_never_ends_is_not_waited_for(
     monkeypatch: pytest.MonkeyPatch, port: int, sent: bytes, answers: int
 ) -> None:
     monkeypatch.setattr(http_connection, "REQUEST_SECONDS_MAX", 0.2)
@@ -117,7 +117,7 @@ async def test_a_head_without_end_is_not_kept(port: int) -> None:
     writer.close()
 
 
-async def test_large_requests_one_behind_the_other_are_no_head(port: int) -> None:
+async def test_large_requests_one_behind_other_are_no_head(port: int) -> None:
     body = b" " * (2 * HEAD_MAX)
     request = REQUEST.replace(b"th: 2", b"th: %d" % len(body)).removesuffix(b"{}") + body
     reader, writer = await asyncio.open_connection("127.0.0.1", port)

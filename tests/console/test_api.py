@@ -187,7 +187,7 @@ async def test_a_lockstep_clock_is_not_steered(shown: Shown) -> None:
     assert (status, "lockstep" in answer["error"]) == (409, True)
 
 
-async def test_the_clock_of_a_world_is_paused_stepped_and_sped_up(tmp_path: Path) -> None:
+async def test_world_clock_pauses_steps_and_speeds_up(tmp_path: Path) -> None:
     base = load_config(None, {"data": str(tmp_path), "world": "empty"})
     robots = (RobotConfig("a", "universal", ADDRESS),)
     runtime = Runtime(replace(base, robots=robots, doors={}, console=ConsoleConfig(port=0)))
@@ -233,7 +233,7 @@ async def test_a_request_is_sent_again_as_it_was(
     wire.close()
 
 
-async def test_a_closed_door_and_too_many_at_once_are_refused(shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_closed_door_and_excess_requests_are_refused(shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = Exchange(0.0, "a", "robomaster", "127.0.0.1:1", "x", Direction.REQUEST, "version", b"version")
     with pytest.raises(Unconnected, match="did not answer"):
         await resend(asked, Endpoint("RoboMaster text SDK", "tcp 127.0.0.1:9"))
@@ -246,7 +246,7 @@ async def test_a_closed_door_and_too_many_at_once_are_refused(shown: Shown, monk
     wire.close()
 
 
-async def test_a_kept_map_is_merged_where_its_walls_fit(shown: Shown) -> None:
+async def test_kept_map_is_merged_where_its_walls_fit(shown: Shown) -> None:
     await shown.clock.advance(2.0)
     whole = shown.robot[Mapping].grid.trimmed()
     part = whole.window(whole.origin.x, whole.origin.y, 0.5, 50.0)  # what lies to the robot's back, and a bit more
@@ -264,7 +264,7 @@ async def test_a_kept_map_is_merged_where_its_walls_fit(shown: Shown) -> None:
     assert (status, "too far apart" in answer["error"]) == (409, True)
 
 
-async def test_chance_begins_anew_from_the_seed_that_is_given(shown: Shown) -> None:
+async def test_chance_begins_anew_from_seed_that_is_given(shown: Shown) -> None:
     async def scanned(seed: int) -> list[float]:
         status, words = await shown.ask("/api/world/reseed", {"seed": seed})
         assert status == 200, words
@@ -293,7 +293,7 @@ async def test_answers_leave_at_once(shown: Shown) -> None:
     assert {listening.proto for listening in server.sockets} == {socket.IPPROTO_TCP}
 
 
-async def test_a_page_that_is_opened_late_sees_all_that_is_kept(shown: Shown) -> None:
+async def test_late_page_sees_all_that_is_kept(shown: Shown) -> None:
     wire = shown.desk.view("a").wire
     wire.open()
     first = wire.last + 1

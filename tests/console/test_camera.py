@@ -78,13 +78,13 @@ async def test_sound_comes_as_an_endless_wav_file(shown: Shown) -> None:
     assert pitch_of(samples) == pytest.approx(PITCH, rel=0.05)
 
 
-async def test_a_page_that_asks_for_pictures_alone_gets_no_sound(shown: Shown) -> None:
+async def test_page_asking_for_pictures_only_gets_no_sound(shown: Shown) -> None:
     peer = await call(shown, "video")
     assert "m=audio" not in peer.remoteDescription.sdp
     await peer.close()
 
 
-async def test_a_call_ends_when_its_caller_may_see_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_call_ends_when_its_caller_loses_the_right(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("roboglot.console.camera.REVOKED_SECONDS", 0.0)
     answers, closed = iter([True, True, False]), asyncio.Event()
 

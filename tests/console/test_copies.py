@@ -86,12 +86,12 @@ async def test_the_log_is_silent_until_opened_and_bounded(monkeypatch: pytest.Mo
     assert not robot.tap.watched
 
 
-def test_bytes_that_are_no_text_are_shown_as_hexadecimal() -> None:
+def test_binary_bytes_are_shown_as_hexadecimal() -> None:
     assert readable(b"\x00\xff") == "00 ff"
     assert readable("ok;\n好".encode()) == "ok;\n好"
 
 
-def test_copied_python_prints_the_answer_of_the_command_itself() -> None:
+def test_copied_python_prints_answer_of_the_command_itself() -> None:
     with socket.create_server(("127.0.0.1", 0)) as door:
 
         def serve() -> None:
@@ -118,7 +118,7 @@ def test_copied_python_prints_refusals() -> None:
     server.server_close()
 
 
-def test_copied_python_trusts_the_robots_certificate_by_its_name() -> None:
+def test_copied_python_trusts_robots_certificate_by_its_name() -> None:
     tool = "grpcurl -cacert '/a b/ca' -cert /a/cert -key /a/key -authority cyberdog2.server -proto p -d '{}' h:1 m"
     proven = copy(request("cyberdog", "1002", b"{}"), "python", Endpoint("CyberDog 2 gRPC", "h:1", tool))
     assert "['/a b/ca', '/a/key', '/a/cert']" in proven

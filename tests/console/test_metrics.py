@@ -82,7 +82,7 @@ async def test_metrics_are_only_read(shown: Shown) -> None:
     assert (await shown.ask("/metrics", {}))[0] == 405
 
 
-async def test_the_board_and_the_page_name_what_there_is(shown: Shown) -> None:
+async def test_board_and_the_page_name_what_there_is(shown: Shown) -> None:
     await scraped(shown)
     await say("command;", "robot battery ?;")
     names = {name for name, *_ in await scraped(shown)}

@@ -75,7 +75,7 @@ async def test_a_block_for_each_function_in_both_languages(shown: Shown) -> None
                 assert parameter["minimum"] <= parameter["default"] <= parameter["maximum"], (function, parameter)
 
 
-async def test_a_program_is_saved_run_halted_and_stepped_by_blocks(shown: Shown) -> None:
+async def test_program_is_saved_run_halted_and_stepped(shown: Shown) -> None:
     async with page(shown) as studio:
         body = "n = 1\ncyberdog.task.block('one')\nn = 2\ncyberdog.task.block('two')\nprint(n)\n"
         assert (await studio.frame(**SAVE, id="1", body=body))["feedback"]["state"] == 0
@@ -93,7 +93,7 @@ async def test_a_program_is_saved_run_halted_and_stepped_by_blocks(shown: Shown)
         await studio.until(lambda m: m["type"] == "frame" and "stop task" in m["text"])
 
 
-async def test_a_page_lights_only_the_blocks_of_its_own_program(shown: Shown) -> None:
+async def test_page_lights_only_blocks_of_its_own_program(shown: Shown) -> None:
     async with page(shown) as mine, page(shown) as theirs, page(shown) as every:
         await mine.say(type="open", robot="a", program="t")
         await theirs.say(type="open", robot="a", program="other")
@@ -116,7 +116,7 @@ async def test_what_is_wrong_is_said_while_typing(shown: Shown) -> None:
         assert (problem["line"], "Did you mean 'turn'" in problem["en"], "turn" in problem["zh"]) == (1, True, True)
 
 
-async def test_a_program_is_tried_in_a_mission_and_in_a_copy_of_the_world(shown: Shown) -> None:
+async def test_program_is_tried_in_mission_and_world_copy(shown: Shown) -> None:
     async with page(shown) as studio:
         await studio.say(type="try", id=1, lesson="02_turn_around", body="cyberdog.motion.turn(180, 2)\n")
         assert (await studio.kind("tried"))["grade"]["stars"] == 3
@@ -156,7 +156,7 @@ async def test_a_class_is_joined_seen_and_handed_in(shown: Shown) -> None:
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"type": "run"}', "[" * 100_000, '{"type": "check", "id": "x"}', "\x00"])
-async def test_what_is_no_message_closes_the_page_and_nothing_else(shown: Shown, text: str) -> None:
+async def test_malformed_message_closes_only_its_page(shown: Shown, text: str) -> None:
     async with page(shown) as other:
         async with connect(shown.url.replace("http", "ws") + "/studio") as socket:
             await socket.send(text)
@@ -167,7 +167,7 @@ async def test_what_is_no_message_closes_the_page_and_nothing_else(shown: Shown,
 
 
 @pytest.mark.parametrize("folder", sorted({path.parent for path in ATTACKS}), ids=lambda folder: str(folder.name))
-async def test_a_hostile_program_is_judged_through_the_page_as_anywhere(shown: Shown, folder: Path) -> None:
+async def test_hostile_program_is_judged_through_page_as_anywhere(shown: Shown, folder: Path) -> None:
     async with page(shown) as studio:
         for path in (path for path in ATTACKS if path.parent == folder):
             body = path.read_text("utf-8")
@@ -181,7 +181,7 @@ async def test_a_hostile_program_is_judged_through_the_page_as_anywhere(shown: S
 @pytest.mark.parametrize(
     "text", ["{", "[" * 100_000, "NaN", '{"type": 7}', '{"type": "task", "target_id": [["t"]]}', "\x00"]
 )
-async def test_a_hostile_frame_is_refused_and_the_page_stays(shown: Shown, text: str) -> None:
+async def test_hostile_frame_is_refused_and_the_page_stays(shown: Shown, text: str) -> None:
     async with page(shown) as studio:
         await studio.say(type="frame", text=text)
         await studio.say(type="check", id=1, body="x = 1\n")
@@ -223,6 +223,6 @@ def test_a_failure_is_explained(text: str, line: int, words: str) -> None:
     assert bool(found["zh"]) == bool(words)
 
 
-def test_the_starting_blocks_of_the_table_are_right_programs() -> None:
+def test_starting_blocks_of_the_table_are_right_programs() -> None:
     for function in table()["functions"]:
         assert check(f"x = {function['key']}\n", ability_set().names()) == [], function["key"]

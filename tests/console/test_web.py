@@ -43,7 +43,7 @@ def test_every_key_of_the_pages_has_words() -> None:
         assert any(key.startswith(prefix) for key in WORDS["en"]), prefix
 
 
-def test_every_fault_and_option_has_words_in_both_languages() -> None:
+def test_faults_and_options_have_words_in_both_languages() -> None:
     options = {name for kind in KINDS.values() for name in list(inspect.signature(kind.begin).parameters)[1:]}
     wanted = {f"robot.{kind}" for kind in KINDS} | {f"option.{name}" for name in options}
     assert sorted(wanted - set(WORDS["en"])) == []
@@ -77,7 +77,7 @@ def test_the_page_is_small_enough() -> None:
     assert sum(len(asset.packed) for asset in sent.values()) < 60 * 1024
 
 
-def test_the_studio_asks_for_all_its_modules_at_once() -> None:
+def test_studio_asks_for_all_its_modules_at_once() -> None:
     text = (FOLDER / "studio" / "index.html").read_text("utf-8")
     asked = set(re.findall(r'rel="modulepreload" href="/([^"]+)"', text))
     later = {"vendor/uplot.mjs", "studio/vendor/codemirror.mjs"}  # with the first plot, the first text

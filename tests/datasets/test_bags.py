@@ -101,7 +101,7 @@ def bag(path: Path, plugin: StoragePlugin, *, by_tf: bool) -> Path:
 
 @pytest.mark.parametrize("plugin", list(StoragePlugin))
 @pytest.mark.parametrize("by_tf", [False, True])
-def test_a_bag_of_ros_2_is_the_drive_that_it_is(tmp_path: Path, plugin: StoragePlugin, by_tf: bool) -> None:
+def test_ros_2_bag_equals_the_drive_it_records(tmp_path: Path, plugin: StoragePlugin, by_tf: bool) -> None:
     log = read_drive_log(bag(tmp_path / "drive", plugin, by_tf=by_tf))
     assert len(log.scans) == COUNT
     for item in log.scans:

@@ -43,7 +43,7 @@ DOORS = [page for page in PAGES if page.parent.name == "protocols" and ".zh" not
 
 
 @pytest.mark.parametrize("door", DOORS, ids=lambda page: page.stem)
-def test_every_door_has_its_page_in_chinese_with_the_same_programs(door: Path) -> None:
+def test_doors_have_chinese_pages_with_the_same_programs(door: Path) -> None:
     chinese = door.with_name(f"{door.stem}.zh.md")
     assert chinese.exists(), chinese
     known = set(blocks(door, "python", "js", "go"))

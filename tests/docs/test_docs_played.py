@@ -137,7 +137,7 @@ async def test_the_page_of_recordings_records_what_runs(tmp_path: Path) -> None:
         assert ended.status == 0, ended
 
 
-async def test_the_page_of_access_lets_in_and_throws_out(tmp_path: Path) -> None:
+async def test_page_of_access_lets_in_and_throws_out(tmp_path: Path) -> None:
     page = DOCS.parent / "access.md"
     pose = "http://127.0.0.1:1448/api/core/slam/v1/localization/pose"
     async with terminal(tmp_path, "127.0.0.84", access=AccessConfig(on=True, local=False)) as user:

@@ -88,7 +88,7 @@ def likeness(one: Frame, other: Frame) -> float:
 
 
 @pytest.mark.world("office", body="cyberdog2")
-async def test_its_pictures_and_photos_are_what_the_dog_sees(driven: Robot, robot: Robot) -> None:
+async def test_its_pictures_and_photos_are_what_dog_sees(driven: Robot, robot: Robot) -> None:
     camera = driven[Camera]
     assert VideoStream in driven
     async with asyncio.timeout(PATIENCE):

@@ -199,7 +199,7 @@ async def test_postures_figures_and_gaits_are_the_dogs(driven: Robot, robot: Rob
 
 
 @pytest.mark.world("playground", body="cyberdog2")
-async def test_it_follows_and_docks_by_its_own_skills_also_when_it_is_localized(
+async def test_follows_and_docks_by_own_skills_when_localized(
     driven: Robot, robot: Robot, until: Until, world: World
 ) -> None:
     start = world.truth.pose_of("a")  # where it is localized: it is not carried elsewhere
@@ -223,7 +223,7 @@ async def test_it_follows_and_docks_by_its_own_skills_also_when_it_is_localized(
     await until(lambda: docking.status.ended)
 
 
-async def test_what_the_dog_did_for_no_one_is_stopped_when_the_link_is_back(
+async def test_unowned_task_is_stopped_when_the_link_returns(
     driven: Robot, robot: Robot, until: Until, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     going = driven[Navigation].navigate_to([Point(6.0, 0.0)], NavigationOptions(), source="test")

@@ -32,7 +32,7 @@ def same(one: Robot, other: Robot) -> bool:
     return {p.id: p for p in one[Places].all()} == {p.id: p for p in other[Places].all()}
 
 
-async def test_what_changes_on_one_side_changes_on_the_other(
+async def test_what_changes_on_one_side_changes_on_other(
     robot: Robot, slamware_door: SlamwareDoor, drive: Drive, until: Until, forward: Forward
 ) -> None:
     far = robot[Places]
@@ -62,7 +62,7 @@ async def test_what_changes_on_one_side_changes_on_the_other(
     await door.close()
 
 
-async def test_a_map_is_loaded_through_the_door_in_front_with_its_places(
+async def test_map_is_loaded_through_the_door_with_places(
     robot: Robot, driven: Robot, rest: OpenRest, until: Until, forward: Forward
 ) -> None:
     dashboard = await rest(driven)

@@ -132,6 +132,6 @@ async def test_a_fourth_driver_is_a_value(cart: tuple[Cart, str], drive: Drive, 
     await until(lambda: robot[Link].state is LinkState.UP)  # the supervisor has connected again
 
 
-def test_options_that_a_driver_does_not_name_are_refused(cart: tuple[Cart, str], clock: LockstepClock) -> None:
+def test_options_that_driver_does_not_name_are_refused(cart: tuple[Cart, str], clock: LockstepClock) -> None:
     with pytest.raises(ValueError, match="unknown options: size"):
         Drivers().drive(Robot("b", UNKNOWN, clock), f"{cart[1]}&size=3")

@@ -78,7 +78,7 @@ FAULTS: dict[str, tuple[Callable[[Rig], Awaitable[None]], Callable[[Rig], Awaita
 
 @pytest.mark.parametrize("fault", FAULTS)
 @pytest.mark.parametrize("back", BACKS)
-async def test_it_stops_in_time_tells_the_truth_and_comes_back(
+async def test_stops_in_time_reports_truthfully_and_comes_back(
     back: str, fault: str, way: Rig, connect: Connect, world: World, rest: OpenRest, text_door: Open
 ) -> None:
     async with connect() as driven:
@@ -113,9 +113,7 @@ async def test_it_stops_in_time_tells_the_truth_and_comes_back(
 
 
 @pytest.mark.parametrize("back", ["cyberdog"])
-async def test_new_certificates_are_used_as_soon_as_they_are_there(
-    back: str, way: Rig, connect: Connect, world: World
-) -> None:
+async def test_new_certificates_are_used_at_once(back: str, way: Rig, connect: Connect, world: World) -> None:
     async with connect() as driven:
         clock, link = driven.clock, driven[Link]
         await drives(driven, world)
@@ -147,7 +145,7 @@ async def test_a_bad_link_still_drives(back: str, fault: str, way: Rig, connect:
 
 
 @pytest.mark.parametrize("back", BACKS)
-async def test_a_link_that_is_too_slow_counts_as_lost(back: str, way: Rig, connect: Connect, world: World) -> None:
+async def test_link_that_is_too_slow_counts_as_lost(back: str, way: Rig, connect: Connect, world: World) -> None:
     slow = 0.6  # s each way
     async with connect() as driven:
         action, clock, link = await drives(driven, world), driven.clock, driven[Link]
@@ -167,7 +165,7 @@ async def test_a_link_that_is_too_slow_counts_as_lost(back: str, way: Rig, conne
 @pytest.mark.world("empty", body="robomaster_ep")
 @pytest.mark.parametrize("delay", [0.05, 0.1])
 @pytest.mark.parametrize("back", ["robomaster"])
-async def test_moves_of_a_late_ep_arrive_at_full_speed(
+async def test_moves_of_late_ep_arrive_at_full_speed(
     back: str, delay: float, way: Rig, connect: Connect, world: World
 ) -> None:
     async with connect() as driven:
@@ -183,7 +181,7 @@ async def test_moves_of_a_late_ep_arrive_at_full_speed(
 
 
 @pytest.mark.parametrize("back", BACKS)
-async def test_a_robot_that_is_away_at_the_start_is_connected_later(
+async def test_robot_away_at_the_start_is_connected_later(
     back: str, way: Rig, connect: Connect, rest: OpenRest, text_door: Open
 ) -> None:
     await cut(way)
@@ -206,7 +204,7 @@ async def test_a_robot_that_is_away_at_the_start_is_connected_later(
 
 
 @pytest.mark.parametrize("back", ["robomaster"])
-async def test_a_way_of_our_own_autonomy_ends_with_the_link(
+async def test_way_of_our_own_autonomy_ends_with_link(
     back: str, way: Rig, connect: Connect, robot: Robot, world: World
 ) -> None:
     """An EP's wheels and odometry through the driver, and a lidar beside it: navigation is ours."""
@@ -242,7 +240,7 @@ async def test_a_way_of_our_own_autonomy_ends_with_the_link(
 
 
 @pytest.mark.parametrize("back", BACKS)
-async def test_letting_go_of_a_silent_robot_ends_though_time_stands_still(
+async def test_releasing_a_silent_robot_ends_while_time_stands(
     back: str, way: Rig, connect: Connect, world: World
 ) -> None:
     async with connect() as driven:
@@ -254,7 +252,7 @@ async def test_letting_go_of_a_silent_robot_ends_though_time_stands_still(
 
 
 @pytest.mark.parametrize("back", ["robomaster"])
-async def test_blocked_pushes_name_the_port_and_are_tried_seldom(
+async def test_blocked_pushes_name_port_and_are_tried_seldom(
     back: str, way: Rig, connect: Connect, caplog: pytest.LogCaptureFixture
 ) -> None:
     way.fault.deaf = True
@@ -268,7 +266,7 @@ async def test_blocked_pushes_name_the_port_and_are_tried_seldom(
 
 
 @pytest.mark.parametrize("back", ["cyberdog"])
-async def test_a_dogs_reckoned_pose_stands_when_its_frames_do(
+async def test_dogs_reckoned_pose_stands_when_its_frames_do(
     back: str, way: Rig, connect: Connect, world: World
 ) -> None:
     async with connect() as driven:

@@ -32,7 +32,7 @@ pytestmark = pytest.mark.world("office")
 
 
 @pytest.mark.parametrize("back", ["slamware"])
-async def test_what_the_robot_still_does_when_the_link_is_back_is_stopped(
+async def test_task_still_running_at_reconnection_is_stopped(
     back: str, way: Rig, connect: Connect, world: World
 ) -> None:
     async with connect() as driven:
@@ -68,9 +68,7 @@ async def test_what_is_ours_is_never_taken_for_anothers(back: str, way: Rig, con
 
 
 @pytest.mark.parametrize("back", ["slamware"])
-async def test_what_the_robot_began_though_its_answer_was_lost_is_stopped_as_well(
-    back: str, way: Rig, connect: Connect, world: World
-) -> None:
+async def test_task_begun_with_lost_answer_is_stopped_too(back: str, way: Rig, connect: Connect, world: World) -> None:
     async with connect() as driven:
         here, start = driven[Localization].pose, world.truth.pose_of("a")
         way.fault.after = b"MoveToAction"
@@ -86,7 +84,7 @@ async def test_what_the_robot_began_though_its_answer_was_lost_is_stopped_as_wel
 
 
 @pytest.mark.parametrize("back", ["slamware"])
-async def test_another_client_takes_over_from_who_drives_by_hand(
+async def test_another_client_takes_over_from_a_manual_driver(
     back: str, way: Rig, connect: Connect, robot: Robot, rest: OpenRest, text_door: Open, world: World
 ) -> None:
     async with connect() as driven:
@@ -114,7 +112,7 @@ async def test_another_client_takes_over_from_who_drives_by_hand(
 
 
 @pytest.mark.parametrize("back", ["slamware"])
-async def test_the_robots_own_speed_limit_is_put_back_when_the_link_is_back(
+async def test_speed_limit_is_restored_with_the_link(
     back: str, way: Rig, connect: Connect, robot: Robot, rest: OpenRest, world: World
 ) -> None:
     async with connect() as driven:
@@ -131,7 +129,7 @@ async def test_the_robots_own_speed_limit_is_put_back_when_the_link_is_back(
 
 
 @pytest.mark.parametrize("back", ["cyberdog"])
-async def test_a_dog_that_another_app_has_walk_is_left_to_it_until_it_is_taken_back(
+async def test_dog_walked_by_another_app_is_left_alone(
     back: str, way: Rig, connect: Connect, world: World, text_door: Open
 ) -> None:
     async with connect() as driven:

@@ -216,7 +216,7 @@ async def test_pictures_come_through(driven_ep: Robot, robot: Robot, forward: Fo
 
 
 @pytest.mark.parametrize("profile", ["spec"])
-async def test_the_dogs_door_takes_photos_and_films_with_it(driven_ep: Robot, forward: Forward, tmp_path: Path) -> None:
+async def test_dogs_door_takes_photos_and_films_with_it(driven_ep: Robot, forward: Forward, tmp_path: Path) -> None:
     files = CameraFiles(driven_ep, tmp_path)
     taking = asyncio.ensure_future(files.photograph())
     for _ in range(40):

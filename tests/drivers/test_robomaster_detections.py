@@ -24,20 +24,20 @@ def where() -> Locator:
     return Locator(_Camera())  # type: ignore[arg-type]
 
 
-def test_a_whole_person_is_as_far_as_the_box_is_low(where: Locator) -> None:
+def test_distance_of_a_whole_person_follows_box_bottom(where: Locator) -> None:
     height = PERSON * FOCAL / 4.0 / HEIGHT
     seen = where.person(Target(0.5, 0.5, 0.1, height), 3)
     assert (seen.distance, seen.number) == (pytest.approx(4.0), 3)
     assert (seen.place.x, seen.place.y) == pytest.approx((0.1, 4.0))
 
 
-def test_of_who_is_cut_off_the_width_counts_and_the_right_of_the_picture_is_right(where: Locator) -> None:
+def test_cut_off_person_is_measured_by_width(where: Locator) -> None:
     seen = where.person(Target(0.75, 0.5, ACROSS * FOCAL / 2.0 / WIDTH, 1.0), 1)
     assert seen.distance == pytest.approx(2.0)
     assert seen.place.x > 0.5  # ahead of base_link, for the camera looks to the left
 
 
-def test_people_keep_their_numbers_while_they_stay_about_where_they_are() -> None:
+def test_people_keep_their_numbers_while_they_stay_near() -> None:
     numbers = PersonTracker()
     assert numbers.number([Box(0.2, 0.5, 0.1, 0.5), Box(0.8, 0.5, 0.1, 0.5)]) == [1, 2]
     assert numbers.number([Box(0.75, 0.5, 0.1, 0.5), Box(0.25, 0.5, 0.1, 0.5)]) == [2, 1]

@@ -63,7 +63,7 @@ async def test_rest_drives_an_asymmetric_path(driven_ep: Robot, rest: OpenRest, 
     assert (reported.x, reported.y, reported.yaw) == pytest.approx((here.x, here.y, here.yaw), abs=0.01)
 
 
-async def test_a_square_and_a_side_step_end_where_they_should(driven_ep: Robot, world: World, forward: Forward) -> None:
+async def test_square_and_side_step_end_where_they_should(driven_ep: Robot, world: World, forward: Forward) -> None:
     start = world.truth.pose_of("a")
 
     async def move(offset: Pose) -> None:
@@ -80,7 +80,7 @@ async def test_a_square_and_a_side_step_end_where_they_should(driven_ep: Robot, 
     assert_pose(world.truth.pose_of("a").relative_to(start), x=0.2, y=0.4, deg=math.degrees(0.5))
 
 
-async def test_an_attitude_that_drifts_while_it_stands_does_not_bend_its_way(
+async def test_drifting_attitude_at_rest_bends_no_way(
     driven_ep: Robot, robot: Robot, world: World, forward: Forward, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(robot[Imu], "_bias", np.array([0.0, 0.0, 0.006, 0.0, 0.0, 0.0]))
@@ -94,7 +94,7 @@ async def test_an_attitude_that_drifts_while_it_stands_does_not_bend_its_way(
     assert_pose(world.truth.pose_of("a").relative_to(start), x=0.8, y=0.0, deg=0.0)
 
 
-async def test_what_the_robot_tells_is_in_the_models_units(driven_ep: Robot, robot: Robot, forward: Forward) -> None:
+async def test_what_robot_tells_is_in_the_models_units(driven_ep: Robot, robot: Robot, forward: Forward) -> None:
     driven_ep[Driving].drive(Twist(x=0.3, y=0.2, yaw=0.5), source="test")
     await forward(seconds=2)
     twist, real = driven_ep[Odometry].reading.twist, robot[Odometry].reading.twist
@@ -136,7 +136,7 @@ async def test_the_gimbal_turns_the_models_way(driven_ep: Robot, robot: Robot, f
     assert real.attitude.yaw == pytest.approx(still, abs=0.03)
 
 
-async def test_what_it_has_not_is_missing_in_the_other_doors_words(driven_ep: Robot, rest: OpenRest) -> None:
+async def test_missing_parts_are_missing_in_the_other_door(driven_ep: Robot, rest: OpenRest) -> None:
     client = await rest(driven_ep)
     assert Lidar not in driven_ep
     assert Localization not in driven_ep

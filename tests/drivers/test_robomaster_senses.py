@@ -36,7 +36,7 @@ def profile(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
-async def test_pwm_outputs_put_out_what_they_are_given_also_after_a_lost_link(
+async def test_pwm_outputs_hold_also_after_a_lost_link(
     driven_ep: Robot, robot: Robot, text_door: Open, until: Until
 ) -> None:
     script, pwm = await text_door(driven_ep), driven_ep[PwmPorts]

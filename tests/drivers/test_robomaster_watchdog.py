@@ -44,7 +44,7 @@ def started(robot: socket.socket, doing: str) -> tuple[subprocess.Popen[bytes], 
 
 
 @pytest.mark.parametrize("blow", [signal.SIGSTOP, signal.SIGKILL])
-def test_a_program_that_hangs_or_dies_loses_its_connection(robot: socket.socket, blow: int) -> None:
+def test_program_that_hangs_or_dies_loses_its_connection(robot: socket.socket, blow: int) -> None:
     program, connection = started(robot, "drives")
     try:
         os.kill(program.pid, blow)
@@ -71,7 +71,7 @@ def test_a_program_at_rest_may_be_stopped(robot: socket.socket) -> None:
         connection.close()
 
 
-async def test_what_is_no_longer_watched_ends_as_any_connection(robot: socket.socket) -> None:
+async def test_unwatched_connection_ends_as_any_other(robot: socket.socket) -> None:
     watchdog = Watchdog()
     with socket.create_connection(robot.getsockname()) as near:
         far, _ = robot.accept()

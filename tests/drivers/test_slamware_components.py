@@ -34,7 +34,7 @@ async def ended(action: Action, until: Until) -> ActionStatus:
     return action.status
 
 
-async def test_boxes_open_and_close_and_tell_what_is_in_them(driven: Robot, robot: Robot, until: Until) -> None:
+async def test_boxes_open_close_and_report_their_contents(driven: Robot, robot: Robot, until: Until) -> None:
     far, near = robot[Cargo], driven[Cargo]
     assert near.compartments == far.compartments
     heard: list[BoxChanged] = []
@@ -109,7 +109,7 @@ async def test_strips_shine_in_the_robots_modes(driven: Robot, robot: Robot, for
         near.shine("left", lamp=1)
 
 
-async def test_the_emergency_stop_holds_it_and_is_reported_to_every_door(
+async def test_emergency_stop_holds_and_reaches_every_door(
     driven: Robot, robot: Robot, rest: OpenRest, until: Until, forward: Forward
 ) -> None:
     dashboard, changes = await rest(driven), list[bool]()
@@ -166,7 +166,7 @@ async def test_what_a_robot_has_not_is_not_announced(driven: Robot) -> None:
         assert part not in driven
 
 
-async def test_an_answer_that_makes_no_sense_costs_only_its_part(
+async def test_senseless_answer_costs_only_its_part(
     slamware_door: SlamwareDoor, drive: Drive, forward: Forward, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def nonsense(_: SlamwareClient) -> None:

@@ -109,7 +109,7 @@ async def test_a_script_that_hangs_up_stops_the_robot(
     assert driven.actions.running() == []
 
 
-async def test_an_arc_is_driven_in_turns_and_keeps_its_mean(driven: Robot, world: World, forward: Forward) -> None:
+async def test_arc_is_driven_in_turns_with_its_mean(driven: Robot, world: World, forward: Forward) -> None:
     start = world.truth.pose_of("a")
     action = driven[Driving].drive(Twist(x=0.2, yaw=0.3), source="test")
     await forward(seconds=4)
@@ -133,7 +133,7 @@ async def test_the_robots_speed_limit_is_put_back(driven: Robot, slamware_door: 
         assert await other.get_system_parameter("base.max_moving_speed") == before
 
 
-async def test_a_limit_that_a_killed_program_left_is_put_back_by_the_next(
+async def test_limit_of_killed_program_is_restored_next_time(
     slamware_door: SlamwareDoor, clock: LockstepClock, forward: Forward, tmp_path: Path
 ) -> None:
     url, database = f"slamware://127.0.0.1:{slamware_door.port}", Database(tmp_path / "kept.db")
@@ -172,7 +172,7 @@ async def test_it_navigates_by_the_robots_own_skill(driven: Robot, world: World,
     assert_pose(world.truth.pose_of("a").relative_to(start), x=1.0, y=0.5, deg=math.degrees(-1.0))
 
 
-async def test_navigation_fails_in_the_models_words_and_stops_when_cancelled(
+async def test_navigation_fails_in_model_words_stops_when_cancelled(
     driven: Robot, world: World, forward: Forward
 ) -> None:
     action = driven[Navigation].navigate_to([Point(500.0, 500.0)], NavigationOptions(), source="test")
@@ -202,7 +202,7 @@ async def test_a_paused_way_goes_on(driven: Robot, world: World, forward: Forwar
     assert action.status is ActionStatus.SUCCEEDED
 
 
-async def test_what_the_robot_senses_arrives_in_the_models_units(driven: Robot, robot: Robot, forward: Forward) -> None:
+async def test_what_robot_senses_arrives_in_the_models_units(driven: Robot, robot: Robot, forward: Forward) -> None:
     await forward(seconds=3)
     scan, real = driven[Lidar].scan, robot[Lidar].scan
     assert scan is not None
@@ -261,7 +261,7 @@ async def test_it_announces_what_it_adds(driven: Robot) -> None:
 
 
 @pytest.mark.world("empty", body="robomaster_ep")
-async def test_a_robot_without_lidar_and_map_has_none_here_either(driven: Robot, rest: OpenRest) -> None:
+async def test_robot_without_lidar_and_map_has_none_here(driven: Robot, rest: OpenRest) -> None:
     dashboard = await rest(driven)
     for ask in (dashboard.get_pose, dashboard.get_laser_scan, dashboard.get_known_area):
         with pytest.raises(SlamwareRefused) as refused:

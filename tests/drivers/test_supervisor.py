@@ -46,12 +46,12 @@ async def pauses_of(clock: LockstepClock, there: Collection[int], served: float)
     return [round(after - before, 2) for before, after in pairwise(tried)], states
 
 
-async def test_pauses_grow_up_to_ten_seconds_and_begin_anew_after_a_connection(clock: LockstepClock) -> None:
+async def test_pauses_grow_to_ten_seconds_until_a_connection(clock: LockstepClock) -> None:
     pauses, states = await pauses_of(clock, {FIRST_THERE}, SERVED)
     assert pauses[:11] == [0.5, 1.0, 2.0, 4.0, 8.0, 10.0, 10.0, SERVED + 0.5, 1.0, 2.0, 4.0]
     assert states == {LinkState.CONNECTING, LinkState.UP, LinkState.LOST}
 
 
-async def test_a_link_that_flaps_is_tried_ever_more_seldom(clock: LockstepClock) -> None:
+async def test_link_that_flaps_is_tried_ever_more_seldom(clock: LockstepClock) -> None:
     pauses, _ = await pauses_of(clock, range(100), FLAPPING)
     assert pauses[:6] == [FLAPPING + pause for pause in (0.5, 1.0, 2.0, 4.0, 8.0, 10.0)]

@@ -56,7 +56,7 @@ def test_other_urls_are_refused_in_plain_words(url: str, words: str, clock: Lock
 @pytest.mark.parametrize(
     "url", ["slamware://127.0.0.1:1", "robomaster://127.0.0.1:1", "cyberdog://127.0.0.1:1?certs=none&app=0"]
 )
-async def test_every_door_opens_in_front_of_a_robot_that_is_away(
+async def test_every_door_opens_for_an_absent_robot(
     url: str, clock: LockstepClock, forward: Forward, tmp_path: Path
 ) -> None:
     from roboglot.fleet import build_fleet
@@ -84,9 +84,7 @@ async def test_every_door_opens_in_front_of_a_robot_that_is_away(
     database.close()
 
 
-async def test_the_doors_of_this_program_are_no_robots_to_be_discovered(
-    clock: LockstepClock, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_own_doors_are_not_discovered_as_robots(clock: LockstepClock, monkeypatch: pytest.MonkeyPatch) -> None:
     from roboglot.fleet import build_fleet
     from roboglot.storage.database import Database
 

@@ -24,7 +24,7 @@ def until(condition: Callable[[], bool]) -> None:
         time.sleep(0.1)
 
 
-def test_the_saved_map_is_loaded_at_the_next_start(tmp_path: Path) -> None:
+def test_saved_map_is_loaded_at_the_next_start(tmp_path: Path) -> None:
     with served(tmp_path / "data", address=ADDRESS) as robot, httpx.Client(base_url=f"http://{ADDRESS}:1448") as client:
         until(lambda: client.get(f"{SLAM}/knownarea").json()["width"] > 0)
         assert client.post(LINES, json=[WALL]).json() is True

@@ -63,7 +63,7 @@ def pair(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServedRobot]:
         yield robots
 
 
-def test_a_second_robot_has_the_same_ports_on_the_next_address(pair: ServedRobot) -> None:
+def test_second_robot_has_same_ports_on_next_address(pair: ServedRobot) -> None:
     for address in (FIRST, SECOND):
         for port in TCP_PORTS:
             socket.create_connection((address, port), timeout=5).close()
@@ -73,7 +73,7 @@ def test_a_second_robot_has_the_same_ports_on_the_next_address(pair: ServedRobot
     assert abs(float(get(POSE, FIRST)["x"])) < 0.05  # type: ignore[index]
 
 
-def test_what_one_door_begins_another_door_sees_and_ends(pair: ServedRobot) -> None:
+def test_task_begun_at_one_door_ends_at_another(pair: ServedRobot) -> None:
     target = {"x": 4.0, "y": 0.0, "z": 0.0}
     post(
         "/api/core/motion/v1/actions",
@@ -157,7 +157,7 @@ def test_it_ends_even_if_something_is_stuck() -> None:
         assert process.wait(20) == 1
 
 
-def test_it_ends_in_the_middle_of_a_day_of_lockstep(tmp_path: Path) -> None:
+def test_it_ends_in_middle_of_day_of_lockstep(tmp_path: Path) -> None:
     with served(tmp_path / "data", "--lockstep", "--world", "empty", address="127.0.0.58") as robot:
         assert robot.process.stdin
         with Line("127.0.0.58") as line:

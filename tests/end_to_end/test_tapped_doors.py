@@ -110,7 +110,7 @@ async def programs(asked: list[Exchange]) -> None:
     ]
 
 
-async def test_every_door_passes_on_what_it_hears_and_says(runtime: Runtime) -> None:
+async def test_every_door_passes_on_what_it_transfers(runtime: Runtime) -> None:
     tap = runtime.fleet.robots["a"].tap
     for name, use in (("slamware", rest), ("robomaster", text), ("cyberdog", dog), ("visual", programs)):
         heard: list[Exchange] = []

@@ -18,7 +18,7 @@ def moved(a: np.ndarray, by: np.ndarray) -> np.ndarray:
     return np.array([a[0] + c * by[0] - s * by[1], a[1] + s * by[0] + c * by[1], a[2] + by[2]])
 
 
-def test_two_rounds_are_straightened_by_what_was_seen_twice() -> None:
+def test_two_rounds_are_straightened_by_shared_sightings() -> None:
     draw, count = np.random.default_rng(1), 400
     angle = np.linspace(0, 4 * np.pi, count)
     truth = np.stack([10 * np.cos(angle), 10 * np.sin(angle), angle + np.pi / 2], axis=1)

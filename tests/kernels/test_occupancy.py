@@ -184,7 +184,7 @@ def test_obstacles_are_remembered_until_a_ray_passes_through() -> None:
     assert seen[10, 30] == 0.0
 
 
-def test_the_way_is_free_up_to_where_the_hull_would_touch() -> None:
+def test_way_is_free_until_the_hull_would_touch() -> None:
     path = np.stack([np.arange(0, 3, 0.05), np.zeros(60)], axis=1)
     ahead = np.array([[2.0, 0.1]])
     assert free_way(path, ahead, 0.0, 0.0, 0.3) == pytest.approx(2.0 - math.sqrt(0.3**2 - 0.1**2), abs=0.051)

@@ -57,7 +57,7 @@ def test_a_wall_covers_the_pixels_that_geometry_says():
     assert depth[inside] == pytest.approx(0.5)
 
 
-def test_what_is_nearer_hides_what_is_behind_whatever_comes_first():
+def test_nearer_things_hide_farther_ones_in_any_order():
     near, far = wall(1.0, -0.2, 0.2, -0.2, 0.2), wall(3.0, -1.0, 1.0, -1.0, 1.0)
     for order in ((near, far), (far, near)):
         seen, _, _, sources, _ = picture(*order)
@@ -89,7 +89,7 @@ def test_is_not_drawn(quad):
     assert not seen.any()
 
 
-def test_what_reaches_behind_the_eye_is_cut_off_there():
+def test_what_reaches_behind_eye_is_cut_off_there():
     """A wall along the way, to the left, from 5 m behind to 5 m ahead."""
     seen, depth, *_ = picture([(-5, 1, -1), (5, 1, -1), (5, 1, 1), (-5, 1, 1)])
     assert (seen[:, 0] == FIRST).all()
@@ -98,7 +98,7 @@ def test_what_reaches_behind_the_eye_is_cut_off_there():
     assert 1 / depth[HEIGHT // 2, 0] == pytest.approx(1 / slant, rel=1e-4)
 
 
-def test_texture_coordinates_are_those_of_the_point_that_is_seen():
+def test_texture_coordinates_belong_to_the_seen_point():
     _, _, planes, _, _ = picture([(1, 1.0, -1), (6, -1.0, -1), (6, -1.0, 1), (1, 1.0, 1)])  # a slanting wall
     p = planes[FIRST]
     x, y = 200.5, 90.5

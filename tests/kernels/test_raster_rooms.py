@@ -16,7 +16,7 @@ def plan(*rows):
 TWO_ROOMS = ["###########", "#    #    #", "#    #    #", "#    #    #", "###########"]
 
 
-def test_rooms_are_numbered_and_walls_belong_to_a_neighbour():
+def test_rooms_are_numbered_and_walls_belong_to_neighbour():
     rooms = np.zeros((5, 11), np.uint8)
     assert label(plan(*TWO_ROOMS), rooms) == 2
     assert set(rooms[1:4, 1:5].ravel()) == {1}
@@ -46,7 +46,7 @@ def seen_from(x, y, yaw, spread, door):
     return set(np.nonzero(visible)[0])
 
 
-def test_a_wall_hides_the_next_room_and_a_door_shows_it():
+def test_wall_hides_next_room_and_door_shows_it():
     assert seen_from(20, 25, 0.0, 1.2, door=False) == {1}
     assert seen_from(20, 25, 0.0, 1.2, door=True) == {1, 2}
 

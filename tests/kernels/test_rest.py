@@ -40,7 +40,7 @@ VmFlags: rd ex mr mw me
 """
 
 
-def test_only_what_no_one_wrote_to_is_given_back() -> None:
+def test_only_unwritten_cells_are_given_back() -> None:
     assert list(_unwritten(MAPS)) == [(0x7F00, 0x7F10, 40 * 1024)]
 
 

@@ -53,7 +53,7 @@ def dijkstra(cost: np.ndarray, start: tuple[int, int], goal: tuple[int, int]) ->
 
 @settings(max_examples=100, deadline=None)
 @given(grids(), st.data())
-def test_all_ways_from_a_cell_cost_what_dijkstras_cost(cost: np.ndarray, data: st.DataObject) -> None:
+def test_all_ways_from_cell_cost_what_dijkstras_cost(cost: np.ndarray, data: st.DataObject) -> None:
     start = data.draw(st.tuples(st.integers(0, cost.shape[0] - 1), st.integers(0, cost.shape[1] - 1)))
     expected = [[dijkstra(cost, start, (row, col)) for col in range(cost.shape[1])] for row in range(cost.shape[0])]
     np.testing.assert_allclose(ways_from(cost, *start), expected, rtol=1e-4, atol=1e-4)

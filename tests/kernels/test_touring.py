@@ -33,7 +33,7 @@ def test_a_few_places_are_ordered_exactly(count: int, seed: int) -> None:
 
 @settings(max_examples=60, deadline=None)
 @given(st.integers(1, 7), st.integers(0, 2**32 - 1))
-def test_round_trips_of_a_few_places_are_exact_with_the_way_back(count: int, seed: int) -> None:
+def test_short_round_trips_are_optimal_including_the_return(count: int, seed: int) -> None:
     costs = costs_between(np.random.default_rng(seed).uniform(0, 30, (count, 2)))
     order = visiting_order(costs, 50, True)
     assert sorted(order) == list(range(count))
@@ -52,7 +52,7 @@ def test_long_round_trips_are_nearly_the_shortest() -> None:
 
 @settings(max_examples=30, deadline=None)
 @given(st.integers(14, 60), st.integers(0, 2**32 - 1))
-def test_many_places_are_each_visited_once_on_no_worse_a_tour_than_nearest_first(count: int, seed: int) -> None:
+def test_tour_visits_each_place_and_beats_nearest_first(count: int, seed: int) -> None:
     costs = costs_between(np.random.default_rng(seed).uniform(0, 30, (count, 2)))
     order, plain = visiting_order(costs, 50, False), visiting_order(costs, 0, False)
     assert sorted(order) == list(range(count))

@@ -35,7 +35,7 @@ def heard(packets_):
     return np.concatenate(parts)
 
 
-def test_one_packet_a_block_and_the_tone_comes_back():
+def test_one_packet_block_and_the_tone_comes_back():
     sound = tone(440, 1.0)
     wave_form = heard(packets(sound))
     assert len(wave_form) == SAMPLE_RATE
@@ -103,7 +103,7 @@ def test_garbage_is_refused_in_plain_words(junk):
 
 
 @given(st.integers(0, 60), st.binary(min_size=1, max_size=8))
-def test_a_damaged_file_gives_a_sound_or_a_plain_refusal(at, junk):
+def test_damaged_file_gives_sound_or_a_plain_refusal(at, junk):
     data = bytearray(wav(tone(300, 0.01).samples.tobytes()).getvalue())
     data[at : at + len(junk)] = junk
     try:

@@ -39,7 +39,7 @@ async def test_a_recording_opens_and_shows_what_was(recorder, lockstep, tmp_path
     assert [entry.name for entry in tmp_path.iterdir()] == ["tour.mp4"]
 
 
-async def test_one_at_a_time_and_stop_needs_a_start(recorder, lockstep, tmp_path):
+async def test_one_at_time_and_stop_needs_a_start(recorder, lockstep, tmp_path):
     with pytest.raises(Refused):
         await recorder.stop()
     recorder.start(tmp_path / "a.mp4")
@@ -54,7 +54,7 @@ async def test_one_at_a_time_and_stop_needs_a_start(recorder, lockstep, tmp_path
     assert (await recorder.stop()).path.name == "b.mp4"
 
 
-async def test_a_recording_ends_by_itself_when_it_is_long_enough(recorder, camera, lockstep, tmp_path, monkeypatch):
+async def test_recording_ends_by_itself_when_long_enough(recorder, camera, lockstep, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "SECONDS_MAX", 0.5)
     recorder.start(tmp_path / "long.mp4")
     await lockstep.advance(2.0)

@@ -35,7 +35,7 @@ def test_every_picture_is_out_at_once_and_decodes():
     assert decoded(b"".join(packet.data for packet in packets)) == list(range(38))
 
 
-def test_each_packet_is_an_access_unit_with_delimiter_and_keyframes_carry_their_parameters():
+def test_packets_are_delimited_access_units_keyframes_carry_parameters():
     packets = encoded(65)
     assert [i for i, packet in enumerate(packets) if packet.keyframe] == [0, 30, 60]
     for packet in packets:
@@ -64,7 +64,7 @@ def test_colours_are_declared_and_survive():
     assert np.abs(seen.to_ndarray()[:HEIGHT].astype(int) - frame.luma).mean() < 4
 
 
-async def test_viewers_share_one_encoder_and_join_in_the_middle(camera, lockstep):
+async def test_viewers_share_one_encoder_and_join_in_middle(camera, lockstep):
     video = VideoStream(camera, lockstep)
     early, data, late_data = video.subscribe(), [], []
     await lockstep.advance(0.5)

@@ -51,7 +51,7 @@ async def test_it_goes_from_accepted_to_succeeded(actions: Actions, clock: Locks
     assert seen == [ActionStatus.ACCEPTED, executing, executing, ActionStatus.SUCCEEDED]  # "half" is reported once
 
 
-async def test_a_new_one_waits_until_the_old_one_has_braked(actions: Actions, clock: LockstepClock) -> None:
+async def test_new_one_waits_until_old_one_has_braked(actions: Actions, clock: LockstepClock) -> None:
     trace = []
 
     async def slow_to_brake(_: Action) -> None:
@@ -101,7 +101,7 @@ async def test_failure_carries_its_reason(actions: Actions) -> None:
         await action.succeeded()
 
 
-async def test_a_bug_in_an_action_aborts_it_and_is_logged(actions: Actions, caplog: pytest.LogCaptureFixture) -> None:
+async def test_bug_in_action_aborts_it_and_is_logged(actions: Actions, caplog: pytest.LogCaptureFixture) -> None:
     async def broken(_: Action) -> None:
         raise ZeroDivisionError("oops")
 

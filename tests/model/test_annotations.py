@@ -20,7 +20,7 @@ def test_a_straight_line_is_its_ends() -> None:
     assert line.points() == (Point(0, 0), Point(3, 4))
 
 
-def test_a_curve_goes_from_end_to_end_as_bezier_has_it() -> None:
+def test_curve_goes_from_end_to_end_as_bezier() -> None:
     line = Line(1, LineKind.TRACK, Point(0, 0), Point(3, 0), control=(Point(0, 3), Point(3, 3)))
     points = line.points()
     assert (points[0], points[-1]) == (Point(0, 0), Point(3, 0))
@@ -29,7 +29,7 @@ def test_a_curve_goes_from_end_to_end_as_bezier_has_it() -> None:
     assert max(a.distance_to(b) for a, b in itertools.pairwise(points)) < 0.15
 
 
-def test_an_area_is_a_rectangle_around_its_centre_line() -> None:
+def test_area_is_a_rectangle_around_its_centre_line() -> None:
     half = math.sqrt(0.5)
     area = Area(1, AreaKind.FORBIDDEN, Point(0, 0), Point(2, 2), half_width=half)
     assert area.contains(Point(1, 1))

@@ -24,7 +24,7 @@ asyncio.run(main())
 """
 
 
-def test_loading_does_not_hold_up_the_end_of_the_process() -> None:
+def test_loading_does_not_hold_up_end_of_process() -> None:
     subprocess.run([sys.executable, "-c", ENDS], check=True, timeout=30)
 
 

@@ -22,7 +22,7 @@ async def test_nothing_happens_until_time_passes() -> None:
     assert clock.epoch() == LOCKSTEP_EPOCH + clock.time()
 
 
-async def test_what_follows_from_an_instant_happens_before_the_next() -> None:
+async def test_what_follows_from_instant_happens_before_the_next() -> None:
     clock, trace = LockstepClock(), []
 
     async def relay(name: str, delay: float) -> None:
@@ -110,7 +110,7 @@ async def test_wait_for_passes_results_and_cancellation_on() -> None:
     assert inner.cancelled()
 
 
-async def test_who_is_cancelled_at_the_moment_of_the_time_out_does_not_go_on() -> None:
+async def test_cancellation_at_the_moment_of_timeout_wins() -> None:
     clock = LockstepClock()
 
     async def slow() -> None:
@@ -125,7 +125,7 @@ async def test_who_is_cancelled_at_the_moment_of_the_time_out_does_not_go_on() -
         await waiting
 
 
-async def test_a_time_out_after_a_cancellation_that_was_survived_is_one() -> None:
+async def test_timeout_after_a_survived_cancellation_is_one() -> None:
     clock = LockstepClock()
 
     async def stubborn() -> None:
@@ -166,7 +166,7 @@ class Hours:
 
 
 @given(steps=st.lists(st.tuples(st.sampled_from(["pass", "pause", "resume", "speed", "step"]), st.floats(0.01, 50.0))))
-def test_steered_time_is_the_sum_of_what_passed_while_it_ran(steps: list[tuple[str, float]]) -> None:
+def test_steered_time_is_the_sum_of_running_time(steps: list[tuple[str, float]]) -> None:
     with pytest.MonkeyPatch.context() as monkeypatch:
         hours = Hours(monkeypatch)
         clock = RealClock()
@@ -194,7 +194,7 @@ def test_steered_time_is_the_sum_of_what_passed_while_it_ran(steps: list[tuple[s
                 assert clock.paused == (what == "pause")
 
 
-async def test_a_paused_clock_holds_its_sleepers_and_a_step_wakes_them() -> None:
+async def test_paused_clock_holds_sleepers_until_a_step() -> None:
     clock = RealClock(speed=1000.0)
     clock.pause()
     now = clock.time()

@@ -18,7 +18,7 @@ async def test_a_reader_gets_its_types_in_order() -> None:
     assert pressed.drain() == []
 
 
-async def test_a_slow_reader_loses_the_oldest_and_no_one_waits() -> None:
+async def test_slow_reader_loses_oldest_and_no_one_waits() -> None:
     events = EventStream()
     with events.subscribe(BumperPressed, maxlen=3) as slow:
         for stamp in range(10):

@@ -23,7 +23,7 @@ class Source:
         )
 
 
-async def test_it_begins_with_the_first_viewer_and_ends_with_the_last():
+async def test_begins_with_first_viewer_and_ends_with_last():
     source = Source()
     one, other = source.feed.subscribe(), source.feed.subscribe()
     one.close()
@@ -45,7 +45,7 @@ async def test_a_viewer_joins_where_it_can():
     assert viewer.dropped == 2
 
 
-async def test_a_slow_viewer_goes_on_at_the_next_joint_and_others_lose_nothing():
+async def test_slow_viewer_resumes_at_the_next_joint():
     source = Source()
     slow, quick = source.feed.subscribe(), source.feed.subscribe()
     got = []

@@ -51,7 +51,7 @@ def test_north_is_found_on_the_way(north_is: float, x: float, y: float) -> None:
 
 
 @given(angles)
-def test_a_robot_that_stood_still_knows_the_distance_alone(north_is: float) -> None:
+def test_robot_that_stood_still_knows_the_distance_alone(north_is: float) -> None:
     found = anchor([(Point(), seen(Point(), north_is))] * 5)
     assert found
     assert found.north is None

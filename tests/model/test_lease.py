@@ -31,9 +31,7 @@ def faults(robot: Robot) -> dict[str, FaultLevel]:
     return {fault.name: fault.level for fault in robot[Health].faults}
 
 
-async def test_the_newest_command_has_the_robot_and_everybody_can_see_whose_it_is(
-    robot: Robot, forward: Forward
-) -> None:
+async def test_newest_command_has_the_robot_visibly(robot: Robot, forward: Forward) -> None:
     lease = robot[Lease]
     assert lease.holder is None
     with robot.events.subscribe(ControlChanged) as reported:
@@ -67,7 +65,7 @@ async def test_two_clients_of_one_door_are_distinguished(robot: Robot, forward: 
     await forward(seconds=1)
 
 
-async def test_who_takes_control_has_it_alone_until_it_is_released(robot: Robot, forward: Forward) -> None:
+async def test_exclusive_control_lasts_until_it_is_released(robot: Robot, forward: Forward) -> None:
     lease = robot[Lease]
     with asking_for(SCRIPT):
         driving = robot[Driving].drive(Twist(x=0.2), source="one")
@@ -113,9 +111,7 @@ async def test_who_takes_control_has_it_alone_until_it_is_released(robot: Robot,
         (PERSON, "", False),
     ],
 )
-async def test_a_client_is_named_by_its_door_its_host_or_its_connection(
-    robot: Robot, taken: str, who: str, may: bool
-) -> None:
+async def test_client_is_named_by_door_host_or_connection(robot: Robot, taken: str, who: str, may: bool) -> None:
     await robot[Lease].take(taken)
     assert robot[Lease].may_move(who) is may
 
@@ -133,9 +129,7 @@ async def test_what_moves_nothing_needs_no_control(robot: Robot) -> None:
         robot[Speaker].say("hello", source="one")
 
 
-async def test_a_real_robot_that_someone_else_moves_is_left_to_him_until_it_is_taken_back(
-    robot: Robot, forward: Forward
-) -> None:
+async def test_robot_moved_by_someone_else_is_left_alone(robot: Robot, forward: Forward) -> None:
     link = robot.add(Link, Link("test://", robot.clock, robot.events, robot[Health]))
     link.move_to(LinkState.UP)
     lease, stopped = robot[Lease], list[bool]()

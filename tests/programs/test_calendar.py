@@ -125,7 +125,7 @@ def test_a_cycle_is_what_trying_every_minute_finds(fields: tuple[str, ...], minu
         assert not matches(found - timedelta(minutes=step))
 
 
-async def test_the_schedule_fires_in_order_once_each_and_forgets_what_was_dropped() -> None:
+async def test_schedule_fires_once_in_order_forgetting_dropped_entries() -> None:
     clock = LockstepClock()
     fired: list[tuple[str, float]] = []
     schedule = Schedule(clock, lambda id, _due: fired.append((id, clock.time())))
@@ -144,7 +144,7 @@ async def test_the_schedule_fires_in_order_once_each_and_forgets_what_was_droppe
     assert len(fired) == 5
 
 
-async def test_the_schedule_does_not_grow_by_being_set_again() -> None:
+async def test_schedule_does_not_grow_by_being_set_again() -> None:
     schedule = Schedule(LockstepClock(), lambda _id, _due: None)
     for i in range(1000):
         schedule.set("t", 1e10 + i)

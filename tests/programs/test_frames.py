@@ -87,7 +87,7 @@ def test_any_object_is_a_message_or_a_violation(content: dict[str, Any]) -> None
 
 
 @given(JSON)
-def test_any_json_is_a_value_or_a_value_error(content: Any) -> None:
+def test_any_json_is_value_or_a_value_error(content: Any) -> None:
     try:
         value = unpack(content)
     except ValueError:
@@ -134,7 +134,7 @@ def test_what_cannot_cross_is_refused() -> None:
         drained(CallMessage(1, "x", msgspec.Raw(json.dumps([0] * 65).encode()), msgspec.Raw(b"{}")).values())
 
 
-def test_too_many_values_are_refused_before_any_is_made() -> None:
+def test_too_many_values_are_refused_before_making_any() -> None:
     body = json.dumps({"t": "call", "id": 1, "name": "x", "args": [[[]] * 60_000], "kwargs": {}})
     with pytest.raises(ProtocolViolation, match="more values"):
         drained(decode(body.encode()).values())  # type: ignore[union-attr]

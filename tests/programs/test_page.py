@@ -39,7 +39,7 @@ def test_a_place_is_where_the_word_is(pair: tuple[Page, mmap.mmap]) -> None:
     assert page.place == (0, 4319)
 
 
-def test_a_place_that_was_known_is_looked_at_again(pair: tuple[Page, mmap.mmap]) -> None:
+def test_place_that_was_known_is_looked_at_again(pair: tuple[Page, mmap.mmap]) -> None:
     page, worker = pair
     worker[:WORD] = b"\x07" * WORD
     for number in (5, 3, 9):

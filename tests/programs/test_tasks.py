@@ -65,7 +65,7 @@ def test_every_cell_of_the_task_table(state: str, operation: str, cell: str) -> 
             assert results == expected
 
 
-def test_the_table_has_no_more_cells_than_the_manual() -> None:
+def test_table_has_no_more_cells_than_the_manual() -> None:
     assert len(CELLS) == len(TaskState) * len(TaskOperation) == 70
 
 

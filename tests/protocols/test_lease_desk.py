@@ -84,7 +84,7 @@ async def test_control_is_seen_taken_given_and_released(desk: Path, robot: Robot
     assert (await _ask(desk / NAME, Request("take", "b"))).error == "there is no robot 'b'; there are a"
 
 
-async def test_only_the_owner_gets_in_and_what_is_no_wish_is_reported(desk: Path) -> None:
+async def test_only_owners_get_in_invalid_wishes_are_reported(desk: Path) -> None:
     assert stat.S_IMODE((desk / NAME).stat().st_mode) == 0o600
     for line in (b"what?\n", b'{"do":"dance"}\n', b'{"does":1}\n', b"\xff\n"):
         assert (await say(desk, line))["error"]
@@ -98,7 +98,7 @@ async def test_only_the_owner_gets_in_and_what_is_no_wish_is_reported(desk: Path
     assert (await say(desk, b"{}\n"))["robots"]
 
 
-async def test_without_a_socket_the_robots_are_there_all_the_same(
+async def test_without_socket_robots_are_there_all_the_same(
     robot: Robot, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     folder = tmp_path / ("long" * 30)
@@ -114,7 +114,7 @@ def test_the_command_says_when_no_one_is_there(tmp_path: Path) -> None:
         command(data=tmp_path)
 
 
-def test_the_command_says_when_there_is_no_such_robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_command_says_when_there_is_no_such_robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     async def answer(path: Path, wish: Request) -> Answer:
         return Answer([Control("a", "", "", 0.0, "", "", "")])
 
@@ -124,7 +124,7 @@ def test_the_command_says_when_there_is_no_such_robot(tmp_path: Path, monkeypatc
         command("b", data=tmp_path)
 
 
-async def test_doors_refuse_in_their_words_and_name_their_clients(robot: Robot, forward: Forward) -> None:
+async def test_doors_refuse_in_their_words_and_name_clients(robot: Robot, forward: Forward) -> None:
     rest, text = (
         SlamwareDoor(robot, ADDRESS, SlamwareConfig(port=0)),
         RoboMasterDoor(

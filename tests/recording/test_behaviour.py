@@ -79,7 +79,7 @@ def test_what_is_different_is_named(other: list[Exchange], what: str) -> None:
     assert what in complaints(other)
 
 
-def test_empty_lists_say_nothing_of_what_would_be_in_them() -> None:
+def test_empty_lists_say_nothing_of_their_elements() -> None:
     assert complaints(replies(lambda value: value.update(items=[]))) == []
 
 
@@ -104,7 +104,7 @@ def test_probes_ask_only_what_reads(door: str) -> None:
     assert len(found) >= 4 * len(asked)
 
 
-def test_robots_that_are_not_there_and_protocols_that_differ_are_refused() -> None:
+def test_absent_robots_and_differing_protocols_are_refused() -> None:
     runner, app = CliRunner(), loaded("compare")
     for door in ("slamware", "robomaster", "cyberdog", "visual"):  # two that do not answer must not agree
         gone = runner.invoke(app, [f"{door}://127.0.193.99:9", f"{door}://127.0.193.99:9"])

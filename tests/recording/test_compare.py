@@ -82,7 +82,7 @@ def _alter_push(chance: random.Random, exchanges: list[Exchange]) -> None:
     exchanges.sort(key=lambda exchange: exchange.stamp)
 
 
-def test_of_500_random_mutations_at_least_95_in_100_are_found() -> None:
+def test_95_of_100_random_mutations_are_found() -> None:
     original, found = session(), 0
     for seed in range(MUTATIONS):
         chance, mutant = random.Random(seed), list(original)
@@ -91,7 +91,7 @@ def test_of_500_random_mutations_at_least_95_in_100_are_found() -> None:
     assert found >= MUTATIONS * FOUND_MIN
 
 
-def test_a_session_agrees_with_itself_to_the_last_bit() -> None:
+def test_session_agrees_with_itself_to_the_last_bit() -> None:
     comparison = compare(session(), session(), STRICT)
     assert comparison.fidelity == 1.0
     assert not comparison.differs
@@ -144,7 +144,7 @@ def test_requests_are_recognised_although_their_ids_differ(one: str, other: str,
     assert rewritten(answer, first.fresh, second.fresh) == f'{{"accepted": "{other}"}}'.encode()
 
 
-def test_the_ids_of_two_protocols_are_made_up_by_clients() -> None:
+def test_ids_of_two_protocols_are_made_by_clients() -> None:
     first, second = (normal("robomaster", f"chassis move x 1 seq {n};".encode()) for n in (7, 12))
     assert first.text == second.text
     assert rewritten(b"ok seq 7;", first.fresh, second.fresh) == b"ok seq 12;"

@@ -37,7 +37,7 @@ def numbers(path: Path) -> list[int]:
     return [message.json()["number"] for message in read_messages(path, "/a/events")]
 
 
-def test_a_file_opens_with_the_reader_of_mcap_itself(tmp_path: Path) -> None:
+def test_file_opens_with_the_reader_of_mcap_itself(tmp_path: Path) -> None:
     part = PartWriter(tmp_path / "x.mcap", ORIGIN, Redaction(), 0)
     for number in range(5):
         part.write(tick(number, number))
@@ -92,7 +92,7 @@ def kill_writers(tmp_path: Path) -> None:
             assert len(list(make_reader(file).iter_messages())) == len(found)
 
 
-def test_a_file_that_is_cut_anywhere_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
+def test_cut_file_is_read_until_the_cut(tmp_path: Path) -> None:
     path = tmp_path / "x.mcap"
     part = PartWriter(path, ORIGIN, Redaction(), 0)
     for number in range(20):
@@ -110,7 +110,7 @@ def test_a_file_that_is_cut_anywhere_is_read_as_far_as_it_goes(tmp_path: Path) -
     assert longest == 20
 
 
-def test_a_recording_goes_on_in_the_next_part_and_keeps_to_its_total(tmp_path: Path) -> None:
+def test_recording_continues_in_parts_and_keeps_its_total(tmp_path: Path) -> None:
     files = Files(tmp_path / "x.mcap", ORIGIN, Redaction(), Limits(part_seconds=10.0, total_bytes=6000))
     files.open(0)
     for second in range(100):
@@ -153,7 +153,7 @@ class SlowSink:
         self.closed = True
 
 
-def test_what_finds_no_room_is_counted_and_the_rest_is_written(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_overflow_is_counted_and_the_rest_is_written(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("roboglot.recording.thread.ENTRIES_MAX", 10)
     sink = SlowSink()
     thread = WriterThread(sink)
@@ -170,7 +170,7 @@ class FullDisk(SlowSink):
         raise OSError(errno.ENOSPC, "No space left on device")
 
 
-def test_a_full_disk_ends_the_recording_and_says_so() -> None:
+def test_full_disk_ends_the_recording_and_says_so() -> None:
     thread = WriterThread(FullDisk())
     thread.put(tick(1))
     thread.settle()
@@ -179,7 +179,7 @@ def test_a_full_disk_ends_the_recording_and_says_so() -> None:
     thread.close()
 
 
-def test_one_value_that_cannot_be_written_is_left_out(tmp_path: Path) -> None:
+def test_only_the_unwritable_value_is_left_out(tmp_path: Path) -> None:
     files = Files(tmp_path / "x.mcap", ORIGIN, Redaction(), Limits())
     files.open(0)
     thread = WriterThread(files)
@@ -191,7 +191,7 @@ def test_one_value_that_cannot_be_written_is_left_out(tmp_path: Path) -> None:
     assert thread.dropped == 1
 
 
-def test_a_ring_writes_the_last_minutes_and_no_more(tmp_path: Path) -> None:
+def test_ring_writes_the_last_minutes_and_no_more(tmp_path: Path) -> None:
     ring = Ring(ORIGIN, Redaction(), seconds=60.0)
     for number in range(3000):
         ring.write(tick(number, number / 10))

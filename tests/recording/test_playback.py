@@ -114,15 +114,13 @@ async def test_the_text_client_ends_with_the_same_result(tmp_path: Path, vendor_
     assert first[0] > 0.4
 
 
-async def test_a_front_end_of_programs_ends_with_the_same_result(tmp_path: Path) -> None:
+async def test_front_end_of_programs_ends_with_same_result(tmp_path: Path) -> None:
     first, second = await twice(tmp_path, by_frames)
     assert first == second
     assert [block["id"] for *_, block in first[0][:-1] if block and block["type"] == "begin"] == ["one", "two"]
 
 
-async def test_a_front_end_ends_with_the_same_result_on_a_busy_machine(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_front_end_repeats_its_result_on_busy_machines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Playback is late by 0.2 s of the robot at every step; ten times as fast as otherwise, so that it costs little."""
 
     async def hog() -> None:
@@ -139,7 +137,7 @@ async def test_a_front_end_ends_with_the_same_result_on_a_busy_machine(
         hogging.cancel()
 
 
-async def test_the_app_of_the_dog_ends_with_the_same_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_app_of_dog_ends_with_the_same_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tests.recording.test_playback.SPEED", 1.5)  # it drives, also on a machine that is busy
     ensure_certificates(tmp_path / "data" / "cyberdog")
     export_client(tmp_path / "data" / "cyberdog", tmp_path / "certificates")

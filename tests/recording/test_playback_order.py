@@ -35,7 +35,7 @@ async def ask(playback: Playback, text: bytes, *, reads: bool = False) -> list[t
     ]
 
 
-async def test_answers_and_pushes_come_at_their_times_with_the_clients_own_ids() -> None:
+async def test_answers_and_pushes_keep_times_and_clients_ids() -> None:
     clock = LockstepClock()
     playback, pushed = Playback(pushing_session(), clock, 0.0), list[tuple[float, bytes]]()
     playback.join("robomaster", lambda _, message: pushed.append((round(clock.time(), 3), message)))
@@ -68,7 +68,7 @@ TIMES = st.lists(st.floats(0.01, 5.0), min_size=1, max_size=12)
 
 
 @given(TIMES, st.data())
-async def test_a_session_played_back_in_order_is_the_session(times: list[float], data: st.DataObject) -> None:
+async def test_session_played_back_in_order_is_the_session(times: list[float], data: st.DataObject) -> None:
     exchanges, now = list[Exchange](), 0.0
     rest = ("a", "robomaster", "127.0.0.1:5", "x")
     texts: list[bytes] = []
@@ -132,7 +132,7 @@ async def played(door: str, directions: Sequence[Direction], gaps: Sequence[floa
 
 
 @pytest.mark.parametrize("door", REQUESTS)
-async def test_a_busy_machine_leaves_answers_before_the_pushes_that_followed(door: str) -> None:
+async def test_busy_machine_leaves_answers_before_pushes_that_followed(door: str) -> None:
     order = (Direction.PUSH, Direction.REPLY, Direction.PUSH)
     assert await played(door, order, (0.1, 0.1, 0.1), ()) == ["<0>", "<1>", "<2>"]
     assert await played(door, order, (0.0, 0.0, 0.0), ()) == ["<0>", "<1>", "<2>"]
@@ -142,14 +142,14 @@ async def test_a_busy_machine_leaves_answers_before_the_pushes_that_followed(doo
     st.lists(st.tuples(st.sampled_from((Direction.PUSH, Direction.REPLY)), st.floats(0.0, 0.5)), max_size=20),
     st.lists(st.floats(0.0, 1.0), max_size=10),
 )
-async def test_what_follows_a_command_comes_in_the_recorded_order(
+async def test_what_follows_command_comes_in_the_recorded_order(
     items: list[tuple[Direction, float]], busy: list[float]
 ) -> None:
     directions, gaps = [direction for direction, _ in items], [gap for _, gap in items]
     assert await played("cyberdog", directions, gaps, busy) == [f"<{index}>" for index in range(len(items))]
 
 
-async def test_an_answer_waits_for_a_push_that_was_recorded_just_before_it() -> None:
+async def test_answer_waits_for_a_push_recorded_just_before() -> None:
     rest = ("a", "visual", "front ends", "x")
     asked = b'{"type":"task","operate":"inquiry","id":"%d","target_id":[]}'
     exchanges = [

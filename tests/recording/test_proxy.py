@@ -61,7 +61,7 @@ async def by_text(address: str) -> list[bytes]:
     ],
     ids=["slamware", "robomaster", "visual"],
 )
-async def test_what_passes_is_what_the_robots_own_tap_says(url: str, script: Any, tmp_path: Path) -> None:
+async def test_what_passes_is_what_robots_own_tap_says(url: str, script: Any, tmp_path: Path) -> None:
     own, passed = tmp_path / "own.mcap", tmp_path / "passed.mcap"
 
     async def through(_: str) -> Any:
@@ -113,7 +113,7 @@ async def test_a_phone_and_its_dog_do_not_notice(tmp_path: Path) -> None:
     assert pushes[1] <= pushes[0]
 
 
-async def test_a_client_that_looks_for_an_ep_finds_the_proxy(tmp_path: Path) -> None:
+async def test_client_that_looks_for_ep_finds_the_proxy(tmp_path: Path) -> None:
     """The robot's address is not this machine's, so its broadcast comes from a socket that is bound to it."""
     path, found = tmp_path / "x.mcap", asyncio.get_running_loop().create_future()
 
@@ -143,9 +143,7 @@ async def test_a_client_that_looks_for_an_ep_finds_the_proxy(tmp_path: Path) -> 
     assert [(e.direction, e.payload) for e in heard] == [(Direction.PUSH, b"robot ip 127.0.0.89;")]
 
 
-async def test_a_disk_that_is_full_stops_the_recording_and_not_the_client(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_full_disk_stops_the_recording_but_no_client(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 

@@ -48,7 +48,7 @@ async def advance(started: Runtime, seconds: float) -> None:
     await started.clock.advance(seconds)
 
 
-async def test_everything_is_in_the_file_and_opens_with_the_reader_of_mcap(tmp_path: Path) -> None:
+async def test_mcap_reads_everything_that_was_recorded(tmp_path: Path) -> None:
     path = tmp_path / "r.mcap"
     started = Runtime(config(tmp_path / "data", RecordConfig(to=str(path))))
     await started.start()
@@ -110,7 +110,7 @@ async def test_recording_is_started_marked_and_ended_from_outside(tmp_path: Path
     assert read_recording(Path(again.path)).topics["/a/pose"] >= 5
 
 
-async def test_the_last_minutes_are_written_when_a_fault_comes(tmp_path: Path) -> None:
+async def test_last_minutes_are_written_when_a_fault_comes(tmp_path: Path) -> None:
     started = Runtime(config(tmp_path / "data", RecordConfig(ring=True, ring_seconds=3.0)))
     await started.start()
     await advance(started, 8.0)
@@ -125,7 +125,7 @@ async def test_the_last_minutes_are_written_when_a_fault_comes(tmp_path: Path) -
     assert "FaultRaised" in events
 
 
-async def test_the_last_minutes_are_written_when_something_breaks_that_no_one_catches(tmp_path: Path) -> None:
+async def test_last_minutes_are_written_after_an_uncaught_error(tmp_path: Path) -> None:
     loop = asyncio.get_running_loop()
     heard: list[object] = []
     loop.set_exception_handler(lambda _loop, context: heard.append(context.get("exception")))
@@ -148,7 +148,7 @@ async def test_the_last_minutes_are_written_when_something_breaks_that_no_one_ca
     assert loop.get_exception_handler() is not before
 
 
-async def test_an_endless_stream_of_pushes_is_recorded_in_order(tmp_path: Path) -> None:
+async def test_endless_stream_of_pushes_is_recorded_in_order(tmp_path: Path) -> None:
     path = tmp_path / "r.mcap"
     started = Runtime(config(tmp_path / "data", RecordConfig(to=str(path))))
     await started.start()

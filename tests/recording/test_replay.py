@@ -41,7 +41,7 @@ async def everything(address: str) -> None:
         await writer.wait_closed()
 
 
-async def test_a_recording_of_three_protocols_agrees_with_its_own_double_and_not_with_another(tmp_path: Path) -> None:
+async def test_three_protocol_recording_agrees_only_with_its_double(tmp_path: Path) -> None:
     file = tmp_path / "r.mcap"
     await run(tmp_path, "universal", str(file), everything)
     recording = read_recording(file)
@@ -71,7 +71,7 @@ async def test_a_recording_of_three_protocols_agrees_with_its_own_double_and_not
     assert any(line.startswith(("GET ", "POST ", "chassis")) for line in differing(dog))
 
 
-async def test_a_robot_that_is_not_there_is_an_error() -> None:
+async def test_robot_that_is_not_there_is_an_error() -> None:
     text = [exchange for exchange in session() if exchange.door == "robomaster"]
     with pytest.raises(ExceptionGroup) as raised:
         await Replay(text, Target("robomaster://127.0.0.87:9"), RealClock()).run()
@@ -99,7 +99,7 @@ def test_other_urls_are_refused(url: str) -> None:
         Target(url)
 
 
-def test_the_status_of_an_answer_is_in_the_taps_words() -> None:
+def test_status_of_answer_is_in_the_taps_words() -> None:
     assert status_of("robomaster", b"ok;") == status_of("robomaster", b"1 2 3;") == "ok"
     assert status_of("robomaster", b"fail;") == "fail"
     assert status_of("cyberdog", b'{"error_code": 104}') == "error_code 104"

@@ -171,7 +171,7 @@ async def test_nothing_is_recorded_after_the_end_begins(tmp_path: Path) -> None:
     assert (recording.last - recording.first) / 1e9 <= end
 
 
-async def test_the_first_difference_is_shown_with_what_came_before(tmp_path: Path) -> None:
+async def test_first_difference_is_shown_with_what_came_before(tmp_path: Path) -> None:
     file = await session(tmp_path, 5.0)
     recording = read_recording(file)
     values = json.loads(recording.attachments["config.json"]) | {"seed": 2}

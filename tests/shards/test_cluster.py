@@ -53,7 +53,7 @@ def homes(registry: Path) -> dict[str, Home]:
         database.close()
 
 
-async def test_a_killed_nodes_robots_run_elsewhere_and_none_twice(cluster: Cluster, tmp_path: Path) -> None:
+async def test_killed_nodes_robots_run_elsewhere_and_none_twice(cluster: Cluster, tmp_path: Path) -> None:
     registry = tmp_path / "registry.db"
     nodes = {n.node_id[:12]: n for n in (cluster.add_node(num_cpus=1, object_store_memory=STORE) for _ in range(2))}
     template = {"registry": str(registry), "console": {"enabled": False}}

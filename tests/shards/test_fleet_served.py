@@ -121,14 +121,14 @@ def wait_until_gone(pids: list[int]) -> None:
         time.sleep(0.05)
 
 
-def test_every_robot_answers_at_an_address_of_its_own(fleet: Fleet) -> None:
+def test_every_robot_answers_at_address_of_its_own(fleet: Fleet) -> None:
     robots = {robot["name"]: robot["address"] for row in fleet.shards().values() for robot in row["robots"]}
     assert robots == {"a1": FIRST, "b1": "127.77.1.2", "a2": "127.77.1.3", "b2": "127.77.1.4"}
     assert len({ask(address, "system/v1/robot/info")["deviceID"] for address in robots.values()}) == 4
     assert json.loads(fleet.call("list", "--json").stdout)["shards"][0]["name"] == "w1"
 
 
-def test_a_killed_shard_is_back_with_what_it_had_acknowledged(fleet: Fleet) -> None:
+def test_killed_shard_returns_with_what_it_acknowledged(fleet: Fleet) -> None:
     before = fleet.shards()
     ask(FIRST, "artifact/v1/pois", POI)
     os.kill(before["w1"]["pid"], signal.SIGKILL)
@@ -155,7 +155,7 @@ def test_stopped_stays_stopped_and_restart_brings_it_back(fleet: Fleet) -> None:
     assert ask("127.77.1.3", "slam/v1/localization/pose")
 
 
-def test_a_robot_moves_with_its_address_and_what_it_stored(fleet: Fleet) -> None:
+def test_robot_moves_with_its_address_and_stored_data(fleet: Fleet) -> None:
     ask("127.77.1.2", "artifact/v1/pois", {**POI, "id": "shelf"})
     assert fleet.call("move", "b1", "w2").returncode == 0
     homes = {name: [robot["name"] for robot in row["robots"]] for name, row in fleet.shards().items()}

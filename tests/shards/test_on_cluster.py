@@ -127,7 +127,7 @@ class RayJob(Part, tag_field="kind"):
 
 
 @pytest.mark.parametrize("name", ["fleet.yaml", "campaign.yaml"])
-def test_a_manifest_has_only_known_fields_and_the_locked_ray(name: str) -> None:
+def test_manifest_has_only_known_fields_and_locked_ray(name: str) -> None:
     document = msgspec.convert(yaml.safe_load((KUBERAY / name).read_text()), type=RayCluster | RayJob)
     cluster = document.spec if isinstance(document, RayCluster) else document.spec.ray_cluster_spec
     assert document.api_version == "ray.io/v1"
@@ -152,7 +152,7 @@ def test_a_manifest_has_only_known_fields_and_the_locked_ray(name: str) -> None:
         assert {word for word in words if word.startswith("--")} <= options
 
 
-def test_without_ray_the_extra_is_named_in_one_sentence(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_without_ray_extra_is_named_in_one_sentence(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setitem(sys.modules, "ray", None)
     monkeypatch.delitem(sys.modules, "roboglot.shards.cluster", raising=False)
     done = CliRunner().invoke(app, ["up", "--worlds", "1", "--on", "local", "--data", str(tmp_path)])

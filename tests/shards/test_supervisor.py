@@ -74,7 +74,7 @@ def first(supervisor: Supervisor) -> Shard:
     return supervisor.shards["w1"]
 
 
-async def test_few_start_at_a_time_and_the_next_when_one_is_ready(supervisor: Supervisor) -> None:
+async def test_few_start_at_a_time_then_the_next(supervisor: Supervisor) -> None:
     states = [shard.state for shard in supervisor.shards.values()]
     assert states == [State.STARTING] * STARTING_MAX + [State.WAITING] * 2
     forks(supervisor).say(1, Ready({}))
@@ -82,9 +82,7 @@ async def test_few_start_at_a_time_and_the_next_when_one_is_ready(supervisor: Su
     assert [shard.state for shard in supervisor.shards.values()].count(State.STARTING) == STARTING_MAX
 
 
-async def test_one_that_dies_comes_back_at_once_and_then_later_and_later(
-    supervisor: Supervisor, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_dead_one_returns_at_growing_distances(supervisor: Supervisor, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "PAUSES", (0.0, 3600.0))
     forks(supervisor).die(1, -signal.SIGKILL)
     await supervisor.until(lambda: forks(supervisor).forked.count(1) == 2)
@@ -94,14 +92,14 @@ async def test_one_that_dies_comes_back_at_once_and_then_later_and_later(
     assert first(supervisor).reason == "killed by SIGKILL"
 
 
-async def test_one_whose_settings_are_wrong_is_not_tried_again(supervisor: Supervisor) -> None:
+async def test_one_with_wrong_settings_is_not_retried(supervisor: Supervisor) -> None:
     forks(supervisor).say(1, Refusal("there is no world 'moon'", lasting=True))
     forks(supervisor).die(1, 1)
     shard = first(supervisor)
     assert (shard.state, shard.reason, shard.again) == (State.FAILED, "there is no world 'moon'", None)
 
 
-async def test_one_that_grows_too_large_is_stopped_in_order_and_comes_back(supervisor: Supervisor) -> None:
+async def test_one_that_grows_too_large_is_restarted_orderly(supervisor: Supervisor) -> None:
     for number in range(2, STARTING_MAX + 1):
         forks(supervisor).say(number, Ready({}))
     forks(supervisor).say(1, Beat(1.0, 200 << 20, 1.0))

@@ -44,7 +44,7 @@ def sim(simulate):
 
 
 @pytest.mark.parametrize("kind", SHOWS)
-async def test_it_shows_in_the_health_of_its_robot_and_goes_away(sim, kind):
+async def test_shows_in_its_robot_s_health_and_goes(sim, kind):
     name, level, seen_after = SHOWS[kind]
     heard = sim.robot.events.subscribe(FaultRaised, FaultCleared)
     sim.world.faults.inject(kind, "a", duration=seen_after)
@@ -77,7 +77,7 @@ async def test_a_dead_wheel_pulls_to_its_side(sim):
     assert sim.pose.yaw > 1.5
 
 
-async def test_a_robot_that_is_carried_off_does_not_feel_it(sim):
+async def test_robot_that_is_carried_off_feels_nothing(sim):
     await sim.clock.advance(0.5)
     before = sim.pose
     sim.world.faults.inject("lost_localization", "a")
@@ -164,7 +164,7 @@ def test_unknown_names_are_not_found(sim):
         sim.world.faults.clear(99)
 
 
-async def test_a_dismissed_fault_comes_back_while_its_cause_persists(sim):
+async def test_dismissed_fault_comes_back_while_its_cause_persists(sim):
     health = sim.robot[Health]
     heard = sim.robot.events.subscribe(FaultRaised, FaultCleared)
     sim.world.faults.inject("low_battery", "a")

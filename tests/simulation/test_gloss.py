@@ -44,7 +44,7 @@ async def ranges_at(file: Path, body: str) -> NDArray[np.float32]:
     return scan.ranges
 
 
-async def test_glass_and_mirrors_are_what_they_are_unless_the_sensors_are_clean(tmp_path: Path) -> None:
+async def test_glass_and_mirrors_matter_unless_sensors_are_clean(tmp_path: Path) -> None:
     file = tmp_path / "gloss.toml"
     file.write_text(ROOM)
     usual, clean = await ranges_at(file, "universal"), await ranges_at(file, "universal+clean")

@@ -40,7 +40,7 @@ def test_hands_find_only_what_is_there(simulate):
             touch()
 
 
-async def test_somebody_more_stands_in_the_way_until_taken_away(simulate):
+async def test_somebody_more_stands_in_way_until_taken_away(simulate):
     sim = simulate("empty")
     hands, start = sim.world.hands, sim.world.hands.robots[0].pose
     ahead = start.compose(Pose(1.2, 0.0))

@@ -48,7 +48,7 @@ async def test_talking_and_tones_are_no_claps():
         assert viewer.drain() == []
 
 
-async def test_claps_behind_walls_and_far_away_are_not_heard():
+async def test_claps_behind_walls_or_far_are_not_heard():
     far = ANNA | {"path": [[95.0, 95.0]]}
     with lab(people=[far], size=100.0) as room, room.robot[Hearing].claps() as viewer:
         room.world.hands.person("anna").clap(2)

@@ -68,7 +68,7 @@ async def test_scripts_begin_anew_and_wait_while_someone_directs():
         assert anna.pose.y != pytest.approx(5.6, abs=0.1)
 
 
-async def test_who_is_put_elsewhere_is_there_for_the_lidar_too():
+async def test_moved_person_is_there_for_the_lidar_too():
     from roboglot.model.components.sensing.lidar import Lidar
 
     with lab(people=[ANNA]) as room:
@@ -198,7 +198,7 @@ async def test_two_at_once_drown_each_other():
         assert all(speech.text == "" for speech in await heard(room))
 
 
-async def test_a_robot_that_stands_in_the_way_is_walked_around():
+async def test_robot_that_stands_in_way_is_walked_around():
     with lab(people=[ANNA]) as room:
         anna = room.world.hands.person("anna")
         room.world.hands.place("a", Pose(4.0, 5.0))
@@ -215,7 +215,7 @@ async def test_a_robot_that_stands_in_the_way_is_walked_around():
         assert room.world.truth.pose_of("a").distance_to(Pose(4.0, 5.0)) < 0.02  # no one pushed it
 
 
-async def test_where_there_is_no_room_aside_they_step_back():
+async def test_people_step_back_without_room_aside():
     walls = [{"from": [2.0, 4.6], "to": [9.0, 4.6]}, {"from": [2.0, 5.4], "to": [9.0, 5.4]}]
     with lab(people=[ANNA], walls=walls) as room:
         anna = room.world.hands.person("anna")

@@ -51,7 +51,7 @@ async def test_the_presets_differ_as_they_should() -> None:
     assert 0.02 < hard[1] < 0.15
 
 
-async def test_usual_is_what_is_without_a_word_and_each_seed_gives_one_trace() -> None:
+async def test_usual_realism_is_default_and_seeds_are_repeatable() -> None:
     assert (await circled("hermes"))[2] == (await circled("hermes+usual"))[2]
     assert (await circled("hermes+hard"))[2] == (await circled("hermes+hard"))[2]
 
@@ -64,7 +64,7 @@ def test_an_unknown_preset_is_refused_in_words() -> None:
 
 
 @pytest.mark.parametrize("body", ["universal+hard", "hermes+hard"])
-async def test_on_a_hard_day_goals_are_reached_within_twice_the_tolerance(body: str) -> None:
+async def test_goals_on_hard_days_are_reached_doubling_tolerance(body: str) -> None:
     clock, database = LockstepClock(), Database(":memory:")
     fleet = build_fleet("office", [RobotConfig(body=body)], clock=clock, seed=2, database=database)
     await fleet.start(wait=True)
@@ -83,7 +83,7 @@ async def test_on_a_hard_day_goals_are_reached_within_twice_the_tolerance(body: 
     database.close()
 
 
-async def test_black_furniture_answers_from_near_and_what_touches_the_lidar_is_unknown() -> None:
+async def test_black_furniture_answers_from_near_touching_lidar_unknown() -> None:
     clock, database = LockstepClock(), Database(":memory:")
     fleet = build_fleet("office", [RobotConfig(body="hermes+hard")], clock=clock, seed=2, database=database)
     await fleet.start(wait=True)

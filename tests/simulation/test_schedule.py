@@ -24,7 +24,7 @@ def run(schedule: Schedule, ticks: range) -> None:
 
 
 @given(st.lists(st.tuples(st.integers(1, 13), st.integers(1, 13)), min_size=1, max_size=5))
-def test_each_is_called_in_its_ticks_in_order_with_the_time_since_its_last_call(periods: list[tuple[int, int]]) -> None:
+def test_each_runs_in_order_with_its_elapsed_time(periods: list[tuple[int, int]]) -> None:
     calls: Calls = []
     schedule = Schedule([Job(recorder(calls, str(n)), *period) for n, period in enumerate(periods)], TICK)
     run(schedule, range(1, 301))
@@ -50,7 +50,7 @@ def test_a_part_without_a_duty_is_not_called() -> None:
     assert [tick for tick, name, _ in calls if name == "a"] == [1, 2, 3, 4, 5, 6]
 
 
-def test_a_duty_that_begins_during_a_tick_counts_in_it_if_its_turn_is_to_come() -> None:
+def test_duty_begun_during_a_tick_counts_by_turn() -> None:
     calls: Calls = []
     before, after = Duty(), Duty()
 
@@ -76,7 +76,7 @@ def test_a_duty_that_begins_during_a_tick_counts_in_it_if_its_turn_is_to_come() 
     ]
 
 
-def test_a_duty_may_end_during_a_tick_and_the_others_are_called_all_the_same() -> None:
+def test_duty_that_ends_during_a_tick_spares_others() -> None:
     calls: Calls = []
     duty = Duty(on=True)
 

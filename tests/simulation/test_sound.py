@@ -35,7 +35,7 @@ def loudness(air, at, floor=0, start=0.2):
     return float(np.abs(air.heard(at, floor, start, 4800)).max())
 
 
-def test_a_sound_fades_with_the_distance_behind_walls_and_slabs(air):
+def test_sound_fades_with_distance_behind_walls_and_slabs(air):
     air.emit(Source(tone(440, 2.0), CORRIDOR, 0, 0.0, 1.0))
     at_one = loudness(air, Point(13.0, 10.0))
     assert at_one == pytest.approx(0.3 * 32767, rel=0.01)
@@ -53,7 +53,7 @@ def test_a_sound_arrives_late_and_ends(air):
     assert not air.heard(CORRIDOR, 0, 0.0, SAMPLE_RATE // 2).any()
 
 
-def test_sounds_add_up_can_be_silenced_and_are_limited(air):
+def test_sounds_add_up_within_limits_and_are_silenced(air):
     first = Source(tone(440, 1.0), CORRIDOR, 0, 0.0, 1.0)
     air.emit(first)
     alone = loudness(air, Point(13.0, 10.0))
@@ -79,7 +79,7 @@ async def taken_down(run, seconds):
     return blocks
 
 
-async def test_the_microphone_gives_gapless_blocks_of_the_same_noise_for_the_same_seed(simulate):
+async def test_microphone_gives_gapless_blocks_of_noise_per_seed(simulate):
     blocks = []
     for _ in range(2):
         run = simulate("empty", seed=5)
@@ -121,7 +121,7 @@ async def test_playing_takes_its_time_and_is_reported(simulate):
         assert [(event.name, event.seconds) for event in played.drain()] == [("tone 500 Hz", 1.0)]
 
 
-async def test_a_new_sound_takes_over_and_the_old_one_falls_silent(simulate):
+async def test_new_sound_takes_over_and_old_falls_silent(simulate):
     run = simulate("empty", start=Pose(5, 5))
     speaker = run.robot[Speaker]
     old = speaker.play(tone(500, 5.0))
@@ -133,7 +133,7 @@ async def test_a_new_sound_takes_over_and_the_old_one_falls_silent(simulate):
     assert np.abs(wave).max() < 1000
 
 
-async def test_without_a_voice_a_text_is_reported_but_not_heard(simulate, monkeypatch, tmp_path):
+async def test_without_voice_text_is_reported_but_not_heard(simulate, monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
     run = simulate("empty")
     with run.robot.events.subscribe(Spoke) as spoke:

@@ -30,7 +30,7 @@ def empty() -> Scene:
     return Scene()
 
 
-async def test_a_robot_that_drives_on_a_level_floor_makes_no_contact(empty: Scene) -> None:
+async def test_driving_on_a_level_floor_makes_no_contact(empty: Scene) -> None:
     await empty.clock.advance(1.0)
     empty.robot[Base].set_velocity(Twist(0.5, 0.0, 0.0))
     await empty.clock.advance(1.0)
@@ -40,7 +40,7 @@ async def test_a_robot_that_drives_on_a_level_floor_makes_no_contact(empty: Scen
     assert empty.hull.motion[0] ** 2 + empty.hull.motion[1] ** 2 == pytest.approx(0.25, rel=0.01)
 
 
-async def test_it_neither_jumps_nor_sinks_when_its_body_moves(empty: Scene) -> None:
+async def test_neither_jumps_nor_sinks_when_its_body_moves(empty: Scene) -> None:
     await empty.clock.advance(1.0)
     empty.robot[Legs].lie_down()
     for _ in range(150):
@@ -49,7 +49,7 @@ async def test_it_neither_jumps_nor_sinks_when_its_body_moves(empty: Scene) -> N
     assert empty.hull.support.sprung
 
 
-async def test_a_hand_takes_it_off_the_floor_and_it_stands_on_it_again(empty: Scene) -> None:
+async def test_lifted_robot_stands_on_the_floor_again(empty: Scene) -> None:
     await empty.clock.advance(1.0)
     empty.world.hands.lift("a", 0.2)
     await empty.clock.advance(1.0)
@@ -72,7 +72,7 @@ async def test_a_blow_from_below_is_a_flight(empty: Scene) -> None:
     assert abs(empty.hull.rise) < STANDING
 
 
-async def test_at_the_edge_of_the_floor_it_stands_on_contacts() -> None:
+async def test_at_edge_of_floor_it_stands_on_contacts() -> None:
     scene = Scene("office")
     shaft = scene.world.description.lift
     assert shaft is not None

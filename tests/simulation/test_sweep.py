@@ -104,7 +104,7 @@ def test_noise_and_the_ends_of_the_range(make):
     assert np.allclose(reported, seen, atol=1e-6, equal_nan=True)
 
 
-def test_the_compiled_noise_is_the_same_to_the_bit():
+def test_compiled_noise_is_the_same_to_the_bit():
     chance = np.random.default_rng(4)
     exact, noise = chance.uniform(0.0, 14.0, 5000), chance.standard_normal(5000, dtype=np.float32)
     exact[chance.integers(0, 5000, 400)] = np.inf
@@ -112,7 +112,7 @@ def test_the_compiled_noise_is_the_same_to_the_bit():
     assert np.array_equal(plain, quick, equal_nan=True)
 
 
-def test_a_crowd_behind_walls_and_behind_each_other_is_swept_alike() -> None:
+def test_hidden_and_overlapping_crowds_are_swept_alike() -> None:
     """The compiled kernel leaves circles out that something hides; plain numpy looks at all of them."""
     random = np.random.default_rng(5)
     for _ in range(300):

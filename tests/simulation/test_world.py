@@ -25,7 +25,7 @@ from roboglot.simulation.world.world import (
 from roboglot.simulation.world.world_files import load_world
 
 
-async def test_an_obstacle_that_appears_is_seen_and_stops_the_robot(simulate):
+async def test_obstacle_that_appears_is_seen_and_stops_robot(simulate):
     sim = simulate(start=Pose(3, 5))
     sim.world.start()
     box = sim.world.hands.add_obstacle(Pose(6, 5), (0.5, 0.5, 1.0))
@@ -69,7 +69,7 @@ async def test_people_walk_and_the_lidar_sees_them(simulate):
     assert min(nearest) < 0.8 < max(nearest)  # someone came past
 
 
-async def test_people_wait_for_a_robot_in_their_way_then_go_around(simulate):
+async def test_people_wait_for_robots_then_go_around(simulate):
     sim = simulate("office", start=Pose(8.0, 10.2))
     sim.world.start()
     way = []

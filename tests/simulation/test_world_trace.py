@@ -26,7 +26,7 @@ async def digest(seed: int, hash_seed: str) -> bytes:
     return output.strip()
 
 
-async def test_two_processes_sense_the_same_and_another_seed_something_else():
+async def test_processes_sense_the_same_other_seeds_differ():
     first, second, other = await asyncio.gather(digest(7, "1"), digest(7, "2"), digest(8, "1"))
     assert len(first) == 64
     assert first == second

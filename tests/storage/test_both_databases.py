@@ -219,7 +219,7 @@ async def test_who_lost_a_robot_writes_nothing_for_it(server: PostgreSQLServer, 
 
 
 @needs_postgresql
-async def test_a_robot_moves_to_another_folder_with_its_places(server: PostgreSQLServer, tmp_path: Path) -> None:
+async def test_robot_moves_to_another_folder_with_its_places(server: PostgreSQLServer, tmp_path: Path) -> None:
     server.empty()
     poi = {"id": "door", "pose": {"x": 1.0, "y": 2.0, "yaw": 0.0}, "metadata": {"display_name": "狗"}}
     for life in ("one machine", "another"):

@@ -20,7 +20,7 @@ def store(database: Transactions) -> CloudStore:
     return CloudStore(database)
 
 
-async def test_a_token_opens_its_account_until_there_is_a_new_one(store: CloudStore) -> None:
+async def test_token_opens_its_account_until_replaced(store: CloudStore) -> None:
     token = await store.add_account("class 7b")
     assert await store.account_of(token) == "class 7b"
     assert await store.account_of("another") is None
@@ -30,7 +30,7 @@ async def test_a_token_opens_its_account_until_there_is_a_new_one(store: CloudSt
         await store.add_account(" ")
 
 
-async def test_favourites_come_in_the_order_of_bytes_and_stay_when_robots_delete(store: CloudStore) -> None:
+async def test_favourites_are_sorted_by_bytes_and_outlive_robots(store: CloudStore) -> None:
     for account in ("one", "two"):
         await store.add_account(account)
     for id in ("b", "B", "_a", "é", "张三"):
@@ -93,7 +93,7 @@ async def test_a_restart_of_the_server_is_survived(server: PostgreSQLServer) -> 
 
 
 @needs_postgresql
-def test_what_is_newer_than_this_program_is_not_touched(server: PostgreSQLServer) -> None:
+def test_newer_formats_are_left_untouched(server: PostgreSQLServer) -> None:
     server.empty()
     PostgreSQL(server.url).close()
     PostgreSQL(server.url).close()  # nothing is made twice

@@ -50,7 +50,7 @@ def home(database: Transactions, holder: str, watch: Watch, lost: Callable[[str]
     return Residence(Homes(database), {"a": f"127.1.0.1#{holder}", "b": "127.1.0.2"}, holder, lost, watch)
 
 
-async def test_a_robot_goes_to_the_next_program_when_its_own_is_silent(database: Transactions, watch: Watch) -> None:
+async def test_robot_of_a_silent_program_goes_to_next(database: Transactions, watch: Watch) -> None:
     lost = list[str]()
     old, new = home(database, "old", watch, lost.append), home(database, "new", watch)
     await old.take()
@@ -67,7 +67,7 @@ async def test_a_robot_goes_to_the_next_program_when_its_own_is_silent(database:
     assert homes["a"].address == "127.1.0.1#new"
 
 
-async def test_the_old_program_never_comes_back_with_an_old_epoch(database: Transactions, watch: Watch) -> None:
+async def test_old_program_never_comes_back_with_old_epoch(database: Transactions, watch: Watch) -> None:
     old, new = home(database, "old", watch), home(database, "new", watch)
     await old.take()
     await new.take()
@@ -79,7 +79,7 @@ async def test_the_old_program_never_comes_back_with_an_old_epoch(database: Tran
     assert not new.why_not("a")
 
 
-async def test_a_robot_that_is_renewed_is_refused_to_others(
+async def test_robot_that_is_renewed_is_refused_to_others(
     database: Transactions, watch: Watch, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     old, new = home(database, "old", watch), home(database, "new", watch)
@@ -106,7 +106,7 @@ async def test_a_program_gives_up_before_another_may_begin(database: Transaction
     assert not old.why_not("a")
 
 
-async def test_released_and_own_robots_are_taken_at_once_and_all_or_none(database: Transactions, watch: Watch) -> None:
+async def test_robots_are_taken_at_once_all_or_none(database: Transactions, watch: Watch) -> None:
     old, began = home(database, "old", watch), watch.now
     await old.take()
     await home(database, "old", watch).take()  # the same folder's next program
@@ -125,7 +125,7 @@ async def test_released_and_own_robots_are_taken_at_once_and_all_or_none(databas
 
 
 @needs_postgresql
-async def test_robots_stand_while_the_server_is_away_and_go_on_after_it(server: PostgreSQLServer, watch: Watch) -> None:
+async def test_robots_stand_while_the_server_is_away(server: PostgreSQLServer, watch: Watch) -> None:
     server.empty()
     database, lost = open_database(Path(), server.url), list[str]()
     old = home(database, "old", watch, lost.append)
@@ -147,7 +147,7 @@ async def test_robots_stand_while_the_server_is_away_and_go_on_after_it(server: 
     database.close()
 
 
-async def test_a_robot_that_another_program_took_stands_and_refuses(tmp_path: Path) -> None:
+async def test_robot_that_another_program_took_stands_and_refuses(tmp_path: Path) -> None:
     registry = tmp_path / "registry.db"
     config = Config(
         world="empty",
@@ -198,7 +198,7 @@ async def watched(silence: Silence, watch: Watch, seconds: float) -> list[str]:
     return freed
 
 
-async def test_robots_of_a_dead_shard_are_back_within_ten_seconds(database: Transactions, watch: Watch) -> None:
+async def test_robots_of_dead_shards_return_within_ten_seconds(database: Transactions, watch: Watch) -> None:
     old, new = home(database, "old", watch), home(database, "new", watch)
     silence = Silence(Homes(database), ["a", "b"], watch)
     await old.take()
@@ -215,7 +215,7 @@ async def test_robots_of_a_dead_shard_are_back_within_ten_seconds(database: Tran
     assert "another program" in old.why_not("a")
 
 
-async def test_a_program_that_waits_takes_robots_when_they_are_freed(
+async def test_waiting_program_takes_robots_when_freed(
     database: Transactions, watch: Watch, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     old, new, homes = home(database, "old", watch), home(database, "new", watch), Homes(database)
@@ -249,7 +249,7 @@ async def test_only_silence_that_was_watched_frees(database: Transactions, watch
     assert (await homes.all())["b"].holder == "old"  # another fleet's
 
 
-async def test_a_renewal_that_comes_before_the_freeing_keeps_the_robot(database: Transactions, watch: Watch) -> None:
+async def test_renewal_that_comes_before_freeing_keeps_the_robot(database: Transactions, watch: Watch) -> None:
     old, homes = home(database, "old", watch), Homes(database)
     await old.take()
     seen = (await homes.all()).values()
@@ -258,7 +258,7 @@ async def test_a_renewal_that_comes_before_the_freeing_keeps_the_robot(database:
     assert {h.holder for h in (await homes.all()).values()} == {"old"}
 
 
-async def test_a_freed_robot_goes_back_to_its_program_if_no_other_had_it(database: Transactions, watch: Watch) -> None:
+async def test_freed_robot_returns_to_its_program_if_unclaimed(database: Transactions, watch: Watch) -> None:
     lost = list[str]()
     old, other = home(database, "old", watch, lost.append), home(database, "other", watch)
     homes = Homes(database)

@@ -53,7 +53,7 @@ def database(tmp_path: Path) -> Iterator[Database]:
     opened.close()
 
 
-async def test_all_of_it_is_new_at_once_and_after_a_start(database: Database) -> None:
+async def test_drawings_are_new_at_once_and_after_start(database: Database) -> None:
     here = parts(database)
     await here.places.put(OLD)
     await here.files.write("gone", b"1")

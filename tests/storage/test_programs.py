@@ -28,7 +28,7 @@ def program(id: str, state: str = "wait_run", body: str = "pass") -> StoredProgr
     return StoredProgram(id, "describe", '{"blocks": {}}', "single", "now", body, state)
 
 
-async def test_programs_are_kept_per_robot_and_kind_and_listed_by_id(database: Database) -> None:
+async def test_programs_are_listed_per_robot_and_kind(database: Database) -> None:
     tasks = DatabaseProgramStore(database, "a")
     for id in ("t10", "t1", "t2"):
         await tasks.put(program(id))
@@ -64,7 +64,7 @@ async def test_a_log_keeps_the_newest_entries(database: Database) -> None:
     assert (await tasks.all())[0].state == "shutdown"
 
 
-async def test_what_was_left_running_is_settled_at_the_start(database: Database) -> None:
+async def test_what_was_left_running_is_settled_at_start(database: Database) -> None:
     tasks = DatabaseProgramStore(database, "a")
     for id, state in (("t1", "run"), ("t2", "suspend"), ("t3", "wait_run")):
         await tasks.put(program(id, state))

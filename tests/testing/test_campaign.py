@@ -64,7 +64,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_all_trials_are_in_the_table_and_nothing_is_played_twice(folder: Path) -> None:
+def test_trials_are_all_tabulated_and_never_played_twice(folder: Path) -> None:
     (folder / "scenarios/stays.yaml").write_text(STAYS)
     (folder / "scenarios/dies.yaml").write_text(DIES)
     first = begin(folder, "--seeds", "1")
@@ -81,7 +81,7 @@ def test_all_trials_are_in_the_table_and_nothing_is_played_twice(folder: Path) -
     assert [row["seed"] for row in rows(folder) if row["scenario"] == "stays.yaml"] == ["1", "2"]
 
 
-def test_an_interrupted_campaign_leaves_a_table_and_no_process(folder: Path) -> None:
+def test_interrupted_campaign_leaves_a_table_and_no_process(folder: Path) -> None:
     (folder / "scenarios/a_stays.yaml").write_text(STAYS)
     (folder / "scenarios/b_hangs.yaml").write_text(HANGS)
     process = begin(folder, "--seeds", "1")

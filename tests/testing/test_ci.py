@@ -28,7 +28,7 @@ def robot(folder: Path, *arguments: str, **more: str) -> str:
     return done.stdout
 
 
-def test_a_job_starts_a_robot_drives_it_and_keeps_what_happened(tmp_path: Path) -> None:
+def test_job_starts_and_drives_a_robot_keeping_events(tmp_path: Path) -> None:
     address = robot(tmp_path, "up", ARGUMENTS=f"--address {ADDRESS} --no-console --world empty --speed 4").strip()
     try:
         assert address == ADDRESS
@@ -41,7 +41,7 @@ def test_a_job_starts_a_robot_drives_it_and_keeps_what_happened(tmp_path: Path) 
     assert (tmp_path / "ci/artifacts/log.txt").exists()
 
 
-def test_a_robot_that_does_not_come_up_fails_the_job_with_its_reason(tmp_path: Path) -> None:
+def test_job_fails_with_the_reason_of_its_robot(tmp_path: Path) -> None:
     with pytest.raises(AssertionError, match="nowhere"):
         robot(tmp_path, "up", ARGUMENTS="--world nowhere")
 

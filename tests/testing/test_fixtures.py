@@ -16,7 +16,7 @@ from roboglot.testing import assert_pose
 START = Path(__file__).parents[2] / "docs/start.md"
 
 
-def test_the_start_pages_example_passes_in_an_empty_folder(tmp_path: Path) -> None:
+def test_start_pages_example_passes_in_an_empty_folder(tmp_path: Path) -> None:
     [example] = [block for block in re.findall(r"```python\n(.*?)```", START.read_text(), re.S) if "def test_" in block]
     (tmp_path / "test_example.py").write_text(example)
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(tmp_path)]

@@ -39,7 +39,7 @@ def test_a_dog_calls_its_app_back(cyberdog: Any) -> None:
 
 
 @pytest.mark.world("empty")
-def test_a_program_tells_its_blocks_and_what_it_prints(program: Any) -> None:
+def test_program_tells_its_blocks_and_what_it_prints(program: Any) -> None:
     run = program.run(PROGRAM)
     assert run.blocks == ["one", "two"]
     assert run.printed == ["hello"]
@@ -47,7 +47,7 @@ def test_a_program_tells_its_blocks_and_what_it_prints(program: Any) -> None:
 
 @pytest.mark.world("empty", robots=("a", "b"), body="hermes", lockstep=True)
 @pytest.mark.seed(5)
-def test_in_lockstep_time_stands_still_until_the_test_lets_it_pass(robot_server: RobotServer, rest: Any) -> None:
+def test_lockstep_time_stands_until_the_test_releases_it(robot_server: RobotServer, rest: Any) -> None:
     assert robot_server.runtime.config.seed == 5
     before = robot_server.time
     rest.begin("MoveToAction", MoveToOptions(Location(0.6, 0.0), MoveOptions()))
@@ -124,6 +124,6 @@ def test_failed_tests_leave_recording_map_and_exchanges(tmp_path: Path) -> None:
     assert 'name="roboglot.recording"' in (tmp_path / "junit.xml").read_text()
 
 
-def test_a_marker_with_a_word_that_it_does_not_know_is_an_error(tmp_path: Path) -> None:
+def test_unknown_word_in_a_marker_is_an_error(tmp_path: Path) -> None:
     done = run_pytest(tmp_path, "import pytest\n@pytest.mark.world(sede=1)\ndef test_it(robot_server): pass\n")
     assert "world has no sede" in done.stdout + done.stderr

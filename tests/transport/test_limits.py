@@ -52,7 +52,7 @@ def test_a_take_can_be_given_back() -> None:
     assert limiter.take("x")
 
 
-async def test_a_client_that_sends_too_much_is_read_later() -> None:
+async def test_client_that_sends_too_much_is_read_later() -> None:
     spent: list[int] = []
 
     def spend(amount: int) -> float:

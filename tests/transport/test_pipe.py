@@ -106,7 +106,7 @@ async def test_an_abort_ends_both_and_drops_what_waits() -> None:
     assert not callee.received
 
 
-async def test_a_writer_that_is_ahead_is_asked_to_pause() -> None:
+async def test_writer_that_is_ahead_is_asked_to_pause() -> None:
     caller, callee = Side(), Side()
     joined(caller, callee)
     callee.transport.pause_reading()

@@ -119,9 +119,7 @@ def test_nothing_is_renegotiated(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not shutil.which("openssl"), reason="OpenSSL's own client is not installed")
-async def test_a_client_that_asks_for_new_keys_again_and_again_is_cut_off(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_client_that_keeps_renewing_keys_is_cut_off(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Python's client cannot ask. Each answer would wait for a client that reads nothing."""
     monkeypatch.setattr(layer, "REPLIES_MAX", 200)
     async with port(tmp_path) as (number, _):

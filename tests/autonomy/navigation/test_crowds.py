@@ -44,7 +44,7 @@ async def test_no_robot_of_a_convoy_believes_to_stand(seed: int) -> None:
     assert not outcome.false_successes
 
 
-async def test_a_robot_whose_neighbours_move_along_believes_its_wheels() -> None:
+async def test_robot_whose_neighbours_move_along_believes_its_wheels() -> None:
     """Between two walls that show no way, most echoes say that it stands: those of robots that drive as fast."""
     clock, database = LockstepClock(), Database(":memory:")
     robots = [RobotConfig(f"r{n}", body="hermes") for n in range(5)]

@@ -40,7 +40,7 @@ async def test_it_gets_through_at_a_slant(tour: Tour) -> None:
 
 
 @pytest.mark.world(WIDE)
-async def test_a_gap_that_is_too_narrow_ends_the_drive_in_time_and_is_reported(tour: Tour) -> None:
+async def test_too_narrow_gap_ends_drive_and_is_reported(tour: Tour) -> None:
     """The map has a door of 0.9 m; two boxes that stand in it when the robot is close leave 0.48 m."""
     await tour.go((6.0, 3.0))
     await tour.go((2.0, 3.0))
@@ -53,7 +53,7 @@ async def test_a_gap_that_is_too_narrow_ends_the_drive_in_time_and_is_reported(t
 
 
 @pytest.mark.world(NARROW)
-async def test_it_gets_out_where_it_was_steered_in_by_hand(tour: Tour) -> None:
+async def test_gets_out_where_it_was_steered_by_hand(tour: Tour) -> None:
     tour.robot[Driving].drive(Twist(x=0.3), lifetime=19.0)
     await tour.clock.advance(40.0)  # the map has thickened since
     assert tour.truth.x > 5.0
@@ -62,7 +62,7 @@ async def test_it_gets_out_where_it_was_steered_in_by_hand(tour: Tour) -> None:
 
 
 @pytest.mark.world(NARROW, body="hermes")
-async def test_who_is_too_wide_says_how_wide_the_door_is(tour: Tour) -> None:
+async def test_too_wide_robot_reports_the_door_width(tour: Tour) -> None:
     await tour.clock.advance(1.5)
     action = await tour.go((6.0, 3.3))
     assert isinstance(action.error, Unreachable)
@@ -72,7 +72,7 @@ async def test_who_is_too_wide_says_how_wide_the_door_is(tour: Tour) -> None:
 
 
 @pytest.mark.world(WIDE)
-async def test_a_person_in_the_only_door_is_waited_for(tour: Tour) -> None:
+async def test_person_in_the_only_door_is_waited_for(tour: Tour) -> None:
     person = tour.world.hands.add_obstacle(Pose(4.0, 3.0, 0.0), PERSON)
     await tour.clock.advance(30.0)  # long enough for the map to show a pillar there
     action = tour.head_for((6.0, 3.0))
@@ -87,7 +87,7 @@ async def test_a_person_in_the_only_door_is_waited_for(tour: Tour) -> None:
 
 
 @pytest.mark.world(WIDE)
-async def test_a_person_who_stays_in_the_only_door_is_reported(tour: Tour) -> None:
+async def test_person_who_stays_in_only_door_is_reported(tour: Tour) -> None:
     tour.world.hands.add_obstacle(Pose(4.0, 3.0, 0.0), PERSON)
     await tour.clock.advance(30.0)
     begun = tour.clock.time()
@@ -97,7 +97,7 @@ async def test_a_person_who_stays_in_the_only_door_is_reported(tour: Tour) -> No
 
 
 @pytest.mark.world("office", body="cyberdog2")
-async def test_a_goal_off_the_map_is_refused_at_once(tour: Tour) -> None:
+async def test_goal_off_the_map_is_refused_at_once(tour: Tour) -> None:
     await tour.clock.advance(2.0)
     begun = tour.clock.time()
     action = await tour.go((70.0, 7.0))
@@ -106,7 +106,7 @@ async def test_a_goal_off_the_map_is_refused_at_once(tour: Tour) -> None:
 
 
 @pytest.mark.world("office", body="cyberdog2")
-async def test_a_goal_in_a_wall_met_on_the_way_is_unreachable(tour: Tour) -> None:
+async def test_goal_in_wall_met_on_way_is_unreachable(tour: Tour) -> None:
     await tour.clock.advance(2.0)
     begun = tour.clock.time()
     action = await tour.go((29.95, 7.0))  # the wall is not on the map yet
@@ -132,7 +132,7 @@ async def test_a_search_through_unknown_floor_is_bounded(tour: Tour) -> None:
 
 
 @pytest.mark.world("office", body="hermes")
-async def test_what_closes_a_known_way_for_a_moment_is_waited_for(tour: Tour) -> None:
+async def test_waits_for_a_known_way_that_closes_briefly(tour: Tour) -> None:
     """Rather than looking for a way through rooms that it never saw: robots in a corridor close it all the time."""
     action = tour.head_for((18.0, 10.0))
     await tour.until(lambda: tour.truth.x < 21.5)

@@ -126,7 +126,7 @@ async def carted(clock: LockstepClock, cart: Cart) -> Robot:
     return robot
 
 
-async def test_a_velocity_is_kept_for_its_lifetime_and_then_the_base_stands(
+async def test_velocity_holds_for_its_lifetime_then_base_stands(
     carted: Robot, cart: Cart, clock: LockstepClock
 ) -> None:
     action = carted[Driving].drive(Twist(x=0.5), lifetime=1.0, source="test")
@@ -137,7 +137,7 @@ async def test_a_velocity_is_kept_for_its_lifetime_and_then_the_base_stands(
     assert cart.twist.speed < 0.01
 
 
-async def test_a_command_that_comes_while_an_expired_one_brakes_expires_too(robot: Robot, forward: Forward) -> None:
+async def test_command_during_the_braking_of_another_expires_too(robot: Robot, forward: Forward) -> None:
     robot[Driving].drive(Twist(x=0.5), lifetime=1.0, source="test")
     await forward(seconds=1.1)
     assert robot[Base].velocity.x > 0.1  # it brakes
@@ -147,9 +147,7 @@ async def test_a_command_that_comes_while_an_expired_one_brakes_expires_too(robo
     assert robot[Base].velocity.speed < 0.01
 
 
-async def test_a_new_command_of_the_same_source_goes_on_without_a_gap(
-    carted: Robot, cart: Cart, clock: LockstepClock
-) -> None:
+async def test_new_command_of_one_source_continues_without_gap(carted: Robot, cart: Cart, clock: LockstepClock) -> None:
     first = carted[Driving].drive(Twist(x=0.5), lifetime=0.5, source="test")
     for _ in range(10):
         await clock.advance(0.4)
@@ -160,9 +158,7 @@ async def test_a_new_command_of_the_same_source_goes_on_without_a_gap(
     assert first.status is ActionStatus.SUCCEEDED
 
 
-async def test_another_source_takes_over_after_the_base_has_braked(
-    carted: Robot, cart: Cart, clock: LockstepClock
-) -> None:
+async def test_another_source_takes_over_after_base_has_braked(carted: Robot, cart: Cart, clock: LockstepClock) -> None:
     first = carted[Driving].drive(Twist(x=1.0), source="one")
     await clock.advance(1.5)
     second = carted[Driving].drive(Twist(x=-1.0), source="two")
@@ -182,9 +178,7 @@ async def test_cancel_by_source_brakes(carted: Robot, cart: Cart, clock: Lockste
     assert cart.twist.speed < 0.01
 
 
-async def test_a_paused_drive_stands_and_still_ends_with_its_lifetime(
-    carted: Robot, cart: Cart, clock: LockstepClock
-) -> None:
+async def test_paused_drive_stands_and_ends_with_its_lifetime(carted: Robot, cart: Cart, clock: LockstepClock) -> None:
     action = carted[Driving].drive(Twist(x=1.0), lifetime=5.0)
     await clock.advance(1.0)
     action.pause()
@@ -230,7 +224,7 @@ async def test_a_move_ends_standing_on_its_goal(carted: Robot, cart: Cart, clock
     assert cart.twist.speed < 0.01
 
 
-async def test_a_move_takes_the_time_that_its_speed_says(carted: Robot, clock: LockstepClock) -> None:
+async def test_move_takes_the_time_that_its_speed_says(carted: Robot, clock: LockstepClock) -> None:
     action = carted[Driving].move_by(Pose(x=1.0), speed=0.25)
     await action_end(clock, action)
     assert 4.0 < action.ended_at - action.started_at < 5.2
@@ -266,7 +260,7 @@ async def test_a_paused_move_holds_and_goes_on(carted: Robot, cart: Cart, clock:
     assert cart.pose.x == pytest.approx(2.0, abs=0.01)
 
 
-async def test_an_emergency_stop_lasts_until_someone_says_stand_up(carted: Robot, clock: LockstepClock) -> None:
+async def test_emergency_stop_lasts_until_someone_says_stand_up(carted: Robot, clock: LockstepClock) -> None:
     legs = carted.add(Legs, SlowLegs(carted, Posture.LIMP))  # type: ignore[abstract]
     for _ in range(3):  # a joystick goes on sending
         with pytest.raises(EmergencyStopped):

@@ -51,7 +51,7 @@ def say_where_the_lift_is(tour: Tour) -> None:
     tour.robot[Floors].set_lift(waiting, inside)
 
 
-async def test_up_and_down_again_with_a_map_and_a_dock_a_floor(tour: Tour) -> None:
+async def test_up_and_down_with_maps_and_docks(tour: Tour) -> None:
     floors, reported = tour.robot[Floors], []
     await tour.go((4.5, 10.0))
     say_where_the_lift_is(tour)
@@ -89,7 +89,7 @@ async def test_up_and_down_again_with_a_map_and_a_dock_a_floor(tour: Tour) -> No
     assert kept.waiting.distance_to(kept.inside) == pytest.approx(1.7)
 
 
-async def test_a_floor_on_disk_that_cannot_be_read_or_written(tour: Tour, caplog: pytest.LogCaptureFixture) -> None:
+async def test_unreadable_or_unwritable_floor_on_disk_is_reported(tour: Tour, caplog: pytest.LogCaptureFixture) -> None:
     robot, shelf = tour.robot, StoreyShelf(tour.robot)
     for data in (b"", b"garbage", b"\x80"):
         await robot[FileStore].write("floors/2.msgpack", data)

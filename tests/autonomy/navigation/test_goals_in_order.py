@@ -114,7 +114,7 @@ def _milestones(action: Action) -> int:
 
 
 @pytest.mark.world("tests/autonomy/worlds/corridor.toml")
-async def test_another_try_goes_on_at_the_goal_that_is_next(tour: Tour) -> None:
+async def test_second_try_continues_at_the_next_goal(tour: Tour) -> None:
     action = tour.head_for((3.0, 1.2), (8.5, 1.2), retries=3)
     await tour.until(lambda: tour.truth.x > 3.5)
     wall = tour.world.hands.add_obstacle(Pose(5.5, 1.2, 0.0), (0.3, 2.3, 1.0))
@@ -130,7 +130,7 @@ async def test_another_try_goes_on_at_the_goal_that_is_next(tour: Tour) -> None:
 
 
 @pytest.mark.world("empty")
-async def test_a_goal_on_the_way_that_is_walled_in_fails(tour: Tour) -> None:
+async def test_goal_on_way_that_is_walled_in_fails(tour: Tour) -> None:
     for x, y in ((5.6, 5.0), (4.4, 5.0), (5.0, 5.6), (5.0, 4.4)):
         tour.world.hands.add_obstacle(Pose(x, y, 0.0), (0.2, 1.4, 1.0) if y == 5.0 else (1.4, 0.2, 1.0))
     action = tour.head_for((2.0, 5.0), (5.0, 5.0), (2.0, 6.0))

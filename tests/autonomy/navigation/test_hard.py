@@ -21,7 +21,7 @@ OFF, TURNED = 0.10, math.radians(4.0)  # m, rad: twice what navigation keeps
 
 
 @pytest.mark.world("office", body=BODY)
-async def test_goals_and_the_dock_are_met_with_bad_sensors(tour: Tour) -> None:
+async def test_goals_and_dock_are_met_with_bad_sensors(tour: Tour) -> None:
     for x, y, deg in ((19.0, 9.8, 90.0), (12.0, 6.5, -45.0), (25.5, 10.0, 180.0)):
         action = await tour.go((x, y), deg=deg)
         assert action.status is ActionStatus.SUCCEEDED, action.reason

@@ -38,7 +38,7 @@ async def visits_three_places(tour: Tour) -> None:
 
 
 @pytest.mark.world("office", seed=1)
-async def test_goals_are_reached_within_5_cm_and_2_degrees_of_the_truth(tour: Tour) -> None:
+async def test_goals_are_reached_within_5_cm_2_degrees(tour: Tour) -> None:
     await visits_three_places(tour)
 
 
@@ -77,7 +77,7 @@ async def test_feedback_counts_down(tour: Tour) -> None:
 
 
 @pytest.mark.world("empty")
-async def test_it_brakes_before_what_appears_and_drives_around_it(tour: Tour) -> None:
+async def test_brakes_before_new_obstacle_and_drives_around_it(tour: Tour) -> None:
     action = tour.head_for((8.5, 5.0))
     await tour.until(lambda: tour.truth.x > 3.0)
     tour.world.hands.add_obstacle(Pose(tour.truth.x + 1.2, tour.truth.y, 0.0), (0.5, 0.5, 1.0))
@@ -90,7 +90,7 @@ async def test_it_brakes_before_what_appears_and_drives_around_it(tour: Tour) ->
 
 
 @pytest.mark.world(CORRIDOR)
-async def test_it_waits_where_there_is_no_way_around_and_goes_on_when_there_is(tour: Tour) -> None:
+async def test_waits_where_there_is_no_way_around(tour: Tour) -> None:
     action = tour.head_for((8.5, 1.2))
     await tour.until(lambda: tour.truth.x > 3.0)
     wall = tour.world.hands.add_obstacle(Pose(5.0, 1.2, 0.0), WALL)
@@ -118,7 +118,7 @@ async def test_it_gives_up_after_half_a_minute(tour: Tour) -> None:
 
 
 @pytest.mark.world(CORRIDOR)
-async def test_what_the_lidar_cannot_see_is_not_pressed_against_for_long(tour: Tour) -> None:
+async def test_does_not_press_long_against_an_unseen_obstacle(tour: Tour) -> None:
     tour.world.hands.add_obstacle(Pose(5.0, 1.2, 0.0), (0.3, 2.3, 0.2))
     begun = tour.clock.time()
     action = await tour.go((8.5, 1.2))
@@ -156,7 +156,7 @@ async def test_pause_holds_and_resume_goes_on(tour: Tour) -> None:
 
 
 @pytest.mark.world("empty")
-async def test_where_no_path_leads_it_does_not_set_out(tour: Tour) -> None:
+async def test_does_not_set_out_where_no_path_leads(tour: Tour) -> None:
     await tour.go((5.0, 5.0))
     here = tour.truth
     for spot in ((9.95, 5.0), (20.0, 5.0), (500.0, 5.0)):  # in the wall, behind it, off every grid
@@ -168,7 +168,7 @@ async def test_where_no_path_leads_it_does_not_set_out(tour: Tour) -> None:
 
 
 @pytest.mark.world("empty")
-async def test_a_plan_leads_from_start_to_goal_around_walls(tour: Tour) -> None:
+async def test_plan_leads_from_start_to_goal_around_walls(tour: Tour) -> None:
     tour.world.hands.add_obstacle(Pose(5.0, 4.0, 0.0), (0.3, 8.0, 1.0))  # a gap in the north
     await tour.clock.advance(3.0)
     path = await tour.robot[Navigation].plan(tour.on_map(3.0, 3.0), tour.on_map(8.0, 3.0))
@@ -201,7 +201,7 @@ async def test_retries_try_again(tour: Tour) -> None:
 
 
 @pytest.mark.world("empty")
-async def test_a_lost_robot_stops_and_goes_on_when_found(tour: Tour) -> None:
+async def test_lost_robot_stops_and_goes_on_when_found(tour: Tour) -> None:
     await tour.clock.advance(3.0)
     news: list[LocalizationLost | LocalizationRecovered] = []
     tour.robot.events.listen(LocalizationLost, news.append)
@@ -258,7 +258,7 @@ async def test_nonsense_is_refused(tour: Tour) -> None:
 
 
 @pytest.mark.world("empty")
-async def test_places_are_ordered_by_the_ways_that_lead_there(tour: Tour) -> None:
+async def test_places_are_ordered_by_ways_that_lead_there(tour: Tour) -> None:
     await tour.clock.advance(1.0)
     navigation = tour.robot[Navigation]
     spots = [(8.0, 5.0), (3.0, 5.0), (6.0, 5.0), (4.5, 5.0)]

@@ -51,7 +51,7 @@ async def test_wheels_that_turn_in_vain_are_reported() -> None:
         patience.look(follower)  # type: ignore[arg-type]
 
 
-async def test_who_does_not_know_where_it_is_gives_up() -> None:
+async def test_lost_robot_gives_up() -> None:
     clock = LockstepClock()
     patience = made(clock, quality=0.1)
     patience.check_place()

@@ -82,7 +82,7 @@ async def test_a_virtual_wall_is_driven_around(tour: Tour) -> None:
     assert not tour.blocks
 
 
-async def test_a_virtual_wall_all_around_makes_the_goal_unreachable_even_on_the_way(tour: Tour) -> None:
+async def test_virtual_wall_drawn_underway_makes_the_goal_unreachable(tour: Tour) -> None:
     fence = [wall(7, 3, 9, 3), wall(9, 3, 9, 5), wall(9, 5, 7, 5), wall(7, 5, 7, 3)]
     action = tour.head_for((8.0, 4.0))
     await tour.until(lambda: tour.truth.x > 3.0)
@@ -93,7 +93,7 @@ async def test_a_virtual_wall_all_around_makes_the_goal_unreachable_even_on_the_
     assert isinstance((await tour.go((8.0, 4.0))).error, Unreachable)
 
 
-async def test_forbidden_areas_are_kept_out_of_but_may_be_left(tour: Tour) -> None:
+async def test_forbidden_areas_may_be_left_but_not_entered(tour: Tour) -> None:
     await draw(tour, area(AreaKind.FORBIDDEN, 5.0, 5.0, 1.5))
     action = tour.head_for((8.5, 5.0))
     places = await watched(tour, action)
@@ -140,7 +140,7 @@ async def test_free_navigation_minds_no_track(tour: Tour) -> None:
     assert max(abs(pose.y - 5.0) for pose in places) < 1.0
 
 
-async def test_on_strict_tracks_it_waits_and_tells_after_three_minutes(
+async def test_waits_on_strict_tracks_reporting_after_three_minutes(
     tour: Tour, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert journey.BLOCKED_SECONDS == 180.0  # as docs/autonomy.md says; here it shall be shorter

@@ -20,7 +20,7 @@ places = st.floats(-300.0, 300.0)
 
 @settings(max_examples=60, deadline=None)
 @given(st.lists(st.tuples(places, places, places, places), min_size=1, max_size=4))
-def test_growing_keeps_every_cell_where_it_is_and_stays_bounded(rectangles: list[tuple[float, ...]]) -> None:
+def test_growing_keeps_cells_in_place_and_stays_bounded(rectangles: list[tuple[float, ...]]) -> None:
     grid = EvidenceGrid()
     first = rectangles[0]
     grid.make_room(first[0], first[1], first[0], first[1])
@@ -39,7 +39,7 @@ def test_growing_keeps_every_cell_where_it_is_and_stays_bounded(rectangles: list
         assert np.count_nonzero(grid.evidence) == 1
 
 
-def test_a_grid_holds_what_it_was_asked_to_hold() -> None:
+def test_grid_holds_what_it_was_asked_to_hold() -> None:
     grid = EvidenceGrid()
     grid.make_room(-3.0, -2.0, 4.0, 5.0)
     grid.make_room(-3.0, -2.0, 30.0, 5.0)
@@ -50,7 +50,7 @@ def test_a_grid_holds_what_it_was_asked_to_hold() -> None:
     assert grid.corner.y + height * RESOLUTION >= 5.0
 
 
-def test_the_drawn_map_keeps_signs_and_never_makes_known_cells_unknown() -> None:
+def test_drawn_map_keeps_signs_and_known_cells_known() -> None:
     grid = EvidenceGrid()
     grid.make_room(0.0, 0.0, 1.0, 1.0)
     row, column = 3 - grid.first_row, 2 - grid.first_column
@@ -96,7 +96,7 @@ def route_through(*legs: list[tuple[float, float]]) -> Route:
     return route
 
 
-def test_a_route_brakes_for_its_end_and_for_bends() -> None:
+def test_route_brakes_for_its_end_and_for_bends() -> None:
     route = route_through([(0.0, 0.0), (4.0, 0.0), (4.0, 4.0)])
     assert route.length == pytest.approx(8.0)
     speeds = dict(zip(np.round(route.along, 2).tolist(), route.speeds.tolist(), strict=True))
@@ -107,7 +107,7 @@ def test_a_route_brakes_for_its_end_and_for_bends() -> None:
     assert steepest.min() >= -2.0
 
 
-def test_a_route_knows_its_goals_and_what_is_left() -> None:
+def test_route_knows_its_goals_and_what_is_left() -> None:
     route = route_through([(0.0, 0.0), (1.0, 0.0)], [(1.0, 2.0)])
     assert route.goals_along == pytest.approx([1.0, 3.0])
     along, beside = route.advance(Pose(0.5, 0.1), 0)
@@ -134,7 +134,7 @@ def test_a_full_map_says_so_once(caplog: pytest.LogCaptureFixture) -> None:
     assert "it has 400 x " in caplog.text
 
 
-def test_a_wide_map_is_bounded_by_its_cells_and_keeps_what_it_holds() -> None:
+def test_wide_map_is_bounded_and_keeps_its_cells() -> None:
     grid = EvidenceGrid()
     grid.make_room(0.0, 0.0, 150.0, 100.0)
     assert not grid.full

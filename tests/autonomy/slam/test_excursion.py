@@ -46,7 +46,7 @@ def walls_in(tour: Tour, corners: tuple[tuple[float, float], tuple[float, float]
 
 
 @pytest.mark.world("office")
-async def test_what_was_seen_while_lost_is_joined_to_the_map(tour: Tour) -> None:
+async def test_sightings_while_lost_are_joined_to_the_map(tour: Tour) -> None:
     news: list[LocalizationLost | LocalizationRecovered] = []
     await tour.go((12.0, 9.8))
     await tour.go((8.0, 9.8))

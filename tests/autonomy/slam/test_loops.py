@@ -94,7 +94,7 @@ def corridor_scan(pose: Pose, walls: NDArray[np.float64]) -> ScanPoints:
     return ScanPoints(ends, (met < 4.0).astype(np.uint8), np.ascontiguousarray(ends[met < 4.0]), Point())
 
 
-def test_a_given_map_stays_and_what_was_added_to_it_is_straightened() -> None:
+def test_given_map_stays_and_additions_are_straightened() -> None:
     rings = [[(0, 0), (14, 0), (14, 10), (0, 10)], [(2, 2), (12, 2), (12, 8), (2, 8)], [(3, 0), (3, 0.5), (3.6, 0.5)],
              [(0, 4), (0.6, 4.4), (0, 5)], [(14, 3), (13.3, 3.4), (14, 4)], [(8, 10), (8, 9.4), (8.8, 9.4)],
              [(6, 2), (6, 1.6), (6.4, 1.6)], [(9, 0), (9.3, 0.6), (9.6, 0)]]  # fmt: skip

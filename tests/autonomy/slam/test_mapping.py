@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from tests.autonomy.conftest import Tour
 
 
-def test_a_grid_on_the_same_cells_comes_back_unchanged() -> None:
+def test_grid_on_the_same_cells_comes_back_unchanged() -> None:
     cells = np.array([[0, -127, 127], [1, -1, 5], [-90, 0, 126]], np.int8)
     grid = OccupancyGrid(cells, 0.05, Point(-1.5, 2.05))
     again = evidence_of(grid).occupancy()
@@ -29,7 +29,7 @@ def test_a_grid_on_the_same_cells_comes_back_unchanged() -> None:
 
 
 @pytest.mark.parametrize("resolution", [0.1, 0.025])
-def test_other_cell_sizes_are_resampled_and_no_wall_gets_lost(resolution: float) -> None:
+def test_other_cell_sizes_are_resampled_without_losing_walls(resolution: float) -> None:
     side = round(2.0 / resolution)
     cells = np.full((side, side), -50, np.int8)
     cells[:, side // 2] = 80  # a wall along y at x = 1 m
@@ -39,7 +39,7 @@ def test_other_cell_sizes_are_resampled_and_no_wall_gets_lost(resolution: float)
     assert (again.log_odds[:, :20] == -50).all()
 
 
-def test_a_grid_without_known_cells_is_an_empty_map() -> None:
+def test_grid_without_known_cells_is_an_empty_map() -> None:
     assert evidence_of(OccupancyGrid(np.zeros((9, 9), np.int8), 0.05, Point())).scans == 0
 
 
@@ -51,7 +51,7 @@ def test_a_map_that_is_too_large_is_refused(shape: tuple[int, int]) -> None:
         evidence_of(OccupancyGrid(cells, 0.05, Point()))
 
 
-async def test_a_loaded_map_is_driven_on_as_well_as_the_one_it_came_from(tour: Tour) -> None:
+async def test_loaded_map_is_driven_on_as_the_original(tour: Tour) -> None:
     await tour.go((22.5, 10.0))
     mapping, localization = tour.robot[Mapping], tour.robot[Localization]
     grid, pose = mapping.grid, localization.pose
@@ -71,7 +71,7 @@ async def test_a_loaded_map_is_driven_on_as_well_as_the_one_it_came_from(tour: T
     assert not tour.bumps
 
 
-async def test_the_origin_moves_and_the_robot_stays_where_it_is(tour: Tour) -> None:
+async def test_origin_moves_and_robot_stays_where_it_is(tour: Tour) -> None:
     mapping, localization = tour.robot[Mapping], tour.robot[Localization]
     before, pose = mapping.grid, localization.pose
     moved = mapping.move_origin(Point(1.02, -0.49))

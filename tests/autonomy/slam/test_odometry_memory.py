@@ -64,7 +64,7 @@ def test_nonsense_in_the_settings_is_left_out() -> None:
     assert bias.scale_x == -SCALE_BIAS_MAX
 
 
-def test_a_turning_gyro_and_wrong_wheels_are_learnt_in_a_second() -> None:
+def test_gyro_drift_and_wrong_wheels_are_learnt_fast() -> None:
     """Ten corrections by scans that see everything; afterwards a wrong one changes little."""
     bias, doubt, moved = LearntBias(), Doubt(way=1e-6, yaw=1e-7), Pose(0.05)
     for _ in range(10):

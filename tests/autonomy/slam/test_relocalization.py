@@ -95,7 +95,7 @@ async def test_no_region_is_refused(tour: Tour) -> None:
 
 
 @pytest.mark.world("office")
-async def test_people_around_the_robot_do_not_hide_its_place(tour: Tour) -> None:
+async def test_people_around_robot_do_not_hide_its_place(tour: Tour) -> None:
     from roboglot.autonomy.slam.matcher import places
     from roboglot.autonomy.slam.scan_points import ScanReader
 
@@ -111,7 +111,7 @@ async def test_people_around_the_robot_do_not_hide_its_place(tour: Tour) -> None
 
 
 @pytest.mark.world(LONG_CORRIDOR)
-async def test_a_robot_that_may_move_looks_around_until_one_place_is_left(tour: Tour) -> None:
+async def test_robot_looks_around_until_one_place_is_left(tour: Tour) -> None:
     await tour.go((tour.start.x + 25.0, tour.start.y))
     await carried(tour, tour.start.x + 12.0, tour.start.y, 90.0)
     standing = await tour.end_of(tour.robot[Localization].relocalize())
@@ -123,7 +123,7 @@ async def test_a_robot_that_may_move_looks_around_until_one_place_is_left(tour: 
     assert not tour.bumps
 
 
-def test_places_are_ruled_out_by_where_they_should_be_by_now() -> None:
+def test_places_are_ruled_out_by_expected_positions() -> None:
     from roboglot.autonomy.slam.look_around import Hypotheses
     from roboglot.autonomy.slam.matcher import Match
 

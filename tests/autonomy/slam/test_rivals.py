@@ -26,9 +26,7 @@ def candidate(x: float, fitting: int, hidden: int, floating: int) -> Candidate:
 
 
 @pytest.mark.parametrize(("unknown", "count"), [(0, 1), (8, 2)])
-def test_what_the_map_does_not_know_speaks_for_rivals(
-    unknown: int, count: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_map_does_not_know_speaks_for_rivals(unknown: int, count: int, monkeypatch: pytest.MonkeyPatch) -> None:
     from roboglot.autonomy.slam import matcher
     from roboglot.autonomy.slam.evidence import EvidenceGrid
     from roboglot.autonomy.slam.scan_points import ScanPoints
@@ -40,7 +38,7 @@ def test_what_the_map_does_not_know_speaks_for_rivals(
 
 
 @pytest.mark.parametrize("complete", [True, False])
-def test_the_best_of_many_is_believed_if_all_were_looked_at(complete: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_best_rival_is_believed_if_all_were_examined(complete: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     from roboglot.autonomy.slam import matcher
     from roboglot.autonomy.slam.evidence import EvidenceGrid
     from roboglot.autonomy.slam.scan_points import ScanPoints
@@ -57,7 +55,7 @@ def test_the_best_of_many_is_believed_if_all_were_looked_at(complete: bool, monk
     assert looks == ([matcher.PLACES_MAX] if complete else [matcher.PLACES_MAX, matcher.PLACES_TRIED])
 
 
-def test_an_echo_seen_through_a_wall_speaks_against_a_place() -> None:
+def test_echo_seen_through_wall_speaks_against_a_place() -> None:
     """Two walls behind each other: the farther one explains no echo while the nearer one stands in the way."""
     from roboglot.kernels.occupancy import CROSSING, FITTING, verdicts
 

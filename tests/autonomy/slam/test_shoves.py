@@ -21,7 +21,7 @@ SIDEWAYS, HARD = Vector3(0.0, 40.0, 0.0), Vector3(0.0, 120.0, 0.0)  # N s, on 20
 
 
 @pytest.mark.world("office", body="hermes")
-async def test_a_robot_that_is_shoved_where_it_stands_says_so(tour: Tour) -> None:
+async def test_shoved_standing_robot_reports_it(tour: Tour) -> None:
     await tour.go((20.0, 10.0))
     shoves, confirmed = tour.robot.events.subscribe(RobotDisplaced), tour.robot.events.subscribe(PoseConfirmed)
     await tour.clock.advance(3.0)
@@ -41,7 +41,7 @@ async def test_a_robot_that_is_shoved_where_it_stands_says_so(tour: Tour) -> Non
 
 
 @pytest.mark.world("office")
-async def test_a_robot_that_is_shoved_while_driving_waits_until_it_knows_where_it_is(tour: Tour) -> None:
+async def test_robot_shoved_while_driving_waits_until_localized(tour: Tour) -> None:
     await tour.go((20.0, 10.0))
     shoves = tour.robot.events.subscribe(RobotDisplaced)
     action = tour.head_for((12.0, 10.0))
@@ -61,7 +61,7 @@ async def test_a_robot_that_is_shoved_while_driving_waits_until_it_knows_where_i
 
 
 @pytest.mark.world("office")
-async def test_a_move_in_which_the_robot_was_shoved_does_not_succeed(tour: Tour) -> None:
+async def test_move_with_a_shove_does_not_succeed(tour: Tour) -> None:
     await tour.go((20.0, 10.0))
     action = tour.robot[Driving].move_by(Pose(2.0), speed=0.8)
     await tour.clock.advance(1.2)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @pytest.mark.world("office", seed=5)
-async def test_a_tour_through_the_office_keeps_within_3_cm_and_1_degree(tour: Tour) -> None:
+async def test_office_tour_keeps_within_3_cm_1_degree(tour: Tour) -> None:
     errors = []
     for spot in ((22.5, 10.0), (5.0, 10.0), (5.0, 6.0), (5.0, 10.0), (20.5, 10.0), (20.5, 13.0)):
         action = tour.head_for(spot)
@@ -93,7 +93,7 @@ async def test_the_revision_stands_for_what_the_grid_shows(tour: Tour) -> None:
 
 
 @pytest.mark.world("office")
-async def test_a_rough_pose_is_corrected_a_wrong_one_reported(tour: Tour) -> None:
+async def test_rough_pose_is_corrected_a_wrong_one_reported(tour: Tour) -> None:
     await tour.go((20.0, 10.0))
     localization, jumps = tour.robot[Localization], []
     tour.robot.events.listen(PoseJumped, jumps.append)

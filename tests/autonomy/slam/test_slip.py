@@ -19,7 +19,7 @@ from tests.masking import mask_bumper
 
 
 @pytest.mark.parametrize("held", [True, False])
-async def test_pressed_against_what_hides_a_corridor_it_does_not_believe_to_move(tmp_path: Path, held: bool) -> None:
+async def test_pressing_against_hidden_obstacle_counts_as_no_motion(tmp_path: Path, held: bool) -> None:
     clock, database = LockstepClock(), Database(":memory:")
     robots = [RobotConfig(body=short_sighted(tmp_path))]
     fleet = build_fleet(RING, robots, clock=clock, seed=2, database=database)

@@ -73,7 +73,7 @@ async def test_errors_asked_for_again_and_again_keep_nothing(tour: Tour) -> None
     assert action.error.__traceback__ is None
 
 
-async def test_standing_for_long_and_another_map_leave_no_trajectory_behind(tour: Tour) -> None:
+async def test_standing_long_and_new_maps_leave_no_trajectory(tour: Tour) -> None:
     localization: Any = tour.robot[Localization]
     await tour.end_of(tour.robot[Driving].move_by(Pose(1.0)))
     driven = len(localization.estimator.trajectory())

@@ -246,7 +246,7 @@ async def test_pictures_move(client: CyberDogClient, door, world) -> None:
     await _until(lambda: door._context.video.viewers == 0)
 
 
-async def test_a_dead_link_is_reported_at_once_and_mends(client: CyberDogClient, door: CyberDogDoor) -> None:
+async def test_dead_link_is_reported_at_once_and_mends(client: CyberDogClient, door: CyberDogDoor) -> None:
     await client.found()
     port = door.port
     await door._server.stop(None)

@@ -43,7 +43,7 @@ async def test_a_task_whose_stream_breaks_is_joined_again() -> None:
     assert heard == [300, 308]
 
 
-async def test_a_task_that_no_one_knows_any_more_has_not_succeeded() -> None:
+async def test_task_that_vanished_has_not_succeeded() -> None:
     streams = [(Code.START_TASK, [*BEGUN, None]), (Code.JOIN_TASK, [{"accepted": Accepted.NOTHING_TO_JOIN}])]
     task = await talking(iter(streams)).navigate(1.0, 0.0)  # type: ignore[arg-type]
     with pytest.raises(TaskFailed) as failed:

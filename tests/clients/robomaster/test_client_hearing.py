@@ -69,7 +69,7 @@ async def test_events(client, run, forward, robot, world) -> None:
         assert await asyncio.wait_for(anext(events), 5) == AdapterLevel(3, 2, 1)
 
 
-async def test_events_of_a_robot_whose_address_was_found_later(client, run, forward, robot, world) -> None:
+async def test_events_of_robot_whose_address_was_found_later(client, run, forward, robot, world) -> None:
     late = RoboMasterClient("discover", clock=robot.clock, ports=client._ports, local="127.0.0.1")
     late.host = client.host
     async with late:
@@ -87,7 +87,7 @@ async def test_what_is_watched_ends_with_the_client(client) -> None:
         await anext(watched)
 
 
-async def test_two_robots_share_a_push_port_and_are_distinguished() -> None:
+async def test_two_robots_share_push_port_and_are_distinguished() -> None:
     """By the address that a datagram comes from."""
     import socket
 

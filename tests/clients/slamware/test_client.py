@@ -43,9 +43,7 @@ async def test_an_action_is_awaited_with_progress(
     assert seen[0].action_name.endswith(".MoveToAction")
 
 
-async def test_a_cancelled_action_and_a_failed_one_raise_the_robots_reason(
-    client: SlamwareClient, forward: Forward
-) -> None:
+async def test_cancelled_action_and_failed_one_raise_robots_reason(client: SlamwareClient, forward: Forward) -> None:
     await forward(seconds=2)
     action = await client.begin("RotateAction", AngleOptions(3.0))
     await forward(seconds=0.5)
@@ -71,7 +69,7 @@ async def test_only_ones_own_action_is_cancelled(client: SlamwareClient, forward
     assert (await client.get_current_action()).action_id == others.id
 
 
-async def test_the_map_comes_as_an_array_and_a_composite_map_goes_round(
+async def test_map_is_array_and_composite_map_round_trips(
     client: SlamwareClient, robot: Robot, forward: Forward
 ) -> None:
     await forward(seconds=2)
@@ -157,7 +155,7 @@ async def test_bad_answers_are_reported_and_nothing_hangs(
         await client.get_pose()
 
 
-async def test_silence_is_a_time_out_and_no_robot_is_a_lost_link(
+async def test_silence_is_timeout_and_absence_a_lost_link(
     fake: Callable[[Reply], Awaitable[SlamwareClient]],
 ) -> None:
     async def silent(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -170,7 +168,7 @@ async def test_silence_is_a_time_out_and_no_robot_is_a_lost_link(
             await no_one.get_pose()
 
 
-async def test_a_question_is_asked_again_on_a_new_connection_but_a_command_never(
+async def test_questions_but_never_commands_are_repeated_on_reconnection(
     fake: Callable[[Reply], Awaitable[SlamwareClient]],
 ) -> None:
     asked: list[bytes] = []

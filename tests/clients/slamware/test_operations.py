@@ -116,7 +116,7 @@ def method_of(name: str) -> str:
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name).lower()
 
 
-def test_the_client_has_a_method_for_each_operation_under_its_key() -> None:
+def test_client_has_a_method_per_operation_key() -> None:
     for row in contract("slamware"):
         assert getattr(SlamwareClient, method_of(row.name)).key == row.key
 
@@ -168,7 +168,7 @@ REFUSED = {
 
 
 @pytest.mark.world("office", body="hermes")
-async def test_every_operation_reaches_the_door_and_its_answer_is_understood(
+async def test_every_operation_reaches_the_door_and_is_answered(
     client: SlamwareClient, forward: Forward, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[str] = []

@@ -128,7 +128,7 @@ async def until(condition: Callable[[], object]) -> None:
             await asyncio.sleep(0.005)
 
 
-async def test_a_task_goes_on_where_its_server_was_killed(second: Callable[[], ProgramService], tmp_path: Path) -> None:
+async def test_task_goes_on_where_its_server_was_killed(second: Callable[[], ProgramService], tmp_path: Path) -> None:
     written = first_life(tmp_path / "robot.db", PROGRAM, "step 2")
     service = second()
     reported: list[tuple[str, str]] = []  # to a front end that was there before the program was back
@@ -149,7 +149,7 @@ async def test_a_task_goes_on_where_its_server_was_killed(second: Callable[[], P
 
 
 @pytest.mark.parametrize("call", ["cyberdog.motion.turn", "choreographer.moonwalk"])
-async def test_what_was_under_way_is_reported_and_not_repeated(
+async def test_unfinished_motion_is_reported_and_not_repeated(
     second: Callable[[], ProgramService], tmp_path: Path, call: str
 ) -> None:
     """A result with a state tells it, and the program goes on; where there is none, the call raises."""
@@ -183,7 +183,7 @@ async def test_what_was_under_way_is_reported_and_not_repeated(
         assert f"caught {words}" in log
 
 
-async def test_a_motion_that_a_kill_cuts_off_fails_and_the_program_goes_on(
+async def test_killed_motion_fails_and_the_program_continues(
     second: Callable[[], ProgramService], tmp_path: Path
 ) -> None:
     program = """print('speaks')
@@ -231,7 +231,7 @@ async def test_a_journal_knows_what_was_under_way(tmp_path: Path) -> None:
     database.close()
 
 
-async def test_a_run_that_becomes_too_long_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_run_that_becomes_too_long_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     database = Database(":memory:")
     store = DatabaseJournalStore(database, "a")
     kept = Journal(store, "t")

@@ -90,7 +90,7 @@ async def test_close_ends_though_the_zygote_is_silent(monkeypatch: pytest.Monkey
     assert process_state(run.pid) in {"", "Z"}  # Z: its new parent has not asked yet
 
 
-async def test_a_start_that_is_given_up_leaves_no_process() -> None:
+async def test_start_that_is_given_up_leaves_no_process() -> None:
     others = children_of(os.getpid())
     async with Engine() as engine:
         before = open_descriptors()
@@ -140,7 +140,7 @@ async def test_without_a_filter_nothing_runs(monkeypatch: pytest.MonkeyPatch) ->
         "from roboglot.programs.worker import seccomp; seccomp.load = lambda *a: None",
     ],
 )
-async def test_without_a_filter_programs_run_if_the_operator_says_so(
+async def test_without_filter_programs_run_if_operator_says_so(
     trick: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(launcher, "_BOOT", launcher._BOOT.replace("zygote.main", f"{trick}\nzygote.main"))
@@ -152,7 +152,7 @@ async def test_without_a_filter_programs_run_if_the_operator_says_so(
         assert (await play(engine, other_walls)).output == "kept in\n"
 
 
-async def test_the_filter_is_used_where_it_holds_whatever_the_operator_says(caplog: pytest.LogCaptureFixture) -> None:
+async def test_filter_applies_whatever_the_operator_says(caplog: pytest.LogCaptureFixture) -> None:
     async with Engine(filter_required=False) as engine:
         assert "seccomp" in engine.layers
     assert caplog.text == ""

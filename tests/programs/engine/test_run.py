@@ -60,7 +60,7 @@ async def test_a_busy_program_stops_goes_on_and_dies(engine: Engine) -> None:
     assert end.source_line in {"n += 1", "n -= 1"}
 
 
-async def test_a_suspended_program_can_be_killed_and_switches_are_idempotent(engine: Engine) -> None:
+async def test_suspended_program_can_be_killed_switches_are_idempotent(engine: Engine) -> None:
     run = await started(engine, BUSY)
     await asyncio.gather(run.suspend(), run.suspend(), run.suspend())
     assert process_state(run.pid) == "T"
@@ -73,7 +73,7 @@ async def test_a_suspended_program_can_be_killed_and_switches_are_idempotent(eng
     assert not run.suspended
 
 
-async def test_a_reply_to_a_suspended_program_waits_for_it(engine: Engine) -> None:
+async def test_reply_to_a_suspended_program_waits_for_it(engine: Engine) -> None:
     """A breakpoint: the host suspends at a call, answers, and the program goes on only when it is resumed."""
     run = await engine.start("cyberdog.task.block('b1')\nprint('after')", PRELUDE)
     call = await anext(run)
@@ -129,7 +129,7 @@ async def test_a_killed_worker_is_a_crash(engine: Engine) -> None:
     assert "signal 11" in end.message
 
 
-async def test_answers_no_one_waits_for_are_errors_of_the_caller(engine: Engine) -> None:
+async def test_unawaited_answers_are_errors_of_the_caller(engine: Engine) -> None:
     run = await engine.start("cyberdog.echo(1)", PRELUDE)
     call = await anext(run)
     assert isinstance(call, Call)
@@ -144,9 +144,7 @@ async def test_answers_no_one_waits_for_are_errors_of_the_caller(engine: Engine)
     run.calls.reply(call.id, 1)
 
 
-async def test_a_program_that_is_over_before_its_process_is_known_is_ended(
-    engine: Engine, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_program_over_before_its_process_starts_is_ended(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
     launch = engine._launch
 
     async def late(protocol: Wire, *others: Any) -> Worker:

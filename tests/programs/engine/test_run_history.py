@@ -78,7 +78,7 @@ async def test_a_lost_run_goes_on_from_its_history(engine: Engine, lost_after: i
     assert replayed == [call.name for call in first[:lost_after]]
 
 
-async def test_a_program_that_does_something_else_the_second_time_is_ended(engine: Engine) -> None:
+async def test_program_that_diverges_on_replay_is_ended(engine: Engine) -> None:
     run = await engine.start(
         "cyberdog.echo(1)\ncyberdog.motion.turn(2)",
         PRELUDE,

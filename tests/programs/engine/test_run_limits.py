@@ -43,7 +43,7 @@ async def test_limits_name_themselves(engine: Engine, monkeypatch: pytest.Monkey
     assert len(output.output) <= 10_000
 
 
-async def test_calls_at_the_depth_limit_do_not_break_off(engine: Engine) -> None:
+async def test_calls_at_depth_limit_do_not_break_off(engine: Engine) -> None:
     """Wherever the limit strikes, the program can go on calling: request and reply stay in step."""
     source = """
 def deep(n):
@@ -67,7 +67,7 @@ async def test_a_quota_of_memory_is_really_there(engine: Engine) -> None:
     assert played.ending == Finished()
 
 
-async def test_calls_above_the_rate_are_slowed_down_not_ended(engine: Engine) -> None:
+async def test_calls_above_rate_are_slowed_down_not_ended(engine: Engine) -> None:
     """100 calls may come at once; the other 200 take a fifth of a second at 1000 a second."""
     loop = asyncio.get_running_loop()
     before = loop.time()
@@ -86,7 +86,7 @@ async def test_large_arguments_are_slowed_down_too(engine: Engine) -> None:
     assert loop.time() - before >= 1.6 / 2.1 - 0.11  # MB, MB a second, and what may come at once
 
 
-async def test_too_many_values_are_refused_where_the_program_can_see_it(engine: Engine) -> None:
+async def test_too_many_values_are_refused_in_the_program(engine: Engine) -> None:
     source = """
 try:
     cyberdog.echo([[] for i in range(110000)])
@@ -102,7 +102,7 @@ assert cyberdog.echo(x) == x
     assert played.output == "more values than can be passed to the robot at once\n"
 
 
-async def test_programs_that_take_much_get_turns_one_by_one() -> None:
+async def test_greedy_programs_get_turns_one_by_one() -> None:
     share, turns, loop = Share(), list[int](), asyncio.get_running_loop()
     accounts = [share.account() for _ in range(3)]
     for account in accounts:
@@ -209,7 +209,7 @@ async def test_a_slow_reader_makes_the_program_wait(engine: Engine) -> None:
     assert run.exit_reason is ExitReason.FINISHED
 
 
-async def test_a_run_has_a_time_limit_that_stands_still_while_it_is_suspended(engine: Engine) -> None:
+async def test_time_limit_of_a_run_pauses_during_suspension(engine: Engine) -> None:
     run = await started(engine, BUSY, Limits(wall=60.0))  # a busy machine may take its time to get there
     await run.suspend()
     run._clock._left = 0.05

@@ -65,7 +65,7 @@ async def test_every_statement_is_a_step(engine: Engine) -> None:
     ("at", "halts"),
     [((4,), [4, 4, 4]), ((5,), [6, 6, 6]), ((8,), [9]), ((2, 10), [3, 10]), ((1,), [1]), ((), [])],
 )
-async def test_it_halts_at_its_lines_or_at_the_next_statement(
+async def test_halts_at_breakpoints_or_the_next_statement(
     engine: Engine, at: tuple[int, ...], halts: list[int]
 ) -> None:
     run = await engine.start(LOOP, PRELUDE, stops=stops(*at))
@@ -88,7 +88,7 @@ async def test_lines_of_modules(engine: Engine) -> None:
     await run.kill()
 
 
-async def test_a_busy_program_is_halted_and_its_stops_change(engine: Engine) -> None:
+async def test_busy_program_is_halted_and_its_stops_change(engine: Engine) -> None:
     run = await engine.start("print(1)\nn = 0\nwhile True:\n    n += 1\n    n -= 1\n", PRELUDE, stops=Stops())
     assert await anext(run) == Output("1\n")
     run.position.step()
@@ -114,7 +114,7 @@ async def test_a_busy_program_is_halted_and_its_stops_change(engine: Engine) -> 
     assert process_state(run.pid) == ""
 
 
-async def test_a_run_that_no_one_watches_does_not_halt(engine: Engine) -> None:
+async def test_run_that_no_one_watches_does_not_halt(engine: Engine) -> None:
     run = await engine.start(LOOP, PRELUDE)
     run.position.step()
     run.position.stop_at([("", 4)])
@@ -135,7 +135,7 @@ def _go_on(run: Run, event: object) -> bool:
     return True
 
 
-async def test_a_halt_that_no_one_asked_for_breaks_the_protocol() -> None:
+async def test_halt_that_no_one_asked_for_breaks_protocol() -> None:
     forged = (
         "import os\n"
         'body = b\'{"t":"call","id":1,"name":"$halt","args":[],"kwargs":{}}\'\n'

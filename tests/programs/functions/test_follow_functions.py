@@ -36,7 +36,7 @@ def code(state: object) -> int:
     return int(field(state, "code"))  # type: ignore[arg-type]
 
 
-async def test_it_walks_after_a_member_and_keeps_its_distance(caller: Caller, world: World, anna: Actor) -> None:
+async def test_it_walks_after_member_and_keeps_its_distance(caller: Caller, world: World, anna: Actor) -> None:
     assert code(await caller("cyberdog.follow.add_personnel", "Anna")) == 0
     assert code(await caller("cyberdog.follow.follow_personnel", "Anna", 1.2)) == 0
     await caller.clock.advance(6.0)
@@ -51,7 +51,7 @@ async def test_it_walks_after_a_member_and_keeps_its_distance(caller: Caller, wo
     assert caller.robot[Vision].people.latest is None
 
 
-async def test_suspended_it_waits_and_at_the_end_it_stops(caller: Caller, world: World, anna: Actor) -> None:
+async def test_suspended_it_waits_and_at_end_it_stops(caller: Caller, world: World, anna: Actor) -> None:
     await caller("cyberdog.follow.add_personnel", "Anna")
     await caller("cyberdog.follow.follow_personnel", "Anna")
     await caller.clock.advance(1.5)

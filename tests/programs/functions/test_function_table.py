@@ -83,7 +83,7 @@ async def test_blocks_breakpoints_and_ends(bare_caller: Caller) -> None:
         await bare_caller("cyberdog.task.block", "\ud800")
 
 
-async def test_a_failed_call_colours_the_blocks_until_one_succeeds(caller: Caller) -> None:
+async def test_failed_call_colours_the_blocks_until_one_succeeds(caller: Caller) -> None:
     await caller("cyberdog.motion.turn", 400)
     await caller("cyberdog.task.block", "a")
     assert field(caller.session.last_state, "code") == 1

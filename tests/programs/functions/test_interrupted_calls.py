@@ -41,7 +41,7 @@ def arguments(name: str) -> tuple[list[object], dict[str, object]]:
     raise AssertionError(f"the example of {name} does not call it")
 
 
-async def test_each_function_tells_its_own_failure_and_does_nothing(caller: Caller) -> None:
+async def test_each_function_reports_its_own_failure(caller: Caller) -> None:
     for name in ACTING:
         await cut_off(Caller(caller.robot, caller.clock), name)
         assert caller.robot.actions.running() == [], name

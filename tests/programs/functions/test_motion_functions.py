@@ -55,7 +55,7 @@ async def test_trotting_on_an_arc_by_distance(caller: Caller, world: World) -> N
     assert_pose(end, x=0.4, y=0.4, deg=90, within=0.1, within_deg=10)
 
 
-async def test_trotting_for_a_time_in_both_directions_at_once(caller: Caller, world: World) -> None:
+async def test_trotting_for_time_in_both_directions_at_once(caller: Caller, world: World) -> None:
     assert_pose(await moved(caller, world, "trot_walking", 0.2, 0.1, duration=3), x=0.6, y=0.3, deg=0, within=0.08)
 
 
@@ -179,7 +179,7 @@ async def test_lying_down_standing_up_and_going_limp(caller: Caller) -> None:
     assert legs.posture is Posture.STANDING
 
 
-async def test_a_lying_robot_stands_up_to_walk_for_the_whole_time(caller: Caller, world: World) -> None:
+async def test_lying_robot_stands_up_to_walk(caller: Caller, world: World) -> None:
     await caller("cyberdog.motion.get_down")
     assert_pose(await moved(caller, world, "go_straight", 0.25, 0, 2), x=0.5, y=0.0, within=0.08)
 
@@ -236,9 +236,7 @@ async def test_the_limits_can_be_read(caller: Caller) -> None:
     [("low_battery", 3026), ("motor_fault", 3032), ("emergency_stop", 3040), ("brake_released", 3040)],
 )
 @pytest.mark.world("empty")
-async def test_what_is_wrong_with_the_robot_is_reported_by_its_number(
-    caller: Caller, world: World, fault: str, code: int
-) -> None:
+async def test_robot_s_trouble_is_reported_by_number(caller: Caller, world: World, fault: str, code: int) -> None:
     world.faults.inject(fault, "a")
     await caller.clock.advance(0.5)
     before = world.truth.pose_of("a")
@@ -258,7 +256,7 @@ async def test_a_program_without_control_learns_so(caller: Caller) -> None:
     assert not robot.actions.running(BASE)
 
 
-async def test_a_wall_ends_a_walk_in_an_error_state(caller: Caller, world: World) -> None:
+async def test_wall_ends_a_walk_in_an_error_state(caller: Caller, world: World) -> None:
     world.hands.place("a", Pose(9.5, 5.0, 0.0))
     result = await caller("cyberdog.motion.go_straight", 0.3, 2.0)
     assert field(result, "state.code") != 0

@@ -111,7 +111,7 @@ async def test_a_drive_is_called_off(home: Caller, world: World) -> None:
     assert result_of(going.result()) == (1, 5)
 
 
-async def test_a_map_of_an_earlier_life_is_loaded_and_found(home: Caller, world: World) -> None:
+async def test_map_of_earlier_life_is_loaded_and_found(home: Caller, world: World) -> None:
     mapping, localization = home.robot[Mapping], home.robot[Localization]
     stored = await home.robot[MapLibrary].get("home")
     pose = localization.pose
@@ -122,9 +122,7 @@ async def test_a_map_of_an_earlier_life_is_loaded_and_found(home: Caller, world:
     assert localization.pose.distance_to(pose) < 0.1
 
 
-async def test_someone_helps_a_robot_that_does_not_know_where_it_is(
-    home: Caller, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_lost_robot_is_helped(home: Caller, monkeypatch: pytest.MonkeyPatch) -> None:
     localization, known = home.robot[Localization], []
     find = localization.relocalize
 
@@ -191,7 +189,7 @@ async def test_an_outdoor_map_is_for_outdoors(home: Caller) -> None:
     assert result_of(await home("cyberdog.navigation.to_preset", "kitchen")) == (0, 0)
 
 
-async def test_a_newer_map_of_outdoors_does_not_move_the_points_indoors(home: Caller) -> None:
+async def test_newer_outdoor_map_leaves_indoor_points_alone(home: Caller) -> None:
     stored = await home.robot[MapLibrary].get("home")
     garden = replace(stored, name="garden", outdoor=True, labels=(Label("kitchen", Point(0.4, 0.2)),))
     await home.robot[MapLibrary].put(garden)

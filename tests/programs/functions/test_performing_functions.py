@@ -26,7 +26,7 @@ async def off_the_dock(caller: Caller) -> None:
     await caller.clock.advance(1.5)
 
 
-async def test_every_motion_of_the_table_is_the_one_that_is_performed(caller: Caller) -> None:
+async def test_every_motion_of_the_table_is_performed(caller: Caller) -> None:
     legs = caller.robot[Legs]
     await off_the_dock(caller)
     for name, _, motion in RESULT_MOTIONS:
@@ -163,7 +163,7 @@ async def test_walking_on_a_leash_begins_standing(caller: Caller) -> None:
     assert (legs.posture, legs.gait, legs.foot_lift) == (Posture.STANDING, Gait.TROT_PASSIVE, FootLift(0.04, 0.05))
 
 
-async def test_a_dog_on_a_leash_goes_where_it_is_pulled(caller: Caller, world: World) -> None:
+async def test_dog_on_leash_goes_where_it_is_pulled(caller: Caller, world: World) -> None:
     legs = caller.robot[Legs]
     await off_the_dock(caller)
     before, start = world.truth.pose_of("a"), caller.clock.time()

@@ -37,7 +37,7 @@ async def anna(caller: Caller, world: World) -> Actor:
 # -- gestures ----------------------------------------------------------------------------------------------------------
 
 
-def test_every_gesture_of_the_manual_has_one_of_the_models() -> None:
+def test_every_gesture_of_manual_has_one_of_models() -> None:
     from roboglot.programs.functions.senses.gestures import KINDS
 
     assert KINDS[Gesture.THUMB_DOWN] == "thumb_down" == GESTURES[8 - 1]
@@ -136,7 +136,7 @@ async def test_a_whole_training_with_words(caller: Caller, anna: Actor) -> None:
 
 
 @pytest.mark.parametrize("interact", [True, False])
-async def test_a_volume_out_of_range_is_refused_also_when_nothing_is_said(caller: Caller, interact: bool) -> None:
+async def test_volume_out_of_range_is_refused_without_speech(caller: Caller, interact: bool) -> None:
     for volume in (-1, 101):
         result = await caller("cyberdog.skeleton.sports_recognition", 1, 2, 5, interact, True, volume)
         assert (field(result, "state.code"), field(result, "response.algo_switch")) == (1, 3)

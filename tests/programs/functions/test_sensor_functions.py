@@ -160,7 +160,7 @@ async def test_results_have_no_fields_that_their_types_lack(caller: Caller) -> N
         check(await caller(f"cyberdog.{name}"))
 
 
-async def test_a_missing_sensor_fails_in_state_and_raises_for_data(bare_caller: Caller) -> None:
+async def test_missing_sensor_fails_in_state_and_raises_data(bare_caller: Caller) -> None:
     for sensor in ("bms", "odometer", "imu", "lidar"):
         assert field(await bare_caller(f"cyberdog.{sensor}.state"), "code") == 1
         with pytest.raises(ComponentMissing):

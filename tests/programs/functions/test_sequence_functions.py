@@ -54,7 +54,7 @@ async def ready(caller: Caller) -> None:
 
 
 @pytest.mark.parametrize("gaits", [TROT, []])
-async def test_a_sequence_moves_robot_and_body_pace_by_pace(
+async def test_sequence_moves_robot_and_body_pace_by_pace(
     caller: Caller, world: World, gaits: list[tuple[str, int]]
 ) -> None:
     await ready(caller)

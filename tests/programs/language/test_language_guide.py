@@ -49,7 +49,7 @@ async def test_programs_show_what_the_page_says(page: str, robot: Robot, clock: 
             assert await guide.shows(kind, program, "zh" in page) == expected, program
 
 
-def test_both_pages_have_the_same_programs_and_show_each() -> None:
+def test_both_pages_have_same_programs_and_show_each() -> None:
     english, chinese = shown("language.md"), shown("language.zh.md")
     assert [found[:2] for found in english] == [found[:2] for found in chinese]
     for page, found in (("language.md", english), ("language.zh.md", chinese)):

@@ -43,11 +43,11 @@ def test_every_cell_of_the_module_table(state: str, operation: str, cell: str) -
     assert results == (expected if len(expected) == 2 else expected * 2)
 
 
-def test_the_table_has_no_more_cells_than_the_manual() -> None:
+def test_table_has_no_more_cells_than_the_manual() -> None:
     assert len(CELLS) == len(ModuleState) * len(ModuleOperation) == 9
 
 
-def test_a_module_is_a_function_whose_lines_are_one_below_the_users() -> None:
+def test_module_is_a_function_one_line_below_users() -> None:
     text = function_of(Interface("say", ("name", "size")), "if size:\r\n    print(name)\n\nreturn size")
     assert text.split("\n") == ["def say(name, size):", "    if size:", "        print(name)", "", "    return size"]
     shown = in_the_body(Problem(3, 9, ProblemKind.NAME, "", ""))
@@ -56,7 +56,7 @@ def test_a_module_is_a_function_whose_lines_are_one_below_the_users() -> None:
 
 
 @given(st.text(alphabet=" \n\r\tx=1:if()\\'\"#"))
-def test_no_line_of_a_body_begins_left_of_the_function(body: str) -> None:
+def test_no_line_of_body_begins_left_of_function(body: str) -> None:
     function = function_of(Interface("f", ()), body)
     assert all(line.startswith("    ") or not line.strip() for line in function.split("\n")[1:])
     try:

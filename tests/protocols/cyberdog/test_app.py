@@ -75,7 +75,7 @@ async def test_without_an_address_no_one_is_dialled(door, app, forward) -> None:
     assert not app.ticks
 
 
-async def test_a_lying_dog_gets_up_for_its_first_app(door, client, app, robot, forward, passing: Passing) -> None:
+async def test_lying_dog_gets_up_for_its_first_app(door, client, app, robot, forward, passing: Passing) -> None:
     robot[Legs].lie_down()
     await forward(seconds=5)
     await client.ask(10001)
@@ -133,7 +133,7 @@ async def test_an_app_with_a_strange_certificate_gets_nothing(
     await stranger.stop()
 
 
-async def test_a_second_client_does_not_take_the_app_s_place(door, client, app, pems, messages, passing) -> None:
+async def test_second_client_does_not_take_app_s_place(door, client, app, pems, messages, passing) -> None:
     await client.ask(10001)
     await passing(lambda: door._context.app.connected)
     door._context.app.seen("ipv4:127.0.0.99:4711")
@@ -150,7 +150,7 @@ class Dialling(AppLink):
         return False
 
 
-async def test_a_call_during_an_attempt_leads_to_the_next_at_once(clock: LockstepClock) -> None:
+async def test_call_during_attempt_leads_to_next_at_once(clock: LockstepClock) -> None:
     link = Dialling(clock, None, AppRoute(ADDRESS, "127.0.0.1:1", 1), ticks=str)
     link.start()
     await clock.advance(2.0)
@@ -191,7 +191,7 @@ async def test_pushes_without_an_app_are_dropped(door, app, client, passing: Pas
     assert app.pushed[1] == (2001, "after")
 
 
-async def test_a_slow_app_gets_the_newest_and_delays_no_other_code(door, app, client, passing: Passing) -> None:
+async def test_slow_app_gets_newest_delaying_no_other_code(door, app, client, passing: Passing) -> None:
     link = door._context.app
     await client.ask(10001)
     await passing(lambda: link.connected)
@@ -207,7 +207,7 @@ async def test_a_slow_app_gets_the_newest_and_delays_no_other_code(door, app, cl
     assert [message["n"] for message in app.of(1003)] == [0, 18, 19]
 
 
-async def test_an_app_that_never_answers_a_push_blocks_it_for_three_seconds(door, app, client, passing, clock) -> None:
+async def test_unanswered_push_blocks_for_three_seconds(door, app, client, passing, clock) -> None:
     link = door._context.app
     await client.ask(10001)
     await passing(lambda: link.connected)
@@ -257,7 +257,7 @@ async def test_program_frames_pass_through(robot, data, app, pems, messages, pas
     assert programs.front_end is None
 
 
-async def test_any_address_of_the_machine_is_reported_by_the_way_to_the_app(robot, data, app, passing: Passing) -> None:
+async def test_wildcard_address_becomes_the_route_to_the_app(robot, data, app, passing: Passing) -> None:
     door = CyberDogDoor(robot, "0.0.0.0", CyberDogConfig(port=0, app=f"127.0.0.1:{app.port}"), data)
     await door.start()
     await passing(lambda: app.ticks)
@@ -302,7 +302,7 @@ def test_a_push_is_declared_once() -> None:
         push(6005, depth=1)
 
 
-def test_heartbeats_of_a_hundred_dogs_do_not_come_at_once():
+def test_heartbeats_of_a_hundred_dogs_are_spread():
     instants = sorted(early_share(f"127.0.1.{number}") for number in range(1, 101))
     assert all(0.0 <= instant <= 0.75 for instant in instants)
     for tenth in range(10):

@@ -41,7 +41,7 @@ def test_made_once_and_kept(tmp_path: Path) -> None:
     x509.load_pem_x509_certificate(first.certificate).verify_directly_issued_by(ca)
 
 
-def test_keys_are_private_and_the_ca_key_is_gone(tmp_path: Path) -> None:
+def test_keys_are_private_and_ca_key_is_gone(tmp_path: Path) -> None:
     previous = os.umask(0)
     try:
         ensure_certificates(tmp_path)
@@ -102,7 +102,7 @@ def test_broken_and_expired_ones_are_not_replaced_silently(tmp_path: Path, monke
 
 @pytest.mark.parametrize("name", ["ca-cert.pem", "server-cert.pem", "server-key.pem"])
 @pytest.mark.parametrize("half", [True, False])
-def test_half_of_a_change_changes_nothing_and_is_reported_at_the_start(tmp_path: Path, name: str, half: bool) -> None:
+def test_half_a_change_changes_nothing_and_is_reported(tmp_path: Path, name: str, half: bool) -> None:
     """A file that is cut short, or a key or certificate whose other half has not come yet."""
     ensure_certificates(tmp_path / "new")
     file, store = tmp_path / "tls" / name, CertificateStore(tmp_path)
@@ -118,7 +118,7 @@ def test_half_of_a_change_changes_nothing_and_is_reported_at_the_start(tmp_path:
 
 
 @pytest.mark.world("empty")
-async def test_certificates_that_are_replaced_count_at_the_next_connection(
+async def test_certificates_that_are_replaced_count_at_next_connection(
     robot, tmp_path: Path, messages: Messages, passing
 ) -> None:
     """The app's old ones are refused from then on, in both directions; who is connected stays so."""

@@ -30,7 +30,7 @@ async def fails(client: Client) -> grpc.StatusCode:
     return caught.value.code()
 
 
-async def test_a_refused_handshake_leaves_a_line_in_the_log(door, pems, messages, client, caplog) -> None:
+async def test_refused_handshake_leaves_a_line_in_the_log(door, pems, messages, client, caplog) -> None:
     assert "task_status" in await client.ask(10001)
     async with pems.channel(door.port, private_key=None, certificate_chain=None) as channel:
         assert await fails(Client(channel, messages)) is grpc.StatusCode.UNAVAILABLE
@@ -86,7 +86,7 @@ async def test_bad_json_is_answered_under_code_0(client, text) -> None:
 
 
 @pytest.mark.parametrize("text", ["[]", "5", "null", '"text"', '{"motion_id":null}'])
-async def test_json_that_lacks_what_is_needed_keeps_its_code(client, text) -> None:
+async def test_incomplete_json_keeps_its_code(client, text) -> None:
     assert await client.raw(1004, text) == [(1004, '{"error_code":323}')]
 
 
@@ -96,12 +96,12 @@ async def test_unknown_codes_are_not_answered(client) -> None:
     assert await client.raw(424242, "{") == [(0, '{"error_code":323}')]
 
 
-def test_all_codes_of_the_text_and_of_real_robots_are_there() -> None:
+def test_all_codes_of_manual_and_real_robots_exist() -> None:
     assert {int(row.key) for row in contract("cyberdog")} <= {int(key) for key in implemented()}
     assert all(extras().values())
 
 
-async def test_there_are_no_files_and_no_heartbeats_to_be_had(client) -> None:
+async def test_neither_files_nor_heartbeats_are_available(client) -> None:
     assert [chunk.error_code for chunk in await client.file(4002)] == [7]
     assert [chunk.error_code for chunk in await client.file(1001)] == [255]
     with pytest.raises(grpc.aio.AioRpcError) as caught:
@@ -109,7 +109,7 @@ async def test_there_are_no_files_and_no_heartbeats_to_be_had(client) -> None:
     assert caught.value.code() is grpc.StatusCode.UNIMPLEMENTED
 
 
-async def test_an_oversize_message_is_refused_and_the_next_is_answered(client) -> None:
+async def test_oversize_message_is_refused_and_next_is_answered(client) -> None:
     with pytest.raises(grpc.aio.AioRpcError) as caught:
         await client.raw(10001, '{"a":"' + "x" * 6_000_000 + '"}')
     assert caught.value.code() is grpc.StatusCode.RESOURCE_EXHAUSTED

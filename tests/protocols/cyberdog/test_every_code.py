@@ -37,7 +37,7 @@ def _is_number(node: ast.expr) -> bool:
     return isinstance(node, ast.Constant) and type(node.value) is int
 
 
-def test_every_request_is_asked_for_and_every_push_read() -> None:
+def test_every_request_is_sent_and_every_push_read() -> None:
     requests = {int(operation.key) for operation in TABLE} | {int(code) for code in files}
     assert {int(row.key) for row in contract("cyberdog")} <= requests | set(pushes)
     assert {code for code, there in extras().items() if there} <= requests | set(pushes)

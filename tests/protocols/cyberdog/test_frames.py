@@ -97,7 +97,7 @@ def in_pairs(count: int) -> list[tuple[str, str]]:
     return [(kind, str(number)) for number in range(count) for kind in ("begin", "end")]
 
 
-async def test_every_block_of_a_quick_program_arrives_in_order(phone: Phone) -> None:
+async def test_every_block_of_quick_program_arrives_in_order(phone: Phone) -> None:
     phone.app.slowness = 0.02
     await phone.start("t", "for n in range(40): cyberdog.task.block(str(n))")
     await until(lambda: len(phone.blocks()) == 80)
@@ -138,7 +138,7 @@ async def test_thirty_targets_get_thirty_feedbacks(phone: Phone) -> None:
     assert [answer["target_id"] for answer in phone.answers("delete")] == [f"t{number}" for number in range(30)]
 
 
-async def test_a_list_too_large_for_a_message_comes_in_parts(phone: Phone) -> None:
+async def test_list_too_large_for_message_comes_in_parts(phone: Phone) -> None:
     style = "样" * 500_000
     for number, text in enumerate((style, style, style, style, 3 * style)):
         await phone.service._store.put(StoredProgram(f"t{number}", "", text, "single", "now", "pass", "wait_run"))
@@ -150,7 +150,7 @@ async def test_a_list_too_large_for_a_message_comes_in_parts(phone: Phone) -> No
     assert all(len(text.encode()) < PUSH_ROOM for _, text in phone.app.pushed)
 
 
-async def test_what_is_no_json_is_answered_by_a_frame(phone: Phone) -> None:
+async def test_what_is_no_json_is_answered_by_frame(phone: Phone) -> None:
     assert await phone.client.raw(2002, "{not json") == []
     await until(lambda: phone.frames)
     assert phone.frames[0]["feedback"]["state"] == FeedbackState.NOT_JSON
@@ -223,7 +223,7 @@ def test_each_kind_keeps_its_order(frames: list[tuple[bool, int]]) -> None:
     asyncio.run(run())
 
 
-async def test_several_pushes_are_under_way_and_large_ones_alone(clock: LockstepClock) -> None:
+async def test_several_pushes_overlap_but_large_ones_go_alone(clock: LockstepClock) -> None:
     wire = Wire()
     queue = FrameQueue(wire.send, clock, 0)
     queue.open()
@@ -259,7 +259,7 @@ async def test_a_broken_connection_loses_nothing(clock: LockstepClock) -> None:
     assert wire.sent == [str(number) for number in range(20)]
 
 
-async def test_a_lost_app_finds_its_answers_and_no_old_news(clock: LockstepClock) -> None:
+async def test_returning_app_finds_answers_but_no_old_news(clock: LockstepClock) -> None:
     wire = Wire()
     queue = FrameQueue(wire.send, clock, 0)
     queue.answer("no one asked")
@@ -279,7 +279,7 @@ async def test_a_lost_app_finds_its_answers_and_no_old_news(clock: LockstepClock
     assert wire.sent == ["early"]
 
 
-async def test_programs_do_not_wait_for_an_app_that_acknowledges_nothing(clock: LockstepClock) -> None:
+async def test_programs_do_not_wait_for_an_unresponsive_app(clock: LockstepClock) -> None:
     wire = Wire()
     queue = FrameQueue(wire.send, clock, 0)
     queue.open()

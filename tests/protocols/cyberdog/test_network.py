@@ -82,7 +82,7 @@ async def afar(
 
 
 @pytest.mark.parametrize("bad", ["delay", "loss"])
-async def test_a_slow_or_lossy_network_delays_and_loses_nothing(afar: Afar, robot: Robot, bad: str) -> None:
+async def test_slow_or_lossy_network_delays_and_loses_nothing(afar: Afar, robot: Robot, bad: str) -> None:
     afar.fault.delay, afar.fault.lossy = (0.3, False) if bad == "delay" else (0.05, True)
     stream = Stream(afar.client, 6004, {"type": 5})
     await afar.passing(lambda: 6 in stream.codes and robot[Mapping].grid.width > 50)
@@ -137,7 +137,7 @@ async def test_silence_while_a_file_is_sent(
     assert sum(len(chunk.buffer) for chunk in chunks.result()) == chunks.result()[0].file_size > 0
 
 
-async def test_a_push_under_way_when_the_app_is_lost_does_not_end_those_that_follow(afar: Afar, robot: Robot) -> None:
+async def test_push_to_a_lost_app_spares_later_ones(afar: Afar, robot: Robot) -> None:
     low, silent_since = DiskLow(stamp=0.0, free=1), robot.clock.time()
     afar.fault.silent = True
     await afar.passing(lambda: robot.clock.time() > silent_since + 3.5)  # soon enough to be waited for at the end

@@ -31,7 +31,7 @@ def anna(world, robot):
     return person
 
 
-async def test_a_nickname_is_kept_and_can_be_switched_off(client: Client) -> None:
+async def test_nickname_is_kept_and_can_be_switched_off(client: Client) -> None:
     assert await client.ask(1011, {"nick_name": "Rex", "wake_name": ""}) == {"success": True}
     names = await client.ask(1001, {"is_nick_name": True})
     assert names["nick_name"] == {"default_name": DEFAULT, "current_name": "Rex"}
@@ -83,7 +83,7 @@ async def test_members_come_go_and_change_their_names(client, robot) -> None:
     assert await client.ask(1021) == {"code": 0, "accounts": []}
 
 
-async def test_the_profile_of_real_robots_words_things_as_they_do(robot, data, pems, messages, passing) -> None:
+async def test_profile_of_real_robots_uses_their_wording(robot, data, pems, messages, passing) -> None:
     door = CyberDogDoor(robot, ADDRESS, CyberDogConfig(port=0, profile="robot"), data)
     await door.start()
     async with pems.channel(door.port) as channel:
@@ -100,7 +100,7 @@ async def test_the_profile_of_real_robots_words_things_as_they_do(robot, data, p
     await door.close()
 
 
-async def test_its_wake_word_makes_it_listen_once_that_is_on(client, robot, anna, forward) -> None:
+async def test_enabled_wake_word_makes_it_listen_once(client, robot, anna, forward) -> None:
     anna.say(DEFAULT * 2 + "坐下")
     await forward(seconds=8)
     assert robot[Legs].posture is Posture.STANDING  # voice control is off
@@ -142,9 +142,7 @@ async def test_a_voiceprint_is_learned_from_who_speaks(client, app: App, robot, 
     assert (await client.ask(1021, {"account": "anna"}))["accounts"][0]["voice_state"] == 1
 
 
-async def test_training_can_be_cancelled_runs_out_and_needs_a_member(
-    client, app, robot, passing, forward, world
-) -> None:
+async def test_training_is_cancellable_expires_and_needs_a_member(client, app, robot, passing, forward, world) -> None:
     await client.ask(10001)
     await passing(lambda: app.ticks)
     await client.ask(3011, {"nick_name": "unknown", "voiceprint_id": "v2"})
@@ -158,7 +156,7 @@ async def test_training_can_be_cancelled_runs_out_and_needs_a_member(
     assert len(app.of(3013)) == 1
 
 
-async def test_the_voice_board_is_activated_by_a_token_that_holds(client, app, robot, forward, passing) -> None:
+async def test_voice_board_is_activated_by_token_that_holds(client, app, robot, forward, passing) -> None:
     asked = await client.ask(3001)
     assert asked.keys() == {"did", "sn"}
     assert asked["sn"] == robot.description.serial

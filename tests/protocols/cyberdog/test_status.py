@@ -32,7 +32,7 @@ async def charging(client: Client) -> tuple[bool, bool]:
     return status["wired_charging"], status["wireless_charging"]
 
 
-async def test_a_dock_is_no_wire_and_a_wire_is_no_dock(client, robot, walker, forward: Forward) -> None:
+async def test_charging_by_dock_and_by_wire_differ(client, robot, walker, forward: Forward) -> None:
     await forward(seconds=1)
     assert await charging(client) == (False, True)
     walker[0].hands.place("a", Pose(6.0, 10.0))

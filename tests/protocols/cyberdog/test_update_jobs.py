@@ -78,7 +78,7 @@ async def test_another_stream_takes_a_running_goal_over(client, passing, forward
     assert await client.ask(5011) == {"accepted": 3}
 
 
-async def test_a_download_is_thrown_away_and_a_reset_gives_up_another(client, work, robot, forward) -> None:
+async def test_download_is_discarded_and_reset_abandons_another(client, work, robot, forward) -> None:
     free = robot[Disk].free
     assert (await work("disk"))[-1]["data"] == {"size": robot[Disk].size, "free": free}
     assert (await work("remove"))[-1]["code"] == 5703
@@ -110,7 +110,7 @@ async def test_goals_that_cannot_be_reached(client, work, robot) -> None:
     }  # fmt: skip
 
 
-async def test_a_lost_app_ends_the_stream_and_not_the_work(client, app, passing, robot) -> None:
+async def test_lost_app_ends_stream_and_not_the_work(client, app, passing, robot) -> None:
     await client.ask(10001)
     await passing(lambda: app.ticks)
     files = [{"md5": MD5, "fileSize": 160_000_000}]  # eight seconds of it

@@ -54,7 +54,7 @@ async def test_an_empty_battery_keeps_it_in_low_power(client, robot, forward) ->
     assert await answered(client, 10002, {}, forward) == {"success": False}
 
 
-async def test_lying_leads_to_low_power_if_that_is_on(client, app, robot, passing, forward) -> None:
+async def test_lying_leads_to_low_power_if_enabled(client, app, robot, passing, forward) -> None:
     await client.ask(10001)
     await passing(lambda: app.ticks)  # the first app makes a lying dog get up
     robot[Legs].lie_down()
@@ -67,7 +67,7 @@ async def test_lying_leads_to_low_power_if_that_is_on(client, app, robot, passin
     assert await client.ask(10003) == {"error_code": 323}
 
 
-async def test_calibration_lets_the_motors_go_and_gives_them_power_again(client, robot, forward, world) -> None:
+async def test_calibration_releases_motors_and_powers_them_again(client, robot, forward, world) -> None:
     world.hands.place("a", Pose(4.0, 2.5))
     assert await answered(client, 12001, {"data": False}, forward) == {"success": True, "message": ""}
     assert robot[Legs].posture is Posture.LIMP
@@ -134,7 +134,7 @@ async def test_an_update_from_download_to_reboot(client, app: App, robot, data, 
         await again.close()
 
 
-async def test_what_was_fetched_and_installed_is_there_after_a_crash(client, robot, forward) -> None:
+async def test_fetched_and_installed_update_survives_a_crash(client, robot, forward) -> None:
     """The program is killed and started anew: a new component over the same settings."""
 
     def next_life() -> SimulatedFirmware:
@@ -182,7 +182,7 @@ async def test_a_low_battery_installs_nothing(client, app, robot, passing, forwa
     await until(lambda: app.of(5005))
 
 
-async def test_developers_access_opens_with_the_robot_s_own_key(client, robot, forward) -> None:
+async def test_developers_access_opens_with_robot_s_own_key(client, robot, forward) -> None:
     serial = robot.description.serial
     for link, result in (("", 1), ("ftp://x/y", 1), ("https://keys.example/another", 2)):
         assert await answered(client, 9030, {"httplink": link}, forward) == {"result": result, "unlock_result": result}
@@ -199,7 +199,7 @@ async def test_the_environment_is_kept(client, robot) -> None:
     assert robot[Settings].get("cyberdog.environment", None) == "test"
 
 
-async def test_the_log_reaches_the_maker_unless_there_is_no_internet(client, robot, forward) -> None:
+async def test_log_reaches_maker_unless_there_is_no_internet(client, robot, forward) -> None:
     assert await answered(client, 10005, {}, forward) == {"success": True}
     assert len(robot[SystemLog].uploads) == 1
     await robot[Network].switch_off()
@@ -223,7 +223,7 @@ async def test_the_depth_camera_is_switched(client, robot) -> None:
     assert await client.ask(6012, {}) == {"error_code": 323}
 
 
-async def test_progress_is_pushed_ten_times_a_second_at_most(robot, forward) -> None:
+async def test_progress_is_pushed_ten_times_second_at_most(robot, forward) -> None:
     reported: list[float] = []
 
     class Phone:
@@ -244,7 +244,7 @@ async def test_progress_is_pushed_ten_times_a_second_at_most(robot, forward) -> 
     updates.close()
 
 
-async def test_the_last_app_is_dialled_again_after_a_restart(client, door, app, robot, data, passing) -> None:
+async def test_last_app_is_dialled_again_after_a_restart(client, door, app, robot, data, passing) -> None:
     await client.ask(10001)
     await passing(lambda: app.ticks and robot[Settings].get("cyberdog.app"))
     await door.close()
@@ -255,7 +255,7 @@ async def test_the_last_app_is_dialled_again_after_a_restart(client, door, app, 
     await again.close()
 
 
-async def test_a_forgotten_app_is_not_dialled_after_a_restart(client, app, robot, passing) -> None:
+async def test_forgotten_app_is_not_dialled_after_a_restart(client, app, robot, passing) -> None:
     await client.ask(10001)
     await passing(lambda: app.ticks and robot[Settings].get("cyberdog.app"))
     await client.ask(55001)

@@ -20,7 +20,7 @@ ANY = st.floats(-100, 100)
 
 
 @given(st.sampled_from(sorted(WALKS)), *[ANY] * 3)
-def test_a_walk_s_velocity_is_never_above_its_top(motion: int, x: float, y: float, yaw: float) -> None:
+def test_walk_s_velocity_is_never_above_its_top(motion: int, x: float, y: float, yaw: float) -> None:
     gait, twist = GAITS[WALKS[motion]], twist_of(motion, [x, y, yaw])
     assert gait.lowest.x <= twist.x <= gait.highest.x
     assert gait.lowest.y <= twist.y <= gait.highest.y

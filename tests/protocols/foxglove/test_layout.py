@@ -37,7 +37,7 @@ async def test_its_topics_are_there(scene: Scene) -> None:
     assert all(topic.removeprefix("/a/") in TOPICS for topic in published)
 
 
-async def test_its_camera_is_there_and_films_only_for_who_looks(scene: Scene) -> None:
+async def test_camera_is_there_and_films_only_for_viewers(scene: Scene) -> None:
     topic = json.loads(LAYOUT.read_text(encoding="utf-8"))["configById"]["Image!camera"]["imageMode"]["imageTopic"]
     viewer = await scene.connect()
     number = await viewer.subscribe(topic)

@@ -57,7 +57,7 @@ async def test_another_protocol_is_refused(scene: Scene) -> None:
     assert refused.value.response.status_code == 400
 
 
-async def test_topics_are_those_of_recordings_and_their_schemas_describe_them(scene: Scene) -> None:
+async def test_topics_are_those_of_recordings_described_by_schemas(scene: Scene) -> None:
     await scene.clock.advance(3.0)
     viewer = await scene.connect()
     scan = await last(viewer, "/a/scan")
@@ -77,7 +77,7 @@ async def test_topics_are_those_of_recordings_and_their_schemas_describe_them(sc
     assert Grid.FromString(grid.SerializeToString()).column_count > 10
 
 
-async def test_frames_make_one_tree_at_the_time_of_the_robot(scene: Scene) -> None:
+async def test_frames_make_one_tree_at_time_of_robot(scene: Scene) -> None:
     viewer = await scene.connect()
     number = await viewer.subscribe("/tf")
     await viewer.until(lambda: len(viewer.data.get(number, ())) > 3, 2.0)
@@ -98,7 +98,7 @@ async def test_a_newcomer_gets_the_state_at_once(scene: Scene) -> None:
     await viewer.until(lambda: viewer.data.get(number))  # no robot time passes
 
 
-async def test_what_other_doors_hear_is_a_topic_without_secrets(scene: Scene) -> None:
+async def test_what_other_doors_hear_is_topic_without_secrets(scene: Scene) -> None:
     viewer = await scene.connect()
     await viewer.topic("/a/pose")
     async with httpx.AsyncClient(base_url=f"http://{ADDRESS}:1448") as client:
@@ -163,9 +163,7 @@ async def test_wrong_messages_are_answered_in_words(scene: Scene) -> None:
     assert viewer.binary[0][:6] == b"\x04\x05\x00\x00\x00\x01"
 
 
-async def test_who_reads_too_slowly_misses_messages_and_hears_of_it(
-    scene: Scene, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_slow_reader_misses_messages_and_is_notified(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     viewer = await scene.connect()
     number = await viewer.subscribe("/a/pose")
     await viewer.until(lambda: viewer.data.get(number), 1.0)

@@ -11,7 +11,7 @@ OK, FAIL = "ok;", "fail;"
 pytestmark = pytest.mark.world("empty", body="robomaster_ep")
 
 
-async def test_a_wall_fails_the_move_and_only_away_is_free(client, robot, world, forward) -> None:
+async def test_wall_fails_move_and_only_away_is_free(client, robot, world, forward) -> None:
     world.hands.place("a", Pose(9.0, 5.0, 0.0))
     await forward(seconds=0.5)
     client.send("chassis move x 3 wait_for_complete true;")
@@ -28,7 +28,7 @@ async def test_a_wall_fails_the_move_and_only_away_is_free(client, robot, world,
     assert world.truth.pose_of("a").x < 9.5
 
 
-async def test_a_speed_held_against_a_wall_brakes_within_100_ms(client, robot, world, forward) -> None:
+async def test_speed_held_against_wall_brakes_within_100_ms(client, robot, world, forward) -> None:
     world.hands.place("a", Pose(9.0, 5.0, 0.0))
     await forward(seconds=0.5)
     assert await client.ask("chassis speed x 1;") == OK
@@ -41,7 +41,7 @@ async def test_a_speed_held_against_a_wall_brakes_within_100_ms(client, robot, w
 
 
 @pytest.mark.parametrize("speed", [1.0, 3.5])
-async def test_a_blow_is_an_impact_although_the_bumper_brakes(speed: float, client, world, forward) -> None:
+async def test_blow_is_an_impact_although_the_bumper_brakes(speed: float, client, world, forward) -> None:
     world.hands.place("a", Pose(6.5, 5.0, 0.0))
     await forward(seconds=0.5)
     assert await client.ask(f"chassis speed x {speed};") == OK

@@ -136,7 +136,7 @@ async def test_a_move_answers_at_once(client, robot, forward) -> None:
     assert math.degrees(moved.yaw) == pytest.approx(-90, abs=2)
 
 
-async def test_a_move_to_be_waited_for_answers_at_its_end(client, robot, forward) -> None:
+async def test_awaited_move_answers_at_its_end(client, robot, forward) -> None:
     client.send("chassis move x 0.4 vxy 0.4 wait_for_complete true;robot mode ?;")
     early = asyncio.ensure_future(client.reply())
     await asyncio.sleep(0.05)

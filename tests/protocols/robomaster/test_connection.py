@@ -99,9 +99,7 @@ async def test_the_robot_stops_when_its_client_is_gone(client, robot, world, for
     assert world.truth.pose_of(robot.id).distance_to(stopped) < 0.002
 
 
-async def test_the_robot_stops_when_the_client_that_drove_it_is_gone_though_others_stay(
-    client, connect, robot, forward
-) -> None:
+async def test_robot_stops_when_its_driver_leaves_among_others(client, connect, robot, forward) -> None:
     monitor = await connect()
     assert await monitor.ask("robot mode ?;") == "chassis_lead;"
     await client.ask("chassis speed z 60;")
@@ -137,7 +135,7 @@ async def test_a_reset_is_a_disconnect_too(client, robot, forward) -> None:
     assert robot[Base].velocity.speed < 0.02
 
 
-async def test_a_client_that_only_finishes_writing_is_gone_too(client, robot, forward) -> None:
+async def test_client_that_only_finishes_writing_is_gone_too(client, robot, forward) -> None:
     await client.ask("chassis speed x 0.4;")
     client.send("robot mode ?;")
     client.writer.write_eof()
@@ -156,7 +154,7 @@ async def test_another_door_keeps_driving_when_our_client_goes(client, robot, fo
     assert robot.actions.running(BASE) == [theirs]
 
 
-async def test_a_new_session_may_drive_while_the_old_one_brakes(client, connect, robot, forward) -> None:
+async def test_new_session_may_drive_while_old_one_brakes(client, connect, robot, forward) -> None:
     await client.ask("chassis speed x 0.4;")
     await forward(seconds=1)
     await client.close()
@@ -201,7 +199,7 @@ async def test_a_megabyte_without_end_harms_no_one(client, connect) -> None:
     assert await other.ask("version;") == "version 00.00.00.70;"
 
 
-async def test_a_flood_behind_a_waiting_command_is_answered_whole(client, connect, door, robot, forward) -> None:
+async def test_flood_behind_a_waiting_command_is_answered_whole(client, connect, door, robot, forward) -> None:
     client.send("chassis move x 1 wait_for_complete true;")
     await until(robot.actions.running)
     client.send("robot mode ?;" * FLOOD)
@@ -216,7 +214,7 @@ async def test_a_flood_behind_a_waiting_command_is_answered_whole(client, connec
         assert await client.reply() == "chassis_lead;"
 
 
-async def test_a_client_that_is_not_read_from_can_leave(client, door, robot, forward) -> None:
+async def test_client_that_is_not_read_from_can_leave(client, door, robot, forward) -> None:
     client.send("chassis speed x 0.4;chassis move x 2 wait_for_complete true;")
     await until(robot.actions.running)
     await forward(seconds=0.5)
@@ -231,7 +229,7 @@ async def test_a_client_that_is_not_read_from_can_leave(client, door, robot, for
     assert robot[Base].velocity.speed < 0.02
 
 
-async def test_replies_that_no_one_reads_are_not_piled_up(client, connect, door) -> None:
+async def test_unread_replies_are_not_piled_up(client, connect, door) -> None:
     client.writer.transport.pause_reading()
     client.writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     for connection in door._connections:

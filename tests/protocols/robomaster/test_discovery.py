@@ -3,7 +3,7 @@
 from roboglot.protocols.robomaster.datagrams import broadcast_address
 
 
-async def test_every_two_seconds_from_the_address_in_the_text(door, broadcasts, forward) -> None:
+async def test_every_two_seconds_from_address_in_the_text(door, broadcasts, forward) -> None:
     await forward(seconds=6.001)
     assert broadcasts.drain() == [("robot ip 127.0.0.9", "127.0.0.9")] * 3
 

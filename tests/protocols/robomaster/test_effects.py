@@ -65,7 +65,7 @@ async def answered(client, forward, text: str, seconds: float = 20.0) -> str:
     return str(await waiting)
 
 
-async def test_gimbal_yaw_is_the_joints_however_far_the_chassis_turns(client, forward) -> None:
+async def test_gimbal_yaw_is_joints_however_far_chassis_turns(client, forward) -> None:
     assert await client.ask("robot mode free;") == OK
     assert await answered(client, forward, "chassis move z 720 vz 300 wait_for_complete true;") == OK
     assert await answered(client, forward, "gimbal recenter;") == OK
@@ -131,7 +131,7 @@ async def test_a_shot_fires_its_beads(client, robot, forward) -> None:
 
 
 @pytest.mark.world("empty", robots=("a", "b"), body="robomaster_ep")
-async def test_beads_are_felt_by_the_robot_that_they_hit(client, robot, world, forward, listen) -> None:
+async def test_beads_are_felt_by_robot_that_they_hit(client, robot, world, forward, listen) -> None:
     """a has the door; b shoots at its front."""
     here = world.truth.pose_of("a")
     world.hands.place("b", here.compose(Pose(1.5, 0.0, math.pi)))
@@ -331,7 +331,7 @@ async def test_ai_pushes_what_is_seen_and_excludes(client, world, robot, pushes,
 
 
 @FW70
-async def test_robots_push_everything_of_a_module_in_one_datagram(client, pushes, forward) -> None:
+async def test_robots_push_everything_of_module_in_one_datagram(client, pushes, forward) -> None:
     await client.ask("chassis push position on attitude on status on freq 10;")
     await forward(seconds=1.001)
     texts = pushes.texts()

@@ -21,7 +21,7 @@ async def test_form_and_sender(client, pushes, forward) -> None:
     assert [len(text.rstrip(";").split()) - 3 for text in texts] == [3, 2, 11]
 
 
-async def test_the_default_is_five_a_second_and_every_attribute_has_its_own(client, pushes, forward) -> None:
+async def test_default_is_five_hertz_each_attribute_its_own(client, pushes, forward) -> None:
     await client.ask("chassis push position on pfreq 1 attitude on;")
     await forward(seconds=4.001)
     texts = pushes.texts()

@@ -75,7 +75,7 @@ async def test_robot_mode_and_bad_texts(client, text: str, reply: str) -> None:
     assert await client.ask(text) == reply
 
 
-async def test_a_mode_that_needs_a_gimbal_is_refused_without_one(client, robot) -> None:
+async def test_mode_that_needs_gimbal_is_refused_without_one(client, robot) -> None:
     del robot._components[Gimbal]
     await client.ask("robot mode free;")
     assert await client.ask("robot mode gimbal_lead;") == "fail;"
@@ -133,14 +133,14 @@ async def test_the_log_of_refusals_has_an_end(client, caplog) -> None:
     assert sum("asked" in record.message for record in caplog.records) == 100
 
 
-def test_what_counts_as_done_is_in_the_contract_and_whole() -> None:
+def test_completion_is_in_the_contract_and_whole() -> None:
     keys = {row.key for row in contract("robomaster")}
     assert implemented() == keys
     assert "version" not in implemented()
     assert not {operation.key for operation in TABLE if operation.partial} & implemented()
 
 
-async def test_a_broken_part_is_a_fail_for_one_command_only(client, robot, caplog, monkeypatch) -> None:
+async def test_broken_part_is_fail_for_one_command_only(client, robot, caplog, monkeypatch) -> None:
     monkeypatch.setattr(type(robot[Base]), "wheel_speeds", property(lambda _self: 1 / 0))
     assert await client.ask("chassis speed ?;") == "fail;"
     assert "broke" in caplog.text

@@ -56,7 +56,7 @@ def test_silence_alone_is_no_death(driver: Driver) -> None:
     assert not any(driver.missing(False, 0.0) for _ in range(50)), "its host never answered an echo: it may not want to"
 
 
-def test_a_host_that_answered_and_stops_answering_is_gone(driver: Driver) -> None:
+def test_host_that_answered_and_stops_answering_is_gone(driver: Driver) -> None:
     assert not driver.missing(True, 0.0)
     assert [driver.missing(False, 0.0) for _ in range(VIGIL_MISSES_MAX + 2)].index(True) == VIGIL_MISSES_MAX - 1
 

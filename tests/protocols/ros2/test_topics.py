@@ -119,7 +119,7 @@ async def test_cmd_vel_drives_until_the_dead_mans_time(opened: Opened) -> None:
     assert 0.05 < scene.robot[Odometry].reading.pose.x < 0.25  # half a second at 0.3 m/s, then it brakes
 
 
-async def test_a_goal_is_reached_and_the_pose_is_set(opened: Opened) -> None:
+async def test_goal_is_reached_and_the_pose_is_set(opened: Opened) -> None:
     scene = await opened()
     goal = made(STAMPED, header=header("a/map"), pose=pose(0.6, 0.0, 1.0))
     await published(scene, "/a/goal_pose", STAMPED, goal)
@@ -131,7 +131,7 @@ async def test_a_goal_is_reached_and_the_pose_is_set(opened: Opened) -> None:
     assert scene.robot[Localization].pose.x == pytest.approx(2.0, abs=0.05)
 
 
-async def test_what_cannot_be_done_is_a_line_of_the_log(opened: Opened) -> None:
+async def test_what_cannot_be_done_is_line_of_log(opened: Opened) -> None:
     scene = await opened()
     peer: Peer = scene.peer
     peer.listen("/rosout", LOG)

@@ -61,7 +61,7 @@ async def test_slow_clients_are_dropped(bare_door: SlamwareDoor, monkeypatch: py
         assert await raw(bare_door, begun) == b""
 
 
-async def test_a_long_body_may_take_its_time_as_long_as_it_comes(
+async def test_long_body_may_arrive_slowly_but_steadily(
     bare_door: SlamwareDoor, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(http_connection, "REQUEST_SECONDS_MAX", 1.0)
@@ -83,7 +83,7 @@ async def test_too_many_connections_are_dropped(bare_door: SlamwareDoor, monkeyp
     first.close()
 
 
-async def test_a_client_that_leaves_in_the_middle_does_no_harm(
+async def test_client_that_leaves_in_middle_does_no_harm(
     bare_door: SlamwareDoor, bare_client: httpx.AsyncClient
 ) -> None:
     _, writer = await asyncio.open_connection("127.0.0.1", bare_door.port)
@@ -101,7 +101,7 @@ async def test_a_client_that_leaves_in_the_middle_does_no_harm(
         b"GET / HTTP/1.1\r\n" + b"xy: 0123456789\r\n" * (HEAD_MAX // 8) + b"\r\n",
     ],
 )
-async def test_a_long_head_that_comes_at_once_is_refused_too(bare_door: SlamwareDoor, head: bytes) -> None:
+async def test_long_head_in_one_piece_is_refused_too(bare_door: SlamwareDoor, head: bytes) -> None:
     assert (await raw(bare_door, head)).startswith(b"HTTP/1.1 431 ")
 
 
@@ -113,7 +113,7 @@ UPGRADES = [
 
 @pytest.mark.parametrize("upgrade", UPGRADES)
 @pytest.mark.parametrize("pieces", [1, 3, 1000])
-async def test_who_wishes_for_another_protocol_gets_a_plain_answer(
+async def test_who_wishes_for_another_protocol_gets_plain_answer(
     bare_door: SlamwareDoor,
     bare_client: httpx.AsyncClient,
     caplog: pytest.LogCaptureFixture,

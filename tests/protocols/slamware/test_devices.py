@@ -39,7 +39,7 @@ async def put(client: httpx.AsyncClient, name: str, value: str) -> int:
     return (await client.put(PARAMETER, json={"param": name, "value": value})).status_code
 
 
-async def test_a_speed_limit_acts_at_once_until_the_robot_restarts(
+async def test_speed_limit_acts_at_once_until_robot_restarts(
     robot: Robot, client: httpx.AsyncClient, forward: Forward
 ) -> None:
     await forward(seconds=1)
@@ -173,7 +173,7 @@ async def test_a_robot_that_is_off_does_not_answer(
     assert (power["powerStage"], power["sleepMode"]) == ("running", "awake")
 
 
-async def test_a_restart_takes_the_door_away_for_a_while(
+async def test_restart_takes_the_door_away_for_a_while(
     robot: Robot, client: httpx.AsyncClient, forward: Forward
 ) -> None:
     await forward(seconds=1)
@@ -261,7 +261,7 @@ async def test_emergency_braking_is_switched(hermes: Fleet) -> None:
     await door.close()
 
 
-async def test_an_emergency_stop_of_another_door_shows_in_health(
+async def test_emergency_stop_of_another_door_shows_in_health(
     robot: Robot, client: httpx.AsyncClient, forward: Forward
 ) -> None:
     robot[Legs].go_limp()

@@ -21,7 +21,7 @@ TRIES_MAX = 200  # of 50 ms of robot time each: what takes longer hangs
 
 @pytest.mark.world("empty")
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
-async def test_whatever_the_document_allows_is_answered_as_it_says(
+async def test_whatever_document_allows_is_answered_as_it_says(
     client: httpx.AsyncClient, forward: Forward, caplog: pytest.LogCaptureFixture, seed: int
 ) -> None:
     await forward(seconds=1)

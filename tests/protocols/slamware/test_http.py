@@ -32,7 +32,7 @@ def test_every_handler_is_in_the_contract() -> None:
     assert all(operation.partial for operation in others)
 
 
-async def test_what_is_not_there_says_so_with_its_name(
+async def test_missing_things_are_reported_by_name(
     bare_client: httpx.AsyncClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("roboglot.protocols.slamware.dispatch.TABLE", OperationTable("none"))
@@ -69,12 +69,12 @@ async def test_whatever_id_was_taken_can_be_asked_for(bare_client: httpx.AsyncCl
 
 
 @pytest.mark.parametrize("id", ["a\0b", "\n", "a\n", ":adjust", "\x7f"])
-async def test_ids_that_can_not_stand_in_a_path_are_refused(bare_client: httpx.AsyncClient, id: str) -> None:
+async def test_ids_that_cannot_stand_in_paths_are_refused(bare_client: httpx.AsyncClient, id: str) -> None:
     assert (await bare_client.post(POIS, json={"id": id, "pose": {"x": 1, "y": 2}})).status_code == 400
     assert (await bare_client.get(POIS)).json() == []
 
 
-async def test_an_empty_list_is_no_metadata_as_in_the_manual_s_example(bare_client: httpx.AsyncClient) -> None:
+async def test_empty_list_is_no_metadata_as_documented(bare_client: httpx.AsyncClient) -> None:
     place = {"id": "a", "pose": {"x": 1, "y": 2}}
     assert (await bare_client.post(POIS, json={**place, "metadata": []})).status_code == 200
     for metadata in (["a"], [[]], [None], "a", 5):

@@ -46,7 +46,7 @@ async def test_the_robot_introduces_itself(robot: Robot, client: httpx.AsyncClie
     assert info == await get(client, f"{SYSTEM}/robot/info")
 
 
-async def test_what_it_can_do_is_enabled_when_the_lidar_turns(client: httpx.AsyncClient, forward: Forward) -> None:
+async def test_abilities_are_enabled_when_the_lidar_turns(client: httpx.AsyncClient, forward: Forward) -> None:
     async def enabled() -> dict[str, bool]:
         plugins = await get(client, f"{SYSTEM}/capabilities")
         assert isinstance(plugins, list)
@@ -83,9 +83,7 @@ async def test_power_follows_the_battery_and_the_dock(
     assert pack["temp"] == [round(robot[Battery].state.temperature * 10)]
 
 
-async def test_the_power_supply_is_a_wire_not_the_dock(
-    robot: Robot, client: httpx.AsyncClient, forward: Forward
-) -> None:
+async def test_power_supply_is_a_wire_not_the_dock(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
     battery = robot[Battery]
     assert isinstance(battery, SimulatedBattery)
     for wire in (False, True, False):
@@ -130,7 +128,7 @@ async def test_the_scan_lies_on_the_walls(world: World, client: httpx.AsyncClien
     assert np.median(walls) < 0.05
 
 
-async def test_a_scan_comes_with_the_pose_where_it_was_taken(
+async def test_scan_comes_with_pose_where_it_was_taken(
     robot: Robot, client: httpx.AsyncClient, forward: Forward
 ) -> None:
     await forward(seconds=1)
@@ -179,7 +177,7 @@ async def test_poses(robot: Robot, client: httpx.AsyncClient, forward: Forward) 
     assert quality == round(robot[Localization].quality * 100)
 
 
-async def test_the_robot_believes_where_it_is_asked_to_be(robot: Robot, client: httpx.AsyncClient) -> None:
+async def test_robot_believes_where_it_is_asked_to_be(robot: Robot, client: httpx.AsyncClient) -> None:
     url = f"{SLAM}/localization/pose"
     assert (await client.put(f"{SLAM}/localization/:enable", json={"enable": False})).json() is True
     reply = await client.put(url, json={"x": 1.5, "y": -2, "z": 0, "yaw": 7, "pitch": 0, "roll": 0})

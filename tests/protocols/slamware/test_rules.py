@@ -80,7 +80,7 @@ async def test_strict_tracks_are_kept_to(client: httpx.AsyncClient, forward: For
 
 
 @pytest.mark.parametrize("flag", [True, False])
-async def test_who_stands_in_the_way_is_waited_for_or_gone_around(
+async def test_person_in_way_is_waited_for_or_passed(
     client: httpx.AsyncClient, world: World, forward: Forward, flag: bool
 ) -> None:
     await forward(seconds=2)

@@ -70,7 +70,7 @@ async def test_a_failed_action_waits_to_be_tried_again(yard: Opened) -> None:
     assert "INVALID_INSTANT_ACTION" in one.control.errors
 
 
-async def test_an_object_is_found_and_a_mark_driven_to(yard: Opened) -> None:
+async def test_object_is_found_and_a_mark_driven_to(yard: Opened) -> None:
     one = await yard(**robot_at(7.8, 4.2, "universal"))
     made = here(
         action("detectObject", "tag", objectType="tag"),
@@ -118,7 +118,7 @@ async def test_hibernation_is_silent_until_it_ends(yard: Opened) -> None:
     assert one.robot[Power].mode is PowerMode.AWAKE
 
 
-async def test_it_wakes_up_by_itself_at_the_time_that_was_set(yard: Opened) -> None:
+async def test_wakes_up_by_itself_at_the_set_time(yard: Opened) -> None:
     one = await yard()
     control = one.control
     control.send("instantActions", instant(action("startHibernation", "no", wakeUpTime="yesterday")))
@@ -131,7 +131,7 @@ async def test_it_wakes_up_by_itself_at_the_time_that_was_set(yard: Opened) -> N
     assert one.clock.epoch() >= then
 
 
-async def test_an_earlier_wake_up_time_wakes_no_later_sleep(yard: Opened) -> None:
+async def test_earlier_wake_up_time_wakes_no_later_sleep(yard: Opened) -> None:
     one = await yard()
     control = one.control
 

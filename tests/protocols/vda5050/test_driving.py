@@ -45,7 +45,7 @@ async def test_an_order_is_driven_node_by_node(yard: Opened) -> None:
         assert all(node["sequenceId"] > said["lastNodeSequenceId"] for node in said["nodeStates"])
 
 
-async def test_the_robot_waits_at_the_decision_point_until_there_is_more(yard: Opened) -> None:
+async def test_robot_waits_at_the_decision_point_for_more(yard: Opened) -> None:
     one = await yard()
     one.control.send("order", order("one", [(0, 0), (0.6, 0), (1.2, 0)], released=2))
     await one.until(lambda: one.control.state["lastNodeId"] == "n1" and not one.control.state["driving"])
@@ -105,7 +105,7 @@ async def test_pause_holds_and_cancel_ends(yard: Opened) -> None:
         (lambda o: o.update(version="2.1.0"), "VALIDATION_FAILURE"),
     ],
 )
-async def test_what_cannot_be_is_refused_in_the_standards_words(yard: Opened, change: Any, error: str) -> None:
+async def test_what_cannot_be_is_refused_in_standards_words(yard: Opened, change: Any, error: str) -> None:
     one = await yard()
     made = order("bad", [(0, 0), (1, 0)])
     change(made)
@@ -117,7 +117,7 @@ async def test_what_cannot_be_is_refused_in_the_standards_words(yard: Opened, ch
     assert one.control.errors == []
 
 
-async def test_an_order_that_cannot_go_on_says_so_and_is_kept(yard: Opened) -> None:
+async def test_order_that_cannot_continue_reports_it_and_stays(yard: Opened) -> None:
     one = await yard()
     one.control.send("order", order("one", [(0, 0), (3, 0)]))
     await one.until(lambda: one.control.state["driving"])
@@ -186,7 +186,7 @@ async def test_a_message_that_breaks_the_door_ends_nothing(yard: Opened, monkeyp
     await one.until(lambda: one.control.state["lastNodeId"] == "n1")
 
 
-async def test_a_state_that_cannot_be_made_ends_no_state_after_it(
+async def test_failed_state_does_not_end_later_ones(
     yard: Opened, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     one = await yard()

@@ -38,7 +38,7 @@ async def asked(yard: Yard, kind: str, id: str, **parameters: Any) -> tuple[str,
     return states(yard)[id]
 
 
-async def test_a_kept_map_is_enabled_and_orders_name_it(yard: Opened) -> None:
+async def test_kept_map_is_enabled_and_orders_name_it(yard: Opened) -> None:
     one = await yard(**robot_at(5.0, 5.0))
     assert listed(one) == {"map": "ENABLED"}
     await keeping(one, "office")
@@ -57,7 +57,7 @@ async def test_a_kept_map_is_enabled_and_orders_name_it(yard: Opened) -> None:
     assert one.control.state["distanceSinceLastNode"] < 0.2
 
 
-async def test_maps_that_cannot_be_used_or_deleted_are_refused(yard: Opened) -> None:
+async def test_unusable_or_undeletable_maps_are_refused(yard: Opened) -> None:
     one = await yard(**robot_at(5.0, 5.0))
     await keeping(one, "office")
     assert (await asked(one, "enableMap", "1", mapId="nowhere"))[0] == "FAILED"
@@ -79,7 +79,7 @@ async def test_no_map_is_changed_under_an_order(yard: Opened) -> None:
     assert (status, why) == ("FAILED", "order way is being driven in 'map'")
 
 
-async def test_a_map_that_the_robot_is_not_in_leaves_the_old_one_in_use(yard: Opened) -> None:
+async def test_map_without_the_robot_is_not_used(yard: Opened) -> None:
     one = await yard(**robot_at(5.0, 5.0))
     await keeping(one, "elsewhere", known=False)
     before = one.robot[Mapping].grid.width
@@ -88,7 +88,7 @@ async def test_a_map_that_the_robot_is_not_in_leaves_the_old_one_in_use(yard: Op
     assert abs(one.robot[Mapping].grid.width - before) <= 2
 
 
-async def test_a_map_that_another_client_loads_is_not_called_by_the_old_name(yard: Opened) -> None:
+async def test_map_loaded_by_another_loses_the_old_name(yard: Opened) -> None:
     one = await yard(**robot_at(5.0, 5.0))
     await keeping(one, "office")
     assert (await asked(one, "initializePosition", "1", x=0.0, y=0.0, theta=0.0, mapId="office"))[0] == "FINISHED"

@@ -131,7 +131,7 @@ async def operations(robots: Robots) -> list[tuple[str, str]]:
     return [(item["id"], item["operate"]) for item in answer.items]
 
 
-async def test_favourites_of_one_robot_come_to_the_other_and_run(robots: Robots, database: Database) -> None:
+async def test_favourites_of_one_robot_run_on_the_other(robots: Robots, database: Database) -> None:
     one = await robots.robot("one", database)
     module = {"type": "module", "mode": "common", "condition": "say()", "body": "print('from the cloud')"}
     # "a" calls "z": what comes first needs what comes later
@@ -164,7 +164,7 @@ async def test_what_happens_is_recorded_in_order(robots: Robots, database: Datab
     assert await operations(robots) == [("t", "run"), ("t", "start"), ("t", "stop")]
 
 
-async def test_a_cloud_that_is_away_delays_no_one_and_is_reported_later(robots: Robots, tmp_path: Path) -> None:
+async def test_absent_cloud_is_reported_later_without_delay(robots: Robots, tmp_path: Path) -> None:
     await robots.cloud.down()
     database = Database(tmp_path / "robot.db")
     app = await robots.robot("one", database)
@@ -212,7 +212,7 @@ def coded(code: CloudCode, *items: Any) -> CloudAnswer:
     return CloudAnswer(code, "", "", list(items))
 
 
-async def test_what_may_pass_is_tried_again_at_growing_distances(database: Database, clock: LockstepClock) -> None:
+async def test_temporary_failures_are_retried_at_growing_distances(database: Database, clock: LockstepClock) -> None:
     failures = [LinkLost("away"), TimedOut("slow"), coded(CloudCode.BROKEN), coded(CloudCode.REFUSED)]
     link = Scripted(clock, *failures, coded(CloudCode.OK), coded(CloudCode.MISSING))  # type: ignore[arg-type]
     mirror = CloudMirror(link, Outbox(database, "a"), clock, ClientError)
@@ -229,7 +229,7 @@ async def test_what_may_pass_is_tried_again_at_growing_distances(database: Datab
     await mirror.close()
 
 
-async def test_the_cloud_can_neither_overwrite_nor_run_nor_smuggle(engine: Engine, clock: LockstepClock) -> None:
+async def test_cloud_can_neither_overwrite_nor_run_nor_smuggle(engine: Engine, clock: LockstepClock) -> None:
     database = Database(":memory:")
     task = {"type": "task", "mode": "single", "condition": "now", "body": "print('cloud')", "describe": "", "style": ""}
     items = [
@@ -311,7 +311,7 @@ async def test_only_accounts_come_in_and_see_their_own(cloud: Cloud) -> None:
     assert len((await cloud.post(new, **inquiry)).items) == 1  # type: ignore[arg-type]
 
 
-async def test_what_is_no_cloud_is_reported_in_plain_words(cloud: Cloud) -> None:
+async def test_address_that_is_no_cloud_is_reported_plainly(cloud: Cloud) -> None:
 
     async def chatty(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         await reader.readuntil(b"{}")

@@ -27,7 +27,7 @@ class Room:
     free = 1
 
 
-async def test_a_full_disk_means_a_list_that_cannot_be_updated(connect: Connect, plain_robot: Robot) -> None:
+async def test_full_disk_means_list_that_cannot_be_updated(connect: Connect, plain_robot: Robot) -> None:
     database, disk = Database(":memory:"), Room()
     app = await connect(plain_robot, database.on(cast(Disk, disk)))
     assert (await app.save("kept", "pass"))["state"] == 0
@@ -43,7 +43,7 @@ async def test_a_full_disk_means_a_list_that_cannot_be_updated(connect: Connect,
     database.close()
 
 
-async def test_a_broken_database_is_reported_in_the_same_way(
+async def test_broken_database_is_reported_in_the_same_way(
     connect: Connect, plain_robot: Robot, tmp_path: Path
 ) -> None:
     database = Database(tmp_path / "robot.db")
@@ -61,7 +61,7 @@ async def test_a_broken_database_is_reported_in_the_same_way(
     database.close()
 
 
-async def test_an_engine_that_does_not_answer_is_a_time_out(
+async def test_engine_that_does_not_answer_is_time_out(
     app: FrontEnd, engine: Engine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert (await app.save("t", "pass"))["state"] == 0

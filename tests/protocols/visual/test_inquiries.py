@@ -18,7 +18,7 @@ from tests.protocols.visual.front_end import FrontEnd
 Connect = Callable[..., Coroutine[Any, Any, FrontEnd]]
 
 
-async def test_modules_people_and_maps_say_what_is_not_there(app: FrontEnd) -> None:
+async def test_modules_people_and_maps_report_what_is_missing(app: FrontEnd) -> None:
     assert (await app.ask("inquiry", type="module"))[0]["list"] == []
     assert (await app.ask("delete", "m", type="module"))[0]["state"] == 27
     assert (await app.ask("inquiry", type="AI", mode="face"))[0]["state"] == 29  # this robot keeps no members

@@ -92,7 +92,7 @@ async def test_modules_that_would_call_themselves_through_others(app: FrontEnd) 
     assert (await module(app, "m4", "down(n)", "return n and down(n - 1)"))["state"] == 0  # plain recursion
 
 
-async def test_a_wrong_module_is_kept_and_keeps_its_callers_from_running(app: FrontEnd) -> None:
+async def test_wrong_module_is_kept_and_stops_its_callers(app: FrontEnd) -> None:
     await module(app, "m", "f(n)", "return n")
     await app.save("t", "print(f(1))")
     answer = await module(app, "m", "f(n)", "x = 1\nif n = 2:\n    pass")
@@ -117,7 +117,7 @@ async def test_errors_in_a_module_tell_its_line(app: FrontEnd) -> None:
     assert error["describe"] == "ZeroDivisionError: division by zero (module f, line 2: return 1 / x)"
 
 
-async def test_debug_runs_use_modules_and_keep_none_from_being_deleted(app: FrontEnd) -> None:
+async def test_debug_runs_use_modules_without_preventing_their_deletion(app: FrontEnd) -> None:
     await module(app, "m", "f()", "print('module')")
     await app.ask("debug", "debug", mode="single", condition="now", body="f()")
     await app.ends("debug")
@@ -126,7 +126,7 @@ async def test_debug_runs_use_modules_and_keep_none_from_being_deleted(app: Fron
     assert (await app.ask("delete", "m", type="module"))[0]["state"] == 0
 
 
-async def test_tasks_and_modules_of_one_id_are_two_things(app: FrontEnd) -> None:
+async def test_task_and_module_of_one_id_are_separate(app: FrontEnd) -> None:
     await module(app, "x", "f()", "pass")
     await app.save("x", "f()")
     assert (await listed(app))["x"]["be_depended"] == ["x"]

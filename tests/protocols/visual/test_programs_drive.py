@@ -121,7 +121,7 @@ async def test_control_taken_during_a_motion_is_reported(connect: Connect, robot
     assert frame["feedback"]["describe"] == "1 motion was not carried out: a person took control"
 
 
-async def test_a_start_of_a_suspended_task_names_the_way_out(connect: Connect, robot: Robot) -> None:
+async def test_start_of_suspended_task_names_the_way_out(connect: Connect, robot: Robot) -> None:
     app = await connect(robot)
     await app.start("t", "time.sleep(100)\n")
     await app.ask("suspend", "t")

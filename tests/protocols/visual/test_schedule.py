@@ -48,7 +48,7 @@ async def test_a_single_task_runs_once_at_its_time(app: FrontEnd, condition: str
     assert starts(app, "t") == 1
 
 
-async def test_a_cycle_runs_again_and_again_until_it_is_taken_off(app: FrontEnd) -> None:
+async def test_cycle_repeats_until_it_is_removed(app: FrontEnd) -> None:
     await plan(app, "t", "cycle", "*/10 * * * *")
     for round in range(1, 4):
         await app.clock.advance(600)
@@ -62,7 +62,7 @@ async def test_a_cycle_runs_again_and_again_until_it_is_taken_off(app: FrontEnd)
     assert starts(app, "t") == 3
 
 
-async def test_a_cycle_that_still_runs_is_not_started_twice(app: FrontEnd) -> None:
+async def test_cycle_that_still_runs_is_not_started_twice(app: FrontEnd) -> None:
     await plan(app, "t", "cycle", "* * * * *", FOREVER)
     await app.clock.advance(60)
     await app.until(lambda: starts(app, "t"), pace=0.0)
@@ -90,7 +90,7 @@ async def test_times_that_are_past_or_never_come(app: FrontEnd) -> None:
     assert answer["state"] == 0
 
 
-async def test_a_new_condition_for_a_running_task_counts_the_next_time(app: FrontEnd) -> None:
+async def test_new_condition_for_running_task_counts_next_time(app: FrontEnd) -> None:
     await app.start("t", FOREVER)
     assert (await app.ask("run", "t", mode="cycle", condition="0 * * * *"))[0]["state"] == 0
     assert (await app.state("t"), starts(app, "t")) == ("run", 1)
@@ -136,7 +136,7 @@ async def test_the_schedule_survives_the_server(connect: Connect, plain_robot: R
     database.close()
 
 
-async def test_a_run_that_was_acknowledged_but_not_begun_begins(connect: Connect, plain_robot: Robot) -> None:
+async def test_run_that_was_acknowledged_but_not_begun_begins(connect: Connect, plain_robot: Robot) -> None:
     database = Database(":memory:")
     store = DatabaseProgramStore(database, plain_robot.id)
     for id in ("t", "debug"):
@@ -149,7 +149,7 @@ async def test_a_run_that_was_acknowledged_but_not_begun_begins(connect: Connect
     database.close()
 
 
-async def test_a_robot_that_may_not_start_says_so_at_the_time(app: FrontEnd, plain_robot: Robot) -> None:
+async def test_forbidden_start_is_reported_at_its_time(app: FrontEnd, plain_robot: Robot) -> None:
     battery = plain_robot.add(Battery, Charge())
     await plan(app, "once", "single", "now + 1minutes")
     await plan(app, "again", "cycle", "* * * * *")

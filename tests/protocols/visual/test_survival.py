@@ -20,7 +20,7 @@ BUSY = "while True:\n    pass\n"
 FOREVER = "time.sleep(100000)\n"
 
 
-async def test_a_lost_client_does_not_leave_half_an_operation(app: FrontEnd) -> None:
+async def test_lost_client_does_not_leave_half_an_operation(app: FrontEnd) -> None:
     await app.save("t", BUSY)
     frame = json.dumps({"type": "task", "id": "x", "operate": "run", "target_id": ["t"]})
     request = asyncio.create_task(app.door.receive(frame))
@@ -62,7 +62,7 @@ async def test_the_state_is_stored_before_it_is_reported(connect: Connect, plain
     database.close()
 
 
-async def test_what_ran_when_the_server_died_is_ended_with_a_note(connect: Connect, plain_robot: Robot) -> None:
+async def test_run_ended_by_server_crash_is_noted(connect: Connect, plain_robot: Robot) -> None:
     database = Database(":memory:")
     store = DatabaseProgramStore(database, plain_robot.id)
     for id, mode, state in (("t1", "single", "run"), ("t2", "cycle", "suspend"), ("t3", "single", "wait_run")):

@@ -22,7 +22,7 @@ BUSY = "while True:\n    pass\n"
 FOREVER = "time.sleep(100000)\n"
 
 
-async def test_the_life_of_a_task_as_the_app_sees_it(app: FrontEnd) -> None:
+async def test_life_of_task_as_the_app_sees_it(app: FrontEnd) -> None:
     body = """
 cyberdog.task.block('M2S3v;kdaZ`r~Ox55ZF9');
 print('one', 2);
@@ -65,7 +65,7 @@ async def test_nothing_is_saved_on_a_full_disk(connect: Connect, robot: Robot, w
     assert (await app.save("t1", "pass"))["state"] == 0
 
 
-async def test_the_list_gives_back_what_was_saved_but_not_the_body(app: FrontEnd) -> None:
+async def test_list_returns_saved_entries_without_the_body(app: FrontEnd) -> None:
     style = '{"blocks":{"languageVersion":0}}'
     await app.save("t10", "pass", describe="十", style=style, mode="cycle", condition="02 15 * * 1,5,7")
     await app.save("t1", "pass")
@@ -85,7 +85,7 @@ async def test_the_list_gives_back_what_was_saved_but_not_the_body(app: FrontEnd
     assert [item["id"] for item in one["list"]] == ["t1"]
 
 
-async def test_a_wrong_body_is_kept_as_an_error_and_says_where(app: FrontEnd) -> None:
+async def test_wrong_body_is_kept_as_a_located_error(app: FrontEnd) -> None:
     answer = await app.save("t", "x = 1\ncyberdog.motion.trun(90)\n")
     assert answer["state"] == 23
     assert "line 2" in answer["describe"]
@@ -96,13 +96,13 @@ async def test_a_wrong_body_is_kept_as_an_error_and_says_where(app: FrontEnd) ->
     assert (await app.save("t", "x = 1"))["state"] == 0
 
 
-async def test_what_the_robot_cannot_do_is_reported_in_the_answer(app: FrontEnd) -> None:
+async def test_what_robot_cannot_do_is_reported_in_answer(app: FrontEnd) -> None:
     await app.start("t", "print(cyberdog.led.freed(9).response.code)\n")
     await app.ends("t")
     assert await app.printed("t") == ["1121"]
 
 
-async def test_an_uncaught_error_ends_the_task_and_is_reported(app: FrontEnd) -> None:
+async def test_uncaught_error_ends_the_task_and_is_reported(app: FrontEnd) -> None:
     await app.start("t", "cyberdog.task.block('a')\nd = {}\nd['厨房']\n")
     await app.ends("t")
     error, block_end = app.news("t", "run")[1:]
@@ -113,7 +113,7 @@ async def test_an_uncaught_error_ends_the_task_and_is_reported(app: FrontEnd) ->
     assert (await app.service.log("t"))[-1].level == "error"
 
 
-async def test_texts_that_utf8_cannot_hold_are_reported_and_logged(app: FrontEnd) -> None:
+async def test_texts_beyond_utf8_are_reported_and_logged(app: FrontEnd) -> None:
     await app.start("t", "print('a\\ud800b')\nraise ValueError('\\udfff' * 10)\n")
     await app.ends("t")
     assert app.news("t", "run")[0]["feedback"]["describe"].startswith("ValueError: ??????????")
@@ -247,7 +247,7 @@ async def test_running_a_running_task_starts_no_second_one(app: FrontEnd) -> Non
     assert (listed["list"][0]["condition"], listed["list"][0]["operate"]) == ("21:30", "run")
 
 
-async def test_debug_runs_at_once_replaces_itself_and_is_not_listed(app: FrontEnd) -> None:
+async def test_debug_runs_at_once_replacing_itself_unlisted(app: FrontEnd) -> None:
     fields = {"mode": "single", "condition": "now"}
     [answer] = await app.ask("debug", "debug", body=f"print(1)\n{BUSY}", **fields)
     assert answer["state"] == 0

@@ -119,7 +119,7 @@ async def test_a_program_is_halted_and_stepped_through(address: str) -> None:
     await debug.close()
 
 
-async def test_who_runs_at_full_speed_is_not_stepped_through(address: str) -> None:
+async def test_program_at_full_speed_is_not_stepped_through(address: str) -> None:
     link, debug = await TextLink.open(address, "/programs"), await TextLink.open(address, "/debug")
     save = {"type": "task", "operate": "save", "target_id": ["t"], "mode": "single", "condition": "now"}
     assert (await ask(link, id="1", body="while True:\n    pass\n", **save))["state"] == 0
@@ -340,7 +340,7 @@ async def started_printing(address: str) -> TextLink:
     return link
 
 
-async def test_a_program_waits_for_a_slow_reader_of_its_log(
+async def test_program_waits_for_slow_reader_of_its_log(
     door: VisualDoor, address: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(websocket, "UNSENT_MAX", 1024 * 1024)

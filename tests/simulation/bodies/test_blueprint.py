@@ -41,7 +41,7 @@ def test_in_shipped_worlds_people_walk_through_nothing(name):
 
 
 @pytest.mark.parametrize("name", ["office", "empty", "playground"])
-def test_docks_stand_against_something_and_look_into_the_open(name):
+def test_docks_stand_against_something_and_look_into_open(name):
     world = load_world(name)
     for number, floor in enumerate(world.floors):
         for dock in floor.docks:
@@ -51,7 +51,7 @@ def test_docks_stand_against_something_and_look_into_the_open(name):
                 Places(world).next(dock.pose.compose(Pose(-0.3)), number, 0.25)
 
 
-async def test_a_robot_drives_into_the_lift_car_where_it_is_parked(simulate):
+async def test_robot_drives_into_the_parked_lift_car(simulate):
     sim = simulate("office", start=Pose(2.4, 9.9, math.pi))
     sim.world.start()
     sim.robot[Base].set_velocity(Twist(0.5))
@@ -61,7 +61,7 @@ async def test_a_robot_drives_into_the_lift_car_where_it_is_parked(simulate):
     assert abs(sim.world._physics.hulls["a"].elevation) < 0.005
 
 
-async def test_the_landing_door_is_shut_where_the_car_is_not(simulate):
+async def test_landing_door_is_shut_where_car_is_not(simulate):
     sim = simulate("office", start=Pose(3.5, 10.0, math.pi), floor=1)
     sim.world.start()
     sim.robot[Base].set_velocity(Twist(0.5))

@@ -67,7 +67,7 @@ async def test_stands_on_four_feet_below_its_hips(dog):
     assert (feet[Foot.LEFT_REAR].position.x, feet[Foot.LEFT_REAR].position.y) == pytest.approx((-0.18, 0.125), abs=1e-3)
 
 
-async def test_a_trot_lifts_diagonal_pairs_and_planted_feet_do_not_slide(dog):
+async def test_trot_lifts_diagonal_pairs_and_planted_feet_hold(dog):
     dog.robot[Legs].walk(Gait.TROT_SLOW, FootLift(0.05, 0.03))
     dog.robot[Base].set_velocity(Twist(0.4))
     await dog.clock.advance(1.0)
@@ -87,7 +87,7 @@ async def test_a_trot_lifts_diagonal_pairs_and_planted_feet_do_not_slide(dog):
     assert tops[Foot.LEFT_REAR] == pytest.approx(0.03, abs=0.002)
 
 
-async def test_anyone_who_stands_still_puts_its_feet_in_order(dog):
+async def test_standing_robot_puts_its_feet_in_order(dog):
     dog.robot[Base].set_velocity(Twist(0.5, 0.0, 0.6))
     await dog.clock.advance(2.13)
     dog.robot[Base].set_velocity(Twist())
@@ -110,7 +110,7 @@ def test_gaits_differ_in_who_is_in_the_air(gait, most, never):
     assert {index for index in range(4) if all(swings[index] for swings in seen)} == never
 
 
-def test_a_flight_goes_on_over_the_end_of_the_order():
+def test_flight_goes_on_over_end_of_the_order():
     order = Order([Footfall(0.1, DIAGONAL), Footfall(0.2, ALL), Footfall(0.1, DIAGONAL)])
     holds = (Foothold(),) * 4
     swing = order.swings(0.3 + 1e-9, holds, 1.0)[0]
@@ -123,7 +123,7 @@ def test_a_flight_goes_on_over_the_end_of_the_order():
 
 
 @pytest.mark.parametrize("landing", [0.0, 0.5, 1.0, 1.5])
-def test_how_fast_a_foot_comes_down_is_what_landing_says(landing):
+def test_landing_reports_how_fast_a_foot_comes_down(landing):
     order = Order([Footfall(1.0, DIAGONAL), Footfall(1.0, ALL)])
     heights = [
         swing.rise for part in range(1000) if (swing := order.swings(part / 1000, (Foothold(),) * 4, landing)[0])
@@ -215,7 +215,7 @@ async def test_a_body_pose_moves_no_foot(dog):
 
 
 @pytest.mark.parametrize("body", ["robomaster_ep", "universal"])
-async def test_who_rolls_has_no_feet_and_dances_all_the_same(simulate, body):
+async def test_robot_on_wheels_has_no_feet_but_dances(simulate, body):
     sim = simulate(start=Pose(2, 5), body=body)
     sim.world.start()
     if Legs not in sim.robot:
@@ -252,7 +252,7 @@ async def test_cameras_see_a_paw_that_is_lifted(simulate):
         (Motion.STRETCH, set()),
     ],
 )
-async def test_figures_lift_the_paws_that_they_are_named_for(dog, motion, turns):
+async def test_figures_lift_paws_that_they_are_named_for(dog, motion, turns):
     before = dog.pose
     action = dog.robot[Legs].perform(motion)
     seen, last = set(), dict.fromkeys(Foot, 0.0)

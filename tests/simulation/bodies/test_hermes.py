@@ -47,7 +47,7 @@ def holes(tmp_path):
     return str(path)
 
 
-async def test_a_differential_drive_goes_ahead_and_turns_but_not_sideways(hermes):
+async def test_differential_drive_goes_ahead_and_turns_never_sideways(hermes):
     sim = hermes()
     base = sim.robot[Base]
     assert not base.limits.holonomic
@@ -83,7 +83,7 @@ async def test_it_stops_before_a_hole_and_turns_away(hermes, holes):
     assert not sim.robot[Health].faults
 
 
-async def test_without_its_cliff_sensors_it_falls_and_stays_there(hermes, holes):
+async def test_falls_without_cliff_sensors_and_stays_there(hermes, holes):
     sim = hermes(holes, Pose(5, 5))
     masks = sim.robot[SensorMasks]
     for sensor in masks.sensors:
@@ -246,7 +246,7 @@ async def test_a_jammed_jack_raises_an_alarm(hermes):
     assert jack.stage is JackStage.UP
 
 
-async def test_the_depth_camera_sees_what_the_lidar_does_not(hermes):
+async def test_depth_camera_sees_what_the_lidar_does_not(hermes):
     sim = hermes()
     sim.world.hands.add_obstacle(Pose(4.2, 5.0), (0.3, 0.6, 0.12))  # below the lidar's plane
     await sim.clock.advance(0.2)

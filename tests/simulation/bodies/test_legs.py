@@ -29,7 +29,7 @@ async def test_lies_down_and_stands_up_in_time(simulate):
     assert [e.posture for e in postures.drain()] == ["changing", "lying", "changing", "standing"]
 
 
-async def test_brakes_before_it_lies_down_and_drives_only_standing(simulate):
+async def test_brakes_before_lying_down_and_drives_only_standing(simulate):
     sim = simulate(start=Pose(2, 5))
     sim.world.start()
     sim.robot[Base].set_velocity(Twist(1.0))
@@ -46,7 +46,7 @@ async def test_brakes_before_it_lies_down_and_drives_only_standing(simulate):
     assert sim.pose.distance_to(there) < 0.001
 
 
-async def test_there_already_is_done_at_once_and_disturbs_no_one(simulate):
+async def test_reached_posture_is_done_at_once_without_disturbance(simulate):
     sim = simulate(start=Pose(5, 5))
     sim.world.start()
     action = sim.robot[Legs].stand()

@@ -38,7 +38,7 @@ def dog(simulate):
     return sim
 
 
-async def test_all_jumps_and_walks_end_where_the_table_says(tmp_path):
+async def test_all_jumps_and_walks_end_where_table_says(tmp_path):
     """All at once, a robot for each; side by side in an open field, without sensors that take time."""
     text = (BODIES / "cyberdog2.toml").read_text()
     simple = text[: text.index("[imu]")] + text[text.index("[battery]") : text.index("[dock_contact]")]
@@ -95,7 +95,7 @@ async def test_a_wall_in_the_way_stops_a_jump(dog):
     dog.robot[Base].set_velocity(Twist(-0.3))
 
 
-async def test_given_up_in_the_air_it_lands_and_stands(dog):
+async def test_given_up_in_air_it_lands_and_stands(dog):
     hull = dog.world._physics.hulls["a"]
     action = dog.robot[Legs].perform(Motion.BACK_FLIP)
     while hull.rise < 0.2:

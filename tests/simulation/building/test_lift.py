@@ -35,7 +35,7 @@ async def drive(sim, speed, seconds):
     await sim.clock.advance(1.0)
 
 
-async def test_a_robot_rides_to_the_second_floor_and_drives_out(simulate):
+async def test_robot_rides_to_second_floor_and_drives_out(simulate):
     sim, lift, heard = start(simulate, BEFORE)
     await drive(sim, 0.5, 3.3)
     assert sim.pose.distance_to(WITHIN) < 0.1
@@ -68,7 +68,7 @@ async def test_it_tells_in_order_what_it_does(simulate):
     assert reported(heard) == [("LiftCalled", 1), ("LiftArrived", 1)]  # it is here
 
 
-async def test_a_shut_landing_door_is_seen_and_an_open_one_is_not(simulate):
+async def test_shut_landing_door_is_seen_open_one_not(simulate):
     sim, lift, _ = start(simulate, BEFORE, floor=1)
     await sim.clock.advance(0.2)
     assert sim.robot[Lidar].scan.ranges[800] == pytest.approx(2.6 - 1.85, abs=0.05)
@@ -77,7 +77,7 @@ async def test_a_shut_landing_door_is_seen_and_an_open_one_is_not(simulate):
     assert sim.robot[Lidar].scan.ranges[800] == pytest.approx(2.6 - 0.15, abs=0.05)  # the car's back wall
 
 
-async def test_the_door_waits_for_who_stands_in_it_and_complains(simulate):
+async def test_door_waits_for_obstructions_and_complains(simulate):
     sim, lift, heard = start(simulate, BEFORE)
     sim.world.hands.place("a", Pose(2.0, 10.0, math.pi))
     lift.call(2)
@@ -120,7 +120,7 @@ async def test_out_of_service_refuses_and_drops_calls(simulate):
     assert ("LiftDoorOpened", 1) in reported(heard)
 
 
-async def test_people_in_the_car_ride_along_and_too_many_keep_it_waiting(simulate):
+async def test_people_ride_along_too_many_keep_it_waiting(simulate):
     sim, lift, heard = start(simulate, BEFORE)
     (fault,) = sim.world.faults.inject("lift_occupied", people=3)
     await sim.clock.advance(0.2)
@@ -146,7 +146,7 @@ async def test_out_of_reach_the_radio_is_silent(simulate):
     assert not reported(heard)
 
 
-async def test_an_open_shaft_stops_the_robot_before_it_falls(simulate):
+async def test_open_shaft_stops_the_robot_before_it_falls(simulate):
     sim, lift, _ = start(simulate, BEFORE)
     lift.call(2)
     await sim.clock.advance(20.0)

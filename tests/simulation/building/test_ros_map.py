@@ -100,7 +100,7 @@ def test_negate_and_modes(write):
     assert solid(write(raw, more="mode: raw\n")) == pytest.approx(expected)
 
 
-def test_grey_is_neither_wall_nor_place_for_a_dock(write):
+def test_grey_is_neither_wall_nor_place_for_dock(write):
     pixels = room()
     pixels[:, :40] = 128
     world = load_world(write(pixels))

@@ -35,7 +35,7 @@ async def carrier(simulate, tmp_path):
     return sim
 
 
-async def test_a_wall_stops_it_and_the_way_back_is_free(carrier):
+async def test_wall_stops_it_and_way_back_is_free(carrier):
     base, (shelf,) = carrier.robot[Base], carrier.world.building.shelves
     base.set_velocity(Twist(0.5))
     await carrier.clock.advance(8.0)
@@ -49,7 +49,7 @@ async def test_a_wall_stops_it_and_the_way_back_is_free(carrier):
     assert carrier.pose.x < 6.5
 
 
-async def test_a_low_thing_stops_a_leg_and_passes_between_legs(carrier):
+async def test_low_thing_stops_leg_and_passes_between_legs(carrier):
     base = carrier.robot[Base]
     base.set_velocity(Twist(yaw=0.5))
     await carrier.clock.advance(math.pi)  # a quarter turn

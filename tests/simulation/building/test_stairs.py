@@ -60,7 +60,7 @@ def test_what_cannot_be_built_is_reported(entry, message, tmp_path):
         load_world(str(file))
 
 
-async def test_the_lidar_sees_the_first_step_that_is_as_high_as_its_plane():
+async def test_lidar_sees_the_first_step_at_its_plane():
     world, robot, _ = await put("cyberdog2", Pose(3.0, 4.0))
     ranges = robot[Lidar].scan.ranges
     ahead = ranges[len(ranges) // 2]
@@ -82,7 +82,7 @@ async def test_the_eyes_see_riser_and_tread():
 
 
 @pytest.mark.parametrize("pose", [Pose(3.5, 4.0), Pose(5.4, 4.0, math.pi), Pose(2.0, 2.0)])
-async def test_what_comes_back_lies_on_the_rays_from_the_eye(pose):
+async def test_what_comes_back_lies_on_rays_from_eye(pose):
     world, robot, _ = await put("cyberdog2", pose)
     for name in robot[TimeOfFlight].names:
         reading = robot[TimeOfFlight].reading(name)

@@ -21,7 +21,7 @@ def places() -> Places:
     return Places(load_world("office"))
 
 
-def test_robots_start_in_the_same_room_and_each_can_drive_off(places: Places) -> None:
+def test_robots_start_in_one_room_and_can_leave(places: Places) -> None:
     stand = [(places.next(None, 0, radius)[0], radius) for radius in RADII]
     for pose, radius in stand:
         assert CORRIDOR[0] < pose.y - radius < pose.y + radius < CORRIDOR[1]
@@ -37,14 +37,14 @@ def test_a_crowd_stands_wherever_there_is_room(places: Places) -> None:
     assert any(not CORRIDOR[0] < pose.y < CORRIDOR[1] for pose in stand)
 
 
-def test_who_is_shown_where_to_stand_stands_there_or_not_at_all(places: Places) -> None:
+def test_robot_with_given_place_stands_there_or_nowhere(places: Places) -> None:
     wanted = Pose(20.0, 10.0, 1.0)
     assert places.next(wanted, 0, 0.25) == (wanted, 0)
     with pytest.raises(ValueError, match="cannot stand"):
         places.next(Pose(20.2, 10.0), 0, 0.25)
 
 
-def test_the_first_robot_of_a_bare_world_stands_in_its_middle(tmp_path: Path) -> None:
+def test_first_robot_of_bare_world_stands_in_middle(tmp_path: Path) -> None:
     bare = tmp_path / "bare.toml"
     bare.write_text('name = "bare"\n[[floors]]\nname = "hall"\nsize = [6, 4]\n')
     places = Places(load_world(bare))

@@ -65,7 +65,7 @@ def test_level_worlds_are_not_uneven():
     assert math.isclose(RAMP.facing, 90.0)
 
 
-async def test_the_lidar_sees_what_of_a_ramp_is_higher_than_itself(simulate):
+async def test_lidar_sees_only_what_rises_above_its_plane(simulate):
     sim = simulate("obstacle_course", start=Pose(2.0, 4.0))
     sim.world.start()
     await sim.clock.advance(0.2)

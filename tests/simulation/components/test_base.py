@@ -50,7 +50,7 @@ async def test_accelerates_no_faster_than_it_can(simulate):
     assert base.velocity == Twist(2.0, 0.0, 5.0)  # the limits
 
 
-async def test_wheel_speeds_move_the_body_as_mecanum_wheels_do(simulate):
+async def test_wheel_speeds_move_body_as_mecanum_wheels_do(simulate):
     sim = simulate(start=Pose(5, 5))
     base = sim.robot[Base]
     sim.world.start()
@@ -62,7 +62,7 @@ async def test_wheel_speeds_move_the_body_as_mecanum_wheels_do(simulate):
     assert sim.pose.x == pytest.approx(5.0, abs=0.005)
 
 
-async def test_wheel_speeds_of_a_velocity_give_that_velocity_back(simulate):
+async def test_wheel_speeds_of_velocity_give_that_velocity_back(simulate):
     sim = simulate(start=Pose(5, 5))
     base = sim.robot[Base]
     sim.world.start()
@@ -76,7 +76,7 @@ async def test_wheel_speeds_of_a_velocity_give_that_velocity_back(simulate):
     assert base.velocity.yaw == pytest.approx(0.5)
 
 
-async def test_wheel_speeds_beyond_the_limits_are_cut_in_proportion(simulate):
+async def test_wheel_speeds_beyond_limits_are_cut_in_proportion(simulate):
     sim = simulate(start=Pose(2, 5))
     base = sim.robot[Base]
     sim.world.start()
@@ -126,7 +126,7 @@ async def test_the_bumper_tells_the_side(simulate, twist, zone):
     assert sim.robot[Bumper].pressed == {zone}
 
 
-async def test_full_speed_into_a_wall_does_not_get_through(simulate):
+async def test_full_speed_into_wall_does_not_get_through(simulate):
     sim = simulate(start=Pose(2, 5))
     sim.world.start()
     sim.robot[Base].set_velocity(Twist(2.0))

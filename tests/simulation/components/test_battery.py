@@ -61,7 +61,7 @@ async def test_contacts_touch_only_near_and_straight(simulate, offset, docked):
     assert sim.robot[DockContact].docked is docked
 
 
-async def test_driving_costs_more_than_standing_and_pushing_more_than_driving(simulate):
+async def test_pushing_costs_more_than_driving_more_than_standing(simulate):
     async def power(start, twist):
         sim = simulate(start=start)
         mask_bumper(sim.robot)
@@ -103,7 +103,7 @@ async def test_voltage_falls_and_cells_warm_under_load(simulate):
     assert pushing.current < still.current < 0
 
 
-async def test_an_empty_battery_stops_the_robot_until_it_is_charged(simulate):
+async def test_empty_battery_stops_robot_until_it_is_charged(simulate):
     sim = simulate()
     battery = sim.robot[Battery]
     sim.world.start()

@@ -42,7 +42,7 @@ async def aim_at(sim, **aim):
 MUZZLE, PLATE, DISTANCE = 0.20, 0.09, 2.0 - 0.175 - 0.10  # heights above the floor, way from muzzle to plate
 
 
-async def test_a_bead_hits_the_plate_that_it_is_aimed_at(duel):
+async def test_bead_hits_plate_that_it_is_aimed_at(duel):
     drop = 9.81 * (DISTANCE / 26) ** 2 / 2
     down = math.atan2(MUZZLE - PLATE - drop, DISTANCE + 0.1)
     assert await shoot(duel, pitch=down) == [(PlatePlace.FRONT, HitKind.BEAD)]
@@ -69,7 +69,7 @@ async def test_beside_it_lands_on_the_wall(duel):
     ("yaw", "place"),
     [(math.pi / 2, PlatePlace.LEFT), (-math.pi / 2, PlatePlace.RIGHT), (0.0, PlatePlace.REAR)],
 )
-async def test_which_plate_it_is_depends_on_how_the_other_stands(duel, yaw, place):
+async def test_hit_plate_depends_on_the_target_s_heading(duel, yaw, place):
     duel.world.hands.place("b", Pose(5, 5, yaw))
     await duel.clock.advance(0.1)
     assert await shoot(duel, pitch=math.atan2(MUZZLE - PLATE, DISTANCE + 0.1)) == [(place, HitKind.BEAD)]
@@ -158,13 +158,13 @@ async def collide(sim, sensitivity, speed):
     return [(hit.place, hit.kind) for hit in sim.hits.drain()]
 
 
-async def test_a_collision_is_felt_if_it_is_hard_enough(duel):
+async def test_collision_is_felt_if_it_is_hard_enough(duel):
     assert await collide(duel, 5, 1.6) == [(PlatePlace.REAR, HitKind.COLLISION)]
     assert await collide(duel, 0, 1.6) == []
 
 
 @pytest.mark.parametrize(("place", "turn"), [(PlatePlace.FRONT, 0.0), (PlatePlace.REAR, math.pi)])
-async def test_a_person_who_is_touched_counts_as_a_hand(simulate, tmp_path, place, turn):
+async def test_person_who_is_touched_counts_as_a_hand(simulate, tmp_path, place, turn):
     (tmp_path / "room.toml").write_text('name = "room"\n[[floors]]\nsize = [10, 10]\npeople = [{ path = [[6, 5]] }]\n')
     sim = simulate(str(tmp_path / "room.toml"), start=Pose(5, 5, turn), body="robomaster_ep")
     sim.world.start()

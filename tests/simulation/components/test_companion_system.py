@@ -68,7 +68,7 @@ async def test_an_update_from_the_download_to_the_reboot(dog):
     assert kinds.index(Rebooting) < kinds.index(Rebooted)
 
 
-async def test_a_reboot_ends_what_is_under_way_and_goes_on_without_who_asked(dog):
+async def test_reboot_ends_work_and_continues_without_its_client(dog):
     walking = dog.robot[Legs].stand()
     rebooting = dog.robot[Firmware].reboot(source="someone")
     await dog.clock.advance(5.0)
@@ -176,7 +176,7 @@ async def test_asleep_the_lidar_stands_still(dog):
     assert dog.robot[Lidar].scan is not None
 
 
-async def test_goes_to_low_power_by_itself_if_set_so(dog):
+async def test_low_power_comes_by_itself_if_set(dog):
     power = dog.robot[Power]
     dog.robot[Legs].lie_down()
     await dog.clock.advance(40.0)

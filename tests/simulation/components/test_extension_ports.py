@@ -24,7 +24,7 @@ def servos(sim):
     return sim.robot[Servos]
 
 
-async def test_a_servo_goes_to_an_angle_at_a_speed(sim, servos):
+async def test_servo_goes_to_an_angle_at_a_speed(sim, servos):
     action = servos.move_to(2, 1.0, speed=0.5)
     await sim.clock.advance(1.0)
     assert servos.angle(2) == pytest.approx(0.5, abs=0.03)
@@ -55,7 +55,7 @@ async def test_a_servo_keeps_turning_until_it_is_stopped(sim, servos):
     assert servos.angle(1) == there
 
 
-async def test_a_servo_that_has_turned_round_goes_the_short_way(sim, servos):
+async def test_servo_that_has_turned_round_goes_short_way(sim, servos):
     servos.set_speed(1, 4 * math.pi)
     await sim.clock.advance(1.1)
     servos.stop()

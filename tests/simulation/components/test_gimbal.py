@@ -63,7 +63,7 @@ async def test_an_axis_that_is_not_named_stays(sim, gimbal):
 @pytest.mark.parametrize(
     "goal", [{"pitch": -36 * DEG}, {"pitch": 21 * DEG}, {"yaw": 251 * DEG}, {"yaw": math.nan}, {"yaw_speed": 0.0}]
 )
-async def test_what_is_out_of_reach_is_refused_and_nothing_moves(sim, gimbal, goal):
+async def test_out_of_reach_is_refused_and_nothing_moves(sim, gimbal, goal):
     with pytest.raises(InvalidGoal):
         gimbal.move_to(**{"yaw": 0.1, **goal})
     await sim.clock.advance(0.5)
@@ -105,7 +105,7 @@ async def test_a_new_command_takes_over(sim, gimbal):
     assert gimbal.angles.yaw == pytest.approx(-0.5)
 
 
-async def test_chassis_lead_brings_the_gimbal_round_with_the_chassis(sim, gimbal):
+async def test_chassis_lead_brings_gimbal_round_with_the_chassis(sim, gimbal):
     sim.robot[Base].set_velocity(Twist(yaw=1.0))
     await sim.clock.advance(2.0)
     assert -0.25 < gimbal.angles.yaw < -0.1  # it lags while the chassis turns left
@@ -148,7 +148,7 @@ async def test_gimbal_lead_turns_the_chassis_after_the_gimbal(sim, gimbal):
     assert sim.pose.y > 5.3
 
 
-async def test_gimbal_lead_lets_others_turn_who_drive_by_plan(sim, gimbal):
+async def test_gimbal_lead_lets_planned_drivers_turn(sim, gimbal):
     gimbal.set_mode(FollowMode.GIMBAL_LEAD)
 
     async def drive(action):
@@ -172,7 +172,7 @@ async def test_world_frame_goals_count_from_power_on(sim, gimbal):
     assert gimbal.angles.yaw + sim.pose.yaw == pytest.approx(0.3, abs=0.02)
 
 
-async def test_a_goal_in_the_world_behind_the_limit_is_given_up(sim, gimbal):
+async def test_goal_in_world_behind_limit_is_given_up(sim, gimbal):
     gimbal.set_mode(FollowMode.FREE)
     action = gimbal.move_to(yaw=300 * DEG, frame=Frame.WORLD)
     await sim.clock.advance(3.0)
@@ -198,7 +198,7 @@ async def test_suspended_it_has_no_torque(sim, gimbal):
     assert gimbal.angles.yaw == pytest.approx(before - 0.5, abs=0.03)
 
 
-async def test_it_keeps_its_pitch_to_the_horizon_on_a_slope(simulate):
+async def test_it_keeps_its_pitch_to_horizon_on_slope(simulate):
     sim = simulate("obstacle_course", start=Pose(3.7, 4.0), body="robomaster_ep")
     sim.world.start()
     await sim.clock.advance(1.0)
@@ -207,7 +207,7 @@ async def test_it_keeps_its_pitch_to_the_horizon_on_a_slope(simulate):
     assert gimbal.angles.pitch == pytest.approx(math.atan(0.4 / 1.5), abs=0.01)  # down, as the body looks up
 
 
-async def test_lifted_and_put_elsewhere_the_gimbal_goes_with_the_robot(sim, gimbal):
+async def test_lifted_and_put_elsewhere_gimbal_goes_with_robot(sim, gimbal):
     gimbal.set_mode(FollowMode.FREE)
     sim.world.hands.place("a", Pose(3, 3, 2.0))
     await sim.clock.advance(0.5)

@@ -116,7 +116,7 @@ async def test_a_bump_shakes_and_is_crossed(course):
     assert not flags(sim).impact_z  # it is reported for a moment
 
 
-async def test_a_low_step_is_climbed_and_a_high_one_is_not(course):
+async def test_low_step_is_climbed_high_one_is_not(course):
     sim = await course(Pose(6.0, 1.5))
     sim.robot[Base].set_velocity(Twist(1.0))
     await sim.clock.advance(1.2)

@@ -30,7 +30,7 @@ def test_a_way_takes_the_time_of_its_trapezoid():
     acceleration=st.floats(0.5, 400),
     rate=st.floats(-3, 3),
 )
-def test_it_arrives_and_never_goes_faster_than_it_can_stop(goal, speed, acceleration, rate):
+def test_arrives_never_faster_than_it_can_stop(goal, speed, acceleration, rate):
     axis = Axis(-20, 20, acceleration, rate=rate)
     for _ in range(20_000):
         before, left = axis.rate, goal - axis.position
@@ -66,7 +66,7 @@ def test_running_takes_up_speed_in_time():
     pull=st.floats(0.5, 10.0),
     top=st.floats(0.1, 3.0),
 )
-def test_trailing_is_a_shift_and_a_run_towards_the_middle(
+def test_trailing_is_shift_and_run_towards_the_middle(
     position: float, rate: float, way: float, pull: float, top: float
 ) -> None:
     one, other = (Axis(-1.0, 1.0, 20.0, position, rate) for _ in range(2))

@@ -21,7 +21,7 @@ GUESTS = "office-guests"
 
 
 @pytest.mark.world("office")
-async def test_a_new_robot_is_in_the_network_that_it_was_made_for(robot, forward):
+async def test_new_robot_is_in_its_intended_network(robot, forward):
     await forward(seconds=1)
     state = robot[Network].state
     assert (state.mode, state.ssid, state.internet, state.route) == (NetworkMode.STATION, OFFICE, True, Uplink.WIFI)
@@ -86,7 +86,7 @@ async def test_impossible_names_and_keys_are_refused_at_once(robot):
 
 
 @pytest.mark.world("office", body="hermes")
-async def test_as_an_access_point_the_modem_is_the_way_out(robot, forward):
+async def test_as_access_point_modem_is_the_way_out(robot, forward):
     await robot[Network].be_access_point()
     await forward(seconds=1)
     state = robot[Network].state

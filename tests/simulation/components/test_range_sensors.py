@@ -47,7 +47,7 @@ async def test_distances_to_four_walls(sim, sensors):
         assert math.hypot(reading.mount.x, reading.mount.y) == pytest.approx(RADIUS)
 
 
-async def test_what_is_within_the_cone_counts_and_beside_it_not(sim, sensors):
+async def test_only_things_within_the_cone_count(sim, sensors):
     sensors.measure(True)
     inside = sim.world.hands.add_obstacle(Pose(5.0, 4.3), (0.1, 0.1, 1.0))
     await sim.clock.advance(0.1)

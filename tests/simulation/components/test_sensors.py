@@ -78,7 +78,7 @@ async def test_the_lidar_sees_the_walls_where_they_are(simulate):
             assert distance == pytest.approx(min(across, along), abs=0.06)
 
 
-async def test_scans_come_ten_times_a_second_with_the_odometry(simulate):
+async def test_scans_come_ten_times_second_with_the_odometry(simulate):
     sim = simulate(start=Pose(2, 5))
     scans = sim.robot.events.subscribe(ScanTaken)
     sim.world.start()

@@ -28,7 +28,7 @@ def test_all_is_well(caplog: pytest.LogCaptureFixture) -> None:
     assert said(caplog, 30.0, 27.0) == []
 
 
-def test_a_stream_that_does_not_fit_is_named_once(caplog: pytest.LogCaptureFixture) -> None:
+def test_stream_that_does_not_fit_is_named_once(caplog: pytest.LogCaptureFixture) -> None:
     (line,) = said(caplog, 30.0, 12.0, 13.0)
     assert "the camera of b takes" in line
     assert "of 30 pictures a second" in line

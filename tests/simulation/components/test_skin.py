@@ -46,7 +46,7 @@ async def seen(dog, steps: int, step: float) -> list[str]:
     return found
 
 
-async def test_it_begins_dark_and_shows_what_it_is_given(dog, skin) -> None:
+async def test_begins_dark_and_shows_what_it_gets(dog, skin) -> None:
     assert set(skin.shades) == set(Patch)
     assert set(skin.shades.values()) == {Shade.DARK}
     skin.show(SkinPattern.LIGHT)
@@ -69,7 +69,7 @@ async def test_patterns_run_over_the_body(dog, skin, pattern, wanted) -> None:
     assert skin.shades[Patch.LEFT_REAR_LEG] is skin.shades[Patch.REAR]
 
 
-async def test_chance_draws_anew_every_cycle_and_the_same_for_the_same_seed(dog, skin) -> None:
+async def test_chance_draws_anew_every_cycle_repeatably_by_seed(dog, skin) -> None:
     skin.show(SkinPattern.RANDOM, cycle=0.5)
     await dog.clock.advance(0.02)
     first, within = await seen(dog, 16, 0.5), []
@@ -100,7 +100,7 @@ async def test_the_legs_that_stand_are_shown(dog, skin, standing) -> None:
     assert len(walks) >= 2
 
 
-async def test_switched_off_it_is_dark_and_takes_no_pattern(dog, skin) -> None:
+async def test_dark_when_switched_off_and_takes_no_pattern(dog, skin) -> None:
     skin.show(SkinPattern.FLASH, cycle=1.0)
     skin.enable(False)
     assert await seen(dog, 3, 0.5) == ["ddd"] * 3
@@ -117,7 +117,7 @@ async def test_cycles_that_cannot_be(skin, cycle) -> None:
     assert skin.state.pattern is SkinPattern.DARK
 
 
-async def test_a_body_on_wheels_has_no_legs_to_show(simulate) -> None:
+async def test_body_on_wheels_has_no_legs_to_show(simulate) -> None:
     sim = simulate(start=Pose(2, 5), body="universal")
     sim.world.start()
     skin = sim.robot[ElectronicSkin]

@@ -92,7 +92,7 @@ async def test_a_box_covers_the_pixels_that_geometry_says():
 
 
 @pytest.mark.parametrize("distance", [1.5, 3.0, 6.0])
-async def test_the_wall_ahead_meets_the_floor_where_geometry_says(distance):
+async def test_wall_ahead_meets_the_floor_where_geometry_says(distance):
     world, robot, _ = await lab(room(), start=Pose(10 - distance, 5))
     frame = await robot[Camera].capture()
     row = pixel(robot, world.truth.pose_of("a"), 10.0, 5.0, 0.0)[1]
@@ -104,7 +104,7 @@ async def test_the_wall_ahead_meets_the_floor_where_geometry_says(distance):
     world.close()
 
 
-async def test_a_person_stands_where_geometry_says_and_a_box_hides_them():
+async def test_person_stands_where_geometry_says_behind_boxes_hidden():
     world, robot, _ = await lab(room(people=[{"path": [[6.0, 5.8]]}]))
     pose = world.truth.pose_of("a")
     shirt = reds(await robot[Camera].capture())
@@ -156,7 +156,7 @@ async def test_a_marker_can_be_read(symbol):
     world.close()
 
 
-async def test_a_line_on_the_floor_is_seen_where_it_lies():
+async def test_line_on_floor_is_seen_where_it_lies():
     world, robot, _ = await lab(room(lines=[{"points": [[2.5, 5.3], [8.0, 5.3]], "width": 0.06}]))
     frame = await robot[Camera].capture()
     for x in (3.5, 5.0, 7.0):
@@ -165,7 +165,7 @@ async def test_a_line_on_the_floor_is_seen_where_it_lies():
     world.close()
 
 
-async def test_a_can_is_seen_where_it_was_put_and_a_foil_shines():
+async def test_can_is_seen_in_place_and_foil_shines():
     foil = {"at": [10, 4.2], "facing": 180, "base": 0.1, "top": 0.7}
     tag = {"at": [10, 6.0], "facing": 180, "text": "17", "size": 0.3}
     floor = room(
@@ -189,7 +189,7 @@ async def test_a_can_is_seen_where_it_was_put_and_a_foil_shines():
     world.close()
 
 
-async def test_the_camera_moves_with_the_robot_and_sinks_with_its_legs():
+async def test_camera_moves_with_the_robot_and_its_legs():
     world, robot, clock = await lab(room())
     high = robot[Camera].mount.z
     robot[Legs].lie_down()
@@ -232,7 +232,7 @@ async def test_exposure_makes_it_darker_and_brighter():
     world.close()
 
 
-async def test_nothing_is_drawn_while_no_one_looks_and_once_for_many():
+async def test_nothing_is_drawn_unwatched_and_once_for_many():
     world, robot, clock = await lab(room())
     camera = robot[Camera]
     await clock.advance(1.0)
@@ -302,7 +302,7 @@ async def test_a_frame_is_sound_and_read_only():
     world.close()
 
 
-async def test_in_real_time_pictures_come_from_a_thread_and_close_ends_them():
+async def test_real_time_pictures_come_from_thread_until_close():
     world, robot, _ = await lab(room(), clock=RealClock())
     with robot[Camera].subscribe() as viewer:
         frames = [await asyncio.wait_for(anext(viewer), 30) for _ in range(3)]
@@ -313,7 +313,7 @@ async def test_in_real_time_pictures_come_from_a_thread_and_close_ends_them():
 
 
 @pytest.mark.parametrize("name", ["office", "empty"])
-async def test_every_floor_of_the_shipped_worlds_can_be_drawn(name):
+async def test_every_floor_of_shipped_worlds_can_be_drawn(name):
     from roboglot.simulation.world.world_files import load_world
 
     description = load_world(name)
@@ -327,7 +327,7 @@ async def test_every_floor_of_the_shipped_worlds_can_be_drawn(name):
     world.close()
 
 
-async def test_who_is_left_out_would_not_have_been_in_the_picture(simulate, monkeypatch):
+async def test_objects_left_out_would_not_be_in_picture(simulate, monkeypatch):
     from roboglot.simulation.rendering import stage
 
     names = ("a", "b", "c", "d", "e")

@@ -95,7 +95,7 @@ async def test_another_floor_is_another_world():
 # -- faces and gestures ------------------------------------------------------------------------------------------------
 
 
-async def test_a_face_is_a_strangers_until_it_is_known():
+async def test_face_is_a_strangers_until_it_is_known():
     with lab(people=[ANNA]) as room:
         (stranger,) = await room.see("faces")
         database = Database(":memory:")
@@ -253,7 +253,7 @@ async def test_a_bend_has_the_curvature_of_its_circle(side, drawn):
     assert all(point.angle * -side > 0 for point in middle_points)  # a left bend leads to the left
 
 
-async def test_lines_of_all_colours_and_only_what_can_be_seen_of_them():
+async def test_lines_of_all_colours_are_seen_where_visible():
     lines = [
         {"points": [[2.5, 5.2], [5.0, 5.2]], "colour": "red"},
         {"points": [[2.5, 4.8], [5.0, 4.8]], "colour": "green"},

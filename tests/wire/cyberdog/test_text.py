@@ -66,7 +66,7 @@ def test_deep_nesting_is_refused() -> None:
         read_params('{"a":' * 200_000)
 
 
-def test_text_goes_out_as_it_is_and_all_else_as_json() -> None:
+def test_text_goes_out_plain_all_else_as_json() -> None:
     assert write("") == ""
     assert write("{ raw }") == "{ raw }"
     assert write({"result": 0}) == '{"result":0}'

@@ -23,7 +23,7 @@ def test_line_ends_and_empty_commands_are_left_out() -> None:
     assert split(b"command;\r\n;; \n version;\r\n") == ["command", "version"]
 
 
-def test_an_overlong_text_is_reported_once_and_the_next_one_read() -> None:
+def test_overlong_text_is_reported_once_and_next_read() -> None:
     assert split(b"x" * LINE_MAX + b";", b"ok;") == ["x" * LINE_MAX, "ok"]
     assert split(b"x" * (LINE_MAX + 1) + b";", b"ok;") == [None, "ok"]
     assert split(*[b"x" * 700] * 3, b"x;ok;") == [None, "ok"]
@@ -42,5 +42,5 @@ def test_bytes_that_are_no_text_are_no_error() -> None:
 
 
 @given(st.lists(st.binary(max_size=2000), max_size=8))
-def test_any_cut_of_a_stream_gives_the_same_texts(chunks: list[bytes]) -> None:
+def test_any_cut_of_stream_gives_the_same_texts(chunks: list[bytes]) -> None:
     assert split(*chunks) == split(b"".join(chunks))

@@ -49,7 +49,7 @@ def test_the_bytes_are_those_of_the_field() -> None:
     )  # fmt: skip
 
 
-def test_sizes_that_do_not_count_themselves_in_are_read_too() -> None:
+def test_sizes_that_exclude_themselves_are_read_too() -> None:
     layers = (Layer((("name", "x"),), b"abc"), Layer((("name", "y"),), b""))
     data = encode_stcm(CompositeMap(layers))
     first = 18
@@ -116,7 +116,7 @@ def test_entries_written_in_another_way_are_not_understood(payload: bytes) -> No
         assert entries is None or payload == b"" or entries
 
 
-def test_areas_are_ours_and_a_vendors_are_left_alone() -> None:
+def test_areas_are_ours_and_vendors_are_left_alone() -> None:
     area = AreaEntry(3, "forbidden_area", 0.1, 0.2, 0.3, 0.4, 0.5, {"escape_distance": "0.4"})
     layer = stcm_layers.area_layer([area])
     assert stcm_layers.read_areas(layer) == [area]

@@ -24,7 +24,7 @@ SAVE: dict[str, Any] = {
 }
 
 
-def test_the_manuals_save_frame_with_raw_line_breaks_in_its_body() -> None:
+def test_manual_s_save_frame_has_raw_line_breaks() -> None:
     text = (
         '{"type": "task", "id": "123", "target_id": ["678"], "operate": "save", "mode": "single",\n'
         ' "condition": "now", "body": "\ncyberdog.stand_up()\ntime.sleep(60)\n"}'
@@ -34,7 +34,7 @@ def test_the_manuals_save_frame_with_raw_line_breaks_in_its_body() -> None:
     )
 
 
-def test_an_app_fills_what_an_operation_does_not_use_with_empty_strings() -> None:
+def test_unused_fields_from_an_app_are_empty_strings() -> None:
     empty = dict.fromkeys(("describe", "style", "mode", "condition", "body"), "")
     request = parse_request(
         json.dumps({"type": "task", "id": "1", "target_id": ["a", "b", "a"], "operate": "suspend"} | empty)
@@ -42,7 +42,7 @@ def test_an_app_fills_what_an_operation_does_not_use_with_empty_strings() -> Non
     assert request == Request(Kind.TASK, "1", "suspend", ("a", "b"))
 
 
-def test_an_inquiry_of_everything_and_of_ai_without_an_operation() -> None:
+def test_inquiry_of_everything_and_of_ai_without_operation() -> None:
     assert parse_request('{"type": "task", "id": "x", "target_id": [], "operate": "inquiry"}').targets == ()
     assert parse_request('{"type": "AI", "id": "x", "target_id": [], "mode": "face"}').operate == "inquiry"
     assert (

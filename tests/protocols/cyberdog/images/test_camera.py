@@ -39,7 +39,7 @@ def _clear(folder: Path) -> None:
         path.unlink()
 
 
-async def test_a_photo_comes_whole_and_is_gone_from_the_robot(client: Client, robot, folder) -> None:
+async def test_photo_comes_whole_and_is_gone_from_robot(client: Client, robot, folder) -> None:
     (chunk,) = await client.file(4002, {"command": 1})
     assert chunk.error_code == 0
     assert chunk.file_size == len(chunk.buffer)
@@ -113,7 +113,7 @@ async def test_a_broken_transfer_loses_nothing(client, robot, folder, monkeypatc
     assert len(chunk.buffer) == chunk.file_size
 
 
-async def test_what_the_network_swallowed_after_the_last_byte_was_written_is_kept(
+async def test_file_swallowed_after_the_last_byte_is_kept(
     client, app, door, pems, messages, folder, passing, monkeypatch
 ) -> None:
     """The client's window takes a small file whole: the robot has sent it, and nothing has arrived."""
@@ -184,7 +184,7 @@ class Stalling:
                 await writer.drain()
 
 
-async def test_a_lost_app_ends_the_recording_and_keeps_it(client, app, robot, folder, passing, forward) -> None:
+async def test_lost_app_ends_the_recording_and_keeps_it(client, app, robot, folder, passing, forward) -> None:
     robot[Camera].rate = 5.0  # six seconds of film in a sixth of the pictures
     await client.ask(4002, {"command": 2})
     await passing(lambda: app.ticks)
@@ -198,7 +198,7 @@ async def test_a_lost_app_ends_the_recording_and_keeps_it(client, app, robot, fo
     assert app.of(4003)[0]["file_name"] == [path.name for path in folder.iterdir()]
 
 
-async def test_files_count_on_the_disk_and_survive_a_restart(client, app, robot, folder, passing) -> None:
+async def test_files_count_on_disk_and_survive_a_restart(client, app, robot, folder, passing) -> None:
     await client.ask(4002, {"command": 1})
     (path,) = folder.iterdir()
     assert robot[Disk].uses[f"camera {path.name}"] == path.stat().st_size
@@ -208,7 +208,7 @@ async def test_files_count_on_the_disk_and_survive_a_restart(client, app, robot,
     assert f"camera {path.name}" in robot[Disk].uses
 
 
-async def test_a_disk_that_fills_up_is_reported_and_takes_no_picture(client, app, robot, folder, passing) -> None:
+async def test_full_disk_is_reported_and_takes_no_picture(client, app, robot, folder, passing) -> None:
     await client.ask(10001)
     await passing(lambda: app.ticks)
     robot[Disk].take("rubbish", robot[Disk].free - 400_000_000)

@@ -140,7 +140,7 @@ async def test_lost_pictures_are_answered_by_the_next_keyframe(watch, robot, for
     assert len(asked) == 1  # twenty at once are one picture
 
 
-async def test_a_phone_held_upright_gets_a_picture_of_its_shape(watch, forward) -> None:
+async def test_phone_held_upright_gets_picture_of_its_shape(watch, forward) -> None:
     watcher = watch()
     await watcher.connect(height=1280, width=720, alignment="top")
     async with time_passing(forward):
@@ -152,7 +152,7 @@ async def test_a_phone_held_upright_gets_a_picture_of_its_shape(watch, forward) 
     assert luma[370:].mean() == pytest.approx(16, abs=1)  # black below
 
 
-async def test_without_a_way_to_the_app_it_gives_up(watch, monkeypatch) -> None:
+async def test_without_way_to_the_app_it_gives_up(watch, monkeypatch) -> None:
     monkeypatch.setattr(door_video, "PATIENCE", 0.2)
     watcher = watch()
     await watcher.offer()  # and never takes the answer
@@ -185,7 +185,7 @@ async def test_what_is_no_offer_is_reported(watch, client, app) -> None:
     assert app.of(4001) == []
 
 
-async def test_an_offer_as_text_with_line_ends_in_it(watch) -> None:
+async def test_offer_as_text_with_line_ends_in_it(watch) -> None:
     watcher = watch("default_uid")
     await watcher.peer.setLocalDescription(await watcher.peer.createOffer())
     raw = '{"offer_sdp": "' + watcher.peer.localDescription.sdp.replace('"', "") + '"}'

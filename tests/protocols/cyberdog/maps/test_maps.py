@@ -62,7 +62,7 @@ async def test_a_map_without_a_name_is_thrown_away(client, robot, passing: Passi
     assert await robot[MapLibrary].names() == []
 
 
-async def test_mapping_goes_on_if_the_map_cannot_be_saved(client, robot, passing: Passing, monkeypatch) -> None:
+async def test_mapping_goes_on_if_map_cannot_be_saved(client, robot, passing: Passing, monkeypatch) -> None:
     async def full(*_: object) -> None:
         raise OSError("the disk is full")
 
@@ -76,9 +76,7 @@ async def test_mapping_goes_on_if_the_map_cannot_be_saved(client, robot, passing
 
 
 @pytest.mark.world("playground")
-async def test_in_a_map_of_an_earlier_life_the_robot_is_searched(
-    client, door, robot, world, forward, passing: Passing
-) -> None:
+async def test_in_map_of_earlier_life_robot_is_searched(client, door, robot, world, forward, passing: Passing) -> None:
     stream = Stream(client, 6004, {"type": 5})
     await passing(lambda: 6 in stream.codes and robot[Mapping].grid.width > 50)
     await client.ask(6009, {"type": 5, "map_name": "old"})
@@ -179,7 +177,7 @@ async def test_stopping_all_tasks_while_mapping(client: Client, robot: Robot, pa
     assert await state(client) == 101
 
 
-async def test_a_map_is_found_by_the_number_that_an_app_gave_it(client: Client, robot: Robot) -> None:
+async def test_map_is_found_by_its_app_s_number(client: Client, robot: Robot) -> None:
     grid = OccupancyGrid(np.ones((4, 4), np.int8), 0.05, Point())
     for name in ("attic", "cellar"):
         await robot[MapLibrary].put(StoredMap(name, grid, 0.0))

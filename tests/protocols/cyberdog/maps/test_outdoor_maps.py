@@ -94,9 +94,7 @@ async def test_satellites_that_see_the_robot_elsewhere_confirm_nothing(
 
 
 @pytest.mark.world("playground")
-async def test_a_robot_carried_off_just_now_is_not_taken_to_be_where_it_was(
-    client: Client, robot, world, forward, passing
-) -> None:
+async def test_carried_robot_is_not_placed_where_it_was(client: Client, robot, world, forward, passing) -> None:
     await forward(seconds=2)
     begun = world.truth.pose_of("a").compose(robot[Localization].pose.inverse())
     assert robot[Localization].quality > 0.5
@@ -109,7 +107,7 @@ async def test_a_robot_carried_off_just_now_is_not_taken_to_be_where_it_was(
     assert 3108 not in stream.codes or believed.distance_to(world.truth.pose_of("a")) < 0.2
 
 
-async def test_outdoors_without_a_map_there_is_nothing_to_be_found_in(client, robot, forward, passing) -> None:
+async def test_outdoors_without_a_map_nothing_is_found(client, robot, forward, passing) -> None:
     await forward(seconds=1)
     stream = Stream(client, 6004, {"type": 7, "outdoor": True})
     await passing(lambda: stream.ended)

@@ -71,7 +71,7 @@ async def test_navigation_arrives_and_the_app_sees_the_way(
     assert any(ticks.task_status.task_status == 1 for ticks in app.ticks)
 
 
-async def test_laser_points_lie_on_the_walls_of_the_map(client, app, robot, forward, passing: Passing) -> None:
+async def test_laser_points_lie_on_walls_of_the_map(client, app, robot, forward, passing: Passing) -> None:
     await forward(seconds=1)
     await client.ask(10001)
     await passing(lambda: app.ticks)
@@ -122,7 +122,7 @@ async def test_a_goal_that_is_nowhere(client, robot, forward, passing: Passing) 
 
 @pytest.mark.world("tests/autonomy/worlds/closed_room.toml")
 @pytest.mark.parametrize("x", [6.0, 8.0], ids=["in the wall", "in a closed room"])
-async def test_a_goal_that_no_way_leads_to_is_306(client, clock, world, forward, passing: Passing, x: float) -> None:
+async def test_goal_that_no_way_leads_to_is_306(client, clock, world, forward, passing: Passing, x: float) -> None:
     await forward(seconds=1)
     await localized(client, passing)
     goal, begun = Pose(x, 3.0).relative_to(world.truth.pose_of("a")), clock.time()
@@ -144,9 +144,7 @@ async def test_another_door_s_driving_ends_navigation_as_failed(client, robot, f
     assert stream.answers[-1] == {"result": 3}
 
 
-async def test_navigation_on_a_map_that_was_replaced_leaves_no_localized_robot(
-    client, robot, forward, passing: Passing
-) -> None:
+async def test_navigation_on_a_replaced_map_leaves_robot_unlocalized(client, robot, forward, passing: Passing) -> None:
     await forward(seconds=1)
     await localized(client, passing)
     stream = Stream(client, 6004, {"type": 1, "goalX": 4.0, "goalY": 0.0})
@@ -157,7 +155,7 @@ async def test_navigation_on_a_map_that_was_replaced_leaves_no_localized_robot(
     assert await state(client) == 101
 
 
-async def test_a_task_can_be_rejoined_and_the_stream_taken_over(client, robot, forward, passing: Passing) -> None:
+async def test_task_can_be_rejoined_and_stream_taken_over(client, robot, forward, passing: Passing) -> None:
     assert await client.ask(6010, {"type": 5}) == {"accepted": 3}
     first = Stream(client, 6004, {"type": 5})
     await passing(lambda: 6 in first.codes)
@@ -174,7 +172,7 @@ async def test_a_task_can_be_rejoined_and_the_stream_taken_over(client, robot, f
     assert third.answers[-1] == {"result": 5}
 
 
-async def test_losing_the_app_ends_the_stream_but_not_the_task(client, app, robot, passing: Passing) -> None:
+async def test_losing_app_ends_stream_but_not_the_task(client, app, robot, passing: Passing) -> None:
     await client.ask(10001)
     await passing(lambda: app.ticks)
     stream = Stream(client, 6004, {"type": 5})
@@ -215,9 +213,7 @@ async def test_an_empty_battery_stops_the_task(client, robot, passing: Passing) 
     assert await client.ask(6004, {"type": 5}) == {"accepted": 2}
 
 
-async def test_relocalisation_that_does_not_fit_asks_to_drive_and_gives_up(
-    client, robot, forward, passing: Passing, monkeypatch
-) -> None:
+async def test_relocalisation_that_does_not_fit_gives_up(client, robot, forward, passing: Passing, monkeypatch) -> None:
     await forward(seconds=1)
     monkeypatch.setattr(type(robot[Localization]), "quality", property(lambda _: 0.1))
     monkeypatch.setattr(robot[Localization].estimator, "placing", lambda _: None)  # nothing fits anywhere
@@ -232,7 +228,7 @@ async def test_relocalisation_that_does_not_fit_asks_to_drive_and_gives_up(
     assert await state(client) == 6
 
 
-async def test_a_robot_that_loses_its_place_says_so_until_it_knows_it_again(
+async def test_lost_robot_reports_it_until_localized_again(
     client: Client, robot: Robot, forward: Forward, passing: Passing
 ) -> None:
     await forward(seconds=1)

@@ -38,7 +38,7 @@ async def middle(world, robot, forward):
         (506, Pose(-0.45), 1.9),
     ],
 )
-async def test_jumps_take_their_time_and_land_in_their_place(client, robot, world, forward, motion, way, seconds):
+async def test_jumps_take_their_time_and_land_in_place(client, robot, world, forward, motion, way, seconds):
     before = world.truth.pose_of("a")
     answer = await answered(client, 1004, {"motion_id": motion}, forward)
     assert answer == {"motion_id": motion, "result": True, "code": 0}
@@ -69,7 +69,7 @@ async def test_sitting_figures_begin_with_sitting_down(client, robot, forward) -
     assert (await client.ask(10001))["motion_status"]["motion_id"] == 143
 
 
-async def test_a_dance_is_reported_as_a_timeout_and_lying_down_interrupts_it(client, robot, forward) -> None:
+async def test_dance_reports_timeout_and_lying_down_interrupts_it(client, robot, forward) -> None:
     asking = asyncio.ensure_future(client.ask(1004, {"motion_id": 140}))
     await until(lambda: robot.actions.running())
     await forward(seconds=5)
@@ -120,7 +120,7 @@ async def test_body_poses(client, robot, forward) -> None:
     assert robot[Legs].attitude.pitch == pytest.approx(0.0, abs=0.01)
 
 
-async def test_servo_frames_choose_the_gait_the_pose_and_the_lift(client, robot, forward) -> None:
+async def test_servo_frames_choose_gait_pose_and_the_lift(client, robot, forward) -> None:
     walk = {"motion_id": 305, "vel_des": [0.4, 0, 0], "rpy_des": [0, 0.1, 0], "step_height": [0.06, 0.05]}
     for _ in range(6):
         await client.ask(1002, walk)
@@ -131,7 +131,7 @@ async def test_servo_frames_choose_the_gait_the_pose_and_the_lift(client, robot,
     assert (await client.ask(10001))["motion_status"]["motion_id"] == 305
 
 
-async def test_getting_up_for_a_servo_is_reported_as_it_goes_on(client, app: App, robot, passing, forward) -> None:
+async def test_getting_up_for_a_servo_is_reported(client, app: App, robot, passing, forward) -> None:
     await client.ask(10001)
     await passing(lambda: app.ticks)
     for _ in range(3):

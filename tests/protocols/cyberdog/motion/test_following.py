@@ -66,7 +66,7 @@ async def test_who_is_lost_for_long_ends_the_task(client, app, robot, world, ann
     assert stream.codes[-2:] == [504, 505]
 
 
-async def test_the_choice_may_be_left_and_the_side_must_be_known(client, app, robot, anna, passing, forward) -> None:
+async def test_choice_is_optional_but_side_must_be_known(client, app, robot, anna, passing, forward) -> None:
     assert await client.ask(6004, {"type": 13, "relative_pos": 7}) == {"error_code": 323}
     stream = Stream(client, 6004, {"type": 13})
     await passing(lambda: 501 in stream.codes)
@@ -75,7 +75,7 @@ async def test_the_choice_may_be_left_and_the_side_must_be_known(client, app, ro
     assert stream.answers[-1] == {"result": 5}
 
 
-async def test_a_thing_in_the_picture_is_followed_wherever_it_goes(
+async def test_thing_in_picture_is_followed_wherever_it_goes(
     client: Client, app: App, robot, world, anna, passing, forward
 ) -> None:
     """Of what the camera makes out nothing is asked: she is a thing like any other, that the lidar sees."""

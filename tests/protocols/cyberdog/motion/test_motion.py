@@ -115,7 +115,7 @@ async def test_every_frame_is_reported(
     assert "cmd_id" not in app.of(1003)[1]
 
 
-async def test_lie_down_and_stand_up_are_answered_when_done(client, robot, world, forward) -> None:
+async def test_lying_and_standing_are_answered_when_done(client, robot, world, forward) -> None:
     assert await answered(client, 1004, {"motion_id": 101, "duration": 0}, forward) == {
         "motion_id": 101,
         "result": True,
@@ -212,7 +212,7 @@ async def test_another_clients_servo_is_not_cut_short(client, robot, world, forw
         assert gaits.check(111, Wish()) is None
 
 
-async def test_emergency_stop_goes_through_and_only_standing_leads_out(client, robot, world, forward) -> None:
+async def test_only_standing_leads_out_of_emergency_stop(client, robot, world, forward) -> None:
     walking = asyncio.ensure_future(client.ask(1004, {"motion_id": 308, "vel_des": [0.5, 0, 0], "duration": 9000}))
     await until(lambda: robot.actions.running())
     await forward(seconds=1)
@@ -225,7 +225,7 @@ async def test_emergency_stop_goes_through_and_only_standing_leads_out(client, r
     assert robot[Legs].posture is Posture.STANDING
 
 
-async def test_a_motion_longer_than_20_s_is_a_timeout(client, robot, world, forward) -> None:
+async def test_motion_longer_than_20_s_is_a_timeout(client, robot, world, forward) -> None:
     long = asyncio.ensure_future(client.ask(1004, {"motion_id": 303, "vel_des": [0, 0, 0.5], "duration": 30_000}))
     await until(lambda: robot.actions.running())
     await forward(seconds=21)
@@ -265,14 +265,14 @@ async def test_device_information_tells_what_was_asked(client, robot, world) -> 
     assert everything["stand"] is True
 
 
-async def test_without_lidar_there_are_no_tasks_and_no_map(client, robot, world) -> None:
+async def test_no_tasks_and_no_map_without_lidar(client, robot, world) -> None:
     for task in (1, 5, 7, 9):
         assert await client.ask(6004, {"type": task, "goalX": 1, "goalY": 1}) == {"error_code": 322}
     assert await client.ask(6003) == {"error_code": 322}
     assert await client.ask(6002, {"mapName": "a"}) == {"error_code": 322}
 
 
-async def test_who_has_not_the_control_is_informed_that_another_has_it(client, robot, forward) -> None:
+async def test_client_without_control_learns_that_another_has_it(client, robot, forward) -> None:
     lease = robot.add(Lease, Lease(robot))
     await lease.take("robomaster")
     assert await client.ask(1004, {"motion_id": 101}) == {"motion_id": 101, "result": False, "code": 3001}

@@ -52,7 +52,7 @@ async def test_frames_hold_the_body_at_a_pose(client, robot, world, forward) -> 
     assert not robot.actions.running(BASE)
 
 
-async def test_frames_add_to_how_the_body_is_held_up_to_its_limits(client, app: App, robot, forward, passing) -> None:
+async def test_frames_add_to_the_body_pose_within_limits(client, app: App, robot, forward, passing) -> None:
     await client.ask(10001)
     await passing(lambda: app.ticks)
     rolled = []
@@ -133,7 +133,7 @@ async def test_what_a_program_danced_is_danced_again(client, robot, world, forwa
     assert list(robot[Legs].choreography.steps) == steps  # what 400 does again is still the program's
 
 
-async def test_places_for_gaits_are_empty_and_states_cannot_be_asked_for(client, robot, world, forward) -> None:
+async def test_gait_places_are_empty_states_not_requestable(client, robot, world, forward) -> None:
     before = world.truth.pose_of("a")
     for number in (180, 199):
         assert (await client.ask(1004, {"motion_id": number}))["code"] == 3031
@@ -196,7 +196,7 @@ async def test_someone_takes_the_dog_up(client, robot, world, forward) -> None:
 
 @pytest.mark.world(str(Path(__file__).parent / "sill.toml"), body="cyberdog2")
 @pytest.mark.parametrize(("number", "over"), [(340, False), (343, True), (344, True), (345, True)])
-async def test_walks_that_look_ahead_lift_the_feet_over_what_they_see(
+async def test_foresighted_walks_lift_feet_over_obstacles(
     client, robot, world, forward, number: int, over: bool
 ) -> None:
     world.hands.place("a", Pose(3.2, 2.0, 0.0))
@@ -210,7 +210,7 @@ async def test_walks_that_look_ahead_lift_the_feet_over_what_they_see(
     assert (world.truth.pose_of("a").x > 4.3) is over
 
 
-async def test_no_one_looks_ahead_for_a_walk_whose_door_has_closed(client, door, forward) -> None:
+async def test_closed_door_ends_the_foresight_of_a_walk(client, door, forward) -> None:
     def looking() -> bool:
         return any(task.get_name() == "look ahead" for task in asyncio.all_tasks())
 

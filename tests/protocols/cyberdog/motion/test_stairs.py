@@ -63,7 +63,7 @@ async def test_down_it_looks_for_the_landings_edge(client, robot, world, forward
     assert_pose(world.truth.pose_of("a"), x=4.9 + BEFORE, deg=180, within=0.03, within_deg=3)
 
 
-async def test_without_a_step_it_says_so_and_disturbs_no_one(client, robot, world, forward) -> None:
+async def test_missing_step_is_reported_and_disturbs_no_one(client, robot, world, forward) -> None:
     world.hands.place("a", Pose(2.0, 2.0))
     await forward(seconds=0.5)
     driving = robot[Driving].drive(Twist(yaw=0.1))
@@ -141,6 +141,6 @@ async def test_it_stops_when_the_app_is_lost(
 
 
 @pytest.mark.world("empty", body="robomaster_ep")
-async def test_a_body_that_does_not_see_the_ground_has_no_such_service(client) -> None:
+async def test_body_that_sees_no_ground_lacks_the_service(client) -> None:
     assert await client.ask(1100, {"data": True}) == {"error_code": 322}
     assert await client.ask(1101) == {"error_code": 322}

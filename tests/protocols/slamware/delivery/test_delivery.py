@@ -16,7 +16,7 @@ from tests.protocols.slamware.screen import API, TASKS, Screen
 pytestmark = pytest.mark.world("empty")
 
 
-async def test_a_takeout_from_the_door_of_the_box_to_the_way_home(screen: Screen, robot: Robot) -> None:
+async def test_takeout_from_door_of_box_to_way_home(screen: Screen, robot: Robot) -> None:
     await screen.prepare(R101=(2.0, 1.0, "ROOM"), P=(0.0, 0.5, "PARKING"))
     number = await screen.create("R101", "TAKEOUT", 0, 1)
     assert (await screen.stage())["stage"] == "ON_DELIVERING"
@@ -50,7 +50,7 @@ async def test_a_takeout_from_the_door_of_the_box_to_the_way_home(screen: Screen
     assert "DELIVERY_TASK_START" in await screen.events()
 
 
-async def test_no_one_comes_and_the_parcel_goes_back_to_reception(screen: Screen, robot: Robot) -> None:
+async def test_unclaimed_parcel_goes_back_to_reception(screen: Screen, robot: Robot) -> None:
     await screen.prepare(R101=(2.0, 0.0, "ROOM"), desk=(0.0, 1.0, "RECEPTION"))
     cargo: Any = robot[Cargo]
     await screen.operate(0, ":open")
@@ -176,7 +176,7 @@ async def test_it_goes_on_after_an_emergency_stop(screen: Screen, robot: Robot) 
     assert_pose(screen.pose, x=3.0, y=0.0, within=0.15)
 
 
-async def test_it_leaves_its_dock_for_an_order_and_comes_back(screen: Screen, robot: Robot) -> None:
+async def test_leaves_its_dock_for_an_order_and_returns(screen: Screen, robot: Robot) -> None:
     await screen.prepare(R101=(2.0, 0.0, "ROOM"))
     assert robot[DockContact].docked
     await screen.create("R101", "RETURN")
@@ -209,7 +209,7 @@ async def test_what_is_refused(screen: Screen) -> None:
     assert (await screen.client.put(f"{API}/cargos/{screen.cargo}/boxes/0/:kick")).status_code == 400
 
 
-async def test_the_stop_button_ends_the_task_and_leaves_the_robot_there(screen: Screen) -> None:
+async def test_stop_button_ends_task_and_leaves_robot_there(screen: Screen) -> None:
     await screen.prepare(R101=(4.0, 0.0, "ROOM"))
     number = await screen.create("R101", "RETURN")
     await screen.forward(seconds=4)

@@ -133,7 +133,7 @@ async def test_a_lost_robot_lets_orders_wait(
 
 
 @pytest.mark.world("office", body="hermes")
-async def test_an_order_goes_on_when_a_wrong_pose_is_seen_through(
+async def test_order_goes_on_after_a_corrected_pose(
     screen: Screen, robot: Robot, world: World, forward: Forward
 ) -> None:
     await screen.prepare(R101=(3.0, 0.0, "ROOM"))

@@ -100,7 +100,7 @@ def test_too_much_is_not_read(monkeypatch: pytest.MonkeyPatch) -> None:
         composite_of(FloorMap(annotations=many))
 
 
-async def test_no_one_waits_while_a_large_file_is_read(
+async def test_no_one_waits_while_large_file_is_read(
     bare_client: httpx.AsyncClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     done = threading.Event()

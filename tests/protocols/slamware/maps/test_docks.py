@@ -68,9 +68,7 @@ async def test_the_bound_dock_is_home(robot: Robot, client: httpx.AsyncClient, f
     assert [dock["id"] for dock in (await client.get(f"{MULTI}/homedocks")).json()] == ["near", "far"]
 
 
-async def test_clearing_docks_answers_the_one_that_was_home_or_null(
-    client: httpx.AsyncClient, forward: Forward
-) -> None:
+async def test_clearing_docks_answers_the_former_home_or_null(client: httpx.AsyncClient, forward: Forward) -> None:
     await forward(seconds=1)
     docks = "/api/core/slam/v1/homedocks"
     entry = {"id": "d", "pose": {"x": 0.0, "y": 1.0, "yaw": 0.0}, "metadata": {"display_name": "d"}}

@@ -212,7 +212,7 @@ async def test_what_is_nowhere_fails(client: httpx.AsyncClient, forward: Forward
     assert (await client.post(ACTIONS, json=body)).status_code == 400
 
 
-async def test_into_a_car_that_others_command_and_out_again(
+async def test_into_car_that_others_command_and_out_again(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward, origin: Pose
 ) -> None:
     await forward(seconds=1)

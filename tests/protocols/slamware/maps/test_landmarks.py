@@ -81,7 +81,7 @@ async def clients(fleet: Fleet, forward: Forward) -> AsyncIterator[dict[str, htt
 
 @pytest.mark.world("empty", robots=("a", "b"))
 @pytest.mark.parametrize("changed", [False, True])
-async def test_one_robot_at_a_time_in_a_restricted_area(
+async def test_one_robot_at_time_in_a_restricted_area(
     clients: dict[str, httpx.AsyncClient], fleet: Fleet, world: World, clock: LockstepClock, changed: bool
 ) -> None:
     starts = {"a": Pose(3.0, 4.5), "b": Pose(7.0, 3.0)}

@@ -48,7 +48,7 @@ async def test_half_a_curve_is_refused(bare: Robot, bare_client: httpx.AsyncClie
     assert not bare[MapAnnotations].current.lines
 
 
-async def test_areas_of_all_kinds_with_what_their_metadata_ask_for(bare: Robot, bare_client: httpx.AsyncClient) -> None:
+async def test_areas_of_all_kinds_with_their_metadata(bare: Robot, bare_client: httpx.AsyncClient) -> None:
     metadata = {
         "forbidden_area": {"escape_distance": "0.4"},
         "elevator_area": {"elevator_id": "e", "elevator_sill_width": "0.4", "elevator_scheduling_point_dist": "1"},

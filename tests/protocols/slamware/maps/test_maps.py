@@ -65,9 +65,7 @@ async def test_a_composite_map_brings_everything_back(
     assert "SET_MAP_DONE" in types
 
 
-async def test_what_is_no_map_is_refused_and_nothing_changes(
-    robot: Robot, client: httpx.AsyncClient, drawn: None
-) -> None:
+async def test_invalid_map_is_refused_and_nothing_changes(robot: Robot, client: httpx.AsyncClient, drawn: None) -> None:
     grid = robot[Mapping].grid
     for nonsense in (b"", b"STCM", b"{}", encode_stcm(CompositeMap((STRANGE,)))):
         assert (await client.put(STCM, content=nonsense)).status_code == 400
@@ -128,7 +126,7 @@ async def test_a_reloaded_map_is_the_same_place(
     assert believed.distance_to(world.truth.pose_of("a")) < 0.06
 
 
-async def test_without_a_pose_a_reload_puts_the_robot_before_its_dock(
+async def test_without_pose_reload_puts_robot_before_its_dock(
     robot: Robot, client: httpx.AsyncClient, forward: Forward, drawn: None
 ) -> None:
     await ok(await client.post(f"{MULTI}/stcm/:save"))
@@ -139,9 +137,7 @@ async def test_without_a_pose_a_reload_puts_the_robot_before_its_dock(
     assert (pose.x, pose.y) == pytest.approx((0.6, 0.0), abs=0.05)
 
 
-async def test_what_is_drawn_on_a_floor_is_there_when_the_robot_comes_back(
-    client: httpx.AsyncClient, forward: Forward, drawn: None
-) -> None:
+async def test_drawing_on_a_floor_survives_leaving_it(client: httpx.AsyncClient, forward: Forward, drawn: None) -> None:
     lower = floors_of(decode_stcm((await ok(await client.get(STCM))).content))[0]
     upper = FloorMap(FloorName("", "2F", 1, default=False), lower.grid)
     layers = (*composite_of(lower).layers, *composite_of(upper).layers)
@@ -214,7 +210,7 @@ async def test_the_origin_moves_with_all_that_is_drawn(robot: Robot, client: htt
     assert home.x == pytest.approx(-1.0)
 
 
-async def test_a_moved_origin_is_forgotten_with_the_map_in_memory(
+async def test_moved_origin_is_forgotten_with_map_in_memory(
     robot: Robot, client: httpx.AsyncClient, forward: Forward, drawn: None
 ) -> None:
     """After a restart the grid is the saved one: what is drawn lies on it where it lay."""
@@ -282,9 +278,7 @@ async def test_loop_closure_is_switched_and_reported(robot: Robot, client: httpx
     assert {"type": "MAP_LOOP_CLOSURE", "timestamp": "1500"} in (await client.get("/api/platform/v1/events")).json()
 
 
-async def test_nothing_drawn_gets_too_far_from_the_origin_to_be_saved(
-    client: httpx.AsyncClient, forward: Forward
-) -> None:
+async def test_drawing_stays_close_enough_to_be_saved(client: httpx.AsyncClient, forward: Forward) -> None:
     await forward(seconds=1)
     far = {"id": "far", "pose": {"x": 95_000.0, "y": 0.0, "yaw": 0.0}}
     assert (await client.post("/api/core/artifact/v1/pois", json=far)).status_code == 200

@@ -46,7 +46,7 @@ async def test_a_lost_robot_is_placed_by_name(robot: Robot, client: httpx.AsyncC
 
 
 @pytest.mark.world("empty")
-async def test_places_are_put_in_order_by_the_ways_to_them(client: httpx.AsyncClient, forward: Forward) -> None:
+async def test_places_are_ordered_by_the_ways_between_them(client: httpx.AsyncClient, forward: Forward) -> None:
     await forward(seconds=1)
     for name, x, y in (("a", 1.0, 0.0), ("b", 3.0, 0.0), ("c", 2.0, 0.0), ("d", 2.0, 1.0)):
         place = {"id": f"id-{name}", "pose": {"x": x, "y": y, "yaw": 0.0}, "metadata": {"display_name": name}}
@@ -66,7 +66,7 @@ async def test_places_are_put_in_order_by_the_ways_to_them(client: httpx.AsyncCl
 
 
 @pytest.mark.world("empty")
-async def test_hundreds_of_places_are_put_in_a_good_order_within_a_second(
+async def test_hundreds_of_places_are_ordered_within_a_second(
     robot: Robot, client: httpx.AsyncClient, forward: Forward
 ) -> None:
     await forward(seconds=1)

@@ -27,7 +27,7 @@ async def triggered(client: httpx.AsyncClient) -> int:
     return sum(event["type"] == "BUMPER_TRIGGERED" for event in (await client.get(EVENTS)).json())
 
 
-async def test_a_wall_ends_the_move_and_only_backwards_is_free(
+async def test_wall_ends_move_and_only_backwards_is_free(
     client: httpx.AsyncClient, world: World, forward: Forward
 ) -> None:
     world.hands.place("a", Pose(9.5, 5.0, 0.0))

@@ -46,7 +46,7 @@ async def finish(client: httpx.AsyncClient, forward: Forward, id: int, *, within
     raise AssertionError(f"action {id} has not ended within {within} s")
 
 
-async def test_going_home_without_docking_ends_at_the_landing_point(
+async def test_going_home_without_docking_ends_at_landing_point(
     robot: Robot, client: httpx.AsyncClient, forward: Forward
 ) -> None:
     await forward(seconds=1)
@@ -64,7 +64,7 @@ async def test_going_home_without_docking_ends_at_the_landing_point(
     assert (await client.get(f"{ACTIONS}/:current")).status_code == 404
 
 
-async def test_a_robot_on_its_dock_stays_there_if_it_is_not_to_dock(
+async def test_docked_robot_stays_if_it_need_not_dock(
     robot: Robot, client: httpx.AsyncClient, forward: Forward
 ) -> None:
     await forward(seconds=1)
@@ -73,7 +73,7 @@ async def test_a_robot_on_its_dock_stays_there_if_it_is_not_to_dock(
     assert robot[DockContact].docked
 
 
-async def test_back_to_the_landing_point_when_the_dock_is_gone(
+async def test_back_to_landing_point_when_dock_is_gone(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward
 ) -> None:
     world.hands.place("a", Pose(5.0, 5.0))
@@ -88,7 +88,7 @@ async def test_back_to_the_landing_point_when_the_dock_is_gone(
     assert events.count("SEARCH_DOCK_FAILED") == 1
 
 
-async def test_the_stop_button_and_who_takes_the_wheels_end_an_errand(
+async def test_stop_button_and_who_takes_wheels_end_errand(
     robot: Robot, client: httpx.AsyncClient, forward: Forward
 ) -> None:
     await forward(seconds=1)
@@ -186,7 +186,7 @@ async def test_a_carried_robot_finds_itself(
 
 @pytest.mark.world("office")
 @pytest.mark.parametrize(("move", "turns"), [("NoMove", False), ("RotateOnly", True)])
-async def test_recovery_gives_up_in_time_and_turns_only_if_it_may(
+async def test_recovery_gives_up_in_time_turning_if_allowed(
     client: httpx.AsyncClient, forward: Forward, robot: Robot, world: World, move: str, turns: bool
 ) -> None:
     await forward(seconds=1)
@@ -210,7 +210,7 @@ async def test_recovery_gives_up_in_time_and_turns_only_if_it_may(
 
 
 @pytest.mark.parametrize("name", ["RecoverLocalizationAction", "ManualRelocalizationAction"])
-async def test_a_search_that_finds_several_places_at_once_lets_time_pass(
+async def test_search_that_finds_several_places_lets_time_pass(
     robot: Robot, client: httpx.AsyncClient, forward: Forward, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     """It looked again in the same instant, for ever: in lockstep the world stood still."""
@@ -230,7 +230,7 @@ async def test_a_search_that_finds_several_places_at_once_lets_time_pass(
 
 
 @pytest.mark.world("office")
-async def test_a_pushed_robot_knows_its_place_on_the_dock(
+async def test_pushed_robot_knows_its_place_on_the_dock(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward
 ) -> None:
     await forward(seconds=1)

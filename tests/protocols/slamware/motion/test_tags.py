@@ -76,7 +76,7 @@ MARKS = str(Path(__file__).parents[3] / "autonomy" / "worlds" / "marks.toml")
 
 
 @pytest.mark.world(MARKS, body="hermes")
-async def test_a_board_that_the_lidar_knows_by_its_shape(
+async def test_board_that_the_lidar_knows_by_its_shape(
     client: httpx.AsyncClient, world: World, forward: Forward
 ) -> None:
     origin = world.truth.pose_of("a")

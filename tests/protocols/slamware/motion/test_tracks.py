@@ -34,7 +34,7 @@ def length(way: list[Point]) -> float:
 RING = [track(0, 0, 4, 0), track(4, 0, 4, 4), track(4, 4, 0, 4), track(0, 4, 0, 0)]
 
 
-def test_the_shorter_way_round_or_the_only_way_in_the_tracks_direction() -> None:
+def test_tracks_give_the_shorter_or_only_directed_way() -> None:
     way = way_along(RING, Point(1, 0), Point(0, 1))
     assert length(way) == pytest.approx(2)
     way = way_along(RING, Point(1, 0), Point(0, 1), directed=True)
