@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from roboglot.clients.cyberdog import RunningTask, values
-from roboglot.drivers.cyberdog.tasks import Skills
+from roboglot.drivers.cyberdog.chapters.mapping.tasks import Skills
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.motion.following import Following, FollowSide
 from roboglot.model.errors import InvalidGoal, NotFound, Refused

@@ -13,9 +13,9 @@ import contextlib
 from roboglot.clients.errors import ClientError
 from roboglot.clients.slamware import RunningAction, SlamwareClient, SlamwareRefused
 from roboglot.drivers.linked_base import LinkedBase
-from roboglot.drivers.slamware.actions import ActionRunner
-from roboglot.drivers.slamware.arcs import ArcSplitter
-from roboglot.drivers.slamware.speed_limit_restore import PARAMETER, SpeedLimitRestore
+from roboglot.drivers.slamware.chapters.motion.actions import ActionRunner
+from roboglot.drivers.slamware.chapters.motion.arcs import ArcSplitter
+from roboglot.drivers.slamware.chapters.motion.speed_limit_restore import PARAMETER, SpeedLimitRestore
 from roboglot.drivers.slamware.state import ReportedState
 from roboglot.model.components.motion.base import BaseLimits
 from roboglot.model.components.system.link import Link

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from roboglot.clients.errors import ClientError
-from roboglot.drivers.cyberdog.tasks import Skills
+from roboglot.drivers.cyberdog.chapters.mapping.tasks import Skills
 from roboglot.drivers.cyberdog.vocabulary import WALKS, robot_errors
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.motion.driving import BASE

@@ -8,7 +8,7 @@ from contextlib import AbstractAsyncContextManager
 
 from roboglot.clients.slamware import SlamwareClient
 from roboglot.drivers.reported import ReportedMapping
-from roboglot.drivers.slamware.actions import ActionRunner
+from roboglot.drivers.slamware.chapters.motion.actions import ActionRunner
 from roboglot.drivers.slamware.state import ReportedState
 from roboglot.drivers.slamware.telemetry import TelemetryPoller
 from roboglot.drivers.slamware.vocabulary import explored_of, pose3d

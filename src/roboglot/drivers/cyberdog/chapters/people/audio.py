@@ -6,7 +6,7 @@ import math
 
 from roboglot.clients.cyberdog import CyberDogClient
 from roboglot.clients.cyberdog.values import Frame
-from roboglot.drivers.cyberdog.status import StatusPoll
+from roboglot.drivers.cyberdog.telemetry import StatusPoll
 from roboglot.drivers.cyberdog.vocabulary import robot_errors
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.actions import Action

@@ -12,7 +12,7 @@ from typing import Generic, NoReturn, TypeVar
 
 from roboglot.clients.errors import ClientError
 from roboglot.clients.robomaster.client import RoboMasterClient
-from roboglot.drivers.robomaster.detections import Locator, PersonTracker, box_of, gesture_of, line_of
+from roboglot.drivers.robomaster.chapters.ai.detections import Locator, PersonTracker, box_of, gesture_of, line_of
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.clock import Clock
 from roboglot.model.components.sensing.camera import Camera

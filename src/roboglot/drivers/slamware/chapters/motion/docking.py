@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from roboglot.clients.slamware import SlamwareClient
-from roboglot.drivers.slamware.actions import ActionRunner
+from roboglot.drivers.slamware.chapters.motion.actions import ActionRunner
 from roboglot.drivers.slamware.state import ReportedState
 from roboglot.drivers.slamware.vocabulary import pose3d
 from roboglot.drivers.supervisor import Supervisor
