@@ -7,7 +7,7 @@ import contextlib
 from collections.abc import Callable
 
 from roboglot.clients.cyberdog import CyberDogClient
-from roboglot.clients.cyberdog.motion import STEP
+from roboglot.clients.cyberdog.chapters.motion import STEP
 from roboglot.clients.errors import ClientError
 from roboglot.drivers.cyberdog.state import ReportedState
 from roboglot.drivers.linked_base import LinkedBase

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 
 from roboglot.clients.cyberdog import CyberDogClient, CyberDogRefused
-from roboglot.clients.cyberdog.motion import STEP
+from roboglot.clients.cyberdog.chapters.motion import STEP
 from roboglot.drivers.cyberdog.chapters.motion.base import CyberDogBase
 from roboglot.drivers.cyberdog.vocabulary import FIGURES, WALKS, posture_of, robot_errors
 from roboglot.drivers.supervisor import Supervisor

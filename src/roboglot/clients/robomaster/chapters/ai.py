@@ -1,8 +1,8 @@
-"""The AI, camera, stream, audio and game chapters (manual 3.2.15 to 3.2.18, 3.2.20)."""
+"""The AI chapter (manual 3.2.15)."""
 
 from __future__ import annotations
 
-from roboglot.clients.robomaster.chapter import Chapter, on_off
+from roboglot.clients.robomaster.calls import Chapter, on_off
 
 
 class Ai(Chapter):
@@ -34,47 +34,3 @@ class Ai(Chapter):
             person=on_off(person), gesture=on_off(gesture), marker=on_off(marker), robot=on_off(robot),
             line=on_off(line), people=on_off(people), pose=on_off(pose),
         )  # fmt: skip
-
-
-class Camera(Chapter):
-    """``client.camera``."""
-
-    async def exposure(self, ev_level: str) -> None:
-        """default, small, medium, large (3.2.16.1)."""
-        await self._do("camera exposure", ev_level)
-
-
-class Stream(Chapter):
-    """``client.stream``; ``client.video()`` has the pictures."""
-
-    async def on(self) -> None:
-        """3.2.17.1."""
-        await self._do("stream on")
-
-    async def off(self) -> None:
-        """3.2.17.2."""
-        await self._do("stream off")
-
-
-class Audio(Chapter):
-    """``client.audio``; ``client.sounds()`` has the packets."""
-
-    async def on(self) -> None:
-        """3.2.18.1."""
-        await self._do("audio on")
-
-    async def off(self) -> None:
-        """3.2.18.2."""
-        await self._do("audio off")
-
-
-class GameMessages(Chapter):
-    """``client.game_msg``: the pilot's keyboard and mouse come as GameInput."""
-
-    async def on(self) -> None:
-        """3.2.20.1."""
-        await self._do("game_msg on")
-
-    async def off(self) -> None:
-        """3.2.20.2."""
-        await self._do("game_msg off")

@@ -1,8 +1,8 @@
-"""The gimbal and blaster chapters (manual 3.2.4, 3.2.5). Degrees, degrees/s; pitch up and yaw right are positive."""
+"""The gimbal chapter (manual 3.2.4). Degrees, degrees/s; pitch up and yaw right are positive."""
 
 from __future__ import annotations
 
-from roboglot.clients.robomaster.chapter import Chapter, on_off
+from roboglot.clients.robomaster.calls import Chapter, on_off
 from roboglot.wire.robomaster.telemetry import GimbalAttitude
 
 
@@ -60,19 +60,3 @@ class Gimbal(Chapter):
     async def push(self, attitude: bool, afreq: int | None = None) -> None:
         """Switch GimbalAttitude on or off (3.2.4.8)."""
         await self._do("gimbal push", attitude=on_off(attitude), afreq=afreq)
-
-
-class Blaster(Chapter):
-    """``client.blaster``."""
-
-    async def bead(self, num: int) -> None:
-        """Set the beads per shot (3.2.5.1)."""
-        await self._do("blaster bead", num)
-
-    async def fire(self) -> None:
-        """3.2.5.2."""
-        await self._do("blaster fire")
-
-    async def get_bead(self) -> int:
-        """3.2.5.3."""
-        return round(await self._number("blaster bead"))

@@ -10,7 +10,7 @@ from roboglot.wire.slamware.geometry import Pose3D
 from roboglot.wire.slamware.slam import ImuData, Switch
 
 
-class Slam(Chapter):
+class Localization(Chapter):
     """Chapter "slam"."""
 
     @call("GET /api/core/slam/v1/localization/pose")

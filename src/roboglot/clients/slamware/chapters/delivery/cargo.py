@@ -9,7 +9,7 @@ from roboglot.clients.slamware.calls import Chapter, call
 from roboglot.wire.slamware.delivery import AssignedCargo, Box, Cargo, OperationResult
 
 
-class DeliveryCargo(Chapter):
+class Boxes(Chapter):
     """Chapter "delivery"."""
 
     @call("GET /api/delivery/v1/cargos")

@@ -22,7 +22,7 @@ from roboglot.wire.slamware.delivery import (
 from roboglot.wire.slamware.motion import MoveOptions
 
 
-class Delivery(Chapter):
+class Admin(Chapter):
     """Chapter "delivery"."""
 
     @call("GET /api/delivery/v1/admin/password")

@@ -1,11 +1,11 @@
-"""The robot and chassis chapters (manual 3.2.2, 3.2.3). m, m/s, degrees, rpm; x forward, y right, z clockwise."""
+"""The chassis chapter (manual 3.2.3). m, m/s, degrees, rpm; x forward, y right, z clockwise."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from roboglot.clients.errors import BadAnswer
-from roboglot.clients.robomaster.chapter import Chapter, on_off
+from roboglot.clients.robomaster.calls import Chapter, on_off
 from roboglot.wire.robomaster.telemetry import ChassisAttitude, ChassisStatus, status_of
 
 
@@ -29,22 +29,6 @@ class ChassisPose:
     x: float
     y: float
     z: float
-
-
-class RobotChapter(Chapter):
-    """``client.robot``: mode and battery."""
-
-    async def mode(self, mode: str) -> None:
-        """chassis_lead, gimbal_lead or free (3.2.2.1)."""
-        await self._do("robot mode", mode)
-
-    async def get_mode(self) -> str:
-        """3.2.2.2."""
-        return (await self._words("robot mode", 1))[0]
-
-    async def get_battery(self) -> int:
-        """Percent (3.2.2.3)."""
-        return round(await self._number("robot battery"))
 
 
 class Chassis(Chapter):

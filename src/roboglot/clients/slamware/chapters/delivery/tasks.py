@@ -16,7 +16,7 @@ from roboglot.wire.slamware.delivery import (
 )
 
 
-class DeliveryTasks(Chapter):
+class Tasks(Chapter):
     """Chapter "delivery"."""
 
     @call("GET /api/delivery/v1/tasks")

@@ -1,4 +1,4 @@
-"""Chapters "firmware", "statistics", "sensors", "application" and "platform": their operations as typed methods."""
+"""Chapters "firmware" and "application": their operations as typed methods."""
 
 # mypy: disable-error-code="empty-body"
 # The bodies are made by @call from the signatures.
@@ -7,14 +7,12 @@ from __future__ import annotations
 
 from roboglot.clients.slamware.calls import Chapter, call
 from roboglot.clients.slamware.values import InstalledApp, Outcome, UpdateProgress
-from roboglot.wire.slamware.devices import DisabledSensor, SensorSwitch
 from roboglot.wire.slamware.firmware import FirmwareInfo
-from roboglot.wire.slamware.platform import RobotEvent
 from roboglot.wire.slamware.slam import Switch
 
 
-class Upkeep(Chapter):
-    """Maintenance of a robot: versions, totals, switches, apps, events."""
+class Firmware(Chapter):
+    """Updates, and installed apps."""
 
     @call("GET /api/core/firmware/v1/newversion")
     async def get_new_version(self) -> FirmwareInfo:
@@ -40,26 +38,6 @@ class Upkeep(Chapter):
     async def get_firmware_progress(self) -> UpdateProgress:
         """Return the progress of the update."""
 
-    @call("GET /api/core/statistics/v1/odometry")
-    async def get_odometry(self) -> float:
-        """Metres travelled."""
-
-    @call("GET /api/core/statistics/v1/runtime")
-    async def get_runtime(self) -> float:
-        """Seconds of robot time."""
-
-    @call("PUT /api/core/sensors/v1/depth/:enable")
-    async def set_depth_sensor_state(self, body: Switch) -> None:
-        """Switch the depth camera."""
-
-    @call("GET /api/core/sensors/v1/masks")
-    async def get_disabled_sensors_mask_data(self) -> list[DisabledSensor]:
-        """The sensors that are switched off."""
-
-    @call("PUT /api/core/sensors/v1/masks")
-    async def set_sensor_mask(self, body: list[SensorSwitch]) -> bool:
-        """Switch sensors off and on, all or none; 404 if one does not exist."""
-
     @call("GET /api/core/application/v1/apps")
     async def get_apps(self) -> list[InstalledApp]:
         """The apps that people installed."""
@@ -71,11 +49,3 @@ class Upkeep(Chapter):
     @call("DELETE /api/core/application/v1/apps/{app_name}")
     async def delete_app(self, app_name: str) -> None:
         """Remove one, or 404."""
-
-    @call("GET /api/platform/v1/timestamp")
-    async def get_timestamp(self) -> str:
-        """Milliseconds since the start, as text."""
-
-    @call("GET /api/platform/v1/events")
-    async def get_events(self) -> list[RobotEvent]:
-        """Return the events since the last call."""
