@@ -40,8 +40,8 @@ from roboglot.clients.errors import ClientError
 from roboglot.model.clock import Clock, RealClock
 from roboglot.model.feed import Feed, Viewer
 from roboglot.wire.cyberdog.channel import APP_PORT, ROBOT_PORT
+from roboglot.wire.cyberdog.chapters.camera import BadSignal, read_signal
 from roboglot.wire.cyberdog.codes import Code
-from roboglot.wire.cyberdog.signalling import BadSignal, read_signal
 from roboglot.wire.cyberdog.text import NotJson, read_params
 
 log = logging.getLogger(__name__)

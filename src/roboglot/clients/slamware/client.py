@@ -37,7 +37,7 @@ from roboglot.clients.slamware.chapters.system.system import System
 from roboglot.clients.slamware.http import HttpLink
 from roboglot.clients.slamware.running import RunningAction
 from roboglot.model.clock import Clock, RealClock
-from roboglot.wire.slamware.motion import ActionInfo, ActionRequest
+from roboglot.wire.slamware.chapters.motion import ActionInfo, ActionRequest
 
 PORT = 1448
 PREFIX = "slamtec.agent.actions."  # of the names of firmware 3 to 5; 6 has a shorter one

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from roboglot.clients.errors import ClientError, LinkLost
 from roboglot.clients.slamware.calls import SlamwareRefused
 from roboglot.model.clock import Clock
-from roboglot.wire.slamware.motion import ActionInfo, ActionState, Result, State
+from roboglot.wire.slamware.chapters.motion import ActionInfo, ActionState, Result, State
 
 if TYPE_CHECKING:
     from roboglot.clients.slamware.chapters.motion import Motion

@@ -9,8 +9,8 @@ import msgspec
 
 from roboglot.clients.cyberdog.calls import Calls, CyberDogRefused
 from roboglot.clients.errors import LinkLost
+from roboglot.wire.cyberdog.chapters.motion.motion import CommandType, Motion, MotionCode
 from roboglot.wire.cyberdog.codes import Code
-from roboglot.wire.cyberdog.motions import CommandType, Motion, MotionCode
 
 FRAME_PERIOD = 0.1  # s; the robot stands still after 0.2 without one
 MOTION_MAX = 25.0  # s: the robot itself answers within 20

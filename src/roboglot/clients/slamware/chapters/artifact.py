@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from roboglot.clients.slamware.calls import Chapter, call
-from roboglot.wire.slamware.artifact import (
+from roboglot.wire.slamware.chapters.artifact import (
     AreaChange,
     AreaRequest,
     AreaUsage,
@@ -16,7 +16,7 @@ from roboglot.wire.slamware.artifact import (
     PoseEntry,
     RectangleArea,
 )
-from roboglot.wire.slamware.slam import Switch
+from roboglot.wire.slamware.chapters.slam.localization import Switch
 
 
 class Artifact(Chapter):

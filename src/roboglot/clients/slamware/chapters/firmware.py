@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from roboglot.clients.slamware.calls import Chapter, call
 from roboglot.clients.slamware.values import InstalledApp, Outcome, UpdateProgress
-from roboglot.wire.slamware.firmware import FirmwareInfo
-from roboglot.wire.slamware.slam import Switch
+from roboglot.wire.slamware.chapters.firmware.firmware import FirmwareInfo
+from roboglot.wire.slamware.chapters.slam.localization import Switch
 
 
 class Firmware(Chapter):

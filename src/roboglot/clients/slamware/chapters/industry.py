@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from roboglot.clients.slamware.calls import Chapter, call
-from roboglot.wire.slamware.industry import (
+from roboglot.wire.slamware.chapters.industry import (
     CommonResponse,
     IndustryTask,
     LandingPose,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from roboglot.clients.slamware.calls import Chapter, call
 from roboglot.clients.slamware.values import ActionReport
-from roboglot.wire.slamware.motion import (
+from roboglot.wire.slamware.chapters.motion import (
     ActionFactory,
     ActionInfo,
     ActionRequest,

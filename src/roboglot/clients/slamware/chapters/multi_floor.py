@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from roboglot.clients.slamware.calls import Chapter, call
 from roboglot.clients.slamware.values import ElevatorInfo
-from roboglot.wire.slamware.motion import PathPoints
-from roboglot.wire.slamware.multi_floor import (
+from roboglot.wire.slamware.chapters.motion import PathPoints
+from roboglot.wire.slamware.chapters.multi_floor import (
     BoundDock,
     CurrentFloorInfo,
     DockChoice,
@@ -24,7 +24,7 @@ from roboglot.wire.slamware.multi_floor import (
     TrackQuery,
     Unbinding,
 )
-from roboglot.wire.slamware.stcm import CompositeMap
+from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap
 
 
 class MultiFloor(Chapter):

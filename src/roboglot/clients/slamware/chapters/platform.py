@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from roboglot.clients.slamware.calls import Chapter, call
-from roboglot.wire.slamware.platform import RobotEvent
+from roboglot.wire.slamware.chapters.platform import RobotEvent
 
 
 class Platform(Chapter):

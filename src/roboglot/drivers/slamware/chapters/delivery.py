@@ -18,7 +18,7 @@ from roboglot.model.components.logistics.cargo import (
 from roboglot.model.errors import Blocked, Expired, NotFound
 from roboglot.model.events import BoxChanged
 from roboglot.model.robot import Robot
-from roboglot.wire.slamware.delivery import Box
+from roboglot.wire.slamware.chapters.delivery import Box
 
 PERIOD = 0.2  # s between two polls
 MOVED_WITHIN = 60.0  # s until a door must have opened or closed

@@ -19,15 +19,15 @@ from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid
 from roboglot.wire.slamware import geometry
-from roboglot.wire.slamware.motion import (
+from roboglot.wire.slamware.chapters.motion import (
     ActionInfo,
     RecoverLocalizationOptions,
     RecoverMovement,
     RelocalizationOptions,
 )
-from roboglot.wire.slamware.slam import NewOrigin, Switch
-from roboglot.wire.slamware.stcm import CompositeMap
-from roboglot.wire.slamware.stcm_layers import grid_layer
+from roboglot.wire.slamware.chapters.slam.localization import NewOrigin, Switch
+from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap
+from roboglot.wire.slamware.chapters.slam.stcm_layers import grid_layer
 
 Replacing = Callable[[], AbstractAsyncContextManager[None]]
 

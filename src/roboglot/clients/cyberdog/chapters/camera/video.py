@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from roboglot.clients.cyberdog.calls import Calls, CyberDogRefused
 from roboglot.clients.errors import LinkLost, TimedOut
 from roboglot.model.feed import Feed, Viewer
+from roboglot.wire.cyberdog.chapters.camera import Description, End, Failure, Screen, Signal, fields_of
 from roboglot.wire.cyberdog.codes import Code
-from roboglot.wire.cyberdog.signalling import Description, End, Failure, Screen, Signal, fields_of
 from roboglot.wire.ice import offer_loopback
 
 if TYPE_CHECKING:

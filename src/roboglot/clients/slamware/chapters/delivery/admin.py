@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from roboglot.clients.slamware.calls import Chapter, call
-from roboglot.wire.slamware.delivery import (
+from roboglot.wire.slamware.chapters.delivery import (
     AdminPassword,
     Configuration,
     Language,
@@ -19,7 +19,7 @@ from roboglot.wire.slamware.delivery import (
     WorkModeEntry,
     WrappedSettings,
 )
-from roboglot.wire.slamware.motion import MoveOptions
+from roboglot.wire.slamware.chapters.motion import MoveOptions
 
 
 class Admin(Chapter):

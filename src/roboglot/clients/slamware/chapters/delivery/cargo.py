@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from roboglot.clients.slamware.calls import Chapter, call
-from roboglot.wire.slamware.delivery import AssignedCargo, Box, Cargo, OperationResult
+from roboglot.wire.slamware.chapters.delivery import AssignedCargo, Box, Cargo, OperationResult
 
 
 class Boxes(Chapter):

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from roboglot.clients.slamware.calls import Chapter, call
-from roboglot.wire.slamware.delivery import (
+from roboglot.wire.slamware.chapters.delivery import (
     DeliveryTask,
     TaskCreated,
     TaskExecution,

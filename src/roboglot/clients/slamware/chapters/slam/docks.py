@@ -6,8 +6,8 @@
 from __future__ import annotations
 
 from roboglot.clients.slamware.calls import Chapter, call
-from roboglot.wire.slamware.artifact import PoseChange, PoseEntry
-from roboglot.wire.slamware.slam import Registration
+from roboglot.wire.slamware.chapters.artifact import PoseChange, PoseEntry
+from roboglot.wire.slamware.chapters.slam.localization import Registration
 
 
 class Docks(Chapter):

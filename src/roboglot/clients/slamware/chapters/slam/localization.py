@@ -6,8 +6,8 @@
 from __future__ import annotations
 
 from roboglot.clients.slamware.calls import Chapter, call
+from roboglot.wire.slamware.chapters.slam.localization import ImuData, Switch
 from roboglot.wire.slamware.geometry import Pose3D
-from roboglot.wire.slamware.slam import ImuData, Switch
 
 
 class Localization(Chapter):

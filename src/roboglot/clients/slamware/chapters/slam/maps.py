@@ -6,10 +6,10 @@
 from __future__ import annotations
 
 from roboglot.clients.slamware.calls import Chapter, call
-from roboglot.wire.slamware.explore_map import ExploreMap
+from roboglot.wire.slamware.chapters.slam.explore_map import ExploreMap
+from roboglot.wire.slamware.chapters.slam.localization import NewOrigin
+from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap
 from roboglot.wire.slamware.geometry import Rectangle
-from roboglot.wire.slamware.slam import NewOrigin
-from roboglot.wire.slamware.stcm import CompositeMap
 
 
 class Maps(Chapter):

@@ -9,7 +9,7 @@ from typing import Literal
 
 from roboglot.clients.slamware.calls import Chapter, call
 from roboglot.clients.slamware.values import JackStatus, RawImu, Scan
-from roboglot.wire.slamware.devices import LightControl
+from roboglot.wire.slamware.chapters.system.devices import LightControl
 
 
 class Devices(Chapter):

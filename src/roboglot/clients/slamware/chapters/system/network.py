@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from roboglot.clients.slamware.calls import Chapter, call
 from roboglot.clients.slamware.values import NetworkStatusAnswer
-from roboglot.wire.slamware.network import ApnStatus, NetworkRequest, RouteStatus
+from roboglot.wire.slamware.chapters.system.network import ApnStatus, NetworkRequest, RouteStatus
 
 
 class Network(Chapter):

@@ -6,8 +6,8 @@
 from __future__ import annotations
 
 from roboglot.clients.slamware.calls import Chapter, call
-from roboglot.wire.slamware.devices import DisabledSensor, SensorSwitch
-from roboglot.wire.slamware.slam import Switch
+from roboglot.wire.slamware.chapters.slam.localization import Switch
+from roboglot.wire.slamware.chapters.system.devices import DisabledSensor, SensorSwitch
 
 
 class Sensors(Chapter):

@@ -6,8 +6,14 @@
 from __future__ import annotations
 
 from roboglot.clients.slamware.calls import Chapter, call
-from roboglot.wire.slamware.devices import Parameter, Restart, Shutdown
-from roboglot.wire.slamware.system import BaseHealthInfo, BatteryPack, Capability, DeviceInfo, PowerStatus
+from roboglot.wire.slamware.chapters.system.devices import Parameter, Restart, Shutdown
+from roboglot.wire.slamware.chapters.system.system import (
+    BaseHealthInfo,
+    BatteryPack,
+    Capability,
+    DeviceInfo,
+    PowerStatus,
+)
 
 
 class System(Chapter):

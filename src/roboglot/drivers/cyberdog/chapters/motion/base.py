@@ -15,7 +15,7 @@ from roboglot.model.clock import Clock
 from roboglot.model.components.motion.base import BaseLimits
 from roboglot.model.components.system.link import US, Link
 from roboglot.model.geometry import STILL, Twist
-from roboglot.wire.cyberdog.motions import Motion
+from roboglot.wire.cyberdog.chapters.motion.motion import Motion
 
 SPEED, SIDE_SPEED, YAW_SPEED = 0.6, 0.2, 1.3  # m/s, m/s, rad/s of the slow trot
 ACCELERATION, YAW_ACCELERATION = 1.0, 3.0  # not reported; only used to plan

@@ -35,8 +35,8 @@ from roboglot.model.components.motion.motions import Motion as Figure
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.geometry import LEVEL, STILL, Orientation
 from roboglot.model.robot import Robot
+from roboglot.wire.cyberdog.chapters.motion.motion import Motion
 from roboglot.wire.cyberdog.codes import InBandError
-from roboglot.wire.cyberdog.motions import Motion
 
 HEIGHTS = {Posture.STANDING: 0.22, Posture.LYING: 0.05, Posture.LIMP: 0.05}  # m, of the belly; not reported
 LIMITS = LegLimits(

@@ -14,9 +14,9 @@ from roboglot.model.components.mapping.annotations import (
     LineKind,
 )
 from roboglot.model.geometry import Point
-from roboglot.wire.slamware import artifact as wire
 from roboglot.wire.slamware import geometry
-from roboglot.wire.slamware.artifact import AreaUsage, LineUsage, MetadataError
+from roboglot.wire.slamware.chapters import artifact as wire
+from roboglot.wire.slamware.chapters.artifact import AreaUsage, LineUsage, MetadataError
 
 Usage = LineUsage | AreaUsage
 LINES = {LineUsage.WALLS: LineKind.WALL, LineUsage.TRACKS: LineKind.TRACK}

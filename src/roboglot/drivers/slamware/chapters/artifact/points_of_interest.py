@@ -8,7 +8,7 @@ from collections.abc import Collection, Hashable, Mapping, Sequence
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
 from roboglot.model.geometry import Pose
 from roboglot.model.maps import PointOfInterest
-from roboglot.wire.slamware.artifact import PoseEntry, metadata_text
+from roboglot.wire.slamware.chapters.artifact import PoseEntry, metadata_text
 from roboglot.wire.slamware.geometry import Pose2D
 
 

@@ -19,7 +19,7 @@ from roboglot.model.components.motion.driving import BASE
 from roboglot.model.components.system.link import Link
 from roboglot.model.errors import Busy
 from roboglot.model.robot import Robot
-from roboglot.wire.slamware.motion import ActionInfo, Result, State
+from roboglot.wire.slamware.chapters.motion import ActionInfo, Result, State
 
 PERIOD = 0.1  # s between two polls
 ORPHANS_MAX = 64

@@ -22,8 +22,8 @@ from roboglot.model.components.system.link import Link
 from roboglot.model.errors import Busy
 from roboglot.model.geometry import STILL, Twist
 from roboglot.model.robot import Robot
-from roboglot.wire.slamware.devices import Parameter
-from roboglot.wire.slamware.motion import Direction, MoveByOptions
+from roboglot.wire.slamware.chapters.motion import Direction, MoveByOptions
+from roboglot.wire.slamware.chapters.system.devices import Parameter
 
 PULSE = 0.4  # s that the robot goes on without a new pulse
 RENEWAL = 0.1  # s between two pulses

@@ -12,7 +12,7 @@ from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.errors import Refused
 from roboglot.model.geometry import Pose
-from roboglot.wire.slamware.motion import ActionInfo, GoHomeOptions
+from roboglot.wire.slamware.chapters.motion import ActionInfo, GoHomeOptions
 
 OFF = 0.6  # m straight ahead, off the contacts and with room to turn
 

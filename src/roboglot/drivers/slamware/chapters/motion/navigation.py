@@ -21,7 +21,13 @@ from roboglot.model.components.motion.navigation import (
 from roboglot.model.errors import InvalidGoal, Refused, Unreachable
 from roboglot.model.geometry import Path, Point
 from roboglot.wire.slamware import geometry
-from roboglot.wire.slamware.motion import ActionInfo, MoveOptions, MoveToOptions, PathQuery, SeriesMoveToOptions
+from roboglot.wire.slamware.chapters.motion import (
+    ActionInfo,
+    MoveOptions,
+    MoveToOptions,
+    PathQuery,
+    SeriesMoveToOptions,
+)
 
 if TYPE_CHECKING:
     import numpy as np

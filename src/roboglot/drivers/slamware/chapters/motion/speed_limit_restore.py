@@ -8,7 +8,7 @@ from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
 from roboglot.model.components.system.link import Link
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.robot import Robot
-from roboglot.wire.slamware.devices import Parameter
+from roboglot.wire.slamware.chapters.system.devices import Parameter
 
 PARAMETER = "base.max_moving_speed"
 SETTING = "slamware_driver.owed_speed"  # the setting: the robot's URL and its limit, m/s

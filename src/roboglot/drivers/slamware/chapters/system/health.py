@@ -11,8 +11,8 @@ from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.components.system.health import FaultLevel, Health
 from roboglot.model.events import BrakeChanged, EmergencyStopChanged
 from roboglot.model.robot import Robot
-from roboglot.wire.slamware.devices import Parameter
-from roboglot.wire.slamware.system import BaseError, Level, Part
+from roboglot.wire.slamware.chapters.system.devices import Parameter
+from roboglot.wire.slamware.chapters.system.system import BaseError, Level, Part
 
 LEVELS = {Level.WARN: FaultLevel.WARNING, Level.ERROR: FaultLevel.ERROR, Level.FATAL: FaultLevel.FATAL}
 STOP, BRAKE = "emergency stop", "brake released"

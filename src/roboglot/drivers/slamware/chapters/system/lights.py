@@ -12,7 +12,7 @@ from roboglot.model.components.interaction.light import (
     LightEffect,
     ZoneState,
 )
-from roboglot.wire.slamware.devices import Channel, Half, LightColour, LightControl, Mode
+from roboglot.wire.slamware.chapters.system.devices import Channel, Half, LightColour, LightControl, Mode
 
 LAMPS = 20  # of each strip; assumed
 HALVES = {

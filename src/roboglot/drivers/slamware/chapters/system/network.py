@@ -20,7 +20,13 @@ from roboglot.model.components.system.network import (
 )
 from roboglot.model.errors import Expired, InvalidGoal
 from roboglot.model.robot import Robot
-from roboglot.wire.slamware.network import ApnStatus, NetworkRequest, RequestedMode, RouteStatus, StationOptions
+from roboglot.wire.slamware.chapters.system.network import (
+    ApnStatus,
+    NetworkRequest,
+    RequestedMode,
+    RouteStatus,
+    StationOptions,
+)
 
 JOINED_WITHIN, PERIOD = 30.0, 0.5  # s
 

@@ -12,7 +12,7 @@ from roboglot.model.components.energy.power import POWER, Power, PowerMode
 from roboglot.model.errors import Expired, InvalidGoal, Refused
 from roboglot.model.events import PowerModeChanged
 from roboglot.model.robot import Robot
-from roboglot.wire.slamware.devices import Shutdown
+from roboglot.wire.slamware.chapters.system.devices import Shutdown
 
 MODES = {"awake": PowerMode.AWAKE, "waking_up": PowerMode.WAKING_UP, "asleep": PowerMode.ASLEEP}
 PERIOD = 0.25  # s between two polls

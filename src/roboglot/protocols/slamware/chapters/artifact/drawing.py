@@ -15,9 +15,9 @@ from roboglot.model.components.mapping.map_memory import Drawings
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import PointOfInterest
-from roboglot.wire.slamware import artifact as wire
 from roboglot.wire.slamware import geometry
-from roboglot.wire.slamware.artifact import AreaUsage, LineUsage, MetadataError
+from roboglot.wire.slamware.chapters import artifact as wire
+from roboglot.wire.slamware.chapters.artifact import AreaUsage, LineUsage, MetadataError
 
 SPEED_MAX, ESCAPE_MAX, ROBOTS_MAX = 100.0, 1000.0, 1000.0  # m/s, m, robots
 

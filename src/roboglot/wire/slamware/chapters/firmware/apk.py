@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import BinaryIO
 
-from roboglot.wire.slamware.packages import BadPackage, entry_of
+from roboglot.wire.slamware.chapters.firmware.packages import BadPackage, entry_of
 
 MANIFEST = "AndroidManifest.xml"
 XML, STRINGS, RESOURCE_IDS, ELEMENT = 0x0003, 0x0001, 0x0180, 0x0102

@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from roboglot.wire.slamware.delivery import CargoEntry, Location
-from roboglot.wire.slamware.industry import OPERATIONS_MAX, WAIT_MAX
+from roboglot.wire.slamware.chapters.delivery import CargoEntry, Location
+from roboglot.wire.slamware.chapters.industry import OPERATIONS_MAX, WAIT_MAX
 
 Number = Annotated[str, msgspec.Meta(pattern=r"^[\w.-]{1,64}$")]
 

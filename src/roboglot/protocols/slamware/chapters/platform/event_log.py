@@ -37,8 +37,8 @@ from roboglot.protocols.slamware.chapters.motion.occupancy import stands_in_some
 from roboglot.protocols.slamware.chapters.multi_floor.elevator_events import RideEvents
 from roboglot.protocols.slamware.chapters.system.charging_monitor import ChargingWatch
 from roboglot.protocols.slamware.vocabulary import action_word, milliseconds
-from roboglot.wire.slamware.delivery import DeliveryEvent
-from roboglot.wire.slamware.platform import ElevatorEvent, GeneralEvent, RobotEvent
+from roboglot.wire.slamware.chapters.delivery import DeliveryEvent
+from roboglot.wire.slamware.chapters.platform import ElevatorEvent, GeneralEvent, RobotEvent
 
 EVENTS_MAX = 256  # the oldest unread ones are dropped beyond this
 HOMING = ("GoHomeAction", "MultiFloorBackHomeAction")

@@ -1,10 +1,10 @@
-"""Chapter "slam": switches, the IMU. The explore map has its own file."""
+"""Chapter "slam": switches, the IMU. Maps have files of their own."""
 
 from __future__ import annotations
 
 import msgspec
 
-from roboglot.wire.slamware.artifact import Metadata
+from roboglot.wire.slamware.chapters.artifact import Metadata
 from roboglot.wire.slamware.geometry import Location, Point, Quaternion
 
 

@@ -12,7 +12,7 @@ import struct
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from roboglot.wire.slamware.explore_map import BadMap
+from roboglot.wire.slamware.chapters.slam.explore_map import BadMap
 
 MAGIC = b"STCM"
 VERSION = (18, 1, 1, 1)

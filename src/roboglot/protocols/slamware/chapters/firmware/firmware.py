@@ -11,14 +11,14 @@ from roboglot.model.components.system.disk import Disk
 from roboglot.model.components.system.firmware import Firmware, FirmwarePackage, FirmwareState
 from roboglot.model.errors import Refused, RobotError
 from roboglot.operations import Right
-from roboglot.protocols.slamware.chapters.uploads import Upload
+from roboglot.protocols.slamware.chapters.firmware.uploads import Upload
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import HttpError
 from roboglot.protocols.slamware.table import TABLE
-from roboglot.wire.slamware.apk import read_apk
-from roboglot.wire.slamware.firmware import FirmwareInfo
-from roboglot.wire.slamware.packages import BadPackage, read_firmware
-from roboglot.wire.slamware.slam import Switch
+from roboglot.wire.slamware.chapters.firmware.apk import read_apk
+from roboglot.wire.slamware.chapters.firmware.firmware import FirmwareInfo
+from roboglot.wire.slamware.chapters.firmware.packages import BadPackage, read_firmware
+from roboglot.wire.slamware.chapters.slam.localization import Switch
 
 API, APPS = "/api/core/firmware/v1", "/api/core/application/v1/apps"
 SUCCESS, ERROR, INIT, UPGRADE = range(4)

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, TypeVar
 import msgspec
 
 from roboglot.extras import lazy
-from roboglot.wire.slamware.explore_map import CELLS_MAX, BadMap, ExploreMap
+from roboglot.wire.slamware.chapters.slam.explore_map import CELLS_MAX, BadMap, ExploreMap
+from roboglot.wire.slamware.chapters.slam.stcm import Layer, Pairs, Reader, pack_pairs, pack_text
 from roboglot.wire.slamware.geometry import COORDINATE_MAX, Metres, Radians
-from roboglot.wire.slamware.stcm import Layer, Pairs, Reader, pack_pairs, pack_text
 
 if TYPE_CHECKING:
     import numpy as np

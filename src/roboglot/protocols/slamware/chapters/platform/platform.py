@@ -7,7 +7,7 @@ from roboglot.operations import Right
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
 from roboglot.protocols.slamware.vocabulary import milliseconds
-from roboglot.wire.slamware.platform import RobotEvent
+from roboglot.wire.slamware.chapters.platform import RobotEvent
 
 API = "/api/platform/v1"
 
