@@ -21,11 +21,11 @@ DOCK = artifact.PoseEntry("0d0c0000-1f6e-4c43-8a5e-9b3d2f1c0a77", Pose2D(0.0, 0.
 MOVED = artifact.PoseChange(Pose3D(1.1, 0.5, 0.0, 0.3))
 WALLS, FORBIDDEN = artifact.LineUsage.WALLS, artifact.AreaUsage.FORBIDDEN
 LINES = [artifact.Line(Point(3.0, 3.0), Point(4.0, 3.0), 1)]
-AREA = artifact.Rectangle(Point(3.0, 3.0), Point(4.0, 3.0), 0.5)
+AREA = artifact.Strip(Point(3.0, 3.0), Point(4.0, 3.0), 0.5)
 LIGHT = devices.LightControl(
     devices.Channel.ONE, devices.Half.LEFT, devices.Mode.BLINK, devices.LightColour(255), bright_ms=500, off_ms=500
 )
-ORDER = delivery.TaskRequest(delivery.Location("101"), "GUIDE")
+ORDER = delivery.TaskRequest(delivery.Destination("101"), "GUIDE")
 
 # What each operation is called with, where it takes anything.
 VALUES: dict[str, dict[str, Any]] = {

@@ -82,7 +82,7 @@ class Line(msgspec.Struct):
 Lines = Annotated[list[Line], msgspec.Meta(max_length=10_000)]
 
 
-class Rectangle(msgspec.Struct):
+class Strip(msgspec.Struct):
     """``half_width`` m to both sides of the centre line."""
 
     start: Point
@@ -93,14 +93,14 @@ class Rectangle(msgspec.Struct):
 class AreaRequest(msgspec.Struct):
     """A new area."""
 
-    area: Rectangle
+    area: Strip
     metadata: Metadata = None
 
 
 class AreaChange(msgspec.Struct):
     """New place, new metadata, or both; what is absent stays."""
 
-    area: Rectangle | None = None
+    area: Strip | None = None
     metadata: Metadata = None
 
 
@@ -109,7 +109,7 @@ class RectangleArea(msgspec.Struct):
 
     id: int
     usage: AreaUsage
-    area: Rectangle
+    area: Strip
     metadata: dict[str, str]
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from roboglot.wire.slamware.chapters.delivery import CargoEntry, Location
+from roboglot.wire.slamware.chapters.delivery import CargoEntry, Destination
 from roboglot.wire.slamware.chapters.industry import OPERATIONS_MAX, WAIT_MAX
 
 Number = Annotated[str, msgspec.Meta(pattern=r"^[\w.-]{1,64}$")]
@@ -31,7 +31,7 @@ class CloudTask(msgspec.Struct):
         "TAKEOUT", "GUIDE", "FOOD_DELIVERY", "RETURN", "RECYCLE", "TAKEOUT_DISTRIBUTE",
         "STATION_TAKEOUT", "INDUSTRY", "DISINFECT",
     ]  # fmt: skip
-    location: Location | None = None
+    location: Destination | None = None
     cargos: Annotated[list[CargoEntry], msgspec.Meta(max_length=OPERATIONS_MAX)] | None = None
     task_targets: Annotated[list[RoundTarget], msgspec.Meta(max_length=OPERATIONS_MAX)] = []
     order_id: Number = ""

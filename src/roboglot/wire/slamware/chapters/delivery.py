@@ -43,7 +43,7 @@ class CargoEntry(msgspec.Struct):
     boxes: Annotated[list[Annotated[str, msgspec.Meta(pattern=r"^\d{1,6}$")] | int], msgspec.Meta(max_length=50)]
 
 
-class Location(msgspec.Struct):
+class Destination(msgspec.Struct):
     """Target and stops on the way."""
 
     poi_name: Name
@@ -53,7 +53,7 @@ class Location(msgspec.Struct):
 class TaskRequest(msgspec.Struct):
     """Body of POST tasks."""
 
-    location: Location
+    location: Destination
     type: Literal["TAKEOUT", "GUIDE", "FOOD_DELIVERY", "RETURN", "RECYCLE", "TAKEOUT_DISTRIBUTE"]
     cargos: Annotated[list[CargoEntry], msgspec.Meta(max_length=ENTRIES_MAX)] | None = None
 

@@ -81,7 +81,7 @@ class SlamwareDrawings:
             usage = next(usage for usage, kind in LINES.items() if kind is drawing.kind)
             await self._client.add_lines(usage, [wire.Line(start, end, 0, metadata)])
         else:
-            rectangle = wire.Rectangle(start, end, drawing.half_width)
+            rectangle = wire.Strip(start, end, drawing.half_width)
             request = wire.AreaRequest(rectangle, metadata)
             await self._client.add_rectangle_area(AreaUsage[drawing.kind.name], request)
 

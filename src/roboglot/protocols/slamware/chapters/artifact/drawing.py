@@ -42,7 +42,7 @@ def wire_line(line: Line) -> wire.Line:
     return wire.Line(_wire_point(line.start), _wire_point(line.end), line.id, dict(line.metadata))
 
 
-def area_of(usage: AreaUsage, rectangle: wire.Rectangle, metadata: dict[str, str], id: int = 0) -> Area:
+def area_of(usage: AreaUsage, rectangle: wire.Strip, metadata: dict[str, str], id: int = 0) -> Area:
     """The model's area, with what its metadata ask for. Raises InvalidGoal for values that make no sense."""
     try:
         robots = wire.number(metadata, "restricted_robots_number_limit", ROBOTS_MAX)
@@ -64,7 +64,7 @@ def area_of(usage: AreaUsage, rectangle: wire.Rectangle, metadata: dict[str, str
 
 def wire_area(area: Area) -> wire.RectangleArea:
     """As the API writes it."""
-    rectangle = wire.Rectangle(_wire_point(area.start), _wire_point(area.end), area.half_width)
+    rectangle = wire.Strip(_wire_point(area.start), _wire_point(area.end), area.half_width)
     return wire.RectangleArea(area.id, AREA_USAGES[area.kind], rectangle, dict(area.metadata))
 
 

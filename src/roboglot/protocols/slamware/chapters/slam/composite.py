@@ -195,7 +195,7 @@ def _line(usage: str, entry: LineEntry) -> Line:
 
 
 def _area(entry: AreaEntry) -> Area:
-    rectangle = artifact.Rectangle(
+    rectangle = artifact.Strip(
         geometry.Point(entry.x1, entry.y1), geometry.Point(entry.x2, entry.y2), abs(entry.half_width)
     )
     try:
