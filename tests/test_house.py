@@ -20,6 +20,12 @@ FUNCTION_MAX = 50  # lines, without the docstring
 GENERATED = ("_pb2.py", "_pb2_grpc.py")
 WORDS_MAX = 5  # in 10,000 lines
 COLUMNS_MAX = 120  # of a line of docs; table rows, code and what is generated may be longer
+CHAPTERLESS = {  # modules of a vendor's package that belong to no chapter of its manual
+    "wire": "annexb channel cloud codes commands geometry lines messages orders proto relay replies requests telemetry "
+    "text versions zenoh",
+    "clients": "calls client cloud control datagrams errors events http link media pairing running texts values",
+    "drivers": "capabilities components driver media_feed motion state telemetry vocabulary watchdog watchdog_process",
+}
 SOURCES = sorted(p for p in (ROOT / "src").rglob("*.py") if not p.name.endswith(GENERATED))
 
 TESTS = sorted((ROOT / "tests").rglob("*.py"))
@@ -47,6 +53,23 @@ def test_no_folder_is_crowded() -> None:
     others = [*TESTS, *(ROOT / "docs").rglob("*.md"), *(ROOT / "benchmarks").rglob("*.py")]
     crowds = Counter(path.parent.relative_to(ROOT) for path in [*SOURCES, *others])
     assert {str(folder): n for folder, n in crowds.items() if n > FILES_MAX} == {}
+
+
+def modules_in(folder: Path) -> set[str]:
+    """Names of modules and packages there."""
+    return {path.stem for path in folder.glob("[!_]*") if path.suffix == ".py" or path.is_dir()}
+
+
+@pytest.mark.parametrize("package", CHAPTERLESS)
+def test_chapters_have_the_names_of_the_door(package: str) -> None:
+    """Who knows a chapter of a vendor's manual finds it in every package of the vendor."""
+    sources = ROOT / "src" / "roboglot"
+    doors = {door.name: modules_in(door / "chapters") for door in (sources / "protocols").iterdir() if door.is_dir()}
+    vendors = [folder for folder in (sources / package).iterdir() if folder.name in doors.keys() - {"__pycache__"}]
+    strange = {folder.name: modules_in(folder / "chapters") - doors[folder.name] for folder in vendors}
+    assert {vendor: names for vendor, names in strange.items() if names} == {}
+    beside = set().union(*(modules_in(folder) for folder in vendors)) - {"chapters"}
+    assert sorted(beside) == CHAPTERLESS[package].split()
 
 
 def test_no_file_is_long() -> None:

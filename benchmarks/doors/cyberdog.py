@@ -23,7 +23,7 @@ from roboglot.clients.cyberdog import Certificates, CyberDogClient
 from roboglot.protocols.cyberdog.certificates import ensure_certificates
 from roboglot.testing.process import ServedRobot, served
 from roboglot.wire.cyberdog.channel import ROBOT_NAME, client_options, server_options
-from roboglot.wire.cyberdog.motions import Motion
+from roboglot.wire.cyberdog.chapters.motion.motion import Motion
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2_grpc as service
 

@@ -25,7 +25,7 @@ from roboglot.model.components.motion.base import Base
 from roboglot.model.geometry import Twist
 from roboglot.runtime import Runtime
 from roboglot.testing.process import served
-from roboglot.wire.cyberdog.motions import Motion
+from roboglot.wire.cyberdog.chapters.motion.motion import Motion
 
 ROBOT, FRONT, DRIVER, CLIENT = (f"127.0.55.{number}" for number in (11, 12, 13, 14))
 RELAYED = {"slamware": (1448, 51448), "robomaster": (40923, 50923)}

@@ -29,8 +29,8 @@ from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.simulation.world.world_files import read_ros_grid
 from roboglot.testing import Forward
-from roboglot.wire.slamware.explore_map import BadMap
-from roboglot.wire.slamware.stcm import CompositeMap, Layer, decode_stcm, encode_stcm
+from roboglot.wire.slamware.chapters.slam.explore_map import BadMap
+from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap, Layer, decode_stcm, encode_stcm
 
 CELLS = np.array([[0, -50, 60], [1, -1, 0], [-127, 127, 0]], np.int8)
 PATIENCE = 60.0  # s of the machine's time

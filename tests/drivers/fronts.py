@@ -30,9 +30,9 @@ from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
 from roboglot.storage.programs import program_stores
-from roboglot.wire.cyberdog.motions import Motion
+from roboglot.wire.cyberdog.chapters.motion.motion import Motion
+from roboglot.wire.slamware.chapters.motion import AngleOptions, Direction, MoveByOptions, MoveOptions, MoveToOptions
 from roboglot.wire.slamware.geometry import Location
-from roboglot.wire.slamware.motion import AngleOptions, Direction, MoveByOptions, MoveOptions, MoveToOptions
 from tests.drivers.chain import TextClient
 
 ADDRESS = "127.0.0.80"

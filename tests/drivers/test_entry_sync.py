@@ -17,7 +17,7 @@ from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.testing import Forward
-from roboglot.wire.slamware.artifact import Line, LineUsage
+from roboglot.wire.slamware.chapters.artifact import Line, LineUsage
 from roboglot.wire.slamware.geometry import Point as GPoint
 from tests.drivers.chain import Drive, OpenRest, Until
 

@@ -25,7 +25,7 @@ from roboglot.model.geometry import Point, Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.simulation.world.world import World
 from roboglot.testing import assert_pose
-from roboglot.wire.slamware.motion import Direction, MoveByOptions
+from roboglot.wire.slamware.chapters.motion import Direction, MoveByOptions
 from tests.drivers.bad_link import (
     BACKS,
     SPEED,

@@ -23,7 +23,7 @@ from roboglot.model.events import LinkChanged
 from roboglot.model.geometry import Point, Twist
 from roboglot.model.robot import Robot
 from roboglot.simulation.world.world import World
-from roboglot.wire.slamware.motion import AngleOptions
+from roboglot.wire.slamware.chapters.motion import AngleOptions
 from tests.drivers.bad_link import SPEED, Connect, cut, drives, healed, stands, succeeds, until
 from tests.drivers.chain import Open, OpenRest
 from tests.drivers.rig import Rig

@@ -4,8 +4,15 @@ import math
 
 import pytest
 
+from roboglot.drivers.robomaster.chapters.ai.detections import (
+    ACROSS,
+    PERSON,
+    Locator,
+    PersonTracker,
+    gesture_of,
+    line_of,
+)
 from roboglot.drivers.robomaster.chapters.camera import FOV, HEIGHT, WIDTH
-from roboglot.drivers.robomaster.detections import ACROSS, PERSON, Locator, PersonTracker, gesture_of, line_of
 from roboglot.model.components.sensing.camera import Mount
 from roboglot.model.perception import Box, Colour, Gesture
 from roboglot.wire.robomaster.telemetry import LinePoint, Target

@@ -31,7 +31,7 @@ from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward, assert_pose
-from roboglot.wire.slamware.motion import AngleOptions, Direction, MoveByOptions
+from roboglot.wire.slamware.chapters.motion import AngleOptions, Direction, MoveByOptions
 from tests.drivers.chain import OpenRest
 
 pytestmark = pytest.mark.world("empty", body="robomaster_ep")

@@ -43,7 +43,7 @@ from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.simulation.world.world import World
 from roboglot.storage.database import Database
 from roboglot.testing import Forward, assert_pose
-from roboglot.wire.slamware.motion import AngleOptions
+from roboglot.wire.slamware.chapters.motion import AngleOptions
 from tests.drivers.chain import Open, OpenRest, Script
 
 

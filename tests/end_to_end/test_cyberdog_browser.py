@@ -14,7 +14,7 @@ import pytest
 
 from roboglot.clients.cyberdog import Certificates, CyberDogClient
 from roboglot.testing.process import served
-from roboglot.wire.cyberdog.motions import Motion
+from roboglot.wire.cyberdog.chapters.motion.motion import Motion
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "cyberdog_video.py"
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)

@@ -34,7 +34,7 @@ from roboglot.simulation.world.world import World
 from roboglot.storage.database import Database
 from roboglot.storage.settings import StoredSettings
 from roboglot.testing import Forward
-from roboglot.wire.slamware.motion import AngleOptions
+from roboglot.wire.slamware.chapters.motion import AngleOptions
 
 pytestmark = pytest.mark.world("empty")
 ADDRESS = "127.0.0.83"

@@ -22,8 +22,8 @@ from roboglot.model.tap import Direction, Exchange
 from roboglot.protocols import sections
 from roboglot.recording.reader import read_recording
 from roboglot.runtime import Runtime
+from roboglot.wire.slamware.chapters.motion import MoveOptions, MoveToOptions
 from roboglot.wire.slamware.geometry import Location
-from roboglot.wire.slamware.motion import MoveOptions, MoveToOptions
 
 WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
 ADDRESS = f"127.0.194.{1 + WORKER}"

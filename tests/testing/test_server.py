@@ -12,8 +12,8 @@ import pytest
 
 from roboglot.recording.reader import read_recording
 from roboglot.testing.server import RobotServer
+from roboglot.wire.slamware.chapters.motion import MoveOptions, MoveToOptions
 from roboglot.wire.slamware.geometry import Location
-from roboglot.wire.slamware.motion import MoveOptions, MoveToOptions
 
 PROGRAM = "cyberdog.task.block('one');\nprint('hello')\ncyberdog.task.block('two');\n"
 

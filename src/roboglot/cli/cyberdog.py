@@ -19,8 +19,8 @@ from roboglot.clients.cyberdog import Certificates, CyberDogClient, CyberDogRefu
 from roboglot.clients.cyberdog.values import Grid
 from roboglot.clients.errors import ClientError
 from roboglot.config import load_config
+from roboglot.wire.cyberdog.chapters.motion.motion import Motion
 from roboglot.wire.cyberdog.codes import Feedback
-from roboglot.wire.cyberdog.motions import Motion
 
 NAMES = ("watch", "status", "stand", "lie", "drive", "map", "go", "charge", "photo", "record", "stop")
 LINE_PERIOD = 0.5  # s between two looks

@@ -19,8 +19,8 @@ from roboglot.cli.maps.survey import RADIUS, first_pose, surveyed
 from roboglot.model.maps import OccupancyGrid
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, composite_of, floors_of
 from roboglot.simulation.world.world_files import load_world, read_ros_grid
-from roboglot.wire.slamware.explore_map import BadMap
-from roboglot.wire.slamware.stcm import MAP_BYTES_MAX, decode_stcm, encode_stcm
+from roboglot.wire.slamware.chapters.slam.explore_map import BadMap
+from roboglot.wire.slamware.chapters.slam.stcm import MAP_BYTES_MAX, decode_stcm, encode_stcm
 
 ANSWER_SECONDS_MAX = 30.0
 COMPOSITE = ".stcm"

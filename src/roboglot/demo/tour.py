@@ -24,7 +24,7 @@ from roboglot.demo.reports import (
 )
 from roboglot.model.geometry import Point, Pose, wrap_angle
 from roboglot.model.maps import OccupancyGrid
-from roboglot.wire.slamware.explore_map import decode_explore_map
+from roboglot.wire.slamware.chapters.slam.explore_map import decode_explore_map
 
 HALF_WIDTH = 0.45  # m that must be free on both sides of the way
 WAY_MAX = 2.5  # m a client drives at most

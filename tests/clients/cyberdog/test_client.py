@@ -17,8 +17,8 @@ from roboglot.model.geometry import Point, Pose
 from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.protocols.cyberdog.table import pushes
 from roboglot.wire.contracts import contract
+from roboglot.wire.cyberdog.chapters.camera import End
 from roboglot.wire.cyberdog.codes import Code, SkinMode, TaskType
-from roboglot.wire.cyberdog.signalling import End
 
 pytestmark = pytest.mark.world("office", body="cyberdog2")
 BRACELET = values.Device("C4:7C:8D:00:00:01", "Bracelet", "random")

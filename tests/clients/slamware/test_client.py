@@ -13,8 +13,7 @@ from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward, assert_pose
-from roboglot.wire.slamware.geometry import Location
-from roboglot.wire.slamware.motion import (
+from roboglot.wire.slamware.chapters.motion import (
     ActionInfo,
     AngleOptions,
     Direction,
@@ -22,6 +21,7 @@ from roboglot.wire.slamware.motion import (
     MoveOptions,
     MoveToOptions,
 )
+from roboglot.wire.slamware.geometry import Location
 
 Reply = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
 

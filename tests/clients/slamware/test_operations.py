@@ -10,9 +10,10 @@ from roboglot.protocols.slamware import dispatch
 from roboglot.protocols.slamware.table import TABLE
 from roboglot.testing import Forward
 from roboglot.wire.contracts import contract
-from roboglot.wire.slamware import artifact, delivery, devices, industry, motion, multi_floor, network
+from roboglot.wire.slamware.chapters import artifact, delivery, industry, motion, multi_floor
+from roboglot.wire.slamware.chapters.slam.localization import NewOrigin, Registration, Switch
+from roboglot.wire.slamware.chapters.system import devices, network
 from roboglot.wire.slamware.geometry import Point, Pose2D, Pose3D
-from roboglot.wire.slamware.slam import NewOrigin, Registration, Switch
 
 ON = Switch(True)
 PLACE = artifact.PoseEntry("4b8a7f2c-1f6e-4c43-8a5e-9b3d2f1c0a77", Pose2D(1.0, 0.5, 0.3), {"display_name": "101"})
@@ -20,11 +21,11 @@ DOCK = artifact.PoseEntry("0d0c0000-1f6e-4c43-8a5e-9b3d2f1c0a77", Pose2D(0.0, 0.
 MOVED = artifact.PoseChange(Pose3D(1.1, 0.5, 0.0, 0.3))
 WALLS, FORBIDDEN = artifact.LineUsage.WALLS, artifact.AreaUsage.FORBIDDEN
 LINES = [artifact.Line(Point(3.0, 3.0), Point(4.0, 3.0), 1)]
-AREA = artifact.Rectangle(Point(3.0, 3.0), Point(4.0, 3.0), 0.5)
+AREA = artifact.Strip(Point(3.0, 3.0), Point(4.0, 3.0), 0.5)
 LIGHT = devices.LightControl(
     devices.Channel.ONE, devices.Half.LEFT, devices.Mode.BLINK, devices.LightColour(255), bright_ms=500, off_ms=500
 )
-ORDER = delivery.TaskRequest(delivery.Location("101"), "GUIDE")
+ORDER = delivery.TaskRequest(delivery.Destination("101"), "GUIDE")
 
 # What each operation is called with, where it takes anything.
 VALUES: dict[str, dict[str, Any]] = {

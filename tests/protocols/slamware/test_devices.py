@@ -24,7 +24,7 @@ from roboglot.model.components.system.firmware import Firmware
 from roboglot.model.errors import RobotError
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
-from roboglot.protocols.slamware.chapters.lifetime_totals import TOTALS
+from roboglot.protocols.slamware.chapters.statistics.lifetime_totals import TOTALS
 from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.storage.database import Database

@@ -11,7 +11,7 @@ from roboglot.model.errors import Blocked, DockNotFound, RobotError, Unreachable
 from roboglot.model.events import BatteryChanged, BumperPressed, DockContactChanged, PathBlocked
 from roboglot.model.geometry import Path
 from roboglot.model.robot import Robot
-from roboglot.protocols.slamware.chapters.event_log import EVENTS_MAX
+from roboglot.protocols.slamware.chapters.platform.event_log import EVENTS_MAX
 from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.testing import Forward

@@ -28,8 +28,10 @@ def test_it_describes_what_is_served_and_nothing_else() -> None:
     assert keys == {operation.key for operation in TABLE} | ALIASES.keys()
     ids = [operation["operationId"] for methods in described["paths"].values() for operation in methods.values()]
     assert len(set(ids)) == len(ids)
+    schemas = described["components"]["schemas"]
+    assert [name for name in schemas if "." in name] == []  # two types of one name: msgspec adds their modules
     for reference in references(described):
-        assert reference.rpartition("/")[2] in described["components"]["schemas"], reference
+        assert reference.rpartition("/")[2] in schemas, reference
 
 
 def test_parameters_bodies_and_answers() -> None:

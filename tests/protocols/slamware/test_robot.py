@@ -24,7 +24,7 @@ from roboglot.protocols.slamware.chapters.system.laser import laser_points
 from roboglot.simulation.components.energy.battery import SimulatedBattery
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
-from roboglot.wire.slamware.explore_map import decode_explore_map
+from roboglot.wire.slamware.chapters.slam.explore_map import decode_explore_map
 
 pytestmark = pytest.mark.world("empty")
 SYSTEM, SLAM = "/api/core/system/v1", "/api/core/slam/v1"

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboglot.wire.cyberdog.signalling import (
+from roboglot.wire.cyberdog.chapters.camera import (
     DEFAULT_UID,
     Alignment,
     BadSignal,

@@ -9,7 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from roboglot.wire.slamware.explore_map import HEADER, BadMap, ExploreMap, decode_explore_map, encode_explore_map
+from roboglot.wire.slamware.chapters.slam.explore_map import (
+    HEADER,
+    BadMap,
+    ExploreMap,
+    decode_explore_map,
+    encode_explore_map,
+)
 
 MAP = ExploreMap(-1.5, 2.25, 0.05, np.array([[0, 127, 1], [-1, -127, 0]], np.int8))
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboglot.wire.slamware.apk import Apk, parse_manifest, read_apk
-from roboglot.wire.slamware.packages import ENTRY_MAX, BadPackage, read_firmware
+from roboglot.wire.slamware.chapters.firmware.apk import Apk, parse_manifest, read_apk
+from roboglot.wire.slamware.chapters.firmware.packages import ENTRY_MAX, BadPackage, read_firmware
 from tests.wire.slamware.manifest import archive, manifest
 
 

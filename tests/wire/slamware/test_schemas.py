@@ -8,10 +8,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboglot.wire.slamware.artifact import PoseEntry, metadata_text
+from roboglot.wire.slamware.chapters.artifact import PoseEntry, metadata_text
+from roboglot.wire.slamware.chapters.motion import MoveByOptions, MoveOptions, MoveToOptions
+from roboglot.wire.slamware.chapters.system.system import (
+    DockingStatus,
+    Level,
+    Part,
+    PowerStatus,
+    error_code,
+    health_record,
+)
 from roboglot.wire.slamware.geometry import Pose2D
-from roboglot.wire.slamware.motion import MoveByOptions, MoveOptions, MoveToOptions
-from roboglot.wire.slamware.system import DockingStatus, Level, Part, PowerStatus, error_code, health_record
 
 T = TypeVar("T")
 

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboglot.wire.slamware import stcm, stcm_layers
-from roboglot.wire.slamware.explore_map import BadMap, ExploreMap
-from roboglot.wire.slamware.stcm import CompositeMap, Layer, decode_stcm, encode_stcm
-from roboglot.wire.slamware.stcm_layers import AreaEntry, LineEntry, PoseEntry
+from roboglot.wire.slamware.chapters.slam import stcm, stcm_layers
+from roboglot.wire.slamware.chapters.slam.explore_map import BadMap, ExploreMap
+from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap, Layer, decode_stcm, encode_stcm
+from roboglot.wire.slamware.chapters.slam.stcm_layers import AreaEntry, LineEntry, PoseEntry
 
 TEXTS = st.binary(max_size=20).map(lambda data: data.decode("utf-8", "surrogateescape"))
 PAIRS = st.lists(st.tuples(TEXTS, TEXTS), max_size=4).map(tuple)

@@ -16,7 +16,7 @@ from roboglot.datasets.measures import absolute_error, neighbour_relations, read
 from roboglot.demo.picture import draw
 from roboglot.model.events import LocalizationLost, LocalizationRecovered, LoopClosed
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, composite_of
-from roboglot.wire.slamware.stcm import encode_stcm
+from roboglot.wire.slamware.chapters.slam.stcm import encode_stcm
 
 BAR = 40  # characters
 

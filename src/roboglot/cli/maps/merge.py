@@ -13,8 +13,8 @@ from roboglot.protocols.slamware.chapters.slam.composite import (
     floors_of,
 )
 from roboglot.simulation.world.world_files import read_ros_grid
-from roboglot.wire.slamware.explore_map import BadMap
-from roboglot.wire.slamware.stcm import CompositeMap, Layer, decode_stcm, encode_stcm
+from roboglot.wire.slamware.chapters.slam.explore_map import BadMap
+from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap, Layer, decode_stcm, encode_stcm
 
 FLOORS_MAX = 100
 LABELS = ("building", "floor", "order", "default")

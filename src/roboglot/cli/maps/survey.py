@@ -15,7 +15,7 @@ from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, FloorN
 from roboglot.simulation.building.blueprint import Solid, solids_of
 from roboglot.simulation.world.description import Floor, Lift, WorldDescription
 from roboglot.simulation.world.placing import Places, docks_of
-from roboglot.wire.slamware.stcm import CompositeMap, Layer, encode_stcm
+from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap, Layer, encode_stcm
 
 RESOLUTION = 0.05  # m
 MARGIN = 0.5  # m around a floor

@@ -19,21 +19,29 @@ from typing import Any, TypeVar
 import msgspec
 
 from roboglot.clients.cyberdog.calls import Calls
-from roboglot.clients.cyberdog.camera import Camera
+from roboglot.clients.cyberdog.chapters.camera.camera import Camera
+from roboglot.clients.cyberdog.chapters.camera.video import Video
+from roboglot.clients.cyberdog.chapters.mapping.labels import Labels
+from roboglot.clients.cyberdog.chapters.motion import MotionChapter
+from roboglot.clients.cyberdog.chapters.people.audio import Audio
+from roboglot.clients.cyberdog.chapters.people.faces import Faces
+from roboglot.clients.cyberdog.chapters.people.following import Following
+from roboglot.clients.cyberdog.chapters.people.members import Members
+from roboglot.clients.cyberdog.chapters.programming import Programs
+from roboglot.clients.cyberdog.chapters.system.bluetooth import Bluetooth
+from roboglot.clients.cyberdog.chapters.system.ota import Updates
+from roboglot.clients.cyberdog.chapters.system.settings import Settings
+from roboglot.clients.cyberdog.chapters.system.skin import Skin
+from roboglot.clients.cyberdog.chapters.system.status import Status
+from roboglot.clients.cyberdog.chapters.system.upkeep import Upkeep
 from roboglot.clients.cyberdog.link import Certificates, Heartbeat, Link
-from roboglot.clients.cyberdog.motion import MotionChapter
-from roboglot.clients.cyberdog.programs import Programs
-from roboglot.clients.cyberdog.settings import Settings
-from roboglot.clients.cyberdog.tasks import Tasks
-from roboglot.clients.cyberdog.upkeep import Upkeep
 from roboglot.clients.cyberdog.values import PUSHED, Value
-from roboglot.clients.cyberdog.video import Video
 from roboglot.clients.errors import ClientError
 from roboglot.model.clock import Clock, RealClock
 from roboglot.model.feed import Feed, Viewer
 from roboglot.wire.cyberdog.channel import APP_PORT, ROBOT_PORT
+from roboglot.wire.cyberdog.chapters.camera import BadSignal, read_signal
 from roboglot.wire.cyberdog.codes import Code
-from roboglot.wire.cyberdog.signalling import BadSignal, read_signal
 from roboglot.wire.cyberdog.text import NotJson, read_params
 
 log = logging.getLogger(__name__)
@@ -42,7 +50,23 @@ UNREAD_MAX = 256  # pushes that a slow reader may leave; then it loses them and 
 FOUND_MAX = 20.0  # s until the robot has called back
 
 
-class CyberDogClient(Upkeep, Settings, MotionChapter, Tasks, Camera, Programs, Video):
+class CyberDogClient(
+    Status,
+    Settings,
+    Skin,
+    Updates,
+    Bluetooth,
+    Upkeep,
+    MotionChapter,
+    Following,
+    Labels,
+    Members,
+    Audio,
+    Faces,
+    Camera,
+    Video,
+    Programs,
+):
     """One robot. Every method raises CyberDogRefused (the robot's number and words), NoAnswer, LinkLost or TimedOut.
 
     ``certificates`` None: without TLS. ``app_port`` None: commands only, no heartbeats, no pushes, no pictures.

@@ -9,26 +9,28 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from roboglot.clients.errors import ClientError, LinkLost
-from roboglot.clients.robomaster.chapter import ANSWER_SECONDS, REFUSALS
-from roboglot.clients.robomaster.chassis import Chassis, RobotChapter
+from roboglot.clients.robomaster.calls import ANSWER_SECONDS, REFUSALS
+from roboglot.clients.robomaster.chapters.ai import Ai
+from roboglot.clients.robomaster.chapters.arm import RoboticArm
+from roboglot.clients.robomaster.chapters.armor import Armor
+from roboglot.clients.robomaster.chapters.blaster import Blaster
+from roboglot.clients.robomaster.chapters.camera import Audio, Camera, Stream
+from roboglot.clients.robomaster.chapters.chassis import Chassis
+from roboglot.clients.robomaster.chapters.game import GameMessages
+from roboglot.clients.robomaster.chapters.gimbal import Gimbal
+from roboglot.clients.robomaster.chapters.gripper import RoboticGripper
+from roboglot.clients.robomaster.chapters.ir_distance import IrDistanceSensor
+from roboglot.clients.robomaster.chapters.led import Led
+from roboglot.clients.robomaster.chapters.pwm import Pwm
+from roboglot.clients.robomaster.chapters.robot import RobotChapter
+from roboglot.clients.robomaster.chapters.sensor_adapter import SensorAdapter
+from roboglot.clients.robomaster.chapters.servo import Servo
+from roboglot.clients.robomaster.chapters.sound import Sound
 from roboglot.clients.robomaster.control import ControlLink, connect
 from roboglot.clients.robomaster.datagrams import PUSH_PORT, PushPort
 from roboglot.clients.robomaster.errors import RoboMasterRefused
 from roboglot.clients.robomaster.events import EventLink
-from roboglot.clients.robomaster.gimbal import Blaster, Gimbal
 from roboglot.clients.robomaster.media import access_units, opus_packets
-from roboglot.clients.robomaster.parts import (
-    Armor,
-    IrDistanceSensor,
-    Led,
-    Pwm,
-    RoboticArm,
-    RoboticGripper,
-    SensorAdapter,
-    Servo,
-    Sound,
-)
-from roboglot.clients.robomaster.senses import Ai, Audio, Camera, GameMessages, Stream
 from roboglot.model.clock import Clock, RealClock
 from roboglot.model.feed import Feed, Viewer
 from roboglot.wire.robomaster.annexb import AccessUnit

@@ -20,8 +20,8 @@ import msgspec
 
 from roboglot.clients.errors import BadAnswer, RefusedByRobot
 from roboglot.clients.slamware.http import Answer, HttpLink
-from roboglot.wire.slamware.explore_map import BadMap, ExploreMap, decode_explore_map
-from roboglot.wire.slamware.stcm import CompositeMap, decode_stcm, encode_stcm
+from roboglot.wire.slamware.chapters.slam.explore_map import BadMap, ExploreMap, decode_explore_map
+from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap, decode_stcm, encode_stcm
 
 P = ParamSpec("P")
 T = TypeVar("T")

@@ -16,30 +16,51 @@ from typing import Any
 
 import msgspec
 
-from roboglot.clients.slamware.artifact import Artifact
 from roboglot.clients.slamware.calls import TIMEOUT, without_none
-from roboglot.clients.slamware.delivery import Delivery
-from roboglot.clients.slamware.delivery_cargo import DeliveryCargo
-from roboglot.clients.slamware.delivery_tasks import DeliveryTasks
-from roboglot.clients.slamware.docks import Docks
+from roboglot.clients.slamware.chapters.artifact import Artifact
+from roboglot.clients.slamware.chapters.delivery.admin import Admin
+from roboglot.clients.slamware.chapters.delivery.cargo import Boxes
+from roboglot.clients.slamware.chapters.delivery.tasks import Tasks
+from roboglot.clients.slamware.chapters.firmware import Firmware
+from roboglot.clients.slamware.chapters.industry import Industry
+from roboglot.clients.slamware.chapters.motion import Motion
+from roboglot.clients.slamware.chapters.multi_floor import MultiFloor
+from roboglot.clients.slamware.chapters.platform import Platform
+from roboglot.clients.slamware.chapters.slam.docks import Docks
+from roboglot.clients.slamware.chapters.slam.localization import Localization
+from roboglot.clients.slamware.chapters.slam.maps import Maps
+from roboglot.clients.slamware.chapters.statistics import Statistics
+from roboglot.clients.slamware.chapters.system.devices import Devices
+from roboglot.clients.slamware.chapters.system.network import Network
+from roboglot.clients.slamware.chapters.system.sensors import Sensors
+from roboglot.clients.slamware.chapters.system.system import System
 from roboglot.clients.slamware.http import HttpLink
-from roboglot.clients.slamware.industry import Industry
-from roboglot.clients.slamware.maps import Maps
-from roboglot.clients.slamware.motion import Motion
-from roboglot.clients.slamware.multi_floor import MultiFloor
 from roboglot.clients.slamware.running import RunningAction
-from roboglot.clients.slamware.slam import Slam
-from roboglot.clients.slamware.system import System
-from roboglot.clients.slamware.upkeep import Upkeep
 from roboglot.model.clock import Clock, RealClock
-from roboglot.wire.slamware.motion import ActionInfo, ActionRequest
+from roboglot.wire.slamware.chapters.motion import ActionInfo, ActionRequest
 
 PORT = 1448
 PREFIX = "slamtec.agent.actions."  # of the names of firmware 3 to 5; 6 has a shorter one
 
 
 class SlamwareClient(
-    System, Slam, Docks, Maps, Artifact, Motion, Upkeep, MultiFloor, Industry, Delivery, DeliveryCargo, DeliveryTasks
+    System,
+    Devices,
+    Network,
+    Sensors,
+    Firmware,
+    Statistics,
+    Platform,
+    Localization,
+    Docks,
+    Maps,
+    Artifact,
+    Motion,
+    MultiFloor,
+    Industry,
+    Admin,
+    Boxes,
+    Tasks,
 ):
     """One robot. Connects when first asked something, and again whenever the connection was lost.
 

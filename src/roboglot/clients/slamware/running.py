@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 from roboglot.clients.errors import ClientError, LinkLost
 from roboglot.clients.slamware.calls import SlamwareRefused
 from roboglot.model.clock import Clock
-from roboglot.wire.slamware.motion import ActionInfo, ActionState, Result, State
+from roboglot.wire.slamware.chapters.motion import ActionInfo, ActionState, Result, State
 
 if TYPE_CHECKING:
-    from roboglot.clients.slamware.motion import Motion
+    from roboglot.clients.slamware.chapters.motion import Motion
 
 PERIOD = 0.1  # s between two polls
 LOST_MAX = 5.0  # s without an answer until waiting for it fails

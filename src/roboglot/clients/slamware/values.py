@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from roboglot.extras import lazy
+from roboglot.wire.slamware.chapters.motion import ActionState
+from roboglot.wire.slamware.chapters.system.system import LaserPoint
 from roboglot.wire.slamware.geometry import Pose3D
-from roboglot.wire.slamware.motion import ActionState
-from roboglot.wire.slamware.system import LaserPoint
 
 if TYPE_CHECKING:
     import numpy as np

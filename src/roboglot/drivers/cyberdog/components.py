@@ -6,11 +6,11 @@ import contextlib
 
 from roboglot.clients.cyberdog import CyberDogClient
 from roboglot.drivers.capabilities import add_if_present
-from roboglot.drivers.cyberdog.audio import CyberDogSpeaker
-from roboglot.drivers.cyberdog.camera import CyberDogCamera
-from roboglot.drivers.cyberdog.power import CyberDogPower
-from roboglot.drivers.cyberdog.skin import CyberDogSkin
-from roboglot.drivers.cyberdog.status import UNSUPPORTED, StatusPoll
+from roboglot.drivers.cyberdog.chapters.camera import CyberDogCamera
+from roboglot.drivers.cyberdog.chapters.people.audio import CyberDogSpeaker
+from roboglot.drivers.cyberdog.chapters.system.power import CyberDogPower
+from roboglot.drivers.cyberdog.chapters.system.skin import CyberDogSkin
+from roboglot.drivers.cyberdog.telemetry import UNSUPPORTED, StatusPoll
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.media.recorder import Recorder
 from roboglot.media.video import VideoStream

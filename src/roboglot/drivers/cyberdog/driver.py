@@ -13,21 +13,18 @@ from dataclasses import replace
 
 from roboglot.clients.cyberdog import Certificates, CyberDogClient, CyberDogRefused, NoAnswer, values
 from roboglot.clients.errors import BadAnswer, ClientError, LinkLost
-from roboglot.drivers.cyberdog.base import CyberDogBase
+from roboglot.drivers.cyberdog.chapters.mapping.docking import CyberDogDocking
+from roboglot.drivers.cyberdog.chapters.mapping.labels import CyberDogPlaces
+from roboglot.drivers.cyberdog.chapters.mapping.mapping import CyberDogMapping
+from roboglot.drivers.cyberdog.chapters.mapping.navigation import CyberDogLocalization, CyberDogNavigation
+from roboglot.drivers.cyberdog.chapters.mapping.tasks import Skills
+from roboglot.drivers.cyberdog.chapters.motion.base import CyberDogBase
+from roboglot.drivers.cyberdog.chapters.motion.legs import CyberDogLegs
+from roboglot.drivers.cyberdog.chapters.motion.stairs import CyberDogStairAlignment
+from roboglot.drivers.cyberdog.chapters.people.following import CyberDogFollowing
 from roboglot.drivers.cyberdog.components import OptionalComponents
-from roboglot.drivers.cyberdog.following import CyberDogFollowing
-from roboglot.drivers.cyberdog.labels import CyberDogPlaces
-from roboglot.drivers.cyberdog.motion import CyberDogLegs
-from roboglot.drivers.cyberdog.stairs import CyberDogStairAlignment
 from roboglot.drivers.cyberdog.state import ReportedState
-from roboglot.drivers.cyberdog.status import StatusPoll
-from roboglot.drivers.cyberdog.tasks import (
-    CyberDogDocking,
-    CyberDogLocalization,
-    CyberDogMapping,
-    CyberDogNavigation,
-    Skills,
-)
+from roboglot.drivers.cyberdog.telemetry import StatusPoll
 from roboglot.drivers.cyberdog.vocabulary import battery_of, grid_of, path_of, pose_of, robot_errors, scan_of
 from roboglot.drivers.driver import Driver
 from roboglot.drivers.entry_sync import EntrySync

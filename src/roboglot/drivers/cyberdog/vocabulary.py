@@ -17,8 +17,8 @@ from roboglot.model.errors import Busy, Refused, RobotError
 from roboglot.model.geometry import Path, Point, Pose
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.sensing import BatteryState, LaserScan, Supply
-from roboglot.wire.cyberdog.motion_names import FIGURE_NAMES, WALK_NAMES
-from roboglot.wire.cyberdog.motions import Motion
+from roboglot.wire.cyberdog.chapters.motion.motion import Motion
+from roboglot.wire.cyberdog.chapters.motion.names import FIGURE_NAMES, WALK_NAMES
 
 if TYPE_CHECKING:
     import numpy as np

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from roboglot.clients.robomaster.client import RoboMasterClient
 from roboglot.drivers.capabilities import add_if_present
-from roboglot.drivers.robomaster.chapters.ai import RoboMasterVision
+from roboglot.drivers.robomaster.chapters.ai.ai import RoboMasterVision
 from roboglot.drivers.robomaster.chapters.arm import RoboMasterArm
 from roboglot.drivers.robomaster.chapters.armor import RoboMasterArmor
 from roboglot.drivers.robomaster.chapters.blaster import RoboMasterBlaster

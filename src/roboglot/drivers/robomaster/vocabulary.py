@@ -6,7 +6,7 @@ import math
 from contextlib import AbstractContextManager
 
 from roboglot.clients.errors import BadAnswer, ClientError, RefusedByRobot
-from roboglot.clients.robomaster.chassis import ChassisPose, ChassisSpeed
+from roboglot.clients.robomaster.chapters.chassis import ChassisPose, ChassisSpeed
 from roboglot.drivers.errors import model_errors
 from roboglot.model.components.interaction.armor import HitKind, PlatePlace
 from roboglot.model.components.interaction.light import LightEffect

@@ -9,14 +9,14 @@ from roboglot.clients.slamware import SlamwareClient
 from roboglot.drivers.capabilities import add_if_present
 from roboglot.drivers.entry_sync import EntrySync
 from roboglot.drivers.local_entries import LocalDrawings, LocalPlaces
-from roboglot.drivers.slamware.cargo import SlamwareCargo
-from roboglot.drivers.slamware.health import SlamwareEmergencyStop, SlamwareHealth
-from roboglot.drivers.slamware.jack import SlamwareJack
-from roboglot.drivers.slamware.lights import SlamwareLight
-from roboglot.drivers.slamware.lines_and_areas import SlamwareDrawings
-from roboglot.drivers.slamware.network import SlamwareNetwork
-from roboglot.drivers.slamware.points_of_interest import SlamwarePlaces
-from roboglot.drivers.slamware.power import SlamwarePower
+from roboglot.drivers.slamware.chapters.artifact.lines_and_areas import SlamwareDrawings
+from roboglot.drivers.slamware.chapters.artifact.points_of_interest import SlamwarePlaces
+from roboglot.drivers.slamware.chapters.delivery import SlamwareCargo
+from roboglot.drivers.slamware.chapters.system.health import SlamwareEmergencyStop, SlamwareHealth
+from roboglot.drivers.slamware.chapters.system.jack import SlamwareJack
+from roboglot.drivers.slamware.chapters.system.lights import SlamwareLight
+from roboglot.drivers.slamware.chapters.system.network import SlamwareNetwork
+from roboglot.drivers.slamware.chapters.system.power import SlamwarePower
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.components.energy.power import Power
 from roboglot.model.components.interaction.light import Light

@@ -14,13 +14,13 @@ from roboglot.drivers.reported import (
     ReportedLidar,
     ReportedOdometry,
 )
-from roboglot.drivers.slamware.actions import ActionRunner
-from roboglot.drivers.slamware.base import SlamwareBase
+from roboglot.drivers.slamware.chapters.motion.actions import ActionRunner
+from roboglot.drivers.slamware.chapters.motion.base import SlamwareBase
+from roboglot.drivers.slamware.chapters.motion.docking import SlamwareDocking
+from roboglot.drivers.slamware.chapters.motion.driving import SlamwareDriving
+from roboglot.drivers.slamware.chapters.motion.navigation import SlamwareNavigation
+from roboglot.drivers.slamware.chapters.slam import SlamwareLocalization, SlamwareMapping
 from roboglot.drivers.slamware.components import OptionalComponents
-from roboglot.drivers.slamware.docking import SlamwareDocking
-from roboglot.drivers.slamware.driving import SlamwareDriving
-from roboglot.drivers.slamware.navigation import SlamwareNavigation
-from roboglot.drivers.slamware.slam import SlamwareLocalization, SlamwareMapping
 from roboglot.drivers.slamware.state import ReportedState
 from roboglot.drivers.slamware.telemetry import TelemetryPoller
 from roboglot.model.components.component import Component

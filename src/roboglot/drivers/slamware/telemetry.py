@@ -18,7 +18,7 @@ from roboglot.model.events import BatteryChanged, DockContactChanged, MapReplace
 from roboglot.model.geometry import Twist, wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import OdometryReading
-from roboglot.wire.slamware.system import BatteryPack, DockingStatus
+from roboglot.wire.slamware.chapters.system.system import BatteryPack, DockingStatus
 
 if TYPE_CHECKING:
     import numpy as np

@@ -23,11 +23,11 @@ from roboglot.model.errors import (
 from roboglot.model.geometry import Orientation, Point, Pose, Vector3, wrap_angle
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.sensing import BatteryState, ImuReading, LaserScan, Supply
-from roboglot.wire.slamware.explore_map import ExploreMap
+from roboglot.wire.slamware.chapters.motion import ActionState
+from roboglot.wire.slamware.chapters.slam.explore_map import ExploreMap
+from roboglot.wire.slamware.chapters.slam.localization import ImuData
+from roboglot.wire.slamware.chapters.system.system import BatteryPack, DockingStatus, PowerStatus
 from roboglot.wire.slamware.geometry import Location, Pose3D
-from roboglot.wire.slamware.motion import ActionState
-from roboglot.wire.slamware.slam import ImuData
-from roboglot.wire.slamware.system import BatteryPack, DockingStatus, PowerStatus
 
 if TYPE_CHECKING:
     import numpy as np

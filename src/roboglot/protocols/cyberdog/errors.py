@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from roboglot.model import errors
+from roboglot.wire.cyberdog.chapters.motion.motion import MotionCode
 from roboglot.wire.cyberdog.codes import Feedback, InBandError
-from roboglot.wire.cyberdog.motions import MotionCode
 
 
 @dataclass(frozen=True, slots=True)

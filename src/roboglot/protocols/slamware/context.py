@@ -8,13 +8,13 @@ from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.chapters.artifact.poi_shifts import PoiShifts
 from roboglot.protocols.slamware.chapters.cloud import CloudFolder
 from roboglot.protocols.slamware.chapters.delivery.box_log import BoxLog
-from roboglot.protocols.slamware.chapters.event_log import EventLog
-from roboglot.protocols.slamware.chapters.lifetime_totals import Totals
+from roboglot.protocols.slamware.chapters.firmware.updater import Updater
 from roboglot.protocols.slamware.chapters.motion.action_book import ActionBook
 from roboglot.protocols.slamware.chapters.motion.speed_limits import SpeedLimits
+from roboglot.protocols.slamware.chapters.platform.event_log import EventLog
 from roboglot.protocols.slamware.chapters.slam.map_keeper import MapKeeper
+from roboglot.protocols.slamware.chapters.statistics.lifetime_totals import Totals
 from roboglot.protocols.slamware.chapters.system.laser import Laser
-from roboglot.protocols.slamware.chapters.updater import Updater
 
 
 @dataclass(frozen=True, slots=True)

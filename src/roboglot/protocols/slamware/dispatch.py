@@ -24,14 +24,9 @@ from roboglot.model.stand_in import StandIn
 from roboglot.operations import BadParameters, Operation, Right
 from roboglot.protocols.browsers import Browsers, of_rows
 from roboglot.protocols.slamware.bodies import ClientGone, Receive, Scope, chunks, read_body
-from roboglot.protocols.slamware.chapters import (  # noqa: F401
-    firmware,
-    industry,
-    platform,
-    statistics,
-)
 
 # Every chapter registers its operations.
+from roboglot.protocols.slamware.chapters import industry  # noqa: F401
 from roboglot.protocols.slamware.chapters.artifact import landmarks, lines_and_areas, points_of_interest  # noqa: F401
 from roboglot.protocols.slamware.chapters.delivery import (  # noqa: F401
     admin,
@@ -39,6 +34,8 @@ from roboglot.protocols.slamware.chapters.delivery import (  # noqa: F401
     stage,
     tasks,
 )
+from roboglot.protocols.slamware.chapters.firmware import firmware  # noqa: F401
+from roboglot.protocols.slamware.chapters.firmware.uploads import PACKAGE_MAX, Upload
 from roboglot.protocols.slamware.chapters.motion import actions, strategies  # noqa: F401
 from roboglot.protocols.slamware.chapters.multi_floor import (  # noqa: F401
     elevators,
@@ -46,7 +43,9 @@ from roboglot.protocols.slamware.chapters.multi_floor import (  # noqa: F401
     tours,
     track_search,
 )
+from roboglot.protocols.slamware.chapters.platform import platform  # noqa: F401
 from roboglot.protocols.slamware.chapters.slam import docks, localization, maps  # noqa: F401
+from roboglot.protocols.slamware.chapters.statistics import statistics  # noqa: F401
 from roboglot.protocols.slamware.chapters.system import (  # noqa: F401
     cube,
     devices,
@@ -58,7 +57,6 @@ from roboglot.protocols.slamware.chapters.system import (  # noqa: F401
     raw_imu,
     system,
 )
-from roboglot.protocols.slamware.chapters.uploads import PACKAGE_MAX, Upload
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import HttpError, bad_request, from_robot, reason_phrase
 from roboglot.protocols.slamware.http_connection import REASON

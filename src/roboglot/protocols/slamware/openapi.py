@@ -11,8 +11,8 @@ from typing import Any
 import msgspec
 
 from roboglot.operations import Operation
+from roboglot.protocols.slamware.chapters.firmware.uploads import Upload
 from roboglot.protocols.slamware.chapters.motion.actions import FACTORIES
-from roboglot.protocols.slamware.chapters.uploads import Upload
 from roboglot.protocols.slamware.routes import ALIASES, BEYOND, SHORTHANDS
 from roboglot.protocols.slamware.table import TABLE, NoContent, Text
 from roboglot.wire.contracts import contract

@@ -19,22 +19,22 @@ from roboglot.protocols.slamware.chapters.artifact.poi_shifts import PoiShifts
 from roboglot.protocols.slamware.chapters.cloud import CloudFolder
 from roboglot.protocols.slamware.chapters.delivery.box_log import BoxLog
 from roboglot.protocols.slamware.chapters.delivery.voice import Voice
-from roboglot.protocols.slamware.chapters.event_log import EventLog
-from roboglot.protocols.slamware.chapters.lifetime_totals import Totals
+from roboglot.protocols.slamware.chapters.firmware.updater import Updater
 from roboglot.protocols.slamware.chapters.motion.action_book import ActionBook
 from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
 from roboglot.protocols.slamware.chapters.motion.speed_limits import SpeedLimits
 from roboglot.protocols.slamware.chapters.multi_floor.floor_maps import LoadedStoreys
+from roboglot.protocols.slamware.chapters.platform.event_log import EventLog
 from roboglot.protocols.slamware.chapters.slam.map_keeper import MapKeeper
+from roboglot.protocols.slamware.chapters.statistics.lifetime_totals import Totals
 from roboglot.protocols.slamware.chapters.system.devices import restore_masks
 from roboglot.protocols.slamware.chapters.system.laser import Laser
-from roboglot.protocols.slamware.chapters.updater import Updater
 from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.dispatch import Application
 from roboglot.protocols.slamware.http_connection import CONNECTIONS_MAX, KEEP_ALIVE_SECONDS, HttpConnection
 from roboglot.transport.tls import Tls
-from roboglot.wire.slamware.platform import GeneralEvent
+from roboglot.wire.slamware.chapters.platform import GeneralEvent
 
 GOODBYE_SECONDS = 0.3  # for answers under way when the door closes
 

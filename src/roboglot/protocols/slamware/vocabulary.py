@@ -9,9 +9,9 @@ from roboglot.model.errors import Blocked, DockNotFound, NotLocalized, RobotErro
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.maps import PointOfInterest
 from roboglot.protocols.slamware.chapters.motion.errands import part_of
-from roboglot.wire.slamware.artifact import PoseEntry
+from roboglot.wire.slamware.chapters.artifact import PoseEntry
+from roboglot.wire.slamware.chapters.motion import ActionState, Result, State
 from roboglot.wire.slamware.geometry import Pose2D, Pose3D
-from roboglot.wire.slamware.motion import ActionState, Result, State
 
 PREFIXES = ("slamtec.agent.actions.", "agent.actions.")  # firmware up to 5, firmware 6: both are understood
 

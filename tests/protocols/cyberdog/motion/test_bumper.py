@@ -6,7 +6,7 @@ import pytest
 
 from roboglot.model.components.motion.base import Base
 from roboglot.model.geometry import Pose
-from roboglot.wire.cyberdog.motions import MotionCode
+from roboglot.wire.cyberdog.chapters.motion.motion import MotionCode
 from tests.protocols.cyberdog.phone import Stream, localized, until
 
 pytestmark = pytest.mark.world("empty")

@@ -19,7 +19,7 @@ from roboglot.protocols.cyberdog.chapters.motion.gait import Gaits
 from roboglot.protocols.cyberdog.chapters.motion.motion_start import Wish
 from roboglot.simulation.world.world import World
 from roboglot.testing import assert_pose
-from roboglot.wire.cyberdog.motions import MotionCode
+from roboglot.wire.cyberdog.chapters.motion.motion import MotionCode
 from tests.protocols.cyberdog.phone import App, Client, answered, until
 
 WALK = {"motion_id": 303, "cmd_type": 1, "cmd_source": 0, "vel_des": [0.4, 0, 0]}

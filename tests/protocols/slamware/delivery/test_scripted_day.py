@@ -16,8 +16,8 @@ from roboglot.model.geometry import Point, Pose
 from roboglot.model.robot import Robot
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward, assert_pose
-from roboglot.wire.slamware import stcm_layers
-from roboglot.wire.slamware.stcm import CompositeMap, Layer, decode_stcm, encode_stcm
+from roboglot.wire.slamware.chapters.slam import stcm_layers
+from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap, Layer, decode_stcm, encode_stcm
 from tests.protocols.slamware.screen import Screen
 
 CORE, MULTI = "/api/core", "/api/multi-floor/map/v1"

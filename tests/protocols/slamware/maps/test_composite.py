@@ -27,10 +27,10 @@ from roboglot.protocols.slamware.chapters.slam.composite import (
     composite_of,
     floors_of,
 )
-from roboglot.wire.slamware import stcm_layers
-from roboglot.wire.slamware.explore_map import BadMap
-from roboglot.wire.slamware.stcm import CompositeMap, Layer, decode_stcm, encode_stcm
-from roboglot.wire.slamware.stcm_layers import LineEntry
+from roboglot.wire.slamware.chapters.slam import stcm_layers
+from roboglot.wire.slamware.chapters.slam.explore_map import BadMap
+from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap, Layer, decode_stcm, encode_stcm
+from roboglot.wire.slamware.chapters.slam.stcm_layers import LineEntry
 
 MULTI, POIS = "/api/multi-floor/map/v1", "/api/core/artifact/v1/pois"
 SINGLE = st.floats(-1e4, 1e4, width=32)

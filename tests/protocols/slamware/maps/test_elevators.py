@@ -25,7 +25,7 @@ from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, FloorN
 from roboglot.simulation.world.world import World
 from roboglot.storage.database import Database
 from roboglot.testing import Forward
-from roboglot.wire.slamware.stcm import CompositeMap, encode_stcm
+from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap, encode_stcm
 
 MULTI, ACTIONS = "/api/multi-floor/map/v1", "/api/core/motion/v1/actions"
 ELEVATORS = f"{MULTI}/elevators"

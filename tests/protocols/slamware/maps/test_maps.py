@@ -22,7 +22,7 @@ from roboglot.protocols.slamware.chapters.slam.composite import (
 )
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
-from roboglot.wire.slamware.stcm import CompositeMap, Layer, decode_stcm, encode_stcm
+from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap, Layer, decode_stcm, encode_stcm
 from tests.protocols.slamware.drawings import DESK, WALL, ok
 
 SLAM, ARTIFACT, MULTI = "/api/core/slam/v1", "/api/core/artifact/v1", "/api/multi-floor/map/v1"

@@ -18,8 +18,8 @@ from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import InvalidGoal, RobotError
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.chapters.delivery.vocabulary import KINDS, boxes_of
-from roboglot.wire.slamware.cloud import CloudTask
-from roboglot.wire.slamware.delivery import VoicePackage
+from roboglot.wire.slamware.chapters.cloud import CloudTask
+from roboglot.wire.slamware.chapters.delivery import VoicePackage
 
 log = logging.getLogger(__name__)
 UNBOUND = "slamware.unbound"  # the setting that says that the robot left its cloud

@@ -32,7 +32,7 @@ from roboglot.protocols.slamware.chapters.system.system import device_id
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
 from roboglot.protocols.slamware.vocabulary import pose3d
-from roboglot.wire.slamware.industry import (
+from roboglot.wire.slamware.chapters.industry import (
     CommonResponse,
     IndustryResult,
     IndustryTarget,

@@ -18,8 +18,7 @@ from roboglot.model.components.sensing.camera import Camera
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.app_link import AppLink
 from roboglot.protocols.cyberdog.table import push
-from roboglot.wire.cyberdog.codes import Code
-from roboglot.wire.cyberdog.signalling import (
+from roboglot.wire.cyberdog.chapters.camera import (
     Alignment,
     Candidate,
     Description,
@@ -30,6 +29,7 @@ from roboglot.wire.cyberdog.signalling import (
     VideoError,
     fields_of,
 )
+from roboglot.wire.cyberdog.codes import Code
 
 if TYPE_CHECKING:
     from roboglot.media.webrtc import VideoCall

@@ -12,11 +12,11 @@ from roboglot.model.components.sensing.camera import Camera
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.table import TABLE
-from roboglot.wire.cyberdog.codes import Code
-from roboglot.wire.cyberdog.signalling import (
+from roboglot.wire.cyberdog.chapters.camera import (
     BadSignal,
     read_signal,
 )
+from roboglot.wire.cyberdog.codes import Code
 from roboglot.wire.cyberdog.text import read_params
 
 log = logging.getLogger(__name__)

@@ -36,12 +36,12 @@ from roboglot.protocols.cyberdog.chapters.motion.motion_table import (
 )
 from roboglot.protocols.cyberdog.chapters.motion.readiness import machine_state, posture_of, refusal_of
 from roboglot.protocols.cyberdog.errors import codes_of
-from roboglot.wire.cyberdog.codes import MachineState
-from roboglot.wire.cyberdog.motions import (
+from roboglot.wire.cyberdog.chapters.motion.motion import (
     Motion,
     MotionCode,
     SwitchStatus,
 )
+from roboglot.wire.cyberdog.codes import MachineState
 
 DURATION_MAX = 60.0  # s that one walk by a result command may take: only an emergency stop ends it
 NOTHING_SPECIAL = Wish()

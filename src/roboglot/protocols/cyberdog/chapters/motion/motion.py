@@ -14,8 +14,8 @@ from roboglot.protocols.cyberdog.chapters.motion.motion_table import POSES, SERV
 from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.protocols.cyberdog.table import TABLE, push
 from roboglot.protocols.cyberdog.vocabulary import ALL_FEET, body_of, feet_of, lift_of, twist_of
+from roboglot.wire.cyberdog.chapters.motion.motion import CommandType, Motion, MotionCode
 from roboglot.wire.cyberdog.codes import Code, InBandError
-from roboglot.wire.cyberdog.motions import CommandType, Motion, MotionCode
 from roboglot.wire.cyberdog.text import Int32
 
 SERVO_RESPONSE = push(Code.SERVO_RESPONSE, depth=2)

@@ -14,7 +14,7 @@ from roboglot.model.geometry import STILL, Orientation, Twist
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.chapters.motion.climbing import WayAhead
 from roboglot.protocols.cyberdog.chapters.motion.motion_table import FIGURES, POSES, SEEING, WALK_STANDS, WALKS
-from roboglot.wire.cyberdog.motions import Motion
+from roboglot.wire.cyberdog.chapters.motion.motion import Motion
 
 SOURCE = "cyberdog"
 WATCHDOG = 0.2  # s without a servo frame, then the robot stands still

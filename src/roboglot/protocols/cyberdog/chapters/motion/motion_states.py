@@ -11,7 +11,7 @@ from roboglot.model.components.motion.motion_status import MotionFlags, MotionSt
 from roboglot.model.components.motion.motions import MOTIONS
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.chapters.motion.motion_table import FIGURES, MAY_LAST, USERS
-from roboglot.wire.cyberdog.motions import Motion
+from roboglot.wire.cyberdog.chapters.motion.motion import Motion
 
 
 def begins_in(motion: int) -> Set[Posture]:

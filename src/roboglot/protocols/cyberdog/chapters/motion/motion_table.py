@@ -9,8 +9,8 @@ from collections.abc import Mapping
 
 from roboglot.model.components.motion.gaits import Gait
 from roboglot.model.components.motion.motions import Motion as Figure
-from roboglot.wire.cyberdog.motion_names import FIGURE_NAMES, WALK_NAMES
-from roboglot.wire.cyberdog.motions import Motion
+from roboglot.wire.cyberdog.chapters.motion.motion import Motion
+from roboglot.wire.cyberdog.chapters.motion.names import FIGURE_NAMES, WALK_NAMES
 
 WALKS: Mapping[int, Gait] = {number: Gait[name] for number, name in WALK_NAMES.items()}
 FIGURES: Mapping[int, Figure] = {number: Figure[name] for number, name in FIGURE_NAMES.items()}

@@ -11,8 +11,8 @@ from roboglot.model.components.system.health import MOTOR_ALARM, Health
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import Supply
 from roboglot.protocols.cyberdog.chapters.motion.motion_table import FIGURES
+from roboglot.wire.cyberdog.chapters.motion.motion import ALLOWED_ON_LOW_BATTERY, ALLOWED_WHEN_STOPPED, MotionCode
 from roboglot.wire.cyberdog.codes import MachineState
-from roboglot.wire.cyberdog.motions import ALLOWED_ON_LOW_BATTERY, ALLOWED_WHEN_STOPPED, MotionCode
 
 PROTECTED_BELOW, LOW_POWER_BELOW = 0.20, 0.05  # charge
 UPDATING = frozenset({FirmwareState.INSTALLING, FirmwareState.INSTALLED, FirmwareState.REBOOTING})

@@ -17,8 +17,8 @@ from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.chapters.motion.motion_start import SOURCE
 from roboglot.protocols.cyberdog.chapters.motion.readiness import refusal_of
 from roboglot.protocols.cyberdog.table import TABLE
+from roboglot.wire.cyberdog.chapters.motion.motion import Motion
 from roboglot.wire.cyberdog.codes import Code, InBandError
-from roboglot.wire.cyberdog.motions import Motion
 
 ANSWER_MAX = 5.0  # s, getting up included
 LOOK = 0.05  # s between two looks at how far it is

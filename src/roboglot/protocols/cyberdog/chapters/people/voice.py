@@ -22,7 +22,7 @@ from roboglot.protocols.cyberdog.chapters.system.stored_settings import (
     kept,
     wake_words,
 )
-from roboglot.wire.cyberdog.motions import Motion, MotionCode
+from roboglot.wire.cyberdog.chapters.motion.motion import Motion, MotionCode
 
 log = logging.getLogger(__name__)
 TRAINING_MAX = 30.0  # s until a person must have spoken

@@ -15,9 +15,9 @@ from roboglot.model.components.mapping.map_memory import Drawings
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import PointOfInterest
-from roboglot.wire.slamware import artifact as wire
 from roboglot.wire.slamware import geometry
-from roboglot.wire.slamware.artifact import AreaUsage, LineUsage, MetadataError
+from roboglot.wire.slamware.chapters import artifact as wire
+from roboglot.wire.slamware.chapters.artifact import AreaUsage, LineUsage, MetadataError
 
 SPEED_MAX, ESCAPE_MAX, ROBOTS_MAX = 100.0, 1000.0, 1000.0  # m/s, m, robots
 
@@ -42,7 +42,7 @@ def wire_line(line: Line) -> wire.Line:
     return wire.Line(_wire_point(line.start), _wire_point(line.end), line.id, dict(line.metadata))
 
 
-def area_of(usage: AreaUsage, rectangle: wire.Rectangle, metadata: dict[str, str], id: int = 0) -> Area:
+def area_of(usage: AreaUsage, rectangle: wire.Strip, metadata: dict[str, str], id: int = 0) -> Area:
     """The model's area, with what its metadata ask for. Raises InvalidGoal for values that make no sense."""
     try:
         robots = wire.number(metadata, "restricted_robots_number_limit", ROBOTS_MAX)
@@ -64,7 +64,7 @@ def area_of(usage: AreaUsage, rectangle: wire.Rectangle, metadata: dict[str, str
 
 def wire_area(area: Area) -> wire.RectangleArea:
     """As the API writes it."""
-    rectangle = wire.Rectangle(_wire_point(area.start), _wire_point(area.end), area.half_width)
+    rectangle = wire.Strip(_wire_point(area.start), _wire_point(area.end), area.half_width)
     return wire.RectangleArea(area.id, AREA_USAGES[area.kind], rectangle, dict(area.metadata))
 
 

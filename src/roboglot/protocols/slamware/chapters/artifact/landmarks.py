@@ -16,8 +16,8 @@ from roboglot.operations import Right
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
 from roboglot.protocols.slamware.vocabulary import entry_of, pose_of
-from roboglot.wire.slamware.artifact import Identifier, PoseEntry, metadata_text
-from roboglot.wire.slamware.slam import Switch
+from roboglot.wire.slamware.chapters.artifact import Identifier, PoseEntry, metadata_text
+from roboglot.wire.slamware.chapters.slam.localization import Switch
 
 API = "/api/core/artifact/v1/laser-landmarks"
 

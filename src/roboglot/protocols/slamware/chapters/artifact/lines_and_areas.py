@@ -17,8 +17,8 @@ from roboglot.protocols.slamware.chapters.artifact.drawing import (
 )
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
-from roboglot.wire.slamware import artifact as wire
-from roboglot.wire.slamware.artifact import AreaChange, AreaRequest, AreaUsage, Lines, LineUsage, RectangleArea
+from roboglot.wire.slamware.chapters import artifact as wire
+from roboglot.wire.slamware.chapters.artifact import AreaChange, AreaRequest, AreaUsage, Lines, LineUsage, RectangleArea
 
 API = "/api/core/artifact/v1"
 LINES, AREAS = f"{API}/lines/{{usage}}", f"{API}/rectangle-areas/{{usage}}"

@@ -9,7 +9,7 @@ from roboglot.operations import Right
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
 from roboglot.protocols.slamware.vocabulary import entry_of, pose_of
-from roboglot.wire.slamware.artifact import Identifier, PoseChange, PoseEntry, metadata_text
+from roboglot.wire.slamware.chapters.artifact import Identifier, PoseChange, PoseEntry, metadata_text
 
 API = "/api/core/artifact/v1/pois"
 

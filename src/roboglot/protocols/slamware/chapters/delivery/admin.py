@@ -20,7 +20,7 @@ from roboglot.protocols.slamware.chapters.delivery.voice import LANGUAGE, langua
 from roboglot.protocols.slamware.chapters.system.system import device_id, software_version
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
-from roboglot.wire.slamware.delivery import (
+from roboglot.wire.slamware.chapters.delivery import (
     AdminPassword,
     BatteryLevels,
     Configuration,
@@ -37,7 +37,7 @@ from roboglot.wire.slamware.delivery import (
     WorkModeEntry,
     WrappedSettings,
 )
-from roboglot.wire.slamware.motion import MoveOptions
+from roboglot.wire.slamware.chapters.motion import MoveOptions
 
 API = "/api/delivery/v1"
 PASSWORD = "slamware.delivery_password"

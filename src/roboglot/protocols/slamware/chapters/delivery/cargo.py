@@ -23,7 +23,7 @@ from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import HttpError
 from roboglot.protocols.slamware.table import TABLE
-from roboglot.wire.slamware.delivery import AssignedCargo, Box, Cargo, OperationResult
+from roboglot.wire.slamware.chapters.delivery import AssignedCargo, Box, Cargo, OperationResult
 
 CARGOS = "/api/delivery/v1/cargos"
 BOXES = f"{CARGOS}/{{cargo_id}}/boxes"

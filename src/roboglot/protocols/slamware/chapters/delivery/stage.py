@@ -23,7 +23,7 @@ from roboglot.protocols.slamware.chapters.delivery.vocabulary import (
 from roboglot.protocols.slamware.chapters.system.health import record_of
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
-from roboglot.wire.slamware.delivery import DeviceError, Pickup, StageInfo, TaskStage
+from roboglot.wire.slamware.chapters.delivery import DeviceError, Pickup, StageInfo, TaskStage
 
 LANDING = {None: "INITIALIZING", "approaching": "GOING_TO_LANDING_POINT"}  # by the feedback of docking
 

@@ -24,7 +24,7 @@ from roboglot.protocols.slamware.chapters.delivery.vocabulary import (
 )
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import NO_CONTENT, TABLE, NoContent
-from roboglot.wire.slamware.delivery import (
+from roboglot.wire.slamware.chapters.delivery import (
     DeliveryTask,
     TaskCreated,
     TaskError,

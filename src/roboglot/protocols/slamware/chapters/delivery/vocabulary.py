@@ -31,7 +31,7 @@ from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.chapters.motion.errands import part_of
 from roboglot.protocols.slamware.chapters.motion.home_docks import NAME
 from roboglot.protocols.slamware.vocabulary import RIDE_STAGES
-from roboglot.wire.slamware.delivery import (
+from roboglot.wire.slamware.chapters.delivery import (
     Box,
     CargoEntry,
     DeliveryEvent,

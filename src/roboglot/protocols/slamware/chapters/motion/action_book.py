@@ -12,7 +12,7 @@ from roboglot.model.components.system.lease import ERRAND
 from roboglot.model.errors import NotFound
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.vocabulary import action_word, stage_of, state_of
-from roboglot.wire.slamware.motion import ActionGravestone, ActionInfo
+from roboglot.wire.slamware.chapters.motion import ActionGravestone, ActionInfo
 
 # Names that the robot's skills give their actions; what is not here is driving by hand.
 FOREIGN = {

@@ -37,8 +37,8 @@ from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import BAD_REQUESTS, HttpError
 from roboglot.protocols.slamware.table import TABLE
 from roboglot.protocols.slamware.vocabulary import action_word
-from roboglot.wire.slamware import motion as wire
-from roboglot.wire.slamware.motion import (
+from roboglot.wire.slamware.chapters import motion as wire
+from roboglot.wire.slamware.chapters.motion import (
     ActionFactory,
     ActionGravestone,
     ActionInfo,

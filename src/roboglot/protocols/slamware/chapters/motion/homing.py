@@ -18,8 +18,8 @@ from roboglot.protocols.slamware.chapters.motion.home_docks import (
 )
 from roboglot.protocols.slamware.chapters.motion.moves import navigate, navigation_options
 from roboglot.protocols.slamware.context import Context
-from roboglot.wire.slamware.motion import GoHome, GoHomeOptions, MoveOptions, ReturnToParkingOptions
-from roboglot.wire.slamware.platform import GeneralEvent
+from roboglot.wire.slamware.chapters.motion import GoHome, GoHomeOptions, MoveOptions, ReturnToParkingOptions
+from roboglot.wire.slamware.chapters.platform import GeneralEvent
 
 PARKING = "PARKING"  # the type of places to park at
 

@@ -12,7 +12,7 @@ from roboglot.protocols.slamware.chapters.motion.errands import PART, Errand, ru
 from roboglot.protocols.slamware.chapters.motion.moves import navigate
 from roboglot.protocols.slamware.chapters.motion.tags import pose_of_target
 from roboglot.protocols.slamware.context import Context
-from roboglot.wire.slamware.motion import JackMoveOptions, JackTopMoveToOptions, JackTopWishes, MoveOptions
+from roboglot.wire.slamware.chapters.motion import JackMoveOptions, JackTopMoveToOptions, JackTopWishes, MoveOptions
 
 
 def move_jack(context: Context, options: JackMoveOptions) -> Action:

@@ -19,7 +19,7 @@ from roboglot.protocols.slamware.chapters.motion.strategies import speed_share
 from roboglot.protocols.slamware.chapters.multi_floor.track_graph import way_along
 from roboglot.protocols.slamware.context import Context
 from roboglot.wire.slamware import geometry
-from roboglot.wire.slamware.motion import (
+from roboglot.wire.slamware.chapters.motion import (
     AngleOptions,
     Direction,
     FollowPathPointsOptions,

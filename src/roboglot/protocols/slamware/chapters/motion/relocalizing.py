@@ -13,8 +13,13 @@ from roboglot.model.geometry import Pose
 from roboglot.protocols.slamware.chapters.motion.errands import PART, Errand, run_errand
 from roboglot.protocols.slamware.chapters.motion.home_docks import home_dock
 from roboglot.protocols.slamware.context import Context
-from roboglot.wire.slamware.motion import NoOptions, RecoverLocalizationOptions, RecoverMovement, RelocalizationOptions
-from roboglot.wire.slamware.platform import GeneralEvent
+from roboglot.wire.slamware.chapters.motion import (
+    NoOptions,
+    RecoverLocalizationOptions,
+    RecoverMovement,
+    RelocalizationOptions,
+)
+from roboglot.wire.slamware.chapters.platform import GeneralEvent
 
 RECOVER_SECONDS = 30.0  # when the client sets no limit
 TURN = math.radians(60)  # before it looks again

@@ -27,7 +27,7 @@ from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, FloorN
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import HttpError
 from roboglot.protocols.slamware.vocabulary import pose_of
-from roboglot.wire.slamware.motion import (
+from roboglot.wire.slamware.chapters.motion import (
     Door,
     EnterElevator,
     EnterElevatorOptions,
@@ -39,7 +39,7 @@ from roboglot.wire.slamware.motion import (
     MultiFloorMoveOptions,
     StoppingYaw,
 )
-from roboglot.wire.slamware.platform import ElevatorEvent
+from roboglot.wire.slamware.chapters.platform import ElevatorEvent
 
 ENTER_SECONDS = LEAVE_SECONDS = 120.0  # when the client sets no limit
 

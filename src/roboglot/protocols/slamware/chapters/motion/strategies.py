@@ -9,7 +9,7 @@ from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE, Text
-from roboglot.wire.slamware.motion import Strategy
+from roboglot.wire.slamware.chapters.motion import Strategy
 
 API = "/api/core/motion/v1/strategies"
 CURRENT = "slamware.strategy"  # the setting

@@ -14,7 +14,7 @@ from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
 from roboglot.protocols.slamware.chapters.motion.home_docks import NAME
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.vocabulary import pose3d, pose_of
-from roboglot.wire.slamware.motion import (
+from roboglot.wire.slamware.chapters.motion import (
     BackOffFromTagOptions,
     MoveToTagOptions,
     ScheduledMoveToTagOptions,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.mapping.floors import RideStage
 from roboglot.model.errors import Blocked
-from roboglot.wire.slamware.platform import ElevatorEvent
+from roboglot.wire.slamware.chapters.platform import ElevatorEvent
 
 BEGINNINGS: dict[RideStage, tuple[ElevatorEvent, ...]] = {
     RideStage.CALLING: (ElevatorEvent.WAIT_ELEVATOR,),

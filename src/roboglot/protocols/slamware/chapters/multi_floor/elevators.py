@@ -25,9 +25,9 @@ from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import HttpError
 from roboglot.protocols.slamware.table import TABLE
 from roboglot.protocols.slamware.vocabulary import pose3d
-from roboglot.wire.slamware.artifact import Identifier, MetadataError, number
+from roboglot.wire.slamware.chapters.artifact import Identifier, MetadataError, number
+from roboglot.wire.slamware.chapters.multi_floor import PoseRelation
 from roboglot.wire.slamware.geometry import Pose3D
-from roboglot.wire.slamware.multi_floor import PoseRelation
 
 API = "/api/multi-floor/map/v1/elevators"
 SILL, WAITING = 0.4, 1.0  # m, where the metadata do not say

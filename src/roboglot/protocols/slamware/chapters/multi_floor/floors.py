@@ -26,8 +26,7 @@ from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, FloorN
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import NO_CONTENT, TABLE, NoContent
 from roboglot.protocols.slamware.vocabulary import pose2d, pose_of
-from roboglot.wire.slamware.geometry import Point
-from roboglot.wire.slamware.multi_floor import (
+from roboglot.wire.slamware.chapters.multi_floor import (
     BoundDock,
     CurrentFloorInfo,
     DockChoice,
@@ -42,6 +41,7 @@ from roboglot.wire.slamware.multi_floor import (
     Reload,
     Unbinding,
 )
+from roboglot.wire.slamware.geometry import Point
 
 MAP, LOCALIZATION = "/api/multi-floor/map/v1", "/api/multi-floor/localization/v1"
 

@@ -10,8 +10,8 @@ from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.multi_floor.track_graph import way_along
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
-from roboglot.wire.slamware.motion import PathPoints
-from roboglot.wire.slamware.multi_floor import TrackQuery
+from roboglot.wire.slamware.chapters.motion import PathPoints
+from roboglot.wire.slamware.chapters.multi_floor import TrackQuery
 
 
 @TABLE.on("POST /api/multi-floor/map/v1/search_path_points", right=Right.SEE, needs=(Localization, MapAnnotations))

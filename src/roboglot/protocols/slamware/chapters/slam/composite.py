@@ -20,10 +20,12 @@ from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid, PointOfInterest
 from roboglot.protocols.slamware.chapters.artifact.drawing import AREA_USAGES, area_of, line_of
-from roboglot.wire.slamware import artifact, geometry, stcm_layers
-from roboglot.wire.slamware.explore_map import BadMap, ExploreMap
-from roboglot.wire.slamware.stcm import CompositeMap, Layer, Pairs
-from roboglot.wire.slamware.stcm_layers import AreaEntry, LineEntry, MarkEntry
+from roboglot.wire.slamware import geometry
+from roboglot.wire.slamware.chapters import artifact
+from roboglot.wire.slamware.chapters.slam import stcm_layers
+from roboglot.wire.slamware.chapters.slam.explore_map import BadMap, ExploreMap
+from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap, Layer, Pairs
+from roboglot.wire.slamware.chapters.slam.stcm_layers import AreaEntry, LineEntry, MarkEntry
 
 T = TypeVar("T")
 ORDER_MAX = 10_000
@@ -193,7 +195,7 @@ def _line(usage: str, entry: LineEntry) -> Line:
 
 
 def _area(entry: AreaEntry) -> Area:
-    rectangle = artifact.Rectangle(
+    rectangle = artifact.Strip(
         geometry.Point(entry.x1, entry.y1), geometry.Point(entry.x2, entry.y2), abs(entry.half_width)
     )
     try:

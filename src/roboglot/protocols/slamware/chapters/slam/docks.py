@@ -26,9 +26,9 @@ from roboglot.protocols.slamware.chapters.motion.home_docks import (
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
 from roboglot.protocols.slamware.vocabulary import entry_of, pose3d, pose_of
-from roboglot.wire.slamware.artifact import Identifier, PoseChange, PoseEntry, metadata_text
+from roboglot.wire.slamware.chapters.artifact import Identifier, PoseChange, PoseEntry, metadata_text
+from roboglot.wire.slamware.chapters.slam.localization import Registration
 from roboglot.wire.slamware.geometry import Pose3D
-from roboglot.wire.slamware.slam import Registration
 
 API = "/api/core/slam/v1"
 

@@ -20,8 +20,7 @@ from roboglot.protocols.slamware.chapters.system.raw_imu import in_units
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
 from roboglot.protocols.slamware.vocabulary import pose3d, pose_of
-from roboglot.wire.slamware.geometry import COORDINATE_MAX, Location, Pose3D, Quaternion, Rectangle
-from roboglot.wire.slamware.slam import (
+from roboglot.wire.slamware.chapters.slam.localization import (
     IMU_ACCELEROMETER,
     IMU_EULER,
     IMU_GYROSCOPE,
@@ -30,6 +29,7 @@ from roboglot.wire.slamware.slam import (
     ImuData,
     Switch,
 )
+from roboglot.wire.slamware.geometry import COORDINATE_MAX, Location, Pose3D, Quaternion, Rectangle
 
 API = "/api/core/slam/v1"
 LOST = "not localized"  # the fault

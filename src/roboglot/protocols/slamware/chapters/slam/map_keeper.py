@@ -44,9 +44,9 @@ from roboglot.protocols.slamware.chapters.slam.composite import (
     composite_of,
     floors_of,
 )
-from roboglot.wire.slamware.explore_map import BadMap
-from roboglot.wire.slamware.multi_floor import MapLoadStatus
-from roboglot.wire.slamware.stcm import Layer, decode_stcm, encode_stcm
+from roboglot.wire.slamware.chapters.multi_floor import MapLoadStatus
+from roboglot.wire.slamware.chapters.slam.explore_map import BadMap
+from roboglot.wire.slamware.chapters.slam.stcm import Layer, decode_stcm, encode_stcm
 
 log = logging.getLogger(__name__)
 FILE = "slamware/map.stcm"

@@ -23,10 +23,10 @@ from roboglot.protocols.slamware.chapters.motion.home_docks import known_docks
 from roboglot.protocols.slamware.chapters.slam.composite import explore_map
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
-from roboglot.wire.slamware.explore_map import encode_explore_map
+from roboglot.wire.slamware.chapters.platform import GeneralEvent
+from roboglot.wire.slamware.chapters.slam.explore_map import encode_explore_map
+from roboglot.wire.slamware.chapters.slam.localization import NewOrigin
 from roboglot.wire.slamware.geometry import COORDINATE_MAX
-from roboglot.wire.slamware.platform import GeneralEvent
-from roboglot.wire.slamware.slam import NewOrigin
 
 API = "/api/core/slam/v1"
 REACH_MAX = 0.99 * COORDINATE_MAX  # m from an origin; the robot may drive about there

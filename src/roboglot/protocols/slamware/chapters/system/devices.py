@@ -18,8 +18,8 @@ from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
-from roboglot.wire.slamware.devices import DisabledSensor, SensorSwitch
-from roboglot.wire.slamware.slam import Switch
+from roboglot.wire.slamware.chapters.slam.localization import Switch
+from roboglot.wire.slamware.chapters.system.devices import DisabledSensor, SensorSwitch
 
 SYSTEM, SENSORS = "/api/core/system/v1", "/api/core/sensors/v1"
 MASKED = "slamware.masked_sensors"  # the setting that holds the ids of sensors that stay off after a restart

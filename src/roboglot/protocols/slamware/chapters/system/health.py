@@ -12,7 +12,7 @@ from roboglot.operations import Right
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import HttpError
 from roboglot.protocols.slamware.table import TABLE
-from roboglot.wire.slamware.system import BaseError, BaseHealthInfo, Level, Part, health_record
+from roboglot.wire.slamware.chapters.system.system import BaseError, BaseHealthInfo, Level, Part, health_record
 
 API = "/api/core/system/v1/robot/health"
 STOP = "emergency stop"  # the fault

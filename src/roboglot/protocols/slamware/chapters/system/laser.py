@@ -13,7 +13,7 @@ from roboglot.model.events import ScanTaken
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import LaserScan
-from roboglot.wire.slamware.system import LaserPoint
+from roboglot.wire.slamware.chapters.system.system import LaserPoint
 
 _NONE_YET = msgspec.Raw(b"[]")
 

@@ -10,7 +10,7 @@ from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import HttpError
 from roboglot.protocols.slamware.table import TABLE
-from roboglot.wire.slamware.devices import Channel, Half, LightColour, LightControl, Mode
+from roboglot.wire.slamware.chapters.system.devices import Channel, Half, LightColour, LightControl, Mode
 
 STEP_MIN = 0.02  # s; faster makes no visible difference
 

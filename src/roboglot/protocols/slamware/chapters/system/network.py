@@ -8,7 +8,7 @@ from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
-from roboglot.wire.slamware.network import (
+from roboglot.wire.slamware.chapters.system.network import (
     ApnStatus,
     NetworkRequest,
     NetworkStatus,

@@ -13,7 +13,7 @@ from roboglot.model.errors import InvalidGoal
 from roboglot.operations import Right
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE, Text
-from roboglot.wire.slamware.devices import Parameter
+from roboglot.wire.slamware.chapters.system.devices import Parameter
 
 PARAMETER = "/api/core/system/v1/parameter"
 SWITCH = {"on": True, "off": False}

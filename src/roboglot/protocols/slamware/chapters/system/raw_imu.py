@@ -7,7 +7,7 @@ from roboglot.model.sensing import RawImu
 from roboglot.operations import Right
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
-from roboglot.wire.slamware.system import ImuCounts, ImuValues
+from roboglot.wire.slamware.chapters.system.system import ImuCounts, ImuValues
 
 API = "/api/core/system/v1"
 

@@ -21,7 +21,7 @@ from roboglot.operations import Right
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
 from roboglot.protocols.slamware.vocabulary import pose3d
-from roboglot.wire.slamware.system import (
+from roboglot.wire.slamware.chapters.system.system import (
     BatteryPack,
     Capability,
     DeviceInfo,

@@ -1,0 +1,1 @@
+"""Chapters "photo and video" and "image transmission": pictures, recordings, live video."""

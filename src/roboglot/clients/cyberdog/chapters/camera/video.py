@@ -1,0 +1,106 @@
+"""The camera live by WebRTC (4001): decoded pictures. Imports aiortc when the first picture is wanted."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import TYPE_CHECKING, Any
+
+from roboglot.clients.cyberdog.calls import Calls, CyberDogRefused
+from roboglot.clients.errors import LinkLost, TimedOut
+from roboglot.model.feed import Feed, Viewer
+from roboglot.wire.cyberdog.chapters.camera import Description, End, Failure, Screen, Signal, fields_of
+from roboglot.wire.cyberdog.codes import Code
+from roboglot.wire.ice import offer_loopback
+
+if TYPE_CHECKING:
+    from av import VideoFrame
+
+ANSWER_MAX = 15.0  # s: the robot itself gives up after 10
+
+
+class Picture:
+    """Pictures as they arrive: ``await pictures.next()``, or ``async for``."""
+
+    def __init__(self, track: Any) -> None:
+        self._track = track
+
+    def __aiter__(self) -> Picture:
+        return self
+
+    async def __anext__(self) -> VideoFrame:
+        from aiortc.mediastreams import MediaStreamError
+
+        try:
+            frame: VideoFrame = await self._track.recv()
+        except MediaStreamError:
+            raise StopAsyncIteration from None
+        return frame
+
+    async def next(self) -> VideoFrame:
+        """The next picture. Raises LinkLost when there are no more."""
+        try:
+            return await anext(self)
+        except StopAsyncIteration:
+            raise LinkLost("the robot sends no more pictures") from None
+
+
+class Video(Calls):
+    """Image transmission."""
+
+    signals: Feed[Any]  # what is pushed under 4001
+
+    async def signal(self, signal: Signal) -> None:
+        """4001: one message of signalling; the robot's own come in ``signals``."""
+        await self.text(Code.VIDEO, fields_of(signal))
+
+    async def negotiate(self, uid: str, offer: str, screen: Screen | None = None) -> str:
+        """The SDP that answers ``offer``. Raises CyberDogRefused, TimedOut."""
+        with self.signals.subscribe() as signals:
+            await self.signal(Description(uid, "offer", offer, screen))
+            try:
+                answer = await self.clock.wait_for(_answer(signals, uid), ANSWER_MAX)
+            except TimeoutError:
+                raise TimedOut(f"VIDEO: no answer within {ANSWER_MAX:g} s") from None
+        if isinstance(answer, Failure):
+            raise CyberDogRefused(Code.VIDEO.name, answer.code, answer.message)
+        return answer.sdp
+
+    async def end_video(self, uid: str) -> None:
+        """End the video of ``uid``."""
+        await self.signal(End(uid))
+
+    @asynccontextmanager
+    async def video(self, uid: str = "roboglot", screen: Screen | None = None) -> AsyncIterator[Picture]:
+        """``async with client.video() as pictures: async for frame in pictures: …``"""
+        from aiortc import RTCConfiguration, RTCPeerConnection, RTCSessionDescription
+
+        offer_loopback()
+        peer = RTCPeerConnection(RTCConfiguration(iceServers=[]))
+        tracks: asyncio.Queue[Any] = asyncio.Queue()
+        peer.add_listener("track", tracks.put_nowait)
+        peer.addTransceiver("video", direction="recvonly")
+        try:
+            await peer.setLocalDescription(await peer.createOffer())
+            answer = await self.negotiate(uid, peer.localDescription.sdp, screen)
+            await peer.setRemoteDescription(RTCSessionDescription(answer, "answer"))
+            try:
+                track = await self.clock.wait_for(tracks.get(), ANSWER_MAX)
+            except TimeoutError:
+                raise TimedOut("VIDEO: the robot's answer has no pictures") from None
+            yield Picture(track)
+        finally:
+            try:
+                await self.end_video(uid)
+            except LinkLost:
+                pass  # the robot is gone
+            finally:
+                await peer.close()
+
+
+async def _answer(signals: Viewer[Any], uid: str) -> Description | Failure:
+    async for signal in signals:
+        if signal.uid == uid and isinstance(signal, Description | Failure):
+            return signal
+    raise LinkLost("the client was closed")

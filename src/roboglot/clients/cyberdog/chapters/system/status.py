@@ -1,0 +1,31 @@
+"""Chapter "status": 1001, 10001, 55001."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from roboglot.clients.cyberdog.calls import Calls
+from roboglot.wire.cyberdog.codes import Code
+
+TOPICS = (
+    "version", "sn", "nick_name", "volume", "mic_state", "voice_control", "wifi", "bat_info", "motor_temper",
+    "audio_state", "device_model", "stand", "lowpower_control",
+)  # fmt: skip
+
+
+class Status(Calls):
+    """What the robot reports about itself."""
+
+    async def information(self, *topics: str, uid: str = "") -> Mapping[str, Any]:
+        """1001: what is asked for of TOPICS (all, if none is named), in the robot's own form."""
+        asked = {f"is_{topic}": True for topic in topics or TOPICS}
+        return await self.ask(Code.DEVICE_INFO, dict[str, Any], {**asked, "uid": uid})
+
+    async def status(self) -> Mapping[str, Any]:
+        """10001: the states of the heartbeat."""
+        return await self.ask(Code.STATUS, dict[str, Any])
+
+    async def disconnect_app(self) -> None:
+        """55001: the robot forgets this app until its next request."""
+        await self.text(Code.DISCONNECT_APP)

@@ -1,0 +1,1 @@
+"""Chapter "delivery": tasks, boxes and settings of the delivery service."""

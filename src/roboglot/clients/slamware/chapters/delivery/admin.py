@@ -1,0 +1,90 @@
+"""Chapter "delivery": its operations as typed methods. Units and frames as the robot has them: m, rad, map."""
+
+# mypy: disable-error-code="empty-body"
+# The bodies are made by @call from the signatures.
+
+from __future__ import annotations
+
+from roboglot.clients.slamware.calls import Chapter, call
+from roboglot.wire.slamware.chapters.delivery import (
+    AdminPassword,
+    Configuration,
+    Language,
+    LineSpeed,
+    OperationReply,
+    Password,
+    TimeoutChange,
+    VoicePackages,
+    WorkingTime,
+    WorkModeEntry,
+    WrappedSettings,
+)
+from roboglot.wire.slamware.chapters.motion import MoveOptions
+
+
+class Admin(Chapter):
+    """Chapter "delivery"."""
+
+    @call("GET /api/delivery/v1/admin/password")
+    async def get_password(self) -> AdminPassword:
+        """Return the password of the robot's settings screen; it never expires."""
+
+    @call("PUT /api/delivery/v1/admin/password")
+    async def set_password(self, body: Password | None = None) -> OperationReply:
+        """Ask for this password, or for none. It guards the screen: the API itself is open."""
+
+    @call("GET /api/delivery/v1/admin/mode")
+    async def get_work_mode(self) -> WorkModeEntry:
+        """Return the kinds of tasks that may be created at the robot."""
+
+    @call("PUT /api/delivery/v1/admin/mode")
+    async def set_work_mode(self, body: WorkModeEntry) -> OperationReply:
+        """DISPATCH: none, RECYCLE: only collecting dishes, MANUAL: any."""
+
+    @call("GET /api/delivery/v1/admin/language")
+    async def get_language(self) -> Language:
+        """Return the language; Chinese by default."""
+
+    @call("PUT /api/delivery/v1/admin/language")
+    async def set_language(self, body: Language) -> OperationReply:
+        """Keep it."""
+
+    @call("GET /api/delivery/v1/admin/working_time")
+    async def get_working_time(self) -> WorkingTime:
+        """UTC; no hours: always."""
+
+    @call("PUT /api/delivery/v1/admin/working_time")
+    async def set_working_time(self, body: WorkingTime) -> OperationReply:
+        """Outside these hours (UTC) the robot rests on its dock and tasks wait."""
+
+    @call("GET /api/delivery/v1/admin/move_options")
+    async def get_move_options(self) -> MoveOptions:
+        """Return the drive settings of tasks."""
+
+    @call("PUT /api/delivery/v1/admin/move_options")
+    async def set_move_options(self, body: dict[str, object]) -> OperationReply:
+        """Change what is sent; an empty body goes back to the default. The next drive has it."""
+
+    @call("GET /api/delivery/v1/admin/line_speed")
+    async def get_line_speed(self) -> LineSpeed:
+        """m/s on the way to people and back; what was never set is as fast as the robot may drive."""
+
+    @call("PUT /api/delivery/v1/admin/line_speed")
+    async def set_line_speed(self, body: LineSpeed) -> None:
+        """The next drive has it; never faster than the robot may drive."""
+
+    @call("GET /api/delivery/v1/configurations")
+    async def get_configurations(self) -> Configuration:
+        """The machine; no cloud manages it, and it does not search its place anew when parked."""
+
+    @call("GET /api/delivery/v1/settings")
+    async def get_delivery_settings(self) -> WrappedSettings:
+        """Battery levels (percent) and time-outs (s)."""
+
+    @call("PUT /api/delivery/v1/settings/timeout")
+    async def set_timeout_settings(self, body: TimeoutChange) -> None:
+        """Return how long the robot waits for a pickup."""
+
+    @call("GET /api/delivery/v1/voice_resources")
+    async def get_voice_resources(self) -> VoicePackages:
+        """They come from the cloud, and no cloud manages this robot."""

@@ -1,0 +1,45 @@
+"""Chapter "industry": its operations as typed methods. Units and frames as the robot has them: m, rad, map."""
+
+# mypy: disable-error-code="empty-body"
+# The bodies are made by @call from the signatures.
+
+from __future__ import annotations
+
+from roboglot.clients.slamware.calls import Chapter, call
+from roboglot.wire.slamware.chapters.industry import (
+    CommonResponse,
+    IndustryTask,
+    LandingPose,
+    LandingRequest,
+    TaskEvent,
+    TaskTemplate,
+    TemplateRequest,
+)
+
+
+class Industry(Chapter):
+    """Chapter "industry"."""
+
+    @call("POST /api/industry/v1/tasks/templates")
+    async def create_task_template(self, body: TemplateRequest) -> TaskTemplate:
+        """Keep it, in place of one with the same key; 404 for a place that is not on the map."""
+
+    @call("GET /api/industry/v1/tasks/templates")
+    async def get_task_templates(self) -> list[TaskTemplate]:
+        """List them in order of creation."""
+
+    @call("DELETE /api/industry/v1/tasks/templates/{key_id}")
+    async def delete_task_template(self, key_id: str) -> CommonResponse:
+        """Forget it; 404 if there is none."""
+
+    @call("GET /api/industry/v1/tasks")
+    async def get_industry_tasks(self, type: str | None = None, status: str | None = None) -> list[IndustryTask]:
+        """List ready and running tasks, oldest first; with ``status`` all also those that ended."""
+
+    @call("POST /api/industry/v1/tasks/events")
+    async def post_task_event(self, body: TaskEvent) -> None:
+        """The client that carries out a call says how it goes; 404 for an unknown one, 403 for one that has ended."""
+
+    @call("POST /api/industry/v1/generate_landing_pose")
+    async def generate_landing_pose(self, body: LandingRequest) -> LandingPose:
+        """Return the robot's pose and a place ahead of it from which it would come back here; beyond the manual."""

@@ -1,0 +1,1 @@
+"""Chapter "slam": localization, docks, maps."""

@@ -1,0 +1,46 @@
+"""Chapter "slam": its operations as typed methods. Units and frames as the robot has them: m, rad, map."""
+
+# mypy: disable-error-code="empty-body"
+# The bodies are made by @call from the signatures.
+
+from __future__ import annotations
+
+from roboglot.clients.slamware.calls import Chapter, call
+from roboglot.wire.slamware.chapters.slam.explore_map import ExploreMap
+from roboglot.wire.slamware.chapters.slam.localization import NewOrigin
+from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap
+from roboglot.wire.slamware.geometry import Rectangle
+
+
+class Maps(Chapter):
+    """Chapter "slam"."""
+
+    @call("GET /api/core/slam/v1/knownarea")
+    async def get_known_area(self) -> Rectangle:
+        """The extent of the map, m."""
+
+    @call("GET /api/core/slam/v1/maps/explore")
+    async def get_explore_map(
+        self,
+        min_x: float | None = None,
+        min_y: float | None = None,
+        max_x: float | None = None,
+        max_y: float | None = None,
+    ) -> ExploreMap:
+        """The map as binary (see the wire's explore_map), all of it or what a window in metres cuts out of it."""
+
+    @call("GET /api/core/slam/v1/maps/stcm")
+    async def get_composite_map(self) -> CompositeMap:
+        """The map with all that is drawn on it as a composite map; 403 while one is being loaded."""
+
+    @call("PUT /api/core/slam/v1/maps/stcm")
+    async def set_composite_map(self, body: CompositeMap) -> None:
+        """Use this map and what is drawn on it, in memory only; the robot's pose becomes the origin."""
+
+    @call("DELETE /api/core/slam/v1/maps")
+    async def clear_map(self) -> None:
+        """Forget the map and begin a new one here. The docks stay where they are; they get new coordinates."""
+
+    @call("PUT /api/core/slam/v1/maps/origin")
+    async def move_origin_point(self, body: NewOrigin) -> None:
+        """Make this place, to the nearest 5 cm, the map's origin; all that is drawn on the map moves with it."""

@@ -1,0 +1,1 @@
+"""Chapters "system" and "sensors": power, health, devices, network."""

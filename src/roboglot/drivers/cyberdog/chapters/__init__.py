@@ -1,0 +1,1 @@
+"""Components of a CyberDog, by the groups of chapters as in ``protocols.cyberdog.chapters``."""

@@ -1,0 +1,86 @@
+"""Relocalization (6004 type 7) and navigation (type 1); poses as pushes 6005."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from roboglot.drivers.cyberdog.chapters.mapping.tasks import Begin, Skills
+from roboglot.model.actions import Action, OnBusy
+from roboglot.model.components.mapping.localization import LOCALIZATION, Localization, Region
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
+from roboglot.model.errors import InvalidGoal, Refused
+from roboglot.model.geometry import Path, Point, Pose
+
+GOALS_MAX, POSITION_MAX = 100, 10_000.0
+FRESH = 1.0  # s that a pose may be old for the dog to count as localized
+
+
+class CyberDogNavigation(Navigation):
+    """6004 type 1; the dog has to be localized."""
+
+    def __init__(self, skills: Skills) -> None:
+        self._skills = skills
+
+    def navigate_to(
+        self, goals: Sequence[Point], options: NavigationOptions, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE
+    ) -> Action:
+        if not 1 <= len(goals) <= GOALS_MAX:
+            raise InvalidGoal(f"1 to {GOALS_MAX} goals, not {len(goals)}")
+        if not all(math.hypot(goal.x, goal.y) <= POSITION_MAX for goal in goals):
+            raise InvalidGoal("not a place on this map")
+        yaws = [None] * (len(goals) - 1) + [options.yaw]
+
+        def begin(goal: Point, yaw: float | None) -> Begin:
+            return lambda: self._skills.client.navigate(goal.x, goal.y, yaw)
+
+        begins = [begin(goal, yaw) for goal, yaw in zip(goals, yaws, strict=True)]
+        return self._skills.start("navigate", begins, goal=tuple(goals), source=source, on_busy=on_busy)
+
+    async def plan(self, start: Point, goal: Point) -> Path:
+        raise Refused("this robot does not report plans")
+
+    async def visiting_order(self, places: Sequence[Point], *, round_trip: bool = False) -> Sequence[int]:
+        raise Refused("this robot does not report plans")
+
+
+class CyberDogLocalization(Localization):
+    """Pushes 6005, and 6004 type 7."""
+
+    def __init__(self, skills: Skills) -> None:
+        self._skills = skills
+
+    @property
+    def pose(self) -> Pose:
+        return self._skills.reported.reckon(self._skills.robot.clock.time()).pose
+
+    @property
+    def quality(self) -> float:
+        """Return 1 while poses arrive, else 0: the dog reports nothing finer."""
+        return float(self.enabled)
+
+    @property
+    def enabled(self) -> bool:
+        return self._skills.robot.clock.time() - self._skills.reported.pose_at < FRESH
+
+    def enable(self, on: bool) -> None:
+        if on is not self.enabled:
+            raise Refused("this robot is localized by a task, not by a switch")
+
+    def set_pose(self, pose: Pose) -> None:
+        raise Refused("this robot finds its place by itself")
+
+    def relocalize(
+        self,
+        region: Region | None = None,
+        *,
+        may_move: bool = False,
+        source: str = "",
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
+        if region is not None:
+            raise Refused("this robot searches the whole map")
+        client = self._skills.client
+        return self._skills.start(
+            "relocalize", [client.relocalise], goal=None, source=source, on_busy=on_busy, resource=LOCALIZATION
+        )

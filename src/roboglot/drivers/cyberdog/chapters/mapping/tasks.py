@@ -1,0 +1,128 @@
+"""Tasks of the dog (6004): relocalization, navigation, docking; and its map."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+from collections.abc import Awaitable, Callable, Sequence
+
+from roboglot.clients.cyberdog import CyberDogClient, CyberDogRefused, RunningTask
+from roboglot.clients.errors import ClientError
+from roboglot.drivers.cyberdog.state import ReportedState
+from roboglot.drivers.cyberdog.vocabulary import robot_errors
+from roboglot.model.actions import Action, OnBusy
+from roboglot.model.components.motion.driving import BASE
+from roboglot.model.components.motion.navigation import NavigationFeedback
+from roboglot.model.components.system.link import Link
+from roboglot.model.errors import Unconnected
+from roboglot.model.robot import Robot
+from roboglot.wire.cyberdog.codes import TaskType
+
+PERIOD = 0.1  # s between two polls
+
+log = logging.getLogger(__name__)
+Begin = Callable[[], Awaitable[RunningTask]]
+Afterwards = Callable[[RunningTask], Awaitable[None]]
+
+
+class Skills:
+    """Runs tasks of the dog as actions of the model."""
+
+    def __init__(self, robot: Robot, client: CyberDogClient, link: Link, reported: ReportedState) -> None:
+        self.robot, self.client, self.link, self.reported = robot, client, link, reported
+        self._orphan: TaskType | None = None  # still runs after the link was lost
+
+    def start(
+        self, name: str, begins: Sequence[Begin], *, goal: object, source: str, on_busy: OnBusy, resource: str = BASE
+    ) -> Action:
+        """Start an action that runs one task after the other."""
+        self.link.require_free()
+
+        async def run(action: Action) -> None:
+            for begin in begins:
+                with robot_errors():
+                    await self._follow(action, await begin())
+
+        return self._begin(name, run, goal=goal, source=source, on_busy=on_busy, resource=resource)
+
+    def start_from_idle(
+        self, name: str, begin: Begin, *, goal: object, source: str, on_busy: OnBusy, then: Afterwards | None = None
+    ) -> Action:
+        """Start a task that the dog accepts only while not localized; relocalize afterwards."""
+        self.link.require_free()
+
+        async def run(action: Action) -> None:
+            with robot_errors():
+                localized = await self._leave_the_map()
+                try:
+                    await self._follow(action, await begin(), then)
+                finally:
+                    if localized:
+                        await self._localize()
+
+        return self._begin(name, run, goal=goal, source=source, on_busy=on_busy, resource=BASE)
+
+    async def stop_orphan(self) -> bool:
+        """Stop the orphaned task after a reconnection; return True if there was one. Raises ClientError."""
+        if self._orphan is None:
+            return False
+        with contextlib.suppress(CyberDogRefused):
+            await self.client.stop_task(self._orphan)
+        self._orphan = None
+        return True
+
+    async def _leave_the_map(self) -> bool:
+        """Stop the localization task; return True if one ran. Heartbeats would be too late to show it."""
+        try:
+            await self.client.stop_task()
+        except CyberDogRefused:
+            return False
+        return True
+
+    async def _localize(self) -> None:
+        try:
+            (await self.client.relocalise()).leave()  # pose pushes show its end
+        except ClientError as error:
+            log.info("%s is not localized: %s", self.link.address, error)
+
+    def _begin(
+        self,
+        name: str,
+        run: Callable[[Action], Awaitable[None]],
+        *,
+        goal: object,
+        source: str,
+        on_busy: OnBusy,
+        resource: str,
+    ) -> Action:
+        return self.robot.actions.start(name, run, resources={resource}, goal=goal, source=source, on_busy=on_busy)
+
+    async def _follow(self, action: Action, task: RunningTask, then: Afterwards | None = None) -> None:
+        try:
+            if then:
+                await then(task)
+            while not task.ended:
+                self.link.require()
+                remaining = self.reported.path
+                action.report(
+                    NavigationFeedback(
+                        stage="driving" if remaining.points else "planning",
+                        remaining=remaining,
+                        milestones=(),
+                        time_to_goal=0.0,
+                    )
+                )
+                await self.robot.clock.sleep(PERIOD)
+            await task.succeeded()
+        except BaseException:
+            if task.result is None:
+                await self._stop(task)
+            raise
+
+    async def _stop(self, task: RunningTask) -> None:
+        try:
+            self.link.require()
+            await task.cancel()
+        except (ClientError, Unconnected):  # without a link the task goes on until it is back
+            task.leave()
+            self._orphan = task.kind

@@ -1,0 +1,1 @@
+"""Chapters "audio" and "following": the loudspeaker, and following a person or the bracelet."""

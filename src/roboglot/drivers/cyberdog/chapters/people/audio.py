@@ -1,0 +1,79 @@
+"""The loudspeaker of a dog: volume by 1012; speech by a one-line program, as the protocol has no command for it."""
+
+from __future__ import annotations
+
+import math
+
+from roboglot.clients.cyberdog import CyberDogClient
+from roboglot.clients.cyberdog.values import Frame
+from roboglot.drivers.cyberdog.telemetry import StatusPoll
+from roboglot.drivers.cyberdog.vocabulary import robot_errors
+from roboglot.drivers.supervisor import Supervisor
+from roboglot.model.actions import Action
+from roboglot.model.components.interaction.speaker import SPEAKER, TEXT_MAX, Speaker
+from roboglot.model.errors import Expired, InvalidGoal, Refused
+from roboglot.model.events import Spoke
+from roboglot.model.feed import Viewer
+from roboglot.model.robot import Robot
+from roboglot.model.sound import Sound
+
+TASK = "roboglot_says"
+SAID_WITHIN = 120.0  # s
+
+
+class CyberDogSpeaker(Speaker):
+    """``volume`` is polled every two seconds."""
+
+    def __init__(self, robot: Robot, client: CyberDogClient, supervisor: Supervisor, status: StatusPoll) -> None:
+        self._robot, self._client, self._supervisor, self._status = robot, client, supervisor, status
+
+    @property
+    def volume(self) -> float:
+        return (self._status.volume or 0) / 100
+
+    def set_volume(self, volume: float) -> None:
+        if not (math.isfinite(volume) and 0.0 <= volume <= 1.0):
+            raise InvalidGoal(f"a volume is 0 to 1, not {volume}")
+
+        async def change() -> None:
+            await self._client.set_volume(round(volume * 100))
+            await self._status.ask()
+
+        self._supervisor.send("setting the volume", change())
+
+    def say(self, text: str, *, source: str = "") -> Action:
+        if not text.strip() or len(text) > TEXT_MAX:
+            raise InvalidGoal(f"a text has 1 to {TEXT_MAX} characters")
+        self._supervisor.link.require()
+
+        async def run(_: Action) -> None:
+            begun = self._robot.clock.time()
+            with robot_errors():
+                await self._speak(text)
+            now = self._robot.clock.time()
+            self._robot.events.publish(Spoke(stamp=now, text=text, seconds=now - begun, audible=True))
+
+        return self._robot.actions.start("say", run, resources={SPEAKER}, goal=text, source=source)
+
+    def play(self, sound: Sound, *, source: str = "") -> Action:
+        raise Refused("this dog plays no sounds but its own")
+
+    async def _speak(self, text: str) -> None:
+        client = self._client
+        await client.deploy(TASK, f"cyberdog.audio.play({text!r})\n")
+        with client.watch(Frame) as frames:
+            await client.run_program(TASK)
+            try:
+                await self._robot.clock.wait_for(_ended(frames), SAID_WITHIN)
+            except TimeoutError:
+                raise Expired("the dog does not report the end of its speech") from None
+            except BaseException:
+                self._supervisor.send("being silent", client.operate("task", "shutdown", TASK))
+                raise
+
+
+async def _ended(frames: Viewer[Frame]) -> None:
+    async for frame in frames:
+        if frame.feedback.get("operate") == "stop" and frame.feedback.get("target_id") == TASK:
+            return
+    raise Expired("the link is lost")

@@ -1,0 +1,98 @@
+"""Following by the dog's own skills: a person in its picture (6004 type 13) or its bracelet (type 11)."""
+
+from __future__ import annotations
+
+from roboglot.clients.cyberdog import RunningTask, values
+from roboglot.drivers.cyberdog.chapters.mapping.tasks import Skills
+from roboglot.model.actions import Action, OnBusy
+from roboglot.model.components.motion.following import Following, FollowSide
+from roboglot.model.errors import InvalidGoal, NotFound, Refused
+from roboglot.model.feed import Viewer
+from roboglot.model.geometry import Point
+
+SIDES = {FollowSide.BEHIND: 201, FollowSide.LEFT: 202, FollowSide.RIGHT: 203}
+DISTANCE_MIN, DISTANCE_MAX = 0.5, 5.0  # m
+SEEN_WITHIN = 10.0  # s until the one to be followed is in the picture
+
+
+class CyberDogFollowing(Following):
+    """People are numbered as the dog numbers them; the nearest is the one whose box is largest."""
+
+    def __init__(self, skills: Skills) -> None:
+        self._skills = skills
+
+    def follow(
+        self,
+        person: int | None = None,
+        *,
+        side: FollowSide = FollowSide.BEHIND,
+        distance: float = 1.0,
+        source: str = "",
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
+        _check(distance)
+        skills = self._skills
+
+        async def choose(_: RunningTask) -> None:
+            clock, client = skills.robot.clock, skills.client
+            with client.watch(values.Tracking) as pushes:
+                try:
+                    region = await clock.wait_for(_in_sight(pushes, person), SEEN_WITHIN)
+                except TimeoutError:
+                    raise NotFound("no person to follow is in sight") from None
+            await client.choose_target(region)
+
+        return skills.start_from_idle(
+            "follow",
+            lambda: skills.client.follow(side=SIDES[side], distance=distance),
+            goal=person,
+            source=source,
+            on_busy=on_busy,
+            then=choose,
+        )
+
+    def follow_tag(
+        self,
+        *,
+        side: FollowSide = FollowSide.BEHIND,
+        distance: float = 1.0,
+        source: str = "",
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
+        _check(distance)
+        client = self._skills.client
+        return self._skills.start_from_idle(
+            "follow the bracelet",
+            lambda: client.follow(bracelet=True, side=SIDES[side], distance=distance),
+            goal=None,
+            source=source,
+            on_busy=on_busy,
+        )
+
+    def follow_thing(
+        self,
+        place: Point,
+        *,
+        side: FollowSide = FollowSide.BEHIND,
+        distance: float = 1.0,
+        source: str = "",
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
+        raise Refused("the app's protocol of a dog takes regions of its picture, not places")
+
+    @property
+    def place(self) -> Point | None:
+        return None
+
+
+async def _in_sight(pushes: Viewer[values.Tracking], person: int | None) -> values.Region:
+    async for push in pushes:
+        seen = [body.roi for body in push.body_info_roi if person is None or body.reid == str(person)]
+        if seen:
+            return max(seen, key=lambda roi: roi.width * roi.height)
+    raise NotFound("the robot sends no more detections")
+
+
+def _check(distance: float) -> None:
+    if not DISTANCE_MIN <= distance <= DISTANCE_MAX:
+        raise InvalidGoal(f"one follows at {DISTANCE_MIN} to {DISTANCE_MAX} m")

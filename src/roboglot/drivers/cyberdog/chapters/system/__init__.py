@@ -1,0 +1,1 @@
+"""Chapters "low power" and "electronic skin": power and skin of the dog."""

@@ -1,0 +1,1 @@
+"""Chapter "artifact": points of interest, virtual lines and areas."""

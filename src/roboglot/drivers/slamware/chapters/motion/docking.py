@@ -1,0 +1,56 @@
+"""Docking by the robot's own GoHome."""
+
+from __future__ import annotations
+
+from roboglot.clients.slamware import SlamwareClient
+from roboglot.drivers.slamware.chapters.motion.actions import ActionRunner
+from roboglot.drivers.slamware.state import ReportedState
+from roboglot.drivers.slamware.vocabulary import pose3d
+from roboglot.drivers.supervisor import Supervisor
+from roboglot.model.actions import Action, OnBusy
+from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.errors import Refused
+from roboglot.model.geometry import Pose
+from roboglot.wire.slamware.chapters.motion import ActionInfo, GoHomeOptions
+
+OFF = 0.6  # m straight ahead, off the contacts and with room to turn
+
+
+class SlamwareDocking(Docking):
+    """``homepose`` and GoHome."""
+
+    def __init__(
+        self,
+        client: SlamwareClient,
+        supervisor: Supervisor,
+        runner: ActionRunner,
+        driving: Driving,
+        reported: ReportedState,
+    ) -> None:
+        self._client, self._supervisor, self._runner, self._reported = client, supervisor, runner, reported
+        self._driving = driving
+
+    @property
+    def home(self) -> Pose | None:
+        return self._reported.home
+
+    def set_home(self, pose: Pose | None) -> None:
+        if pose is None:
+            self._supervisor.send("forgetting the docks", self._client.clear_home_docks())
+        else:
+            self._supervisor.send("setting the dock", self._client.set_home_pose(pose3d(pose)))
+
+    def dock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+        return self._runner.start(
+            "dock", "GoHomeAction", GoHomeOptions(), _stage, goal=self.home, source=source, on_busy=on_busy
+        )
+
+    def undock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+        if not self._reported.docked:
+            raise Refused("the robot is on no dock")
+        return self._driving.move_by(Pose(OFF), source=source, on_busy=on_busy)
+
+
+async def _stage(info: ActionInfo) -> str:
+    return "approaching" if info.stage in ("INITIALIZING", "GOING_TO_LANDING_POINT") else "docking"

@@ -1,0 +1,1 @@
+"""Chapter "system": health, power, lights, network and the jack."""

@@ -1,0 +1,1 @@
+"""Chapters "firmware" and "application": updates from the maker, uploaded packages, installed apps."""

@@ -1,0 +1,155 @@
+"""Chapters "firmware" and "application": updates from the maker, installed apps."""
+
+from __future__ import annotations
+
+import uuid
+
+import msgspec
+
+from roboglot.model.components.system.apps import Apps
+from roboglot.model.components.system.disk import Disk
+from roboglot.model.components.system.firmware import Firmware, FirmwarePackage, FirmwareState
+from roboglot.model.errors import Refused, RobotError
+from roboglot.operations import Right
+from roboglot.protocols.slamware.chapters.firmware.uploads import Upload
+from roboglot.protocols.slamware.context import Context
+from roboglot.protocols.slamware.errors import HttpError
+from roboglot.protocols.slamware.table import TABLE
+from roboglot.wire.slamware.chapters.firmware.apk import read_apk
+from roboglot.wire.slamware.chapters.firmware.firmware import FirmwareInfo
+from roboglot.wire.slamware.chapters.firmware.packages import BadPackage, read_firmware
+from roboglot.wire.slamware.chapters.slam.localization import Switch
+
+API, APPS = "/api/core/firmware/v1", "/api/core/application/v1/apps"
+SUCCESS, ERROR, INIT, UPGRADE = range(4)
+STEPS = ("Preparing", "PrepareFinished", "Downloading", "DownloadFinished", "Updating", "UpdateFinished")
+PROGRESS = {
+    FirmwareState.IDLE: (0, INIT),
+    FirmwareState.DOWNLOADING: (2, UPGRADE),
+    FirmwareState.DOWNLOADED: (3, UPGRADE),
+    FirmwareState.INSTALLING: (4, UPGRADE),
+    FirmwareState.INSTALLED: (5, SUCCESS),
+    FirmwareState.REBOOTING: (5, SUCCESS),
+    FirmwareState.FAILED: (0, ERROR),
+}
+
+
+IDLE = (FirmwareState.IDLE, FirmwareState.DOWNLOADED, FirmwareState.FAILED)  # an update may begin then
+
+
+class Outcome(msgspec.Struct):
+    """Whether it has begun, and why not."""
+
+    result: bool
+    reason: str
+
+
+class UploadOutcome(msgspec.Struct):
+    """Whether it has begun, and why not; ``data`` tells the version."""
+
+    result: bool
+    msg: str
+    data: dict[str, str]
+
+
+class UpdateProgress(msgspec.Struct):
+    """The step (see ``STEPS``), its share in percent; ``status``: 0 success, 1 error, 2 nothing begun, 3 under way."""
+
+    current_step: int
+    current_step_name: str
+    current_step_progress: int
+    total_steps: int = msgspec.field(name="toptalSteps")  # the vendor's spelling
+    status: int
+    error_code: int
+
+
+class InstalledApp(msgspec.Struct):
+    """An app."""
+
+    name: str
+    version: str
+
+
+@TABLE.on(f"GET {API}/newversion", right=Right.SEE, needs=(Firmware,))
+async def get_new_version(context: Context) -> FirmwareInfo:
+    """What the maker offers, if it is newer than what runs."""
+    plate = context.robot.description
+    if (package := context.robot[Firmware].available) is None:
+        return FirmwareInfo()
+    return FirmwareInfo(plate.maker, plate.model, package.version, str(uuid.UUID(package.digest)))
+
+
+@TABLE.on(f"GET {API}/autoupdate/:enable", right=Right.SEE, needs=(Firmware,))
+async def get_enable_auto_update(context: Context) -> bool:
+    """Whether the robot updates itself on its dock."""
+    return context.robot[Firmware].automatic
+
+
+@TABLE.on(f"PUT {API}/autoupdate/:enable", right=Right.ADMIN, needs=(Firmware,))
+async def set_enable_auto_update(context: Context, body: Switch) -> None:
+    """Let it, or not."""
+    await context.robot[Firmware].set_automatic(body.enable)
+
+
+@TABLE.on(f"POST {API}/autoupdate/:start", right=Right.ADMIN, needs=(Firmware,))
+async def start_update(context: Context) -> Outcome:
+    """Download the newest version, install it and restart."""
+    firmware = context.robot[Firmware]
+    if firmware.available is None:
+        return Outcome(result=False, reason="there is no newer version")
+    if context.updater.busy:
+        return Outcome(result=False, reason="an update is under way")
+    context.updater.begin(firmware.available)
+    return Outcome(result=True, reason="")
+
+
+@TABLE.on(f"POST {API}/update/:start", right=Right.ADMIN, needs=(Disk, Firmware))
+async def upload_and_start_update(context: Context, body: Upload) -> UploadOutcome:
+    """Install the uploaded package, whatever its version, and restart; a zip archive with ``firmware.json``."""
+    firmware, plate = context.robot[Firmware], context.robot.description
+    if context.updater.busy or firmware.progress.state not in IDLE:
+        return UploadOutcome(result=False, msg="an update is under way", data={})
+    try:
+        found = read_firmware(body.file)
+    except BadPackage as error:
+        return UploadOutcome(result=False, msg=f"no firmware package: {error}", data={})
+    if found.model not in ("", plate.model):
+        return UploadOutcome(result=False, msg=f"the firmware is for {found.model}", data={})
+    if context.robot[Disk].free < body.size:
+        return UploadOutcome(result=False, msg="no room on the disk", data={})
+    context.updater.begin(FirmwarePackage(found.version, body.size, body.digest, found.modules, notes=found.notes))
+    return UploadOutcome(result=True, msg="", data={"version": found.version})
+
+
+@TABLE.on(f"GET {API}/progress", right=Right.SEE, needs=(Firmware,))
+async def get_firmware_progress(context: Context) -> UpdateProgress:
+    """How far the update is."""
+    progress = context.robot[Firmware].progress
+    step, status = PROGRESS[progress.state]
+    if context.updater.failed and status != SUCCESS:
+        status = ERROR
+    share = round(progress.share * 100)
+    return UpdateProgress(step, STEPS[step], share, len(STEPS), status, int(status == ERROR))
+
+
+@TABLE.on(f"GET {APPS}", right=Right.SEE, needs=(Apps,))
+async def get_apps(context: Context) -> list[InstalledApp]:
+    """The apps that people installed."""
+    return [InstalledApp(app.name, app.version) for app in context.robot[Apps].all()]
+
+
+@TABLE.on(f"POST {APPS}", right=Right.ADMIN, needs=(Apps,))
+async def install_app(context: Context, body: Upload) -> None:
+    """Install an Android package (APK) or a newer version of one; 400 for what is none, 500 without room."""
+    try:
+        app = read_apk(body.file)
+        await context.robot[Apps].install(app.name, app.version, body.file)
+    except (BadPackage, RobotError) as error:
+        status = 500 if isinstance(error, Refused) else 400  # the manual knows 500 only
+        raise HttpError(status, "Failed to install application", str(error)) from None
+
+
+@TABLE.on(f"DELETE {APPS}/{{app_name}}", right=Right.ADMIN, needs=(Apps,))
+async def delete_app(context: Context, app_name: str) -> None:
+    """Remove one, or 404."""
+    await context.robot[Apps].remove(app_name)

@@ -1,0 +1,1 @@
+"""Chapter "platform": the system's time, and the events that clients collect."""

@@ -1,0 +1,24 @@
+"""Chapter "platform": the system's time and events."""
+
+from __future__ import annotations
+
+from roboglot.model.components.system.settings import Settings
+from roboglot.operations import Right
+from roboglot.protocols.slamware.context import Context
+from roboglot.protocols.slamware.table import TABLE
+from roboglot.protocols.slamware.vocabulary import milliseconds
+from roboglot.wire.slamware.chapters.platform import RobotEvent
+
+API = "/api/platform/v1"
+
+
+@TABLE.on(f"GET {API}/timestamp", right=Right.SEE)
+async def get_timestamp(context: Context) -> str:
+    """Milliseconds since the start, as text."""
+    return milliseconds(context.robot.clock.time())
+
+
+@TABLE.on(f"GET {API}/events", right=Right.SEE, needs=(Settings,))
+async def get_events(context: Context) -> list[RobotEvent]:
+    """What happened since the last call."""
+    return context.events.read()

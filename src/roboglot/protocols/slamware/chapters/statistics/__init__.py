@@ -1,0 +1,1 @@
+"""Chapter "statistics": metres and seconds over the robot's life."""

@@ -1,0 +1,1 @@
+"""Chapter "motion": motions by number, their results, and plain names of walks and figures."""

@@ -1,0 +1,159 @@
+"""Chapter "artifact": points of interest (docks and landmarks are written the same way), lines and areas."""
+
+from __future__ import annotations
+
+import re
+from enum import StrEnum
+from typing import Annotated
+
+import msgspec
+
+from roboglot.wire.slamware.geometry import COORDINATE_MAX, Point, Pose2D, Pose3D
+
+ID_MAX = 64
+METADATA_MAX = 64  # entries
+METADATA_TEXT_MAX = 4096  # characters
+
+Identifier = Annotated[str, msgspec.Meta(min_length=1, max_length=ID_MAX)]
+# Of what a client adds: an id that can stand in a path, where a colon begins the name of a command.
+NewIdentifier = Annotated[
+    str, msgspec.Meta(min_length=1, max_length=ID_MAX, pattern=r"\A[^:\x00-\x1f\x7f][^\x00-\x1f\x7f]*\Z")
+]
+_Text = Annotated[str, msgspec.Meta(max_length=METADATA_TEXT_MAX)]
+_Key = Annotated[str, msgspec.Meta(max_length=ID_MAX)]
+# Values are text by the manual, but clients send numbers as well, and [] for none.
+Metadata = (
+    Annotated[dict[_Key, _Text | int | float | bool | None], msgspec.Meta(max_length=METADATA_MAX)]
+    | Annotated[list[None], msgspec.Meta(max_length=0)]
+    | None
+)
+
+
+class PoseEntry(msgspec.Struct, omit_defaults=True):
+    """A pose with a client-made id (a UUID) and free metadata. Without a pose: where the robot is."""
+
+    id: NewIdentifier
+    pose: Pose2D | None = None
+    metadata: Metadata = None
+
+
+class PoseChange(msgspec.Struct):
+    """New pose, new metadata, or both; what is absent stays."""
+
+    pose: Pose3D | None = None
+    metadata: Metadata = None
+
+
+def metadata_text(metadata: Metadata) -> dict[str, str]:
+    """Metadata with every value as text, in the JSON spelling where it was none."""
+    if not isinstance(metadata, dict):
+        return {}
+    return {k: v if isinstance(v, str) else msgspec.json.encode(v).decode() for k, v in metadata.items()}
+
+
+class LineUsage(StrEnum):
+    """Kind of a line."""
+
+    TRACKS = "tracks"
+    WALLS = "walls"
+
+
+class AreaUsage(StrEnum):
+    """Kind of an area."""
+
+    FORBIDDEN = "forbidden_area"
+    ELEVATOR = "elevator_area"
+    DANGEROUS = "dangerous_area"
+    COVERAGE = "coverage_area"
+    MAINTENANCE = "maintenance_area"
+    SENSOR_DISABLE = "sensor_disable_area"
+    RESTRICTED = "restricted_area"
+
+
+class Line(msgspec.Struct):
+    """Line from ``start`` to ``end``; a Bézier curve if the metadata have ``control_point1`` and ``control_point2``."""
+
+    start: Point
+    end: Point
+    id: int = 0
+    metadata: Metadata = None
+
+
+Lines = Annotated[list[Line], msgspec.Meta(max_length=10_000)]
+
+
+class Strip(msgspec.Struct):
+    """``half_width`` m to both sides of the centre line."""
+
+    start: Point
+    end: Point
+    half_width: Annotated[float, msgspec.Meta(ge=0, le=COORDINATE_MAX)]
+
+
+class AreaRequest(msgspec.Struct):
+    """A new area."""
+
+    area: Strip
+    metadata: Metadata = None
+
+
+class AreaChange(msgspec.Struct):
+    """New place, new metadata, or both; what is absent stays."""
+
+    area: Strip | None = None
+    metadata: Metadata = None
+
+
+class RectangleArea(msgspec.Struct):
+    """An area as it is answered."""
+
+    id: int
+    usage: AreaUsage
+    area: Strip
+    metadata: dict[str, str]
+
+
+class MetadataError(ValueError):
+    """A value in the metadata makes no sense; the message names it."""
+
+
+def control_points(metadata: dict[str, str]) -> tuple[Point, Point] | None:
+    """A curve's control points, None for a straight line. Raises MetadataError.
+
+    They are written as ``{'x':0.1,'y':0.1}``, in one kind of quotes or the other.
+    """
+    texts = [metadata.get(key) for key in ("control_point1", "control_point2")]
+    if texts == [None, None]:
+        return None
+    try:
+        first, second = (msgspec.json.decode((text or "").replace("'", '"'), type=Point) for text in texts)
+    except (msgspec.DecodeError, UnicodeEncodeError) as error:
+        raise MetadataError(f"control_point1 and control_point2: {error}") from None
+    return first, second
+
+
+def number(metadata: dict[str, str], key: str, most: float) -> float | None:
+    """A number between 0 and ``most`` written as text; None if it is not there. Raises MetadataError."""
+    if (text := metadata.get(key, "")) == "":
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0 <= value <= most:
+        raise MetadataError(f"{key} is a number up to {most:g}, not {text[:40]}")
+    return value
+
+
+SENSOR_TYPES = ("bumper", "cliff", "sonar", "depth camera")
+
+
+def sensor_types(metadata: dict[str, str]) -> frozenset[str]:
+    """The sensors that a ``sensor_type`` like ``[0,3]`` means; other commas are in use. Raises MetadataError."""
+    text = metadata.get("sensor_type", "")
+    if not re.fullmatch(r"\s*\[?[\s0-9,，、]*\]?\s*", text[:100]):
+        raise MetadataError("sensor_type is a list like [0,3]")
+    numbers = [int(found) for found in re.findall("[0-9]+", text[:100])]
+    if any(n >= len(SENSOR_TYPES) for n in numbers):
+        raise MetadataError(f"sensor_type has numbers up to {len(SENSOR_TYPES) - 1}")
+    return frozenset(SENSOR_TYPES[n] for n in numbers)

@@ -1,0 +1,1 @@
+"""Chapters "firmware" and "application": offers, uploaded packages, Android apps."""

@@ -1,0 +1,1 @@
+"""Chapter "slam": switches, the IMU, explore maps and composite maps."""

@@ -1,0 +1,206 @@
+"""What is in the layers of a composite map, as far as publicly known: grids, lines, poses.
+
+How rectangles and landmarks are written is not known. Areas go into a layer of our own, as JSON, so that they survive;
+a vendor's layer of that kind is left alone. Every reader answers None for a layer that it does not understand wholly.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeVar
+
+import msgspec
+
+from roboglot.extras import lazy
+from roboglot.wire.slamware.chapters.slam.explore_map import CELLS_MAX, BadMap, ExploreMap
+from roboglot.wire.slamware.chapters.slam.stcm import Layer, Pairs, Reader, pack_pairs, pack_text
+from roboglot.wire.slamware.geometry import COORDINATE_MAX, Metres, Radians
+
+if TYPE_CHECKING:
+    import numpy as np
+else:
+    np = lazy("numpy")
+
+GRID, LINES, POSES = (f"vnd.slamtec.map-layer/vnd.{kind}-map+binary" for kind in ("grid", "line", "pose"))
+JSON = "vnd.roboglot.map-layer/json"
+EXPLORE, WALLS, TRACKS = "explore", "virtual_walls", "virtual_tracks"
+PLACES, DOCKS, AREAS, LANDMARKS = "point_of_interest", "home_dock_pose", "rectangle_area", "landmark"
+T = TypeVar("T")
+ENTRIES_MAX = 20_000  # of one layer
+_ENDS, _POSE = struct.Struct("<4f"), struct.Struct("<3f")
+
+
+@dataclass(frozen=True, slots=True)
+class LineEntry:
+    """A line from (x1, y1) to (x2, y2), m."""
+
+    id: str
+    x1: float
+    y1: float
+    x2: float
+    y2: float
+    metadata: Pairs = ()
+
+
+@dataclass(frozen=True, slots=True)
+class PoseEntry:
+    """A pose (m, rad) with a name, which is the id of a place or dock."""
+
+    name: str
+    x: float
+    y: float
+    yaw: float
+    metadata: Pairs = ()
+    flags: int = 0
+
+
+class AreaEntry(msgspec.Struct, frozen=True):
+    """A rectangle around the centre line from (x1, y1) to (x2, y2), m; ``usage`` is one of the API's."""
+
+    id: int
+    usage: str
+    x1: Metres
+    y1: Metres
+    x2: Metres
+    y2: Metres
+    half_width: Metres
+    metadata: dict[str, str] = {}
+
+
+class MarkEntry(msgspec.Struct, frozen=True):
+    """A landmark: pose (m, rad) with an id."""
+
+    id: str
+    x: Metres
+    y: Metres
+    yaw: Radians
+    metadata: dict[str, str] = {}
+
+
+def _named(usage: str, kind: str, *pairs: tuple[str, str]) -> Pairs:
+    return (("name", usage), ("usage", usage), ("type", kind), *pairs)
+
+
+def _is(layer: Layer, usage: str, kind: str) -> bool:
+    metadata = layer.metadata
+    return metadata.get("usage") == usage and kind in metadata.get("type", "") and not metadata.get("compression")
+
+
+def grid_layer(explored: ExploreMap, extra: Pairs = ()) -> Layer:
+    """Return the grid as a layer; ``extra`` pairs name its floor."""
+    height, width = explored.cells.shape
+    numbers = {
+        "dimension_width": width,
+        "dimension_height": height,
+        "origin_x": explored.x,
+        "origin_y": explored.y,
+        "resolution_x": explored.resolution,
+        "resolution_y": explored.resolution,
+    }
+    pairs = tuple((key, str(value) if isinstance(value, int) else f"{value:.9g}") for key, value in numbers.items())
+    return Layer(_named(EXPLORE, "vnd.slamtec.map-layer/vnd.grid-map+binary", *pairs, *extra), explored.cells.tobytes())
+
+
+def read_grid(layer: Layer) -> ExploreMap | None:
+    """The explore map in ``layer``; None if it is another layer. Raises BadMap for one that is broken."""
+    if not _is(layer, EXPLORE, "grid-map"):
+        return None
+    values = layer.metadata
+    try:
+        width, height = int(values["dimension_width"]), int(values["dimension_height"])
+        x, y, resolution, other = (float(values[k]) for k in ("origin_x", "origin_y", "resolution_x", "resolution_y"))
+    except (KeyError, ValueError) as error:
+        raise BadMap(f"the grid's {error} is missing or no number") from None
+    if not (min(width, height) >= 0 and width * height == len(layer.payload) <= CELLS_MAX):
+        raise BadMap(f"{width} x {height} cells do not make {len(layer.payload)}")
+    if not (math.hypot(x, y) <= COORDINATE_MAX and 0 < resolution < math.inf and resolution == other):
+        raise BadMap(f"no map has its corner at ({x}, {y}) and cells of {resolution} x {other} m")
+    return ExploreMap(x, y, resolution, np.frombuffer(layer.payload, np.int8).reshape(height, width))
+
+
+def line_layer(usage: str, lines: list[LineEntry]) -> Layer:
+    """Walls or tracks."""
+    entries = (
+        pack_text(line.id) + _ENDS.pack(line.x1, line.y1, line.x2, line.y2) + pack_pairs(line.metadata)
+        for line in lines
+    )
+    return Layer(_named(usage, LINES, ("count", str(len(lines)))), b"".join(entries))
+
+
+def read_lines(layer: Layer, usage: str) -> list[LineEntry] | None:
+    """The lines in ``layer``; None if it is another layer, or written in another way."""
+    if not _is(layer, usage, "line-map"):
+        return None
+    reader, lines = Reader(layer.payload), []
+    try:
+        while reader.at < len(layer.payload):
+            id, (x1, y1, x2, y2) = reader.text(), _ENDS.unpack(reader.take(_ENDS.size))
+            lines.append(LineEntry(id, x1, y1, x2, y2, reader.pairs()))
+            _check((x1, y1, x2, y2), len(lines))
+    except BadMap:
+        return None
+    return lines
+
+
+def pose_layer(usage: str, poses: list[PoseEntry]) -> Layer:
+    """Places or docks."""
+    entries = (
+        pack_text(p.name) + b"\0" + _POSE.pack(p.x, p.y, p.yaw) + pack_pairs(p.metadata) + bytes((p.flags,))
+        for p in poses
+    )
+    return Layer(_named(usage, POSES, ("count", str(len(poses)))), b"".join(entries))
+
+
+def read_poses(layer: Layer, usage: str) -> list[PoseEntry] | None:
+    """The poses in ``layer``; None if it is another layer, or written in another way."""
+    if not _is(layer, usage, "pose-map"):
+        return None
+    reader, poses = Reader(layer.payload), []
+    try:
+        while reader.at < len(layer.payload):
+            name, unknown = reader.text(), reader.take(1)
+            x, y, yaw = _POSE.unpack(reader.take(_POSE.size))
+            poses.append(PoseEntry(name, x, y, yaw, reader.pairs(), reader.take(1)[0]))
+            _check((x, y, yaw), len(poses))
+            if unknown != b"\0":
+                return None
+    except BadMap:
+        return None
+    return poses
+
+
+def _check(numbers: tuple[float, ...], count: int) -> None:
+    if count > ENTRIES_MAX or not all(abs(number) <= COORDINATE_MAX for number in numbers):
+        raise BadMap("too many entries, or not where any map is")
+
+
+def area_layer(areas: list[AreaEntry]) -> Layer:
+    """Areas, in our own way."""
+    return Layer(_named(AREAS, JSON, ("count", str(len(areas)))), msgspec.json.encode(areas))
+
+
+def read_areas(layer: Layer) -> list[AreaEntry] | None:
+    """The areas in a layer of ours; None for any other."""
+    return _read_json(layer, AREAS, list[AreaEntry])
+
+
+def landmark_layer(marks: list[MarkEntry]) -> Layer:
+    """Landmarks, in our own way."""
+    return Layer(_named(LANDMARKS, JSON, ("count", str(len(marks)))), msgspec.json.encode(marks))
+
+
+def read_landmarks(layer: Layer) -> list[MarkEntry] | None:
+    """The landmarks in a layer of ours; None for any other."""
+    return _read_json(layer, LANDMARKS, list[MarkEntry])
+
+
+def _read_json(layer: Layer, usage: str, kind: type[list[T]]) -> list[T] | None:
+    if not _is(layer, usage, JSON):
+        return None
+    try:
+        entries = msgspec.json.decode(layer.payload, type=kind)
+    except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
+        return None
+    return entries if len(entries) <= ENTRIES_MAX else None

@@ -1,0 +1,1 @@
+"""Chapters "system" and "sensors": name plate, power, health, devices, network."""
