@@ -16,7 +16,7 @@ from pathlib import Path
 from _claim import Claims
 
 from roboglot.access.guard import Guard
-from roboglot.access.store import FILE, AccessStore, Grant
+from roboglot.access.store import Grant, open_store
 from roboglot.config import AccessConfig
 from roboglot.model.admission import Proof, ProofKind
 from roboglot.model.client_context import ask_for
@@ -36,7 +36,7 @@ SEE = frozenset({Right.SEE})
 
 async def asking(claims: Claims, folder: Path) -> None:
     """The guard alone, without sockets."""
-    store = AccessStore(folder / FILE)
+    store = open_store(folder)
     tokens = [store.add_machine(f"cell{number}", [Grant("a", SEE)]) for number in range(NEW)]
     store.close()
     clock = LockstepClock()
@@ -75,7 +75,7 @@ def requests(connection: http.client.HTTPConnection) -> float:
 def encrypted(claims: Claims, folder: Path) -> None:
     """REST with and without TLS, on the same port, in turns."""
     data, config = folder / "data", folder / "robots.toml"
-    store = AccessStore(data / FILE)
+    store = open_store(data)
     store.allow(FRIEND, [Grant("a", SEE)])
     store.close()
     config.write_text("[access]\nlocal = false\nrequests = 1_000_000\n[access.tls]\n")

@@ -25,7 +25,7 @@ from pathlib import Path
 
 from _claim import Claims
 
-from roboglot.access.store import FILE, AccessStore, Grant
+from roboglot.access.store import Grant, open_store
 from roboglot.operations import Right
 from roboglot.testing.process import served
 
@@ -135,7 +135,7 @@ def main() -> None:
     cores = sorted(os.sched_getaffinity(0))
     with tempfile.TemporaryDirectory() as name:
         data, config = Path(name) / "data", Path(name) / "robots.toml"
-        store = AccessStore(data / FILE)
+        store = open_store(data)
         token = store.add_machine("cell", [Grant("a", frozenset({Right.DRIVE}))])
         store.allow(DIRECT, [Grant("a", frozenset({Right.DRIVE}))])
         store.close()

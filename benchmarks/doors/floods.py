@@ -23,7 +23,7 @@ from pathlib import Path
 
 from _claim import Claims
 
-from roboglot.access.store import FILE, AccessStore, Grant
+from roboglot.access.store import Grant, open_store
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.certificates import export_app
 from roboglot.testing.process import served
@@ -64,7 +64,7 @@ def main(count: int) -> None:
     claims = Claims()
     with tempfile.TemporaryDirectory() as name:
         data, phone, config = Path(name) / "data", Path(name) / "phone", Path(name) / "robots.toml"
-        store = AccessStore(data / FILE)
+        store = open_store(data)
         store.allow(FRIEND, [Grant("a", frozenset({Right.DRIVE}))])
         store.add_app("phone", [Grant("a", frozenset({Right.SEE}))])
         store.close()

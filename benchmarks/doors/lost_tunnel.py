@@ -24,7 +24,7 @@ from pathlib import Path
 
 from _claim import Claims
 
-from roboglot.access.store import FILE, AccessStore, Grant
+from roboglot.access.store import Grant, open_store
 from roboglot.config import AccessConfig, RobotConfig, load_config
 from roboglot.model.components.motion.base import Base
 from roboglot.model.robot import Robot
@@ -63,7 +63,7 @@ class Scene:
 async def scene(body: str, delay: float = 0.0, loss: float = 0.0) -> AsyncIterator[Scene]:
     with tempfile.TemporaryDirectory() as folder, BadLine(delay=delay, loss=loss) as line:
         data = Path(folder) / "data"
-        store = AccessStore(data / FILE)
+        store = open_store(data)
         token = store.add_machine("cell", [Grant("a", frozenset({Right.DRIVE}))])
         store.close()
         base = load_config(None, {"data": str(data), "world": "empty"})

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from roboglot.access.guard import Guard
+from roboglot.access.store import FILE
 from roboglot.access.tunnel.gateway import Gateway, Ports
 from roboglot.clients.errors import ClientError
 from roboglot.clients.visual.cloud import CloudLink
@@ -142,7 +143,8 @@ class Runtime:
         )
         self._registry: Transactions | None = None
         self._residence = self._join_registry()
-        self.guard = Guard(config.data, config.access, self.fleet.robots) if config.access.on else None
+        self._shared: Transactions | None = None  # what is no single robot's, on the server
+        self.guard = self._build_guard() if config.access.on else None
         self._gateway: Gateway | None = None
         self._tls = self._build_tls()
         self._leases = LeaseDesk(config.data, self.fleet.robots, self.fleet.world.hands)
@@ -171,6 +173,17 @@ class Runtime:
         for name, lease in leases.items():
             lease.fence(partial(residence.why_not, name))
         return residence
+
+    def _build_guard(self) -> Guard:
+        """Return who asks at all doors; its list is where robots are kept. Raises OSError, ValueError."""
+        database = self.config.database
+        if database and self._registry is not None and self.config.registry in ("", database):
+            self._shared = self._registry
+        elif database:
+            self._shared = open_registry(database)
+        if database and (unused := self.config.data / FILE).exists():
+            log.warning("people in %s are let in by the database's list alone: `roboglot access copy`", unused)
+        return Guard(self.config.data, self.config.access, self.fleet.robots, shared=self._shared)
 
     @property
     def recorder(self) -> Recorder:
@@ -316,11 +329,14 @@ class Runtime:
             await _in_time("the program engine", self._engine.close())
         if self._gateway is not None:
             await _in_time("the gateway", self._gateway.close())
-        if self._residence is not None and self._registry is not None:
+        if self._residence is not None:
             await self._residence.close()
-            self._registry.close()
         if self.guard is not None:
             self.guard.close()
+        if self._registry is not None:
+            self._registry.close()
+        if self._shared is not None and self._shared is not self._registry:
+            self._shared.close()
         self._database.close()
         os.close(self._lock)
 

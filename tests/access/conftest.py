@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from roboglot.access.store import FILE, AccessStore, Grant
+from roboglot.access.store import AccessStore, Grant, open_store
 from roboglot.config import AccessConfig, RobotConfig, load_config
 from roboglot.operations import Right
 from roboglot.runtime import Runtime
@@ -23,7 +23,7 @@ def data(tmp_path: Path) -> Path:
 @pytest.fixture
 def store(data: Path) -> AccessStore:
     """The list, with the matrix' callers by address and as apps."""
-    store = AccessStore(data / FILE)
+    store = open_store(data)
     for caller in CALLERS:
         robot = "b" if caller.name == "owner-of-b" else "a"
         rights = [Right.ADMIN] if caller.name in ("owner-of-b", "revoked") else [Right(caller.name)]\

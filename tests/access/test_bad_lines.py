@@ -15,7 +15,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from roboglot.access.store import FILE, AccessStore, Grant
+from roboglot.access.store import Grant, open_store
 from roboglot.access.tunnel.connector import Connector, KnownGateways
 from roboglot.clients.cyberdog import Certificates, CyberDogClient, CyberDogRefused
 from roboglot.clients.visual import TextLink
@@ -36,7 +36,7 @@ HERE = f"127.0.96.{100 + WORKER}"
 @contextlib.asynccontextmanager
 async def behind_a_bad_line(folder: Path, body: str, world: str) -> AsyncIterator[Runtime]:
     """A robot at HERE, whose time passes a little faster than outside."""
-    store = AccessStore(folder / FILE)
+    store = open_store(folder)
     token = store.add_machine("cell", [Grant("a", frozenset({Right.PROGRAM, Right.EDIT}))])
     store.close()
     base = load_config(None, {"data": str(folder), "world": world, "lockstep": True})

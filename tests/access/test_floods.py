@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from roboglot.access.store import FILE, AccessStore, Grant
+from roboglot.access.store import Grant, open_store
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.certificates import export_app
 from roboglot.testing.process import ServedRobot, served
@@ -30,7 +30,7 @@ DRIVE = frozenset({Right.DRIVE})
 def attacked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[ServedRobot, Path]]:
     folder = tmp_path_factory.mktemp("floods")
     data, phone, config = folder / "data", folder / "phone", folder / "robots.toml"
-    store = AccessStore(data / FILE)
+    store = open_store(data)
     store.allow(FRIEND, [Grant("a", DRIVE)])
     store.add_person("anna", "correct horse", [Grant("a", DRIVE)])
     store.add_app("phone", [Grant("a", frozenset({Right.SEE}))])

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import sqlite3
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +18,8 @@ import pytest
 
 from roboglot.access import audit
 from roboglot.access.guard import Guard
-from roboglot.access.store import FILE, AccessStore, Grant
+from roboglot.access.store import AccessStore, Grant, open_store
+from roboglot.access.trail import FILE, BrokenChain, Entry, open_trail
 from roboglot.config import AccessConfig
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.system.lease import Lease
@@ -150,7 +153,7 @@ async def test_a_right_ends_with_its_time(runtime: Runtime, store: AccessStore) 
 async def test_another_program_revokes_within_a_second(runtime: Runtime, data: Path) -> None:
     link = await open_frames(CALLERS[1].address)
     assert link is not None
-    other = AccessStore(data / FILE)
+    other = open_store(data)
     other.revoke(CALLERS[1].address)
     other.close()
     async with asyncio.timeout(10.0):
@@ -162,7 +165,7 @@ async def test_another_program_revokes_within_a_second(runtime: Runtime, data: P
 
 def test_a_change_is_found_at_the_next_look(data: Path) -> None:
     """Counts looks instead of seconds: the one after a change finds it, and two are less than a second apart."""
-    guard, other = Guard(data, AccessConfig(on=True), {}), AccessStore(data / FILE)
+    guard, other = Guard(data, AccessConfig(on=True), {}), open_store(data)
     looks: list[float] = []
     found_at: list[int] = []
 
@@ -200,13 +203,14 @@ async def test_what_changed_and_what_was_refused_is_kept(runtime: Runtime, store
         await client.delete("/api/core/slam/v1/maps")
         await client.get(POSE, auth=("anna", secrets[1]))
     guard_of(runtime).audit.close()
-    rows = [entry[1:2] + entry[4:7] for _, entry in audit.read(data / audit.FILE)]
+    with open_trail(data) as trail:
+        rows = [entry[1:2] + entry[4:7] for _, entry in trail.rows()]
+        assert trail.verify().number == 3
     assert rows == [
         ("cell", "slamware", f"POST {ACTIONS}", "done"),
         ("cell", "slamware", "DELETE /api/core/slam/v1/maps", "refused"),
         ("", "", "", "turned away"),
     ]
-    assert audit.verify(data / audit.FILE)[0] == 3
     for path in filter(Path.is_file, sorted(data.rglob("*"))):  # noqa: ASYNC240
         assert not any(secret.encode() in path.read_bytes() for secret in secrets), path
 
@@ -230,7 +234,8 @@ async def test_what_the_console_changes_is_kept(runtime: Runtime, store: AccessS
         assert await ask(token, "class", do="open") == 403
         assert await ask(teacher, "class", do="open", name="7b") == 200
     guard_of(runtime).audit.close()
-    rows = [(entry.who, entry.operation, entry.outcome) for _, entry in audit.read(data / audit.FILE)]
+    with open_trail(data) as trail:
+        rows = [(entry.who, entry.operation, entry.outcome) for _, entry in trail.rows()]
     assert [row for row in rows if row[1] != "go_to"] == [
         ("cell", "take_control", "done"),
         ("eye", "release_control", "refused"),
@@ -262,41 +267,45 @@ async def until(condition) -> None:  # type: ignore[no-untyped-def]
 
 
 def test_the_audit_survives_a_kill_and_shows_changes(tmp_path: Path) -> None:
-    path = tmp_path / "audit.db"
     code = (
-        "import sys, os, time; from pathlib import Path; from roboglot.access.audit import Audit, Entry, read\n"
-        "path = Path(sys.argv[1]); audit = Audit(path)\n"
+        "import sys, os, time; from pathlib import Path; from roboglot.access.audit import Audit\n"
+        "from roboglot.access.trail import Entry, open_trail\n"
+        "trail = open_trail(Path(sys.argv[1])); audit = Audit(trail)\n"
         "for n in range(50): audit.note(Entry(float(10 * n), 'anna', '', 'a', 'slamware', f'op {n}', 'done'))\n"
-        "while len(list(read(path))) < 50: time.sleep(0.01)\n"
+        "while len(list(trail.rows())) < 50: time.sleep(0.01)\n"
         "os.kill(os.getpid(), 9)"
     )
-    assert subprocess.run([sys.executable, "-c", code, str(path)], timeout=60, check=False).returncode == -9
-    assert audit.verify(path)[0] == 50
-    connection = audit._open(path)
-    with pytest.raises(Exception, match="the audit stays"):
-        connection.execute("DELETE FROM audit WHERE number = 7")
-    connection.executescript("DROP TRIGGER audit_stays; UPDATE audit SET who='bert' WHERE number = 7")
-    connection.close()
-    with pytest.raises(audit.BrokenChain, match="row 7"):
-        audit.verify(path)
+    assert subprocess.run([sys.executable, "-c", code, str(tmp_path)], timeout=60, check=False).returncode == -9
+    with open_trail(tmp_path) as trail:
+        assert trail.verify().number == 50
+        with closing(sqlite3.connect(tmp_path / FILE, isolation_level=None)) as connection:
+            with pytest.raises(sqlite3.Error, match="the audit stays"):
+                connection.execute("DELETE FROM audit WHERE number = 7")
+            connection.executescript("DROP TRIGGER audit_stays; UPDATE audit SET who='bert' WHERE number = 7")
+        with pytest.raises(BrokenChain, match="row 7"):
+            trail.verify()
+
+
+def audited(folder: Path, entries: Iterable[Entry]) -> list[Entry]:
+    """Note these; the rows that are kept."""
+    with open_trail(folder) as trail:
+        kept = audit.Audit(trail)
+        for entry in entries:
+            kept.note(entry)
+        kept.close()
+        return [entry for _, entry in trail.rows()]
 
 
 def test_repeated_rows_are_counted(tmp_path: Path) -> None:
-    kept = audit.Audit(tmp_path / "audit.db")
-    for number in range(100):
-        kept.note(audit.Entry(number * 0.02, "anna", "", "a", "robomaster", "chassis speed", "done"))
-    kept.close()
-    rows = [entry for _, entry in audit.read(tmp_path / "audit.db")]
+    entries = (Entry(number * 0.02, "anna", "", "a", "robomaster", "chassis speed", "done") for number in range(100))
+    rows = audited(tmp_path, entries)
     assert [(row.at, row.repeats) for row in rows] == [(0.0, 0), (1.0, 49), (1.98, 48)]
     assert sum(1 + row.repeats for row in rows) == 100, "each is counted, also the last"
 
 
 def test_audit_counts_entries_pushed_out_by_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(audit, "KINDS_MAX", 3)
-    kept = audit.Audit(tmp_path / "audit.db")
-    for number in range(60):
-        kept.note(audit.Entry(number * 0.001, "anna", "", "a", "slamware", f"op {number // 10}", "done"))
-    kept.close()
-    rows = [entry for _, entry in audit.read(tmp_path / "audit.db")]
+    entries = (Entry(n * 0.001, "anna", "", "a", "slamware", f"op {n // 10}", "done") for n in range(60))
+    rows = audited(tmp_path, entries)
     assert {row.operation: row.repeats for row in rows} == {f"op {number}": 8 for number in range(6)}
     assert len(rows) == 12

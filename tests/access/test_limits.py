@@ -14,7 +14,7 @@ import pytest
 from websockets.asyncio.client import connect
 from websockets.exceptions import InvalidHandshake
 
-from roboglot.access.store import FILE, AccessStore, Grant
+from roboglot.access.store import Grant, open_store
 from roboglot.config import AccessConfig, ConsoleConfig, RobotConfig, TlsConfig, load_config
 from roboglot.operations import Right
 from roboglot.runtime import Runtime
@@ -44,7 +44,7 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def token(data: Path) -> str:
-    store = AccessStore(data / FILE)
+    store = open_store(data)
     token = store.add_machine("cell", [Grant("a", frozenset({Right.DRIVE}))])
     for caller in (DRIVER, OTHER):
         store.allow(caller.address, [Grant("a", caller.rights)])

@@ -14,7 +14,7 @@ import pytest
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
-from roboglot.access.store import FILE, AccessStore
+from roboglot.access.store import AccessStore, open_store
 from roboglot.model.clock import LockstepClock
 from roboglot.protocols.cyberdog.certificates import export_app
 from roboglot.runtime import Runtime
@@ -140,7 +140,7 @@ async def test_what_a_revoked_client_does_stops(
         while not any(action.identity == who for action in robot.actions.running()):
             await clock.advance(0.05)
             await asyncio.sleep(0.005)
-        other = AccessStore(data / FILE)  # as `roboglot access revoke` does it in a process of its own
+        other = open_store(data)  # as `roboglot access revoke` does it in a process of its own
         other.revoke(who)
         other.close()
         closing = asyncio.ensure_future(until(gone))

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import httpx
 
-from roboglot.access.store import FILE, AccessStore, Grant
+from roboglot.access.store import Grant, open_store
 from roboglot.operations import Right
 from tests.access.matrix import ADDRESS
 
@@ -20,7 +20,7 @@ NETWORK, SCREEN = "/api/core/system/v1/network/status", "/api/delivery/v1/admin/
 
 def test_secrets_are_nowhere(tmp_path: Path) -> None:
     data = tmp_path / "data"
-    store = AccessStore(data / FILE)
+    store = open_store(data)
     token = store.add_machine("cell", [Grant("a", frozenset({Right.ADMIN}))])
     store.add_person("anna", PASSWORD, [Grant("a", frozenset({Right.SEE}))])
     store.close()

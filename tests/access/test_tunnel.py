@@ -15,8 +15,8 @@ from pathlib import Path
 import httpx
 import pytest
 
-from roboglot.access import audit
-from roboglot.access.store import FILE, AccessStore, Grant
+from roboglot.access.store import Grant, open_store
+from roboglot.access.trail import open_trail
 from roboglot.access.tunnel import connector, heartbeat
 from roboglot.access.tunnel import tunnel as carrying
 from roboglot.access.tunnel.connector import Connector, KnownGateways, NotTrusted, Refused
@@ -38,7 +38,7 @@ async def gateway(data: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[
     monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
     for limit in ("QUIET_AFTER", "LOST_AFTER"):
         monkeypatch.setattr(heartbeat, limit, 20.0)  # a busy machine is no lost tunnel
-    store = AccessStore(data / FILE)
+    store = open_store(data)
     token = store.add_machine("cell", [Grant("a", frozenset({Right.DRIVE}))])
     store.close()
     base = load_config(None, {"data": str(data), "world": "empty", "lockstep": True})
@@ -99,8 +99,8 @@ async def test_the_text_protocol_passes_with_its_pushes(
         async with asyncio.timeout(10.0):
             while not noted:  # a thread writes it
                 await asyncio.sleep(0.01)
-                rows = audit.read(runtime.config.data / audit.FILE)
-                noted = {entry.address for _, entry in rows if entry.operation == "chassis speed"}
+                with open_trail(runtime.config.data) as trail:
+                    noted = {entry.address for _, entry in trail.rows() if entry.operation == "chassis speed"}
         assert noted == {"127.0.0.1 by tunnel"}  # where it comes from, not where the tunnel ends
         writer.close()
     inbox.close()
@@ -175,7 +175,7 @@ async def test_a_revoked_token_ends_its_tunnel(gateway: tuple[Runtime, str], tmp
     runtime, token = gateway
     async with connected(runtime, token, tmp_path):
         reader, writer = await asyncio.open_connection(HERE, 40923)
-        other = AccessStore(data / FILE)
+        other = open_store(data)
         other.revoke("cell")
         other.close()
         async with asyncio.timeout(10.0):

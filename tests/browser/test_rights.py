@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 import pytest_asyncio
 
-from roboglot.access.store import FILE, AccessStore, Grant
+from roboglot.access.store import AccessStore, Grant, open_store
 from roboglot.config import AccessConfig, ConsoleConfig, RobotConfig, load_config
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.motion.base import Base
@@ -81,7 +81,7 @@ async def guarded(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Gua
     assert runtime.console is not None
     monkeypatch = pytest.MonkeyPatch()
     monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
-    store = AccessStore(data / FILE)
+    store = open_store(data)
     await runtime.start()
     await runtime.console.ready()
     yield Guarded(runtime, runtime.clock, store, runtime.console.address)
@@ -239,8 +239,8 @@ async def test_reduced_right_leaves_the_page_with_the_rest(guarded: Guarded, ope
     await sign_in(page, "dora")
     await page.wait_for_selector("text=Scan fits map")
     assert await offered(page, "drive")
-    with guarded.store._transaction() as connection:
-        connection.execute("UPDATE allowed SET rights='see' WHERE identity='dora'")
+    [dora] = [identity for identity in guarded.store.identities() if identity.name == "dora"]
+    guarded.store.put(replace(dora, grants=(Grant("a", frozenset({Right.SEE})),)))
     guarded.runtime.guard.reload()  # type: ignore[union-attr]
     await page.wait_for_selector("button[aria-disabled=true]:has-text('Take control')")
 

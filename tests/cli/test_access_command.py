@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from roboglot.access import audit
 from roboglot.access.rights import parse_rights, whole, write_rights
 from roboglot.access.secrets import password_fits, password_hash, token_hash
-from roboglot.access.store import FILE, AccessStore, Grant, Kind
+from roboglot.access.store import FILE, Grant, Kind, open_store
+from roboglot.access.trail import Entry, open_trail
 from roboglot.cli.access import _end
 from roboglot.operations import Right
 
@@ -24,7 +24,7 @@ def call(*arguments: str, text: str = "") -> subprocess.CompletedProcess[str]:
 
 def test_a_machine_is_let_in_and_revoked(tmp_path: Path) -> None:
     added = call("access", "add", "cell", "--rights", "drive,edit", "--robots", "a,b", "--data", str(tmp_path))
-    store = AccessStore(tmp_path / FILE)
+    store = open_store(tmp_path)
     [cell] = store.identities()
     assert cell.token == token_hash(added.stdout.strip())
     assert [grant.robot for grant in cell.grants] == ["a", "b"]
@@ -42,7 +42,7 @@ def test_people_apps_and_addresses(tmp_path: Path) -> None:
     app = call("access", "add", "phone", "--cyberdog", str(tmp_path / "phone"), *data)
     assert "client-key.pem" in app.stdout
     assert call("access", "allow", "10.0.0.7", "a", "--for", "2h", *data).returncode == 0
-    store = AccessStore(tmp_path / FILE)
+    store = open_store(tmp_path)
     found = {identity.name: identity for identity in store.identities()}
     store.close()
     assert {name: identity.kind for name, identity in found.items()} == {
@@ -71,9 +71,8 @@ def test_mistakes_are_reported_in_one_line(tmp_path: Path, arguments: tuple[str,
 
 
 def test_the_audit_is_printed_and_verified(tmp_path: Path) -> None:
-    kept = audit.Audit(tmp_path / audit.FILE)
-    kept.note(audit.Entry(time.time(), "anna", "10.0.0.7:1", "a", "slamware", "DELETE /x", "done"))
-    kept.close()
+    with open_trail(tmp_path) as trail:
+        trail.add([Entry(time.time(), "anna", "10.0.0.7:1", "a", "slamware", "DELETE /x", "done")])
     assert "anna 10.0.0.7:1 DELETE /x done" in call("audit", "--data", str(tmp_path)).stdout
     assert "1 rows, whole" in call("audit", "--verify", "--data", str(tmp_path)).stdout
 
@@ -106,7 +105,7 @@ def test_passwords_are_kept_as_scrypt() -> None:
 
 
 def test_the_file_is_its_owners_alone(tmp_path: Path) -> None:
-    store = AccessStore(tmp_path / FILE)
+    store = open_store(tmp_path)
     store.add_machine("cell", [Grant("a", frozenset({Right.SEE}))])
     store.close()
     assert (tmp_path / FILE).stat().st_mode & 0o077 == 0

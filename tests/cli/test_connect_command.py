@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from roboglot.access.store import FILE, AccessStore, Grant
+from roboglot.access.store import Grant, open_store
 from roboglot.cli.connect import addresses
 from roboglot.operations import Right
 from roboglot.testing.process import served
@@ -22,7 +22,7 @@ POSE = "api/core/slam/v1/localization/pose"
 
 def test_robots_of_gateway_are_on_addresses_of_range(tmp_path: Path) -> None:
     data, config, known = tmp_path / "data", tmp_path / "robots.toml", tmp_path / "settings"
-    store = AccessStore(data / FILE)
+    store = open_store(data)
     token = store.add_machine("cell", [Grant("*", frozenset({Right.SEE}))])
     store.close()
     config.write_text('[access]\nlocal = false\ngateway = "127.0.97.1:50090"\n')
@@ -87,7 +87,7 @@ def test_addresses_follow_one_another() -> None:
 
 def test_how_to_have_address_of_others_is_explained(tmp_path: Path) -> None:
     data = tmp_path / "data"
-    store = AccessStore(data / FILE)
+    store = open_store(data)
     token = store.add_machine("cell", [Grant("*", frozenset({Right.SEE}))])
     store.close()
     config = tmp_path / "robots.toml"

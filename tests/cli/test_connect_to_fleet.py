@@ -12,7 +12,7 @@ import httpx
 import psycopg
 import pytest
 
-from roboglot.access.store import FILE, AccessStore, Grant
+from roboglot.access.store import Grant, open_store
 from roboglot.access.tunnel import dialling, heartbeat
 from roboglot.access.tunnel.connector import NotTrusted
 from roboglot.access.tunnel.dialling import Dialling
@@ -43,7 +43,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 @contextlib.asynccontextmanager
 async def program(folder: Path, registry: str, address: str, token: str = "") -> AsyncIterator[tuple[Runtime, str]]:
     """A program that runs robot a behind a gateway, and a token for it."""
-    store = AccessStore(folder / FILE)
+    store = open_store(folder)
     token = token or store.add_machine("cell", [Grant("a", frozenset({Right.DRIVE}))])
     store.close()
     base = load_config(None, {"data": str(folder), "world": "empty", "lockstep": True, "registry": registry})
@@ -59,8 +59,9 @@ async def program(folder: Path, registry: str, address: str, token: str = "") ->
 
 def same_people(old: Path, new: Path) -> None:
     """Have the second program know the first one's clients."""
-    new.mkdir()
-    (new / FILE).write_bytes((old / FILE).read_bytes())
+    with contextlib.closing(open_store(old)) as source, contextlib.closing(open_store(new)) as target:
+        for identity in source.identities():
+            target.put(identity)
 
 
 class Client:

@@ -10,9 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from roboglot.access.audit import FILE as AUDIT
-from roboglot.access.audit import Audit, Entry
-from roboglot.access.store import FILE, AccessStore, Grant
+from roboglot.access.store import Grant, open_store
+from roboglot.access.trail import Entry, open_trail
 from roboglot.cli.checks.security import DAY, UNUSED_DAYS, examine_security
 from roboglot.config import AccessConfig, Config, RobotConfig, TlsConfig
 from roboglot.operations import Right
@@ -63,7 +62,7 @@ def test_what_is_open_is_named(data: Path) -> None:
 
 
 def test_rights_that_are_weak_or_unused_are_named(data: Path) -> None:
-    store = AccessStore(data / FILE)
+    store = open_store(data)
     now = time.time()
     store.add_machine("root", [Grant("*", ADMIN)])
     store.add_machine("busy", [Grant("a", DRIVE)])
@@ -71,11 +70,10 @@ def test_rights_that_are_weak_or_unused_are_named(data: Path) -> None:
     store.add_machine("past", [Grant("a", DRIVE, now - 1.0)])
     store.allow("192.0.2.9", [Grant("a", DRIVE)])
     store.close()
-    rows = Audit(data / AUDIT)
     old = now - (UNUSED_DAYS + 1) * DAY
-    rows.note(Entry(old, "idle", "", "a", "robomaster", "chassis move", "done"))
-    rows.note(Entry(now - DAY, "busy", "", "a", "robomaster", "chassis move", "done"))
-    rows.close()
+    with open_trail(data) as trail:
+        trail.add([Entry(old, "idle", "", "a", "robomaster", "chassis move", "done")])
+        trail.add([Entry(now - DAY, "busy", "", "a", "robomaster", "chassis move", "done")])
     found = weak(Config(robots=OUTSIDE, data=data, access=AccessConfig(on=True, tls=TlsConfig(on=True, plain=False))))
     assert set(found) == {
         "machine root",

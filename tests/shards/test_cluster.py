@@ -6,6 +6,7 @@ import asyncio
 import os
 import time
 from collections.abc import Iterator
+from functools import partialmethod
 from pathlib import Path
 
 import pytest
@@ -25,6 +26,7 @@ from roboglot.storage.homes import Home, Homes
 from roboglot.storage.opening import open_registry
 
 STORE = 80 << 20
+PATIENCE = 300.0  # s
 FIRST = "127.77.9.1"
 HEALTH = {  # as in deploy/kuberay: a node that is silent for 3 s is gone
     "health_check_initial_delay_ms": 1000,
@@ -37,7 +39,31 @@ pytestmark = pytest.mark.filterwarnings("ignore")
 
 
 @pytest.fixture
-def cluster() -> Iterator[Cluster]:
+def patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have Ray wait for its nodes as long as they take.
+
+    A node registers when its two agents, programs in Python, are up: ten seconds of a processor on a quiet machine. Ray
+    gives up after 30 s, which a busy machine takes.
+    """
+    from ray._private import services
+
+    get_node = services.get_node
+
+    def found(address: str, node: str) -> object:
+        end = time.monotonic() + PATIENCE
+        while True:
+            try:
+                return get_node(address, node)
+            except RuntimeError:
+                if time.monotonic() > end:
+                    raise
+
+    monkeypatch.setattr(services, "get_node", found)
+    monkeypatch.setattr(Cluster, "_wait_for_node", partialmethod(Cluster._wait_for_node, timeout=PATIENCE))
+
+
+@pytest.fixture
+def cluster(patience: None) -> Iterator[Cluster]:
     """A head without room for shards, and two nodes with room for all."""
     head = {"num_cpus": 0, "object_store_memory": STORE, "include_dashboard": False, "_system_config": HEALTH}
     made = Cluster(initialize_head=True, head_node_args=head)

@@ -152,6 +152,20 @@ def test_manifest_has_only_known_fields_and_locked_ray(name: str) -> None:
         assert {word for word in words if word.startswith("--")} <= options
 
 
+@pytest.mark.parametrize("name", ["fleet.yaml", "campaign.yaml"])
+def test_kubernetes_own_schema_takes_a_manifests_pods(name: str) -> None:
+    """By the package kubernetes-validate (22 MB, so development goes without): no further field, no other type."""
+    kubernetes = pytest.importorskip("kubernetes_validate", reason="the package kubernetes-validate is not installed")
+    spec = yaml.safe_load((KUBERAY / name).read_text())["spec"]
+    cluster = spec.get("rayClusterSpec", spec)
+    for group in (cluster["headGroupSpec"], *cluster["workerGroupSpecs"]):
+        pod = {"apiVersion": "v1", "kind": "Pod", "metadata": {"name": "checked"}, **group["template"]}
+        kubernetes.validate(pod, "1.34", strict=True)
+        pod["spec"]["containers"][0]["imagee"] = "roboglot"
+        with pytest.raises(kubernetes.ValidationError, match="imagee"):
+            kubernetes.validate(pod, "1.34", strict=True)
+
+
 def test_without_ray_extra_is_named_in_one_sentence(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setitem(sys.modules, "ray", None)
     monkeypatch.delitem(sys.modules, "roboglot.shards.cluster", raising=False)

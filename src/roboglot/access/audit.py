@@ -1,54 +1,30 @@
-"""Who changed what, and what was refused: a table that only grows, each row with the hash of the one before.
+"""Who changed what, and what was refused, on its way to the audit's table.
 
 A thread writes what is noted, at once and many rows together, so that no request waits for the disk; a row that is
-written survives ``kill -9``. Rows hold names of operations and reasons, and never what was sent.
+written survives ``kill -9``. Rows hold names of operations and reasons, and never what was sent. While the table cannot
+be written, rows wait.
 """
 
 from __future__ import annotations
 
-import contextlib
-import hashlib
-import json
 import logging
 import math
 import queue
-import sqlite3
 import threading
 import time
-from collections.abc import Iterator
-from pathlib import Path
 from typing import NamedTuple
+
+from roboglot.access.trail import Entry, Trail
+from roboglot.storage.transactions import DatabaseError, DiskFull
 
 log = logging.getLogger(__name__)
 
-FILE = "audit.db"  # in the data folder
 WAITING_MAX = 10_000  # rows that wait for the disk; then they are dropped, and a row says how many
-TEXT_MAX = 300  # characters of one field
+TOGETHER_MAX = 500  # rows of one transaction
+AGAIN_SECONDS = 1.0  # between two tries to write them
 REPEATED_WITHIN = 1.0  # s: the same again so soon is counted, and the count written then
 KINDS_MAX = 1024  # different rows whose repetitions are counted
-_SCHEMA = """
-CREATE TABLE IF NOT EXISTS audit (
-    number INTEGER PRIMARY KEY, at REAL NOT NULL, who TEXT NOT NULL, address TEXT NOT NULL, robot TEXT NOT NULL,
-    door TEXT NOT NULL, operation TEXT NOT NULL, outcome TEXT NOT NULL, reason TEXT NOT NULL,
-    repeats INTEGER NOT NULL, hash TEXT NOT NULL
-) STRICT;
-CREATE TRIGGER IF NOT EXISTS audit_stays BEFORE UPDATE ON audit BEGIN SELECT RAISE(ABORT, 'the audit stays'); END;
-CREATE TRIGGER IF NOT EXISTS audit_is_kept BEFORE DELETE ON audit BEGIN SELECT RAISE(ABORT, 'the audit stays'); END;
-"""
-
-
-class Entry(NamedTuple):
-    """One thing that was done or refused. ``repeats``: how often the same came before it without a row of its own."""
-
-    at: float  # Unix time, s
-    who: str
-    address: str
-    robot: str
-    door: str
-    operation: str
-    outcome: str  # "done", or the protocol's word for the refusal
-    reason: str = ""
-    repeats: int = 0
+CLOSE_SECONDS = 5.0
 
 
 class _Kind(NamedTuple):
@@ -59,20 +35,16 @@ class _Kind(NamedTuple):
     last: Entry
 
 
-class BrokenChain(ValueError):
-    """A row is missing or was changed."""
-
-
 class Audit:
-    """Opens, or makes, the table at ``path``; ``note`` from any thread, ``close`` at the end."""
+    """Writes to ``trail``: ``note`` from any thread, ``close`` at the end. The trail stays open."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, trail: Trail) -> None:
         self._queue: queue.SimpleQueue[Entry | None] = queue.SimpleQueue()
-        self._path = path
+        self._trail = trail
         self._kinds: dict[tuple[str, ...], _Kind] = {}
         self._lock = threading.Lock()
         self._dropped = 0
-        _open(path).close()  # an unusable file is found now, not in the thread
+        self._closing = threading.Event()
         self._thread = threading.Thread(target=self._write, name="audit", daemon=True)
         self._thread.start()
 
@@ -91,10 +63,13 @@ class Audit:
             self._put(entry._replace(repeats=kind.repeats if kind else 0))
 
     def close(self) -> None:
-        """Write what waits, then close the file."""
+        """Write what waits; what cannot be written in time is counted in the log."""
         self._settle(math.inf)
         self._queue.put(None)
-        self._thread.join(5.0)
+        self._closing.set()
+        self._thread.join(CLOSE_SECONDS)
+        if self._thread.is_alive():
+            log.error("the audit is not written to its end: its database does not answer")
 
     def _settle(self, until: float) -> None:
         """Write what was only counted, if nothing of its kind came for a while."""
@@ -118,79 +93,35 @@ class Audit:
         self._queue.put(entry)
 
     def _write(self) -> None:
-        with contextlib.closing(_open(self._path)) as connection:
-            last = connection.execute("SELECT hash FROM audit ORDER BY number DESC LIMIT 1").fetchone()
-            digest = last[0] if last else ""
-            while True:
-                try:
-                    entry = self._queue.get(timeout=REPEATED_WITHIN)
-                except queue.Empty:
-                    self._settle(now())
-                    continue
-                if entry is None:
+        ended = False
+        while not ended:
+            try:
+                taken = [self._queue.get(timeout=REPEATED_WITHIN)]
+                while len(taken) < TOGETHER_MAX and taken[-1] is not None and not self._queue.empty():
+                    taken.append(self._queue.get())  # no one else takes any
+            except queue.Empty:
+                self._settle(now())
+                continue
+            ended = taken[-1] is None
+            if entries := [entry for entry in taken if entry is not None]:
+                self._keep(entries)
+
+    def _keep(self, entries: list[Entry]) -> None:
+        """Write rows, and try again until that works; while the program ends, once more."""
+        last = False
+        while True:
+            try:
+                self._trail.add(entries)
+            except (DatabaseError, DiskFull) as error:
+                if last:
+                    log.error("%d rows of the audit are lost: %s", len(entries), error)
                     return
-                try:
-                    digest = _append(connection, entry, digest)
-                except sqlite3.Error as error:
-                    log.error("cannot write the audit: %s", error)
-
-
-def read(path: Path, *, robot: str = "", after: int = 0) -> Iterator[tuple[int, Entry]]:
-    """Rows with their numbers from the one behind ``after`` on, of one robot or of all."""
-    query = "SELECT * FROM audit WHERE number > ? AND (? = '' OR robot = ?) ORDER BY number"
-    with contextlib.closing(_open(path)) as connection:
-        for number, *fields, _ in connection.execute(query, (after, robot, robot)):
-            yield number, Entry(*fields)
-
-
-def verify(path: Path) -> tuple[int, str]:
-    """How many rows there are, and the hash of the last: kept elsewhere, it shows later that none was cut off.
-
-    Raises BrokenChain naming the first row that does not fit.
-    """
-    digest, count = "", 0
-    with contextlib.closing(_open(path)) as connection:
-        for number, *fields, kept in connection.execute("SELECT * FROM audit ORDER BY number"):
-            count += 1
-            digest = _hash(digest, number, Entry(*fields))
-            if number != count or digest != kept:
-                raise BrokenChain(f"row {count} does not fit the rows before it: the audit was changed there")
-    return count, digest
+                log.error("cannot write the audit yet: %s", error)
+            else:
+                return
+            last = self._closing.wait(AGAIN_SECONDS)
 
 
 def now() -> float:
     """The machine's time, Unix s."""
     return time.time()
-
-
-def _append(connection: sqlite3.Connection, entry: Entry, before: str) -> str:
-    cut = entry._replace(
-        who=entry.who[:TEXT_MAX],
-        address=entry.address[:TEXT_MAX],
-        operation=entry.operation[:TEXT_MAX],
-        outcome=entry.outcome[:TEXT_MAX],
-        reason=entry.reason[:TEXT_MAX].encode("utf-8", "replace").decode(),
-    )
-    connection.execute("BEGIN IMMEDIATE")
-    try:
-        number = connection.execute("SELECT ifnull(max(number), 0) + 1 FROM audit").fetchone()[0]
-        digest = _hash(before, number, cut)
-        connection.execute("INSERT INTO audit VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", (number, *cut, digest))
-    except BaseException:
-        connection.execute("ROLLBACK")
-        raise
-    connection.execute("COMMIT")
-    return digest
-
-
-def _hash(before: str, number: int, entry: Entry) -> str:
-    return hashlib.sha256(json.dumps([before, number, *entry]).encode()).hexdigest()
-
-
-def _open(path: Path) -> sqlite3.Connection:
-    path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-    path.touch(mode=0o600)
-    connection = sqlite3.connect(path, isolation_level=None, timeout=5.0)
-    connection.executescript("PRAGMA journal_mode=WAL; PRAGMA synchronous=NORMAL;")
-    connection.executescript(_SCHEMA)
-    return connection

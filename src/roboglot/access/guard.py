@@ -1,4 +1,8 @@
-"""Decides, for all robots of a program, who comes in and who may do what; notes it; and throws out who may no more."""
+"""Decides, for all robots of a program, who comes in and who may do what; notes it; and throws out who may no more.
+
+Nothing that comes in waits for the list's database: requests ask a copy in memory, which a thread renews. While the
+database cannot be reached, the copy stays as it is; rights still end at their time.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +12,9 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 from weakref import WeakValueDictionary
 
 from roboglot.access import audit
@@ -17,7 +22,8 @@ from roboglot.access.book import LOCAL, Book, Rights
 from roboglot.access.callers import basic_of, host_of, port_of
 from roboglot.access.rights import NOTHING
 from roboglot.access.secrets import password_fits, token_hash
-from roboglot.access.store import FILE, AccessStore, Grant, Kind
+from roboglot.access.store import AccessStore, Grant, Kind, Snapshot, open_store
+from roboglot.access.trail import Entry, Trail, open_trail
 from roboglot.config import AccessConfig, is_loopback
 from roboglot.model.admission import NO_PROOF, Admission, Forbidden, LockedOut, Proof, ProofKind, Right, Unknown
 from roboglot.model.client_context import connection, identity
@@ -25,14 +31,14 @@ from roboglot.model.components.system.lease import Lease
 from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
 from roboglot.model.tap import Direction, Exchange
+from roboglot.storage.transactions import DatabaseError, Transactions
 from roboglot.transport.limiter import Limiter
 from roboglot.transport.seldom import Seldom
 
-T = TypeVar("T")
 log = logging.getLogger(__name__)
 seldom = Seldom(log)
 
-LOOK_PERIOD = 0.25  # s between two looks at the file and at the clock
+LOOK_PERIOD = 0.25  # s between two looks at the list and at the clock
 PROOFS_MAX = 4096  # clients whose proof needs no further look
 CHECKS_MAX = 16  # passwords that wait to be checked; each takes 50 ms of a thread
 TRIES_SECONDS = 60.0
@@ -57,7 +63,11 @@ class Tunnelled(NamedTuple):
 
 
 class Guard:
-    """One for all robots. ``start`` begins to follow the file; ``reload`` does it at once."""
+    """One for all robots. ``start`` begins to follow the list; ``reload`` reads it at once.
+
+    ``shared``: the server's database that keeps list and audit for a fleet, and that whoever opened it closes; without
+    it they are files in ``folder``. Raises OSError, ValueError, sqlite3.Error, DatabaseError.
+    """
 
     def __init__(
         self,
@@ -65,16 +75,19 @@ class Guard:
         config: AccessConfig,
         robots: Mapping[str, Robot],
         *,
+        shared: Transactions | None = None,
         now: Callable[[], float] = time.time,
     ) -> None:
         self.config = config
         self.now = now
-        self.audit = audit.Audit(folder / audit.FILE)
+        self._store = AccessStore(shared) if shared else open_store(folder)
+        self._trail = Trail(shared) if shared else open_trail(folder)
+        self._own = () if shared else (self._store, self._trail)
+        self.audit = audit.Audit(self._trail)
         self.requests = Limiter(config.requests, config.requests, time.monotonic)
         self.tunnels: dict[str, Tunnelled] = {}  # by the loopback address that stands for each
-        self._path = folder / FILE
-        self._store = AccessStore(self._path)
-        self._book = Book(self._store.identities())
+        self._list = self._store.snapshot()
+        self._book = Book(self._list.identities)
         self._proofs: dict[str, str] = {}  # by the header that shows who it is
         self._tries = Limiter(config.logins / TRIES_SECONDS, config.logins, time.monotonic)
         often = TRIES_OF_ONE_NAME * config.logins
@@ -92,7 +105,7 @@ class Guard:
             admission.renew(self._book)
 
     def start(self) -> None:
-        """Follow the file and the clock, on the running loop."""
+        """Follow the list and the clock, on the running loop."""
         loop = asyncio.get_running_loop()
         for admission in self._admissions:
             admission.settle_control()
@@ -104,12 +117,20 @@ class Guard:
         self._ended.set()
         if self._thread is not None:
             self._thread.join(2.0)
-        self._store.close()
         self.audit.close()
+        for opened in self._own:
+            opened.close()
 
     def reload(self) -> None:
         """Read the list anew: who lost a right loses it now, on open connections, too."""
-        older, self._book = self._book, Book(self._store.identities())
+        self._adopt(self._store.snapshot())
+
+    def _adopt(self, newer: Snapshot) -> None:
+        """Let what the list says now be so, unless a later state of it was read meanwhile."""
+        if newer.version < self._list.version:
+            return
+        self._list = newer
+        older, self._book = self._book, Book(newer.identities)
         self._next_end = self._book.next_end(self.now())
         replaced = self._book.replaced(older)
         self._proofs = {proof: who for proof, who in self._proofs.items() if who not in replaced}
@@ -155,23 +176,15 @@ class Guard:
 
     async def invite(self, name: str, grant: Grant) -> Proof:
         """See ``Admission.invite``."""
-        token = await asyncio.to_thread(self._change, lambda store: store.add_guest(name, [grant], self.now()))
-        self.reload()
+        token = await asyncio.to_thread(self._store.add_guest, name, [grant], self.now())
+        self._adopt(await asyncio.to_thread(self._store.snapshot))
         return Proof(HTTP, f"Bearer {token}")
 
     async def shut_out(self, name: str) -> None:
         """See ``Admission.shut_out``."""
         if self._book.has(name, Kind.GUEST):
-            await asyncio.to_thread(self._change, lambda store: store.revoke(name))
-            self.reload()
-
-    def _change(self, change: Callable[[AccessStore], T]) -> T:
-        """Change the list, in a thread: the disk is slow."""
-        store = AccessStore(self._path)
-        try:
-            return change(store)
-        finally:
-            store.close()
+            await asyncio.to_thread(self._store.revoke, name)
+            self._adopt(await asyncio.to_thread(self._store.snapshot))
 
     def may_shake_hands(self, host: str) -> bool:
         """See ``Admission.may_shake_hands``."""
@@ -216,23 +229,28 @@ class Guard:
 
     def _follow(self, loop: asyncio.AbstractEventLoop) -> None:
         """In a thread: looks cost nothing to the robots, and lockstep waits for none of them."""
-        store = AccessStore(self._path)
-        version = store.version
+        seen = self._list.version
         while not self._ended.wait(LOOK_PERIOD):
-            newer = store.version
-            if newer != version or self.now() >= self._next_end:
-                version = newer
-                self._next_end = float("inf")  # until it is read anew
-                loop.call_soon_threadsafe(self._reload_safely)
-        store.close()
+            if self.now() >= self._next_end:
+                self._next_end = float("inf")  # until it is counted anew
+                loop.call_soon_threadsafe(lambda: self._adopt_safely(self._list))
+            try:
+                if self._store.version == seen:
+                    continue
+                newer = self._store.snapshot()
+            except DatabaseError as error:
+                seldom.warning("list", "the list of who may do what cannot be read, and stays as it was: %s", error)
+                continue
+            seen = newer.version
+            loop.call_soon_threadsafe(partial(self._adopt_safely, newer))
 
-    def _reload_safely(self) -> None:
+    def _adopt_safely(self, newer: Snapshot) -> None:
         if self._ended.is_set():
             return
         try:
-            self.reload()
+            self._adopt(newer)
         except Exception:
-            log.exception("the list of who may do what could not be read: it stays as it was")
+            log.exception("the list of who may do what could not be taken over: it stays as it was")
 
 
 class RobotAdmission(Admission):
@@ -377,5 +395,5 @@ class RobotAdmission(Admission):
     def _note(self, who: str, address: str, door: str, operation: str, outcome: str, reason: str) -> None:
         if (tunnelled := self._guard.tunnels.get(host_of(address))) is not None:
             address = f"{tunnelled.host} by tunnel"
-        entry = audit.Entry(audit.now(), who, address, self._name, door, operation, outcome, reason)
+        entry = Entry(audit.now(), who, address, self._name, door, operation, outcome, reason)
         self._guard.audit.note(entry)

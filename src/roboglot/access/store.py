@@ -1,11 +1,11 @@
-"""The list of who may do what, in a SQLite file of its own: written by ``roboglot access``, read by the running robots.
+"""The list of who may do what: written by ``roboglot access``, read by the running robots.
 
-Two programs use it at once, so every change is one transaction, and ``version`` tells when another program made one.
+It is a SQLite file of its own, or where robots are kept on a PostgreSQL server, there, for all programs of a fleet.
+Several programs use it at once, so every change is one transaction, and counts the version up.
 """
 
 from __future__ import annotations
 
-import sqlite3
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
@@ -15,19 +15,13 @@ from pathlib import Path
 from roboglot.access.rights import ALL_ROBOTS, parse_rights, write_rights
 from roboglot.access.secrets import new_token, password_hash, token_hash
 from roboglot.operations import Right
+from roboglot.storage.opening import open_private
+from roboglot.storage.transactions import Connection, Transactions
 
 FILE = "access.db"  # in the data folder
+SCHEMA = "roboglot.storage.schema.access"
 NAME_MAX = 64  # characters
 IDENTITIES_MAX = 10_000
-_SCHEMA = """
-CREATE TABLE IF NOT EXISTS identity (
-    name TEXT PRIMARY KEY, kind TEXT NOT NULL, password TEXT NOT NULL DEFAULT '', token TEXT UNIQUE
-) STRICT;
-CREATE TABLE IF NOT EXISTS allowed (
-    identity TEXT NOT NULL REFERENCES identity (name) ON DELETE CASCADE,
-    robot TEXT NOT NULL, rights TEXT NOT NULL, until REAL, PRIMARY KEY (identity, robot)
-) STRICT;
-"""
 
 
 class Kind(StrEnum):
@@ -60,108 +54,148 @@ class Identity:
     grants: tuple[Grant, ...]
 
 
-class AccessStore:
-    """Open with ``AccessStore(path)``, close with ``close``. One thread at a time. Raises sqlite3.Error, ValueError."""
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """The whole list at one instant; ``version`` is larger after every change."""
 
-    def __init__(self, path: Path) -> None:
-        path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-        path.touch(mode=0o600)
-        self._connection = sqlite3.connect(path, isolation_level=None, timeout=5.0, check_same_thread=False)
-        self._connection.executescript("PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA foreign_keys=ON;")
-        self._connection.executescript(_SCHEMA)
+    version: int
+    identities: tuple[Identity, ...]
+
+
+def open_store(folder: Path, url: str = "") -> AccessStore:
+    """Open the list of a data folder, or of a PostgreSQL server. Raises OSError, ValueError, sqlite3.Error."""
+    return AccessStore(open_private(folder / FILE, SCHEMA, url))
+
+
+class AccessStore:
+    """The list in a database. From any thread; all wait in place. Raises DatabaseError, ValueError, LookupError."""
+
+    def __init__(self, database: Transactions) -> None:
+        self._database = database
 
     def close(self) -> None:
-        """Close the file."""
-        self._connection.close()
+        """Close the database."""
+        self._database.close()
 
     @property
     def version(self) -> int:
-        """Another number after another program has changed the file."""
-        return int(self._connection.execute("PRAGMA data_version").fetchone()[0])
+        """Another number after every change."""
+        return self._database.run_now(_version)
+
+    def snapshot(self) -> Snapshot:
+        """Return all of it, by name."""
+        return self._database.run_now(lambda connection: Snapshot(_version(connection), tuple(_all(connection))))
+
+    def identities(self) -> list[Identity]:
+        """All, by name."""
+        return self._database.run_now(_all)
 
     def add_person(self, name: str, password: str, grants: Iterable[Grant]) -> None:
         """Let a person in by a password, with these rights and no others."""
-        self._put(name, Kind.PERSON, grants, password=password_hash(password))
+        self.put(Identity(name, Kind.PERSON, password_hash(password), None, tuple(grants)))
 
     def add_machine(self, name: str, grants: Iterable[Grant]) -> str:
         """Let a machine in; its token, which is known this once."""
         token = new_token()
-        self._put(name, Kind.MACHINE, grants, token=token_hash(token))
+        self.put(Identity(name, Kind.MACHINE, "", token_hash(token), tuple(grants)))
         return token
 
     def add_guest(self, name: str, grants: Iterable[Grant], now: float) -> str:
         """Let a guest in, and forget those whose time is over at ``now``; the guest's token. Raises ValueError."""
-        for identity in self.identities():
-            over = all(grant.until is not None and grant.until < now for grant in identity.grants)
-            if identity.kind is Kind.GUEST and over:
-                self.revoke(identity.name)
-            elif identity.name == name and identity.kind is not Kind.GUEST:
-                raise ValueError(f"there is a {identity.kind} named {name}")
         token = new_token()
-        self._put(name, Kind.GUEST, grants, token=token_hash(token))
+        guest = _checked(Identity(name, Kind.GUEST, "", token_hash(token), tuple(grants)))
+
+        def work(connection: Connection) -> None:
+            for identity in _all(connection):
+                over = all(grant.until is not None and grant.until < now for grant in identity.grants)
+                if identity.kind is Kind.GUEST and over:
+                    connection.execute("DELETE FROM identity WHERE name=?", (identity.name,))
+                elif identity.name == name and identity.kind is not Kind.GUEST:
+                    raise ValueError(f"there is a {identity.kind} named {name}")
+            _put(connection, guest)
+
+        self._database.run_now(work)
         return token
 
     def add_app(self, name: str, grants: Iterable[Grant]) -> None:
         """Let a CyberDog app in by the certificate with this common name."""
-        self._put(name, Kind.APP, grants)
+        self.put(Identity(name, Kind.APP, "", None, tuple(grants)))
 
     def allow(self, address: str, grants: Iterable[Grant]) -> str:
         """Let in whatever comes from an address; the address as it is kept."""
         name = str(ip_address(address))
-        self._put(name, Kind.ADDRESS, grants)
+        self.put(Identity(name, Kind.ADDRESS, "", None, tuple(grants)))
         return name
+
+    def put(self, identity: Identity) -> None:
+        """Let it in, in place of who had this name. Raises ValueError."""
+        _checked(identity)
+        self._database.run_now(lambda connection: _put(connection, identity))
 
     def rotate(self, name: str, password: str = "") -> str:
         """Another token (returned) or this password; the old one is no longer valid. Raises LookupError."""
-        kind = self._kind(name)
+        kind = self._database.run_now(lambda connection: _kind(connection, name))
         if kind is Kind.PERSON:
-            self._set("UPDATE identity SET password=? WHERE name=?", (password_hash(password), name))
+            self._set("password", password_hash(password), name)
             return ""
         if kind is not Kind.MACHINE:
             raise ValueError(f"{name} is let in by its {kind}: there is nothing to rotate")
         token = new_token()
-        self._set("UPDATE identity SET token=? WHERE name=?", (token_hash(token), name))
+        self._set("token", token_hash(token), name)
         return token
+
+    def _set(self, column: str, value: str, name: str) -> None:
+        def work(connection: Connection) -> None:
+            _kind(connection, name)
+            connection.execute(f"UPDATE identity SET {column}=? WHERE name=?", (value, name))
+
+        self._database.run_now(work)
 
     def revoke(self, name: str) -> None:
         """Let it in no more. Raises LookupError."""
-        self._kind(name)
-        self._set("DELETE FROM identity WHERE name=?", (name,))
 
-    def identities(self) -> list[Identity]:
-        """All, by name."""
-        grants: dict[str, list[Grant]] = {}
-        for name, robot, rights, until in self._connection.execute(
-            "SELECT identity, robot, rights, until FROM allowed ORDER BY robot"
-        ):
-            grants.setdefault(name, []).append(Grant(robot, parse_rights(rights), until))
-        rows = self._connection.execute("SELECT name, kind, password, token FROM identity ORDER BY name")
-        return [Identity(row[0], Kind(row[1]), row[2], row[3], tuple(grants.get(row[0], ()))) for row in rows]
-
-    def _put(
-        self, name: str, kind: Kind, grants: Iterable[Grant], *, password: str = "", token: str | None = None
-    ) -> None:
-        forbidden = " " if kind is Kind.ADDRESS else " :"
-        if not 0 < len(name) <= NAME_MAX or not name.isprintable() or set(name) & set(forbidden):
-            raise ValueError(f"a name has 1 to {NAME_MAX} characters, no blanks and no colon")
-        count = self._connection.execute("SELECT count(*) FROM identity").fetchone()[0]
-        if count >= IDENTITIES_MAX:
-            raise ValueError(f"at most {IDENTITIES_MAX} names")
-        rows = [(name, grant.robot or ALL_ROBOTS, write_rights(grant.rights), grant.until) for grant in grants]
-        with self._transaction() as connection:
+        def work(connection: Connection) -> None:
+            _kind(connection, name)
             connection.execute("DELETE FROM identity WHERE name=?", (name,))
-            connection.execute("INSERT INTO identity VALUES (?, ?, ?, ?)", (name, kind, password, token))
-            connection.executemany("INSERT INTO allowed VALUES (?, ?, ?, ?)", rows)
 
-    def _set(self, query: str, values: tuple[str, ...]) -> None:
-        self._connection.execute(query, values)
+        self._database.run_now(work)
 
-    def _transaction(self) -> sqlite3.Connection:
-        self._connection.execute("BEGIN IMMEDIATE")
-        return self._connection
 
-    def _kind(self, name: str) -> Kind:
-        row = self._connection.execute("SELECT kind FROM identity WHERE name=?", (name,)).fetchone()
-        if row is None:
-            raise LookupError(f"there is no {name!r}; `roboglot access list` shows who there is")
-        return Kind(row[0])
+def _checked(identity: Identity) -> Identity:
+    """Return it, if its name may be one. Raises ValueError."""
+    name, forbidden = identity.name, " " if identity.kind is Kind.ADDRESS else " :"
+    if not 0 < len(name) <= NAME_MAX or not name.isprintable() or set(name) & set(forbidden):
+        raise ValueError(f"a name has 1 to {NAME_MAX} characters, no blanks and no colon")
+    return identity
+
+
+def _version(connection: Connection) -> int:
+    return int(connection.execute("SELECT number FROM access_version").fetchone()[0])
+
+
+def _all(connection: Connection) -> list[Identity]:
+    grants: dict[str, list[Grant]] = {}
+    for name, robot, rights, until in connection.execute(
+        "SELECT identity, robot, rights, until FROM allowed ORDER BY robot"
+    ):
+        grants.setdefault(name, []).append(Grant(robot, parse_rights(rights), until))
+    rows = connection.execute("SELECT name, kind, password, token FROM identity ORDER BY name")
+    return [Identity(row[0], Kind(row[1]), row[2], row[3], tuple(grants.get(row[0], ()))) for row in rows]
+
+
+def _put(connection: Connection, identity: Identity) -> None:
+    if connection.execute("SELECT count(*) FROM identity").fetchone()[0] >= IDENTITIES_MAX:
+        raise ValueError(f"at most {IDENTITIES_MAX} names")
+    name = identity.name
+    rows = [(name, grant.robot or ALL_ROBOTS, write_rights(grant.rights), grant.until) for grant in identity.grants]
+    connection.execute("DELETE FROM identity WHERE name=?", (name,))
+    values = (name, str(identity.kind), identity.password, identity.token)
+    connection.execute("INSERT INTO identity (name, kind, password, token) VALUES (?, ?, ?, ?)", values)
+    connection.executemany("INSERT INTO allowed (identity, robot, rights, until) VALUES (?, ?, ?, ?)", rows)
+
+
+def _kind(connection: Connection, name: str) -> Kind:
+    row = connection.execute("SELECT kind FROM identity WHERE name=?", (name,)).fetchone()
+    if row is None:
+        raise LookupError(f"there is no {name!r}; `roboglot access list` shows who there is")
+    return Kind(row[0])

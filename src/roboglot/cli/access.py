@@ -15,8 +15,9 @@ from typing import Annotated
 import typer
 
 from roboglot.access.rights import ALL_ROBOTS, parse_rights, write_rights
-from roboglot.access.store import FILE, AccessStore, Grant, Kind
+from roboglot.access.store import AccessStore, Grant, Kind, open_store
 from roboglot.config import Config
+from roboglot.storage.transactions import DatabaseError
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -27,6 +28,9 @@ app = typer.Typer(
 UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 
 Data = Annotated[Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="Folder of the robots' data.")]
+Database = Annotated[
+    str, typer.Option(envvar="ROBOGLOT_DATABASE", help="In place of the folder's list: postgresql://host/name.")
+]
 Name = Annotated[str, typer.Argument(help="A name without blanks.")]
 Rights = Annotated[str, typer.Option(help="see, drive, program, edit, admin; several with commas.")]
 Robots = Annotated[str, typer.Option(help="Names of robots with commas; *: all.")]
@@ -46,9 +50,10 @@ def add(
         Path | None, typer.Option(help="A CyberDog app: write its own certificate to this folder.")
     ] = None,
     data: Data = None,
+    database: Database = "",
 ) -> None:
     """Add an account; a machine's token is printed, and known this once."""
-    with _store(data) as store:
+    with _store(data, database) as store:
         grants = _grants(rights, robots, until, lasts)
         if person:
             store.add_person(name, _password(), grants)
@@ -71,42 +76,59 @@ def allow(
     until: Until = "",
     lasts: For = "",
     data: Data = None,
+    database: Database = "",
 ) -> None:
     """Let in whatever comes from an address: for clients that can show neither a token nor a certificate."""
-    with _store(data) as store:
+    with _store(data, database) as store:
         store.allow(address, _grants(rights, robot, until, lasts))
 
 
 @app.command()
-def revoke(name: Name, data: Data = None) -> None:
+def revoke(name: Name, data: Data = None, database: Database = "") -> None:
     """Remove an account; what it had robots do ends."""
-    with _store(data) as store:
+    with _store(data, database) as store:
         store.revoke(name)
 
 
 @app.command()
-def rotate(name: Name, data: Data = None) -> None:
+def rotate(name: Name, data: Data = None, database: Database = "") -> None:
     """Give a machine another token, or a person another password; the old one is no longer valid."""
-    with _store(data) as store:
+    with _store(data, database) as store:
         person = any(entry.name == name and entry.kind is Kind.PERSON for entry in store.identities())
         if token := store.rotate(name, _password() if person else ""):
             print(token)
 
 
 @app.command(name="list")
-def list_all(data: Data = None) -> None:
+def list_all(data: Data = None, database: Database = "") -> None:
     """Who may do what."""
     from rich.console import Console
     from rich.table import Table
 
     table = Table("name", "kind", "robot", "rights", "until")
-    with _store(data) as store:
+    with _store(data, database) as store:
         for identity in store.identities():
             for grant in identity.grants or (Grant("-", frozenset()),):
                 until = datetime.fromtimestamp(grant.until).astimezone() if grant.until else None
                 end = f"{until:%Y-%m-%d %H:%M}" if until else ""
                 table.add_row(identity.name, identity.kind, grant.robot, write_rights(grant.rights), end)
     Console().print(table)
+
+
+@app.command()
+def copy(
+    database: Annotated[str, typer.Option(envvar="ROBOGLOT_DATABASE", help="To here: postgresql://host/name.")],
+    data: Data = None,
+) -> None:
+    """Copy the list of a data folder to a PostgreSQL server; names that are there already stay as they are there."""
+    if not database:
+        sys.exit("roboglot access: to which --database?")
+    with _store(data, "") as source, _store(None, database) as target:
+        there = {identity.name for identity in target.identities()}
+        missing = [identity for identity in source.identities() if identity.name not in there]
+        for identity in missing:
+            target.put(identity)
+    print(f"{len(missing)} copied, {len(there)} were there")
 
 
 def _grants(rights: str, robots: str, until: str, lasts: str) -> list[Grant]:
@@ -151,13 +173,13 @@ def _folder(data: Path | None) -> Path:
 
 
 @contextmanager
-def _store(data: Path | None) -> Iterator[AccessStore]:
+def _store(data: Path | None, database: str) -> Iterator[AccessStore]:
     """The list; mistakes end the program with one line."""
     try:
-        store = AccessStore(_folder(data) / FILE)
+        store = open_store(_folder(data), database)
         try:
             yield store
         finally:
             store.close()
-    except (ValueError, LookupError, OSError, sqlite3.Error) as error:
+    except (ValueError, LookupError, OSError, sqlite3.Error, DatabaseError) as error:
         sys.exit(f"roboglot access: {error.args[-1] if error.args else error}")

@@ -11,8 +11,9 @@ from typing import Annotated
 
 import typer
 
-from roboglot.access.audit import FILE, BrokenChain, Entry, read, verify
+from roboglot.access.trail import FILE, Entry, Trail, open_trail
 from roboglot.config import Config
+from roboglot.storage.transactions import DatabaseError
 
 LOOK_PERIOD = 0.5  # s
 
@@ -22,27 +23,31 @@ def command(
     follow: Annotated[bool, typer.Option("--follow", "-f", help="Go on with what comes.")] = False,
     check: Annotated[bool, typer.Option("--verify", help="Check that no row was changed or taken away.")] = False,
     data: Annotated[Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="Folder of the robots' data.")] = None,
+    database: Annotated[
+        str, typer.Option(envvar="ROBOGLOT_DATABASE", help="In place of the folder's: postgresql://host/name.")
+    ] = "",
 ) -> None:
     """Print the rows, oldest first. They are there for robots that ask who drives them (--access)."""
-    path = (data or Config().data) / FILE
-    if not path.exists():
-        sys.exit(f"roboglot audit: there is none in {path.parent}: robots keep one with --access")
+    folder = data or Config().data
+    if not database and not (folder / FILE).exists():
+        sys.exit(f"roboglot audit: there is none in {folder}: robots keep one with --access")
     try:
-        if check:
-            count, digest = verify(path)
-            print(f"{count} rows, whole; keep this elsewhere to see later that none was cut off: {count} {digest}")
-            return
-        last = _print(path, robot, 0)
-        while follow:
-            time.sleep(LOOK_PERIOD)
-            last = _print(path, robot, last)
-    except (BrokenChain, sqlite3.Error) as error:
+        with open_trail(folder, database) as trail:
+            if check:
+                count, digest = trail.verify()
+                print(f"{count} rows, whole; keep this elsewhere to see later that none was cut off: {count} {digest}")
+                return
+            last = _print(trail, robot, 0)
+            while follow:
+                time.sleep(LOOK_PERIOD)
+                last = _print(trail, robot, last)
+    except (ValueError, OSError, sqlite3.Error, DatabaseError) as error:
         sys.exit(f"roboglot audit: {error}")
 
 
-def _print(path: Path, robot: str, after: int) -> int:
+def _print(trail: Trail, robot: str, after: int) -> int:
     """The rows behind ``after``; the number of the last."""
-    for number, entry in read(path, robot=robot, after=after):
+    for number, entry in trail.rows(robot=robot, after=after):
         print(_line(number, entry), flush=True)
         after = number
     return after

@@ -22,6 +22,7 @@ from roboglot.storage.transactions import AlreadyThere, Connection, DatabaseErro
 
 T = TypeVar("T")
 Work = Callable[[Connection], Any]
+ROBOTS = "roboglot.storage.schema"  # tables of what robots remember
 
 
 class Database:
@@ -29,12 +30,13 @@ class Database:
 
     ``in_place``: ``run`` waits in place, for a lockstep clock: it could go on meanwhile, never as far as last time, and
     what the robot does next would depend on how fast the disk is. In memory there is no disk, and it always does.
+    ``schema``: the package with its tables.
     """
 
-    def __init__(self, path: Path | str, *, in_place: bool = False) -> None:
+    def __init__(self, path: Path | str, *, in_place: bool = False, schema: str = ROBOTS) -> None:
         self._in_place = in_place or str(path) == ":memory:"
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="database")
-        self._connection = self._thread.submit(connect, str(path)).result()
+        self._connection = self._thread.submit(connect, str(path), schema).result()
         self._reader = None if self._in_place else _Reader(path)
         self._disk: Disk | None = None
         self._together: list[tuple[Database, Work, asyncio.Future[Any]]] = []  # of all robots: copies share it
@@ -191,7 +193,7 @@ def database_errors() -> Iterator[None]:
         raise DatabaseError(str(error)) from error
 
 
-def connect(path: Path | str) -> sqlite3.Connection:
+def connect(path: Path | str, schema: str = ROBOTS) -> sqlite3.Connection:
     """Open the file with the newest schema, outside of any transaction. Raises ValueError for a newer one."""
     connection = sqlite3.connect(path, isolation_level=None, timeout=5.0)
     try:
@@ -199,9 +201,9 @@ def connect(path: Path | str) -> sqlite3.Connection:
         connection.execute("PRAGMA synchronous=FULL")
         connection.execute("PRAGMA foreign_keys=ON")
         if str(path) == ":memory:" and hasattr(connection, "deserialize"):
-            connection.deserialize(_empty())
+            connection.deserialize(_empty(schema))
         else:
-            _migrate(connection)
+            _migrate(connection, schema)
     except BaseException:
         connection.close()
         raise
@@ -209,17 +211,17 @@ def connect(path: Path | str) -> sqlite3.Connection:
 
 
 @cache
-def _empty() -> bytes:
+def _empty(schema: str) -> bytes:
     """Return an empty database with the newest schema."""
     with contextlib.closing(sqlite3.connect(":memory:", isolation_level=None)) as connection:
-        _migrate(connection)
+        _migrate(connection, schema)
         return connection.serialize()
 
 
-def _migrate(connection: sqlite3.Connection) -> None:
+def _migrate(connection: sqlite3.Connection, schema: str) -> None:
     """Apply the schema files that this database has not seen yet."""
     (current,) = connection.execute("PRAGMA user_version").fetchone()
-    files = resources.files("roboglot.storage.schema")
+    files = resources.files(schema)
     versions = sorted(int(m[1]) for f in files.iterdir() if (m := re.fullmatch(r"v(\d+)\.sql", f.name)))
     if current > versions[-1]:
         raise ValueError(
@@ -227,4 +229,4 @@ def _migrate(connection: sqlite3.Connection) -> None:
         )
     for version in versions[versions.index(current) + 1 if current in versions else 0 :]:
         script = (files / f"v{version}.sql").read_text(encoding="utf-8")
-        connection.executescript(f"BEGIN;\n{script}\nPRAGMA user_version={version};\nCOMMIT;")
+        connection.executescript(f"BEGIN IMMEDIATE;\n{script}\nPRAGMA user_version={version};\nCOMMIT;")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from pathlib import Path
 
-from roboglot.storage.database import Database
+from roboglot.storage.database import ROBOTS, Database
 from roboglot.storage.transactions import Transactions
 
 
@@ -26,17 +26,35 @@ def read_registry(where: str) -> Transactions:
     return open_database(Path(where))
 
 
+def open_private(file: Path, schema: str, url: str = "") -> Transactions:
+    """Open a ``file`` of its own that its owner alone may read, or the server that keeps the same tables.
+
+    Raises as ``open_database`` does.
+    """
+    if not url:
+        file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        file.touch(mode=0o600)
+    return open_database(file, url, schema=schema)
+
+
 def open_database(
-    file: Path, url: str = "", robots: Collection[str] = (), *, in_place: bool = False, only_read: bool = False
+    file: Path,
+    url: str = "",
+    robots: Collection[str] = (),
+    *,
+    in_place: bool = False,
+    only_read: bool = False,
+    schema: str = ROBOTS,
 ) -> Transactions:
-    """Open PostgreSQL by its ``url``, or without one the ``file``.
+    """Open PostgreSQL by its ``url``, or without one the ``file``, whose tables are those of ``schema``.
 
     ``robots``: this program alone writes what belongs to them, in the order of its calls. ``only_read``: a server's
     tables stay as they are, and nothing can be written. Raises ValueError for another
-    kind of URL, or a database of a newer program; OSError if the server or its driver is missing or a robot is taken.
+    kind of URL, or a database of a newer program; OSError if the server or its driver is missing or a robot is taken;
+    sqlite3.Error for a file that is none of SQLite's.
     """
     if not url:
-        return Database(file, in_place=in_place)
+        return Database(file, in_place=in_place, schema=schema)
     if not url.startswith(("postgresql://", "postgres://")):
         raise ValueError("the database's URL begins with postgresql://")
     try:

@@ -9,15 +9,17 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from roboglot.access import audit
 from roboglot.access.rights import ALL_ROBOTS, BRINGS, whole, write_rights
-from roboglot.access.store import FILE, AccessStore, Grant, Identity, Kind
+from roboglot.access.store import FILE, Grant, Identity, Kind, open_store
+from roboglot.access.trail import FILE as TRAIL
+from roboglot.access.trail import open_trail
 from roboglot.cli.checks.finding import Finding
 from roboglot.cli.checks.listeners import holder_of
 from roboglot.config import Config, is_loopback
 from roboglot.operations import Right
 from roboglot.protocols import DOORS
 from roboglot.protocols.door import PortKind
+from roboglot.storage.transactions import DatabaseError
 
 UNUSED_DAYS = 30
 DAY = 86400.0  # s
@@ -28,7 +30,7 @@ def examine_security(config: Config) -> Iterator[Finding]:
     yield from _listeners(config)
     yield from _opened(config)
     yield from _fingerprints(config)
-    identities = list(_identities(config.data / FILE))
+    identities = list(_identities(config))
     yield from _identity_findings(config, identities)
     yield from _unused(config, identities)
     yield from _settings(config)
@@ -112,10 +114,10 @@ def _fingerprints(config: Config) -> Iterator[Finding]:
                 yield Finding(label, False, str(error), f"remove {path.parent} to have new ones")
 
 
-def _identities(path: Path) -> list[Identity]:
-    if not path.exists():
+def _identities(config: Config) -> list[Identity]:
+    if not config.database and not (config.data / FILE).exists():
         return []
-    store = AccessStore(path)
+    store = open_store(config.data, config.database)
     try:
         return store.identities()
     finally:
@@ -153,10 +155,10 @@ def _weakness(identity: Identity, grants: list[Grant]) -> str:
 
 def _unused(config: Config, identities: list[Identity]) -> Iterator[Finding]:
     """Rights to change something that were not used for UNUSED_DAYS; only where the audit is that old."""
-    path, now = config.data / audit.FILE, time.time()
-    if not path.exists():
+    now = time.time()
+    if not config.database and not (config.data / TRAIL).exists():
         return
-    used, oldest = _used(path, now - UNUSED_DAYS * DAY)
+    used, oldest = _used(config, now - UNUSED_DAYS * DAY)
     if oldest is None or now - oldest < UNUSED_DAYS * DAY:
         yield Finding("unused rights", True, f"the audit is younger than {UNUSED_DAYS} days: too early to tell")
         return
@@ -168,7 +170,7 @@ def _unused(config: Config, identities: list[Identity]) -> Iterator[Finding]:
             yield Finding(f"unused: {identity.name}", False, seen, f"roboglot access revoke {identity.name}, or fewer")
 
 
-def _used(path: Path, since: float) -> tuple[Mapping[str, set[Right]], float | None]:
+def _used(config: Config, since: float) -> tuple[Mapping[str, set[Right]], float | None]:
     """Which rights each identity made use of, and when the audit begins."""
     needed: dict[tuple[str, str], Right] = {
         (door.name, str(_key(operation.key))): operation.right
@@ -179,12 +181,13 @@ def _used(path: Path, since: float) -> tuple[Mapping[str, set[Right]], float | N
     used: dict[str, set[Right]] = defaultdict(set)
     oldest = None
     try:
-        for _, entry in audit.read(path):
-            oldest = entry.at if oldest is None else oldest
-            if entry.outcome == "done" and entry.at >= since:
-                right = needed.get((entry.door, entry.operation))
-                used[entry.who] |= {right} if right else set(Right)  # of what is not known, nothing is claimed
-    except sqlite3.Error:
+        with open_trail(config.data, config.database) as trail:
+            for _, entry in trail.rows():
+                oldest = entry.at if oldest is None else oldest
+                if entry.outcome == "done" and entry.at >= since:
+                    right = needed.get((entry.door, entry.operation))
+                    used[entry.who] |= {right} if right else set(Right)  # of what is not known, nothing is claimed
+    except (sqlite3.Error, OSError, DatabaseError):
         return used, None
     return used, oldest
 
