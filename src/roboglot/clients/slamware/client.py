@@ -32,6 +32,7 @@ from roboglot.clients.slamware.slam import Slam
 from roboglot.clients.slamware.system import System
 from roboglot.clients.slamware.upkeep import Upkeep
 from roboglot.model.clock import Clock, RealClock
+from roboglot.model.tap import Line
 from roboglot.wire.slamware.motion import ActionInfo, ActionRequest
 
 PORT = 1448
@@ -60,6 +61,10 @@ class SlamwareClient(
     def close(self) -> None:
         """Disconnect. Actions of the robot go on."""
         self._link.close()
+
+    def note_in(self, line: Line) -> None:
+        """Note there what is asked and answered."""
+        self._link.line = line
 
     async def begin(
         self,
