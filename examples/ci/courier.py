@@ -87,7 +87,7 @@ class Arm:
     """The few words of the text protocol that the courier needs."""
 
     def __init__(self, host):
-        self.socket = socket.create_connection((host, 40923), timeout=10)
+        self.socket = socket.create_connection((host, 40923), timeout=60)
         self.say("command")
 
     def say(self, text):

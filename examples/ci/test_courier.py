@@ -8,7 +8,7 @@ from courier import Arm, Courier, RobotError
 
 @pytest.fixture
 def courier(robot_server):
-    return Courier(robot_server.url, patience=30)
+    return Courier(robot_server.url, patience=120)
 
 
 @pytest.fixture

@@ -162,6 +162,7 @@ class RecordConfig:
 class Config:
     """Everything ``roboglot up`` needs. ``speed`` is the clock's; ``lockstep`` stops it until it is advanced.
 
+    ``patient``: on a machine that is too slow time waits for the world, instead of passing without it.
     ``doors`` are the doors' own sections by name; the defaults hold for those that are not there.
     ``database`` is the URL of a PostgreSQL server that keeps what robots remember, for a fleet on several machines;
     without it, a file in the data folder does.
@@ -174,6 +175,7 @@ class Config:
     robots: tuple[RobotConfig, ...] = (RobotConfig(),)
     speed: float = 1.0
     lockstep: bool = False
+    patient: bool = False
     seed: int = 1
     data: Path = field(default_factory=lambda: default_data_folder(os.environ))
     database: str = ""

@@ -30,7 +30,7 @@ from roboglot.console.studio.programs import Programs, Studio
 from roboglot.fleet import build_fleet, origin_of
 from roboglot.hosting.exclusive import lock_folder
 from roboglot.model.client_context import concerning
-from roboglot.model.clock import Clock, LockstepClock, RealClock
+from roboglot.model.clock import Clock, LockstepClock, PatientClock, RealClock
 from roboglot.model.components.system.lease import Lease
 from roboglot.model.errors import RobotError
 from roboglot.model.events import Rebooted, Rebooting, ShuttingDown
@@ -130,7 +130,8 @@ class Runtime:
         refuse_unguarded(config)
         self.config = config
         self._lock = lock_folder(config.data)
-        self.clock: Clock = LockstepClock() if config.lockstep else RealClock(config.speed)
+        running = PatientClock if config.patient else RealClock
+        self.clock: Clock = LockstepClock() if config.lockstep else running(config.speed)
         file, names = config.data / "roboglot.db", [robot.name for robot in config.robots]
         self._database = open_database(file, config.database, names, in_place=config.lockstep)
         limits = dataclasses.asdict(config.programs)

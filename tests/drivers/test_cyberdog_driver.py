@@ -44,6 +44,7 @@ from roboglot.model.errors import InvalidGoal, NotFound, Refused
 from roboglot.model.events import LinkChanged
 from roboglot.model.geometry import Orientation, Point, Pose, Twist
 from roboglot.model.robot import Robot
+from roboglot.model.tap import Direction, Exchange
 from roboglot.protocols.cyberdog.certificates import export_client
 from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.server import CyberDogDoor
@@ -247,3 +248,20 @@ async def test_it_announces_what_it_adds(driven: Robot, until: Until) -> None:
     await until(lambda: driven[Link].age("scan") < 1)
     kept_here = {Lease, Places, MapAnnotations, MapMemory, MapLibrary, FileStore, Settings, Ledger, Members}
     assert set(driven.interfaces) - kept_here == APPROXIMATIONS.keys()
+
+
+async def test_its_tap_tells_what_the_dog_hears_and_answers(driven: Robot, robot: Robot, until: Until) -> None:
+    here: list[Exchange] = []
+    there: list[Exchange] = []
+    leave = driven.tap.listen(here.append), robot.tap.listen(there.append)
+
+    def told(exchanges: list[Exchange], way: Direction) -> set[tuple[str, bytes]]:
+        return {(found.operation, found.payload) for found in exchanges if found.direction is way}
+
+    await until(lambda: len(told(here, Direction.REPLY)) > 2)
+    assert {found.door for found in here} == {"driver/cyberdog"}
+    await until(lambda: told(here, Direction.REQUEST) <= told(there, Direction.REQUEST))
+    assert told(here, Direction.REPLY) & told(there, Direction.REPLY)
+    for end in leave:
+        end()
+    assert not driven.tap.watched

@@ -5,10 +5,11 @@ import logging
 import math
 import subprocess
 import sys
+import time
 
 import pytest
 
-from roboglot.model.clock import Clock, LockstepClock
+from roboglot.model.clock import LEAD, Clock, LockstepClock, PatientClock
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.sensing.odometry import Odometry
@@ -201,6 +202,28 @@ async def test_a_slow_machine_skips_time_with_one_warning(caplog):
     clock.leap(3 * TICK)
     assert robot[Odometry].reading.stamp == pytest.approx(clock.now)
     world.close()
+
+
+def busy():
+    """Keep the loop busy for 20 s of robot time, in which nobody simulates."""
+    time.sleep(0.001)
+
+
+async def test_a_patient_clock_waits_for_a_world_that_is_too_slow(caplog):
+    clock = PatientClock(speed=20_000.0)  # of which no machine simulates the half
+    world = World(load_world("empty"), [RobotPlacement("a", start=Pose(2, 5))], clock=clock)
+    world.equip(Robot("a", world.description_of("a"), clock))
+    world.start()
+    began, simulated = clock.time(), world.simulated
+    with caplog.at_level(logging.WARNING):
+        for _ in range(10):
+            await clock.sleep(0.5)
+            busy()
+            assert clock.time() - began <= world.simulated - simulated + LEAD + 1e-6
+    assert world.simulated - simulated >= 5.0 - LEAD
+    assert caplog.text == ""  # nothing was lost
+    world.close()
+    await clock.sleep(1000.0)  # which nobody has to simulate
 
 
 def test_mujoco_is_loaded_with_the_first_world_only():

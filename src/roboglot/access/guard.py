@@ -30,7 +30,7 @@ from roboglot.model.client_context import connection, identity
 from roboglot.model.components.system.lease import Lease
 from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
-from roboglot.model.tap import Direction, Exchange
+from roboglot.model.tap import DRIVER, Direction, Exchange
 from roboglot.storage.transactions import DatabaseError, Transactions
 from roboglot.transport.limiter import Limiter
 from roboglot.transport.seldom import Seldom
@@ -385,7 +385,7 @@ class RobotAdmission(Admission):
     def _note_reply(self, exchange: Exchange) -> None:
         """What changed something, or was refused by the robot; what ``check`` refused is noted already."""
         right = self._needs.get(exchange.operation)
-        if exchange.direction is not Direction.REPLY or right in (None, Right.SEE):
+        if exchange.door.startswith(DRIVER) or exchange.direction is not Direction.REPLY or right in (None, Right.SEE):
             return
         who = identity()
         if right in self._rights.get(who, NOTHING):

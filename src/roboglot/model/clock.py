@@ -21,6 +21,8 @@ from typing import Protocol, TypeVar
 T = TypeVar("T")
 YIELD_AFTER = 0.5  # s of lockstep time
 HOLD_MAX = 5.0  # s of the machine that lockstep time waits for work outside of the event loop
+LEAD = 0.1  # s that a patient clock goes further than the world
+STANDING = 0.002  # real s between two looks at a patient clock that stands still
 LOCKSTEP_EPOCH = 1_767_225_600.0  # 2026-01-01T00:00:00Z: lockstep traces carry no real date
 
 
@@ -55,6 +57,9 @@ class Clock(ABC):
 
     def release(self, work: object) -> None:  # noqa: B027
         """End what ``hold`` began; do nothing if it has ended."""
+
+    def reached(self, stamp: float) -> None:  # noqa: B027 - most clocks wait for no world
+        """The world has been simulated up to there; inf: there is none any more."""
 
     @contextmanager
     def holding(self) -> Iterator[None]:
@@ -144,6 +149,9 @@ class _RealTimer:
             self._armed.cancel()
 
     def _fire(self) -> None:
+        if self._clock.late(self.when):
+            self.arm()
+            return
         self._clock.forget(self)
         self._callback()
 
@@ -216,6 +224,10 @@ class RealClock(Clock):
         real, robot = self._anchor
         return real + (stamp - robot) / self._speed
 
+    def late(self, _when: float) -> bool:
+        """Whether the clock stood still since a timer for then was armed, so that it is not yet due."""
+        return False
+
     def forget(self, timer: _RealTimer) -> None:
         """Drop a timer that fired or was cancelled."""
         self._timers.discard(timer)
@@ -225,6 +237,32 @@ class RealClock(Clock):
         self._speed, self._until = speed, until
         for timer in tuple(self._timers):
             timer.arm()
+
+
+class PatientClock(RealClock):
+    """A real clock that waits for the world: a machine that is too slow makes time pass later, and loses none of it.
+
+    It goes LEAD further than the world at most. Until ``reached`` is called first it waits for nothing.
+    """
+
+    def __init__(self, speed: float = 1.0) -> None:
+        self._reach = math.inf
+        super().__init__(speed)
+
+    def time(self) -> float:
+        return min(super().time(), self._reach)
+
+    def reached(self, stamp: float) -> None:
+        if super().time() > self._reach:  # it stood there, and goes on from there
+            self._anchor = time.monotonic(), self._reach
+        self._reach = stamp + LEAD
+
+    def late(self, when: float) -> bool:
+        return self.time() < when
+
+    def real_seconds_until(self, when: float) -> float | None:
+        seconds = super().real_seconds_until(when)
+        return None if seconds is None else max(seconds, STANDING if self.time() >= self._reach < when else 0.0)
 
 
 class _LockstepTimer:

@@ -7,7 +7,21 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import AsyncIterator, Callable, Collection
+from pathlib import Path
 from typing import NamedTuple
+
+
+class Recorded(NamedTuple):
+    """A file of which a robot is played back, as ``robot`` of it; its first and last instant in ns since 1970.
+
+    ``others``: the other robots of the file.
+    """
+
+    path: Path
+    robot: str
+    others: tuple[str, ...]
+    first: int
+    last: int
 
 
 class StandInReply(NamedTuple):
@@ -19,7 +33,9 @@ class StandInReply(NamedTuple):
 
 
 class StandIn(ABC):
-    """Answers for one robot at all of its doors."""
+    """Answers for one robot at all of its doors. ``recorded``: the file that it plays back, if it is one."""
+
+    recorded: Recorded | None = None
 
     @abstractmethod
     def answer(self, door: str, operation: str, payload: bytes, *, reads: bool) -> AsyncIterator[StandInReply]:

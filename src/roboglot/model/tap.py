@@ -1,8 +1,9 @@
-"""What a robot's doors hear and say, as it happens: for the console, recordings, the audit and counters.
+"""What a robot's doors and driver hear and say, as it happens: for the console, recordings, the audit and counters.
 
 A door calls ``request`` when it has understood what a client asks, ``reply`` when it answers, ``push`` for what it
 sends by itself, each behind ``if tap.watched``: without followers that is all that it costs. Who asks is what
-the door said with ``ask_for``.
+the door said with ``ask_for``. The driver of a real robot notes through a ``Line`` what it asks that robot and
+hears from it, as the door ``driver/NAME``.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ _SECRET = re.compile(rb"""("\w*[Pp]assword"\s*:\s*)(?:"(?:[^"\\]|\\.)*(?:"|\Z)|[
 _SECRET_IN_TEXT = re.compile(
     rb"""(\\"\w*[Pp]assword\\"\s*:\s*\\")(?:[^"\\]|\\\\.)*""", re.DOTALL
 )  # JSON in a JSON text
+LOST = "lost"  # the status where a real robot's answer does not come
+DRIVER = "driver/"  # with which the name begins that stands for a driver where doors have theirs
 PAYLOAD_MAX = 8 * 1024 * 1024  # bytes of one exchange that are kept
 
 
@@ -39,7 +42,7 @@ class Direction(StrEnum):
 
 
 class Exchange(NamedTuple):  # made for each message: a frozen dataclass takes five times as long
-    """One message of one door, in either direction.
+    """One message of one door, or of the driver of a real robot, in either direction.
 
     ``stamp``: robot time in s. ``connection``: the other end's address ("127.0.0.1:40312"), or a name where there is
     none. ``client``: for whom, as the control lease has it. ``operation``: the key in the protocol's contract; empty if
@@ -86,6 +89,10 @@ class Tap:
             self._look()
 
         return leave
+
+    def line(self, driver: str, address: str) -> Line:
+        """Return what notes the messages between a driver and the robot at ``address``."""
+        return Line(self, f"{DRIVER}{driver}", address)
 
     def request(self, door: str, operation: str, payload: bytes | str) -> float:
         """A client asks. Returns when, for its ``reply``."""
@@ -145,3 +152,29 @@ class Tap:
     def _look(self) -> None:
         """Update the flag: a follower came or left."""
         self.watched = bool(self._listeners or self._feed.viewers)
+
+
+class Line:
+    """What a driver asks its robot and hears from it; look at ``watched`` first, as with a tap."""
+
+    def __init__(self, tap: Tap, door: str, address: str) -> None:
+        self._tap, self._door, self.address = tap, door, address
+
+    @property
+    def watched(self) -> bool:
+        """Whether anybody follows."""
+        return self._tap.watched
+
+    def request(self, operation: str, payload: bytes | str) -> float:
+        """The robot is asked. Returns when, for its ``reply``."""
+        return self._tap._pass(self._door, self.address, Direction.REQUEST, operation, payload)
+
+    def reply(
+        self, operation: str, payload: bytes | str, status: str, refusal: str = "", began: float | None = None
+    ) -> None:
+        """The robot answers what it was asked at ``began``; status LOST: it does not."""
+        self._tap._pass(self._door, self.address, Direction.REPLY, operation, payload, status, refusal, began)
+
+    def push(self, operation: str, payload: bytes | str) -> None:
+        """The robot says something by itself."""
+        self._tap._pass(self._door, self.address, Direction.PUSH, operation, payload)

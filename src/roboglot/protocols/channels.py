@@ -24,6 +24,10 @@ class Carrier(Protocol):
         """The client in words, as control has it."""
 
     @property
+    def subprotocol(self) -> str:
+        """The one of the channel's that was agreed on; empty: none."""
+
+    @property
     def unsent(self) -> int:
         """Bytes that wait for the client to read."""
 

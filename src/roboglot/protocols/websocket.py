@@ -110,6 +110,7 @@ class Connection(asyncio.Protocol):
         self._host = ""
         self._name = ""  # host and port
         self.identity = ""  # of the account, where admission asks for one
+        self.subprotocol = ""  # the one of the channel's that was agreed on
         self._head = bytearray()
         self._early = b""  # received after the request, before it was accepted
         self._protocol: ServerProtocol | None = None
@@ -323,7 +324,7 @@ class Connection(asyncio.Protocol):
         assert self._channel is not None
         self._protocol.send_response(self._protocol.accept(request))
         self._flush()
-        self._open = True
+        self._open, self.subprotocol = True, self._protocol.subprotocol or ""
         try:
             self._session = copy_context().run(self._open_session, self._channel)
         except RuntimeError as full:

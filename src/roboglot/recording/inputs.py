@@ -11,7 +11,7 @@ from typing import Any
 
 from roboglot.clients.errors import ClientError
 from roboglot.model.clock import LockstepClock, RealClock
-from roboglot.model.tap import Direction, Exchange
+from roboglot.model.tap import DRIVER, Direction, Exchange
 from roboglot.recording.lines import FrameLine, Line, TextLine
 from roboglot.recording.reader import Asked, pair
 
@@ -25,7 +25,8 @@ class Inputs:
     """Plays the requests of a recording. ``where`` returns a new connection to a robot's door, not yet open."""
 
     def __init__(self, exchanges: Sequence[Exchange], clock: LockstepClock, where: Where) -> None:
-        self._asked, self._clock, self._where = pair(exchanges)[0], clock, where
+        doors = [exchange for exchange in exchanges if not exchange.door.startswith(DRIVER)]
+        self._asked, self._clock, self._where = pair(doors)[0], clock, where
         self._lines: dict[tuple[str, str, str], Line] = {}
         self._tasks: set[asyncio.Task[Any]] = set()
         self._heard: Counter[tuple[str, str, Direction]] = Counter()

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from roboglot.model.clock import Clock
 from roboglot.model.errors import NotFound
-from roboglot.model.stand_in import StandIn, StandInReply
+from roboglot.model.stand_in import Recorded, StandIn, StandInReply
 from roboglot.model.tap import Exchange
 from roboglot.recording.matching import Normal, normal, rewritten, without_numbers
 from roboglot.recording.reader import Asked, BadRecording, Recording, pair, read_recording
@@ -221,7 +221,12 @@ def open_playback(place: str, clock: Clock) -> Playback:
         recording = read_recording(Path(path))
     except OSError as error:
         raise ValueError(f"recording {path}: {error.strerror}") from None
-    return Playback(recording.of(_robot(recording, name)), clock, recording.epoch)
+    chosen = _robot(recording, name)
+    played = Playback(recording.of(chosen), clock, recording.epoch)
+    own = chosen or next(iter(recording.robots), "")
+    others = tuple(other for other in recording.robots if other != own)
+    played.recorded = Recorded(recording.path, own, others, recording.first, recording.last)
+    return played
 
 
 def _robot(recording: Recording, name: str) -> str:

@@ -8,11 +8,11 @@ import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import zstandard
 from mcap.exceptions import McapError
-from mcap.records import Attachment, Channel, Message, Metadata, Schema
+from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
 
 from roboglot.model.tap import Direction, Exchange
@@ -21,6 +21,7 @@ from roboglot.recording.messages import decode_exchange
 log = logging.getLogger(__name__)
 RECORD_MAX = 1 << 30  # bytes of one record of the file
 EXCHANGES_MAX = 2_000_000
+DAMAGE = (struct.error, zstandard.ZstdError, ValueError, KeyError, EOFError, MemoryError, OverflowError)  # what it says
 
 
 class BadRecording(ValueError):
@@ -133,20 +134,28 @@ def records(path: Path) -> Iterator[tuple[Any, Channel | None, Schema | None]]:
     channels: dict[int, Channel] = {}
     schemas: dict[int, Schema] = {}
     with path.open("rb") as file:
-        try:
-            for record in StreamReader(file, record_size_limit=RECORD_MAX).records:
-                if isinstance(record, Schema):
-                    schemas[record.id] = record
-                elif isinstance(record, Channel):
-                    channels[record.id] = record
-                channel = channels.get(record.channel_id) if isinstance(record, Message) else None
-                yield record, channel, schemas.get(channel.schema_id) if channel else None
-        except McapError as error:
-            if file.tell() <= 16:
-                raise BadRecording(f"{path} is no MCAP file") from None
-            log.info("%s: cut off: %s", path, error)
-        except (struct.error, zstandard.ZstdError, ValueError, KeyError, EOFError, MemoryError, OverflowError) as error:
-            log.info("%s: damaged: %s", path, error)
+        for record in stream(path, file):
+            if isinstance(record, Schema):
+                schemas[record.id] = record
+            elif isinstance(record, Channel):
+                channels[record.id] = record
+            channel = channels.get(record.channel_id) if isinstance(record, Message) else None
+            yield record, channel, schemas.get(channel.schema_id) if channel else None
+
+
+def stream(path: Path, file: IO[bytes], *, chunks: bool = False) -> Iterator[McapRecord]:
+    """Yield the records of an open file, or with ``chunks`` these as they are; ends where the file is cut off.
+
+    Raises BadRecording, OSError.
+    """
+    try:
+        yield from StreamReader(file, emit_chunks=chunks, record_size_limit=RECORD_MAX).records
+    except McapError as error:
+        if file.tell() <= 16:
+            raise BadRecording(f"{path} is no MCAP file") from None
+        log.info("%s: cut off: %s", path, error)
+    except DAMAGE as error:
+        log.info("%s: damaged: %s", path, error)
 
 
 def read_recording(path: Path) -> Recording:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import ipaddress
+import re
 from collections.abc import AsyncGenerator, Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,7 @@ import grpc
 
 from roboglot.clients.errors import LinkLost, TimedOut
 from roboglot.model.clock import Clock
+from roboglot.model.tap import LOST, Line
 from roboglot.wire.cyberdog.channel import APP_PORT, LOST_AFTER, ROBOT_NAME, ROBOT_PORT, client_options
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import (
@@ -27,6 +29,7 @@ from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import (
 REDIAL_MAX = 2000  # ms between two attempts to connect
 PUSH_MAX = 5_242_880  # bytes that the app takes in one message
 FOUND_PERIOD = 0.05  # s between two looks at whether the robot has called
+IN_BAND = re.compile(r'"error_code"\s*:\s*([1-9]\d*)')
 POLITE = "the app sends no heartbeats"
 
 
@@ -101,6 +104,7 @@ class Link:
         self.clock = clock
         self.heartbeat: Heartbeat | None = None
         self.app_port = app_port
+        self.line: Line | None = None  # what is asked, answered and pushed is noted there
         self._host, self._port, self._certificates, self._pushed = host, port, certificates, pushed
         self._channel: Any = None
         self._stub: Any = None
@@ -163,10 +167,18 @@ class Link:
     async def send(self, code: int, text: str) -> AsyncGenerator[tuple[int, str], None]:
         """The answers to one request: (code, text) until the robot ends it. Raises LinkLost."""
         call = self._robot().sendMsg(pb.SendRequest(nameCode=code, params=text))
+        line = self.line if self.line is not None and self.line.watched else None
+        began = 0.0 if line is None else line.request(str(int(code)), text)
         try:
             async for answer in call:
+                if line is not None:
+                    found = IN_BAND.search(answer.data)
+                    refusal = f"error_code {found[1]}" if found else ""
+                    line.reply(str(int(code)), answer.data, refusal or "ok", refusal, began)
                 yield answer.nameCode, answer.data
         except grpc.aio.AioRpcError as error:
+            if line is not None:
+                line.reply(str(int(code)), b"", LOST, error.details() or error.code().name, began)
             raise _lost(error) from None
         finally:
             call.cancel()
@@ -174,10 +186,16 @@ class Link:
     async def fetch(self, code: int, text: str) -> AsyncGenerator[Any, None]:
         """The chunks of a file. Raises LinkLost."""
         call = self._robot().getFile(pb.SendRequest(nameCode=code, params=text))
+        line = self.line if self.line is not None and self.line.watched else None
+        began = 0.0 if line is None else line.request(str(int(code)), text)
         try:
             async for chunk in call:
+                if line is not None:
+                    line.reply(str(int(code)), chunk.SerializeToString(), "ok", "", began)
                 yield chunk
         except grpc.aio.AioRpcError as error:
+            if line is not None:
+                line.reply(str(int(code)), b"", LOST, error.details() or error.code().name, began)
             raise _lost(error) from None
         finally:
             call.cancel()
@@ -203,6 +221,8 @@ class _App(GrpcAppServicer):  # type: ignore[misc]
         return pb.Result(result="ok")
 
     async def sendMsg(self, request: Any, _context: Any) -> Any:  # noqa: N802 - the service's name
+        if self._link.line is not None and self._link.line.watched:
+            self._link.line.push(str(int(request.nameCode)), request.params)
         self._link._pushed(request.nameCode, request.params)
         yield pb.RecResponse(nameCode=request.nameCode, data="{}")
 

@@ -31,8 +31,10 @@ from roboglot.clients.robomaster.datagrams import PUSH_PORT, PushPort
 from roboglot.clients.robomaster.errors import RoboMasterRefused
 from roboglot.clients.robomaster.events import EventLink
 from roboglot.clients.robomaster.media import access_units, opus_packets
+from roboglot.clients.robomaster.noting import Noting
 from roboglot.model.clock import Clock, RealClock
 from roboglot.model.feed import Feed, Viewer
+from roboglot.model.tap import Line
 from roboglot.wire.robomaster.annexb import AccessUnit
 from roboglot.wire.robomaster.replies import Reply
 from roboglot.wire.robomaster.telemetry import Telemetry, hear
@@ -94,6 +96,7 @@ class RoboMasterClient:
         self._detach: Callable[[], None] | None = None
         self._events = EventLink(self.clock, ports.event, self._hear)
         self._link: ControlLink | None = None
+        self._noting: Noting | None = None
         self._seeking: asyncio.Task[None] | None = None
         self._listeners: list[tuple[Callable[[Telemetry], object], tuple[type[Telemetry], ...]]] = []
         self._feeds: set[Feed[Telemetry]] = set()
@@ -138,6 +141,10 @@ class RoboMasterClient:
             self._detach = None
         for feed in tuple(self._feeds):
             feed.close()
+
+    def note_in(self, line: Line) -> None:
+        """Note there what is asked, answered and heard from now on; before ``connect``."""
+        self._noting = Noting(line)
 
     @property
     def as_robots(self) -> bool:
@@ -227,6 +234,8 @@ class RoboMasterClient:
         return opus_packets(self.clock, self.host, self._ports.audio)
 
     def _hear(self, data: bytes) -> None:
+        if self._noting is not None:
+            self._noting.heard(data)
         for item in hear(data):
             for heard, kinds in tuple(self._listeners):
                 if not kinds or isinstance(item, kinds):
@@ -249,7 +258,9 @@ class RoboMasterClient:
                 hook(state)
 
     async def _open(self) -> None:
-        self._link = link = await connect(self.clock, self.host, self._ports.control, self._local, self._lost)
+        self._link = link = await connect(
+            self.clock, self.host, self._ports.control, self._local, self._lost, self._noting
+        )
         try:
             await self.command()
         except BaseException:

@@ -8,7 +8,8 @@ import socket
 from collections.abc import Callable
 from typing import cast
 
-from roboglot.clients.errors import BadAnswer, LinkLost, TimedOut
+from roboglot.clients.errors import BadAnswer, ClientError, LinkLost, TimedOut
+from roboglot.clients.robomaster.noting import Noting
 from roboglot.clients.robomaster.pairing import Pairing
 from roboglot.model.clock import Clock
 
@@ -20,8 +21,8 @@ KEEPALIVE = (1, 1, 3)  # s of silence before the kernel asks, s between its ques
 class ControlLink(asyncio.Protocol):
     """One TCP connection to the control port; never reopened, its owner makes a new one. ``lost`` is called once."""
 
-    def __init__(self, clock: Clock, lost: Callable[[str], None]) -> None:
-        self._clock, self._lost = clock, lost
+    def __init__(self, clock: Clock, lost: Callable[[str], None], noting: Noting | None = None) -> None:
+        self._clock, self._lost, self._noting = clock, lost, noting
         self._numbers = itertools.count(1)
         self._pairing = Pairing()
         self._answers: dict[int, asyncio.Future[str]] = {}
@@ -66,13 +67,23 @@ class ControlLink(asyncio.Protocol):
         answer: asyncio.Future[str] = asyncio.get_running_loop().create_future()
         self._answers[number] = answer
         self._pairing.sent(number, bare=not numbered)
-        self._transport.write(f"{command} seq {number};".encode() if numbered else f"{command};".encode())
+        text = f"{command} seq {number};" if numbered else f"{command};"
+        self._transport.write(text.encode())
+        if self._noting is not None:
+            self._noting.sent(number, text)
+        why = "nobody waits for it any more"
         try:
             return await self._clock.wait_for(answer, timeout)
         except TimeoutError:
-            raise TimedOut(f"no answer to {command!r} within {timeout:g} s") from None
+            why = f"no answer to {command!r} within {timeout:g} s"
+            raise TimedOut(why) from None
+        except ClientError as error:
+            why = str(error)
+            raise
         finally:
             self._answers.pop(number, None)
+            if self._noting is not None:
+                self._noting.lost(number, why)
 
     def close(self) -> None:
         """Hang up; what waits for an answer gets LinkLost."""
@@ -86,8 +97,12 @@ class ControlLink(asyncio.Protocol):
         keep_asking(transport.get_extra_info("socket"))
 
     def data_received(self, data: bytes) -> None:
+        wordings: dict[int, str] = {}
+        self._pairing.wordings = wordings if self._noting is not None and self._noting.line.watched else None
         try:
             for number, text in self._pairing.received(data):
+                if self._noting is not None:
+                    self._noting.answered(number, wordings.get(number, text), text)
                 if (answer := self._answers.get(number)) and not answer.done():
                     answer.set_result(text)
         except ValueError as error:
@@ -118,10 +133,21 @@ def keep_asking(connection: socket.socket) -> None:
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, (idle + interval * count) * 1000)
 
 
-async def connect(clock: Clock, host: str, port: int, local: str | None, lost: Callable[[str], None]) -> ControlLink:
+async def connect(
+    clock: Clock,
+    host: str,
+    port: int,
+    local: str | None,
+    lost: Callable[[str], None],
+    noting: Noting | None = None,
+) -> ControlLink:
     """An open link. Raises LinkLost or TimedOut."""
     opening = asyncio.get_running_loop().create_connection(
-        lambda: ControlLink(clock, lost), host, port, local_addr=(local, 0) if local else None, family=socket.AF_INET
+        lambda: ControlLink(clock, lost, noting),
+        host,
+        port,
+        local_addr=(local, 0) if local else None,
+        family=socket.AF_INET,
     )
     try:
         _, link = await clock.wait_for(opening, CONNECT_SECONDS_MAX)

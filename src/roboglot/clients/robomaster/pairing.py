@@ -23,6 +23,7 @@ class Pairing:
         self._waiting: deque[int] = deque()
         self._bare: set[int] = set()  # those of them that went out without their number
         self._text = ""
+        self.wordings: dict[int, str] | None = None  # if it is a dict: answers as they came, by number
         self.as_robots = False  # whether an answer had the form that real robots' builds give it
 
     def __len__(self) -> int:
@@ -57,15 +58,16 @@ class Pairing:
     def _ended(self, head: str, tail: str) -> list[tuple[int, str]]:
         """``head`` is an answer that a ``;`` ended; empty if it belongs to no command."""
         self._text = tail
+        wording = f"{head};"
         if (found := _NUMBERED.fullmatch(head.strip())) is None:
             self.as_robots = self.as_robots or head.endswith(" ")  # behind a number every build may have a blank
-            return [(self._next(), head.strip())]
+            return [(self._keep(self._next(), wording), head.strip())]
         number = int(found[2])
         if number not in self._waiting:
             return []
         while self._next() != number:
             pass  # those before it will not be answered any more
-        return [(number, found[1].strip())]
+        return [(self._keep(number, wording), found[1].strip())]
 
     def _endless(self, head: str) -> list[tuple[int, str]] | None:
         """An answer without a ``;`` so far; None if it isn't whole yet."""
@@ -76,7 +78,12 @@ class Pairing:
             self._text, self.as_robots = "", True
         else:
             return None
-        return [(self._next(), answer.strip())]
+        return [(self._keep(self._next(), answer + mark), answer.strip())]
+
+    def _keep(self, number: int, wording: str) -> int:
+        if self.wordings is not None:
+            self.wordings[number] = wording
+        return number
 
     def _next(self) -> int:
         number = self._waiting.popleft()

@@ -18,8 +18,9 @@ from urllib.parse import quote, urlencode
 
 import msgspec
 
-from roboglot.clients.errors import BadAnswer, RefusedByRobot
+from roboglot.clients.errors import BadAnswer, ClientError, RefusedByRobot
 from roboglot.clients.slamware.http import Answer, HttpLink
+from roboglot.model.tap import LOST, Line
 from roboglot.wire.slamware.chapters.slam.explore_map import BadMap, ExploreMap, decode_explore_map
 from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap, decode_stcm, encode_stcm
 
@@ -99,11 +100,28 @@ async def _ask(chapter: Chapter, key: str, plan: _Plan, values: Mapping[str, Any
         path += "?" + urlencode(query)
     body, content_type = _encode(values.get("body"))
     timeout = max(TRANSFER_TIMEOUT, chapter.timeout) if plan.transfer else chapter.timeout
-    answer = await chapter._link.ask(plan.method, path, body, content_type, timeout)
+    asking, line = chapter._link.ask(plan.method, path, body, content_type, timeout), chapter._link.line
+    if line is None or not line.watched:
+        answer = await asking
+    else:
+        answer = await _noted(line, key, f"{plan.method} {path}\n\n".encode() + body, asking)
     if not 200 <= answer.status < 300:
         words = answer.body.decode("utf-8", "replace").strip()
         raise SlamwareRefused(key, answer.status, words if answer.reason in words else answer.reason)
     return plan.decode(answer)
+
+
+async def _noted(line: Line, key: str, payload: bytes, asking: Awaitable[Answer]) -> Answer:
+    """Return the answer, and note it with what was asked."""
+    began = line.request(key, payload)
+    try:
+        answer = await asking
+    except ClientError as error:
+        line.reply(key, b"", LOST, str(error), began)
+        raise
+    refusal = "" if 200 <= answer.status < 300 else answer.reason or str(answer.status)
+    line.reply(key, bytes(answer.body), str(answer.status), refusal, began)
+    return answer
 
 
 def _encode(body: object) -> tuple[bytes, str]:

@@ -37,6 +37,7 @@ from roboglot.clients.slamware.chapters.system.system import System
 from roboglot.clients.slamware.http import HttpLink
 from roboglot.clients.slamware.running import RunningAction
 from roboglot.model.clock import Clock, RealClock
+from roboglot.model.tap import Line
 from roboglot.wire.slamware.chapters.motion import ActionInfo, ActionRequest
 
 PORT = 1448
@@ -81,6 +82,10 @@ class SlamwareClient(
     def close(self) -> None:
         """Disconnect. Actions of the robot go on."""
         self._link.close()
+
+    def note_in(self, line: Line) -> None:
+        """Note there what is asked and answered."""
+        self._link.line = line
 
     async def begin(
         self,

@@ -14,6 +14,7 @@ import httptools
 
 from roboglot.clients.errors import BadAnswer, LinkLost, TimedOut
 from roboglot.model.clock import Clock
+from roboglot.model.tap import Line
 
 CONNECTIONS_MAX = 6
 HEAD_MAX = 32 * 1024  # bytes before an answer's body
@@ -120,6 +121,7 @@ class HttpLink:
 
     def __init__(self, host: str, port: int, clock: Clock) -> None:
         self.host, self.port = host, port
+        self.line: Line | None = None  # what is asked and answered is noted there
         self._clock = clock
         self._idle: list[_Connection] = []
         self._all: set[_Connection] = set()

@@ -91,6 +91,7 @@ class CyberDogDriver(Driver):
         self._certificates = certificates
         reported = self._reported = ReportedState()
         self._client = CyberDogClient(host, None, port=port, app_port=app_port, clock=robot.clock)
+        self._client.link.line = robot.tap.line("cyberdog", f"{host}:{port}")
         self._open = False
         self._ours_at = -math.inf  # when an action of ours last moved the dog
         self._skills = Skills(robot, self._client, self.link, reported)

@@ -77,9 +77,11 @@ class RoboMasterDriver(Driver):
 
     def _new_client(self) -> RoboMasterClient:
         at = self._endpoint
-        return RoboMasterClient(
+        client = RoboMasterClient(
             at.host, clock=self.robot.clock, ports=at.ports, pushes=self._pushes, local=at.local, reconnect=False
         )
+        client.note_in(self.robot.tap.line("robomaster", f"{at.host}:{at.ports.control}"))
+        return client
 
     async def brake(self) -> None:
         await self._base.stop()

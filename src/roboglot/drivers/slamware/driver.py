@@ -54,6 +54,7 @@ class SlamwareDriver(Driver):
     def __init__(self, robot: Robot, address: str, host: str, port: int = PORT, *, touches: bool = True) -> None:
         super().__init__(robot, address, touches=touches)
         self._client = SlamwareClient(host, port, clock=robot.clock, timeout=TIMEOUT)
+        self._client.note_in(robot.tap.line("slamware", f"{host}:{port}"))
         reported = self._reported = ReportedState()
         self._optional = OptionalComponents(robot, self._client, self.supervisor)
         self._telemetry = TelemetryPoller(robot, self._client, self.link, reported, self._optional.parts)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import msgspec
 
@@ -12,15 +12,23 @@ from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.client_context import ask_for
 from roboglot.model.robot import Robot
 from roboglot.protocols.channels import Carrier
+from roboglot.protocols.foxglove.channels import Channel, Source
 from roboglot.protocols.foxglove.config import FoxgloveConfig
 from roboglot.protocols.foxglove.vocabulary import DOOR, parameters
-from roboglot.wire.foxglove.messages import Level, message, message_data, time_message
-
-if TYPE_CHECKING:
-    from roboglot.protocols.foxglove.topics import Channel, Topics
+from roboglot.wire.foxglove.messages import (
+    PLAYS,
+    Level,
+    Playback,
+    message,
+    message_data,
+    playback_state,
+    split_time,
+    time_message,
+)
 
 log = logging.getLogger(__name__)
 CAPABILITIES = ("clientPublish", "parameters", "parametersSubscribe", "time")
+PLAYED = ("parameters", "parametersSubscribe", "time", "playbackControl")  # of a recorded robot
 UNSENT_MAX = 1 << 20  # bytes that wait for a slow client; what comes then is dropped
 DROPS_PERIOD = 10.0  # s between two words about it
 
@@ -37,7 +45,7 @@ class Published(msgspec.Struct, rename="camel"):
 class Context:
     """From the client's opening to its end."""
 
-    def __init__(self, robot: Robot, carrier: Carrier, config: FoxgloveConfig, topics: Topics | None = None) -> None:
+    def __init__(self, robot: Robot, carrier: Carrier, config: FoxgloveConfig, topics: Source | None = None) -> None:
         self.robot, self.config, self.topics = robot, config, topics
         self.subscriptions: dict[int, int] = {}  # the client's number by the channel's
         self.published: dict[int, Published] = {}
@@ -47,16 +55,20 @@ class Context:
         self._dropped = 0
         self._warned_at = -DROPS_PERIOD
         self._following: set[asyncio.Task[None]] = set()
+        self.joined = asyncio.Event()  # once ``topics`` is there, or cannot be had
         session = f"{robot.id}-{int(robot.clock.epoch() * 1e3)}"
         model = robot.description.model
+        recorded = robot.stand_in.recorded if robot.stand_in is not None else None
         self.send(
             message(
                 "serverInfo",
                 name=f"roboglot: {robot.id}",
-                capabilities=CAPABILITIES,
+                capabilities=CAPABILITIES if recorded is None else PLAYED,
                 supportedEncodings=["json"],
                 metadata={"robot": robot.id, "model": model},
                 sessionId=session,
+                dataStartTime=None if recorded is None else split_time(recorded.first),
+                dataEndTime=None if recorded is None else split_time(recorded.last),
             )
         )
 
@@ -93,7 +105,7 @@ class Context:
 
     # -- what topics call ----------------------------------------------------------------------------------------------
 
-    def advertise(self, channels: list[Channel]) -> None:
+    def advertise(self, channels: Sequence[Channel]) -> None:
         """There are these topics, too."""
         if channels:
             self.send(message("advertise", channels=[channel.row for channel in channels]))
@@ -121,6 +133,11 @@ class Context:
             self.status(Level.WARNING, f"{dropped} messages were dropped: this client reads too slowly")
         if self.watched:
             self.report_parameters()
+
+    def played(self, state: Playback) -> None:
+        """A recording is played so from now on; the older subprotocol has no word for it."""
+        if self._carrier.subprotocol in PLAYS:
+            self.send(playback_state(state))
 
     def report_parameters(self) -> None:
         """Send what changed of the parameters that the client follows."""

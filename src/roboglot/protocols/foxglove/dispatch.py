@@ -7,7 +7,7 @@ import re
 
 from roboglot.model.errors import RobotError
 from roboglot.operations import BadParameters, Right
-from roboglot.protocols.foxglove.chapters import parameters, publishing, topics  # noqa: F401 - they fill the table
+from roboglot.protocols.foxglove.chapters import parameters, playback, publishing, topics  # noqa: F401 - they fill the table
 from roboglot.protocols.foxglove.context import Context
 from roboglot.protocols.foxglove.errors import level_of, refusal
 from roboglot.protocols.foxglove.table import TABLE

@@ -6,7 +6,6 @@ import asyncio
 import logging
 from collections.abc import Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING
 
 from roboglot.extras import explained
 from roboglot.model.background import load
@@ -15,6 +14,7 @@ from roboglot.operations import Right
 from roboglot.protocols.browsers import Browsers
 from roboglot.protocols.channels import Carrier, Channel
 from roboglot.protocols.door import Endpoint
+from roboglot.protocols.foxglove.channels import Source
 from roboglot.protocols.foxglove.config import FoxgloveConfig
 from roboglot.protocols.foxglove.context import Context
 from roboglot.protocols.foxglove.dispatch import answer
@@ -23,12 +23,10 @@ from roboglot.protocols.websocket import WebSocketServer
 from roboglot.transport.tls import Tls
 from roboglot.wire.foxglove.messages import SUBPROTOCOLS, Level
 
-if TYPE_CHECKING:
-    from roboglot.protocols.foxglove.topics import Topics
-
 log = logging.getLogger(__name__)
 CLIENTS_MAX = 16
-TOPICS = "roboglot.protocols.foxglove.topics"  # with libraries of an extra, loaded for the first client
+# With libraries of an extra, loaded for the first client; their ``open_source`` takes the robot.
+LIVE, RECORDED = "roboglot.protocols.foxglove.topics", "roboglot.protocols.foxglove.player"
 
 
 class Session:
@@ -54,12 +52,14 @@ class Session:
     async def _join(self) -> None:
         """Show the client all topics; what they need is loaded in a thread the first time."""
         try:
-            topics = await self._door.topics()
+            topics = self.context.topics = await self._door.topics()
+            topics.join(self.context)
         except ImportError as error:
             self.context.status(Level.ERROR, explained(error, "the robot's topics") or str(error))
-            return
-        self.context.topics = topics
-        topics.join(self.context)
+        except (OSError, ValueError) as error:
+            self.context.status(Level.ERROR, f"the recording cannot be read: {error}")
+        finally:
+            self.context.joined.set()
 
 
 class FoxgloveDoor:
@@ -69,7 +69,8 @@ class FoxgloveDoor:
 
     def __init__(self, robot: Robot, address: str, config: FoxgloveConfig, tls: Tls | None = None) -> None:
         self.robot, self.config = robot, config
-        self._topics: Topics | None = None
+        self._topics: Source | None = None
+        self._opening = asyncio.Lock()
         self._sessions: set[Session] = set()
         self._socket: WebSocketServer | None = None
         if config.enabled:
@@ -100,12 +101,14 @@ class FoxgloveDoor:
             return ()
         return [Endpoint("Foxglove", f"{self._socket.scheme}://{self._socket.address}:{self._socket.port}")]
 
-    async def topics(self) -> Topics:
-        """Return the robot's topics. Raises ImportError where the extra is not installed."""
-        if self._topics is None:
-            module = await load(lambda: import_module(TOPICS))
-            self._topics = self._topics or module.Topics(self.robot)
-        assert self._topics is not None
+    async def topics(self) -> Source:
+        """Return the robot's topics, live or recorded. Raises ImportError (without the extra), OSError, ValueError."""
+        async with self._opening:
+            if self._topics is None:
+                name = RECORDED if self.robot.stand_in is not None and self.robot.stand_in.recorded else LIVE
+                module = await load(lambda: import_module(name))
+                source: Source = await module.open_source(self.robot)
+                self._topics = source
         return self._topics
 
     def forget(self, session: Session) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from roboglot.operations import OperationTable
 
 TABLE: OperationTable[str] = OperationTable("foxglove")
-SENT = frozenset({"serverInfo", "status", "advertise", "messageData", "time", "parameterValues"})
+SENT = frozenset({"serverInfo", "status", "advertise", "messageData", "time", "parameterValues", "playbackState"})
 REFUSALS = frozenset({"serviceCallFailure"})  # sent, and whole: there is no other service
 
 

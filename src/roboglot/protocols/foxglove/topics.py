@@ -6,12 +6,12 @@ Values become bytes only for topics that someone has subscribed to, once for all
 from __future__ import annotations
 
 import asyncio
-import base64
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 from roboglot.media.video import VideoStream
+from roboglot.model.errors import NotFound
 from roboglot.model.robot import Robot
+from roboglot.protocols.foxglove.channels import Channel, Listener, Wish
 from roboglot.recording.entries import KINDS, Entry, encoded
 from roboglot.recording.redaction import Redaction
 from roboglot.recording.sampler import POSE_PERIOD, STATE_BEATS, Sampler, Stamps
@@ -23,43 +23,17 @@ KEPT = frozenset({"battery", "pressure", "state", "grid", "scene", "pose", "tran
 
 
 @dataclass(frozen=True, slots=True)
-class Channel:
-    """A topic as clients know it."""
+class LiveChannel(Channel):
+    """A topic of the robot, and the kind of its values."""
 
-    id: int
-    topic: str
     kind: str
 
-    @property
-    def row(self) -> dict[str, Any]:
-        """What ``advertise`` says about it."""
-        kind = KINDS[self.kind]
-        protobuf = kind.is_protobuf
-        schema = base64.b64encode(kind.schema_data) if protobuf else kind.schema_data
-        return {
-            "id": self.id,
-            "topic": self.topic,
-            "encoding": "protobuf" if protobuf else "json",
-            "schemaName": kind.schema,
-            "schemaEncoding": "protobuf" if protobuf else "jsonschema",
-            "schema": schema.decode(),
-        }
 
-
-class Listener(Protocol):
-    """A client."""
-
-    def advertise(self, channels: list[Channel]) -> None:
-        """There are these topics, too."""
-
-    def wants(self, channel: int) -> int | None:
-        """Its number for what it subscribed to; None: it has not."""
-
-    def deliver(self, subscription: int, at: int, data: bytes) -> None:
-        """Send a message; ``at``: ns since 1970."""
-
-    def beat(self, at: int, *, seldom: bool) -> None:
-        """Robot time goes on; ``seldom``: about once a second."""
+def _channel(number: int, topic: str, kind: str) -> LiveChannel:
+    written = KINDS[kind]
+    protobuf = written.is_protobuf
+    encoding, schema_encoding = ("protobuf", "protobuf") if protobuf else ("json", "jsonschema")
+    return LiveChannel(number, topic, encoding, written.schema, schema_encoding, written.schema_data, kind)
 
 
 class Topics:
@@ -69,14 +43,14 @@ class Topics:
         self._robot = robot
         self._redaction = Redaction()
         self._stamps = Stamps(robot)
-        self._channels: dict[tuple[str, str], Channel] = {}
+        self._channels: dict[tuple[str, str], LiveChannel] = {}
         self._last: dict[int, Entry] = {}
         self._listeners: list[Listener] = []
         self._sampler: Sampler | None = None
         self._task: asyncio.Task[None] | None = None
 
     @property
-    def channels(self) -> list[Channel]:
+    def channels(self) -> list[LiveChannel]:
         """Those that are known."""
         return list(self._channels.values())
 
@@ -120,6 +94,10 @@ class Topics:
             camera = next((channel.id for channel in self.channels if channel.kind == "video"), -1)
             self._sampler.film(any(listener.wants(camera) is not None for listener in self._listeners))
 
+    def control(self, _listener: Listener, _wish: Wish) -> None:
+        """Nothing is played back here. Raises NotFound."""
+        raise NotFound("this robot is live; one of a recording (--robot a=recording:FILE) can be played back")
+
     async def _sample(self) -> None:
         number = 0
         async for _ in self._robot.clock.every(POSE_PERIOD):
@@ -143,10 +121,15 @@ class Topics:
                     data = encoded(entry, self._redaction)
                 listener.deliver(subscription, entry.at, data)
 
-    def _channel(self, topic: str, kind: str) -> Channel | None:
+    def _channel(self, topic: str, kind: str) -> LiveChannel | None:
         known = self._channels.get((topic, kind))
         if known is None and len(self._channels) < CHANNELS_MAX:
-            known = self._channels[topic, kind] = Channel(len(self._channels) + 1, topic, kind)
+            known = self._channels[topic, kind] = _channel(len(self._channels) + 1, topic, kind)
             for listener in self._listeners:
                 listener.advertise([known])
         return known
+
+
+async def open_source(robot: Robot) -> Topics:
+    """Return the robot's."""
+    return Topics(robot)

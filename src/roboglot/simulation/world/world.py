@@ -191,6 +191,7 @@ class World:
         """Let time pass; needs the running loop."""
         if self._timer is None:
             self._origin = self._clock.time() - self._ticks * TICK
+            self._clock.reached(self.time)
             self._timer = self._clock.call_at(self._due(), self._beat)
 
     def close(self) -> None:
@@ -198,6 +199,7 @@ class World:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
+            self._clock.reached(math.inf)
         if self._loading is not None:
             self._loading.cancel()
         for robot in self._population.simulated.values():
@@ -216,6 +218,7 @@ class World:
         self._pace.look(self._clock.time())
         for _ in range(min(due, CATCH_UP_MAX)):
             self._tick()
+        self._clock.reached(self.time)
         self._timer = self._clock.call_at(self._due(), self._beat)
 
     def _tick(self) -> None:

@@ -14,6 +14,7 @@ from typing import Any
 import msgspec
 
 SUBPROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
+PLAYS = SUBPROTOCOLS[:1]  # those that have playback
 ENCODING_MAX = 64  # bytes of the name of an encoding
 REQUEST_ID_MAX = 256  # bytes of the id of a playback request
 _DATA = struct.Struct("<BIQ")
@@ -51,6 +52,15 @@ class ClientOpcode(IntEnum):
     PLAYBACK_CONTROL_REQUEST = 3
 
 
+class PlayStatus(IntEnum):
+    """How a recording is being played."""
+
+    PLAYING = 0
+    PAUSED = 1
+    BUFFERING = 2
+    ENDED = 3
+
+
 class Malformed(ValueError):
     """A message is none of the protocol's; the text says why."""
 
@@ -65,10 +75,7 @@ class Request:
 
 @dataclass(frozen=True, slots=True)
 class Playback:
-    """How a server plays; ``status``: 0 playing, 1 paused, 2 buffering, 3 ended; time in ns, speed, whom it answers.
-
-    ``sought``: the time has jumped, for the client sought.
-    """
+    """How a server plays: ``time`` in ns since 1970, whose ``request`` it answers, and whether the time has jumped."""
 
     status: int
     time: int
@@ -157,6 +164,11 @@ def playback_state(state: Playback) -> bytes:
     return (
         _STATE.pack(ServerOpcode.PLAYBACK_STATE, state.status, state.time, state.speed, state.sought, len(name)) + name
     )
+
+
+def split_time(at: int) -> dict[str, int]:
+    """Return ns since 1970 as JSON messages have it."""
+    return {"sec": at // 1_000_000_000, "nsec": at % 1_000_000_000}
 
 
 def asset_failure(request: int, why: str) -> bytes:

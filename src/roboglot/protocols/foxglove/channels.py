@@ -1,0 +1,90 @@
+"""What a door offers its clients, live or played: topics with their schemas, and who listens to them."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from roboglot.wire.foxglove.messages import Playback
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """A topic as clients know it."""
+
+    id: int
+    topic: str
+    encoding: str
+    schema: str
+    schema_encoding: str
+    schema_data: bytes
+
+    @property
+    def row(self) -> Mapping[str, object]:
+        """What ``advertise`` says about it."""
+        binary = self.schema_encoding == "protobuf"
+        return {
+            "id": self.id,
+            "topic": self.topic,
+            "encoding": self.encoding,
+            "schemaName": self.schema,
+            "schemaEncoding": self.schema_encoding,
+            "schema": (base64.b64encode(self.schema_data) if binary else self.schema_data).decode(),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """What a client wants of a recording that is played: whether to ``play``, how fast, from where (ns), its name."""
+
+    play: bool
+    speed: float
+    seek: int | None = None
+    request: str = ""
+
+
+class Listener(Protocol):
+    """A client."""
+
+    def advertise(self, channels: Sequence[Channel]) -> None:
+        """There are these topics, too."""
+
+    def wants(self, channel: int) -> int | None:
+        """Its number for what it subscribed to; None: it has not."""
+
+    def deliver(self, subscription: int, at: int, data: bytes) -> None:
+        """Send a message; ``at``: ns since 1970."""
+
+    def beat(self, at: int, *, seldom: bool) -> None:
+        """Robot time goes on; ``seldom``: about once a second."""
+
+    def played(self, state: Playback) -> None:
+        """A recording is played so from now on."""
+
+
+class Source(Protocol):
+    """What is to be seen at a door."""
+
+    @property
+    def channels(self) -> Sequence[Channel]:
+        """Those that are known."""
+
+    def join(self, listener: Listener) -> None:
+        """Let a client in: it gets all topics that are known, and those to come."""
+
+    def leave(self, listener: Listener) -> None:
+        """Forget a client; the last one ends the looking."""
+
+    def close(self) -> None:
+        """Look no more."""
+
+    def show_last(self, listener: Listener, channel: int, subscription: int) -> None:
+        """Send a newcomer what was said last, so that it need not wait for a change."""
+
+    def look_at_camera(self) -> None:
+        """Film if someone has subscribed to the camera; else do not."""
+
+    def control(self, listener: Listener, wish: Wish) -> None:
+        """Play on, pause or jump, as a client wants it. Raises NotFound: it is live, InvalidGoal."""

@@ -1,0 +1,27 @@
+"""Playing a recording: on, paused, faster, from another moment."""
+
+from __future__ import annotations
+
+import math
+
+from roboglot.model.errors import InvalidGoal, NotReady
+from roboglot.operations import Right
+from roboglot.protocols.foxglove.channels import Wish
+from roboglot.protocols.foxglove.context import Context
+from roboglot.protocols.foxglove.table import TABLE
+
+PLAY, PAUSE = 0, 1
+SPEED_MIN, SPEED_MAX = 0.01, 100.0
+
+
+@TABLE.on("playbackControlRequest", right=Right.SEE)
+async def control(context: Context, *, command: int, speed: float, seek: int | None = None, request: str = "") -> None:
+    """Play, or pause, at this speed; with ``seek`` (ns since 1970) from there. All clients see the same."""
+    await context.joined.wait()
+    if context.topics is None:
+        raise NotReady("there are no topics to play")
+    if command not in (PLAY, PAUSE):
+        raise InvalidGoal(f"a recording is played (0) or paused (1), not {command}")
+    if not math.isfinite(speed) or not SPEED_MIN <= speed <= SPEED_MAX:
+        raise InvalidGoal(f"a recording is played {SPEED_MIN:g} to {SPEED_MAX:g} times as fast, not {speed:g}")
+    context.topics.control(context, Wish(command == PLAY, speed, seek, request))

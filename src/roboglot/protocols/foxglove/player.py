@@ -1,0 +1,221 @@
+"""Plays a recorded robot's file to all clients of the door: its topics as recorded, with pause, speed and seek.
+
+It begins when the first client comes, so that viewers without playback controls see it too, and rewinds when the last
+one has left. Threads read; a chunk's messages wait in memory for their time.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Coroutine, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+
+from roboglot.model.background import beside
+from roboglot.model.client_context import ask_for
+from roboglot.model.errors import NotReady
+from roboglot.model.robot import Robot
+from roboglot.model.stand_in import Recorded
+from roboglot.protocols.foxglove.channels import Channel, Listener, Wish
+from roboglot.recording.reader import BadRecording
+from roboglot.recording.reel import Reel, Shot
+from roboglot.wire.foxglove.messages import Playback, PlayStatus
+
+log = logging.getLogger(__name__)
+BEAT = 0.1  # s between two looks at the time
+SELDOM = 10  # beats
+NANO = 1e9
+# Schemas of which the last message before a moment says how things stand then.
+STATES = frozenset(
+    f"foxglove.{name}" for name in ("Grid", "SceneUpdate", "PoseInFrame", "FrameTransforms", "LaserScan")
+) | {"roboglot.Battery", "roboglot.Pressure", "roboglot.State"}
+
+
+class Player:
+    """One file's. Time is the clock's, so a clock that is faster or stands still plays so, too."""
+
+    def __init__(self, robot: Robot, recorded: Recorded, reel: Reel) -> None:
+        self._clock, self._reel, self._recorded = robot.clock, reel, recorded
+        foreign = tuple(f"{start}/{other}/" for other in recorded.others for start in ("", "/truth"))
+        self._channels: Mapping[int, Channel] = {  # by their place in the reel
+            place: Channel(
+                place + 1, topic.name, topic.encoding, topic.schema, topic.schema_encoding, topic.schema_data
+            )
+            for place, topic in enumerate(reel.topics)
+            if not topic.name.startswith(foreign)
+        }
+        self._listeners: list[Listener] = []
+        self._newcomers: list[tuple[Listener, int, int]] = []  # with channel and subscription: they lack the last one
+        self._beating: asyncio.Task[None] | None = None
+        self._playing: asyncio.Task[None] | None = None
+        self._showing: asyncio.Task[None] | None = None
+        self._broken = ""  # why the file cannot be read any more
+        self._rewind()
+
+    # -- who listens ---------------------------------------------------------------------------------------------------
+
+    @property
+    def channels(self) -> Sequence[Channel]:
+        """Topics of the file, without those of its other robots."""
+        return tuple(self._channels.values())
+
+    def join(self, listener: Listener) -> None:
+        """Let a client in; the first one starts the recording."""
+        self._listeners.append(listener)
+        listener.advertise(self.channels)
+        if len(self._listeners) == 1:
+            self._beating = self._begin(self._beat(), "foxglove time")
+            self._go(PlayStatus.PLAYING)
+        listener.played(self._state())
+
+    def leave(self, listener: Listener) -> None:
+        """Forget a client; after the last one it is wound back."""
+        if listener in self._listeners:
+            self._listeners.remove(listener)
+        if not self._listeners:
+            self.close()
+
+    def close(self) -> None:
+        """Play no more."""
+        for task in (self._beating, self._playing, self._showing):
+            if task is not None:
+                task.cancel()
+        self._beating = self._playing = self._showing = None
+        self._newcomers.clear()
+        self._rewind()
+
+    def look_at_camera(self) -> None:
+        """It was filmed then, or not."""
+
+    def show_last(self, listener: Listener, channel: int, subscription: int) -> None:
+        """Send a newcomer how things stood at this moment of the recording, where the topic says that."""
+        self._newcomers.append((listener, channel, subscription))
+        if self._showing is None or self._showing.done():
+            self._showing = self._begin(self._show_newcomers(), "foxglove newcomers")
+
+    # -- what they want ------------------------------------------------------------------------------------------------
+
+    def control(self, listener: Listener, wish: Wish) -> None:
+        """Play on, pause, jump. Raises NotReady: the file has become unreadable."""
+        if self._broken:
+            raise NotReady(f"the recording cannot be read: {self._broken}")
+        self._at = self._now()
+        sought = wish.seek is not None or (wish.play and self._status is PlayStatus.ENDED)
+        if sought:
+            seek = self._recorded.first if wish.seek is None else wish.seek
+            self._at = self._next = min(max(seek, self._recorded.first), self._recorded.last)
+        self._speed, self._since = wish.speed, self._clock.time()
+        ended = self._status is PlayStatus.ENDED and not sought
+        self._go(PlayStatus.PLAYING if wish.play else PlayStatus.ENDED if ended else PlayStatus.PAUSED, sought=sought)
+        state = replace(self._state(), sought=sought)
+        for other in tuple(self._listeners):
+            other.played(replace(state, request=wish.request) if other is listener else state)
+
+    # -- how it runs ---------------------------------------------------------------------------------------------------
+
+    def _rewind(self) -> None:
+        self._status, self._speed, self._broken = PlayStatus.PAUSED, 1.0, ""
+        self._at = self._next = self._recorded.first  # where it stood at ``_since``; what has not been sent yet
+        self._since = self._clock.time()
+
+    def _now(self) -> int:
+        """The moment of the recording that is played now, ns since 1970."""
+        if self._status is not PlayStatus.PLAYING:
+            return self._at
+        return min(self._at + round((self._clock.time() - self._since) * self._speed * NANO), self._recorded.last)
+
+    def _state(self) -> Playback:
+        return Playback(self._status, self._now(), self._speed)
+
+    def _go(self, status: PlayStatus, *, sought: bool = False) -> None:
+        """Go on from where it stands now, or stay there."""
+        if self._playing is not None:
+            self._playing.cancel()
+        self._status, self._since = status, self._clock.time()
+        self._playing = self._begin(self._play(sought=sought), "foxglove playback")
+
+    def _begin(self, work: Coroutine[None, None, None], name: str) -> asyncio.Task[None]:
+        return asyncio.get_running_loop().create_task(work, name=name)
+
+    async def _play(self, *, sought: bool) -> None:
+        ask_for("")  # it is not for the one client that began it
+        try:
+            if sought:
+                await self._show(self._at)
+            if self._status is PlayStatus.PLAYING:
+                await self._play_on(self._reel.play(self._next))
+        except (OSError, BadRecording) as error:
+            log.warning("playback of %s ends: %s", self._recorded.path, error)
+            self._broken = str(error)
+        if self._status is PlayStatus.PLAYING:
+            self._at, self._status = self._now() if self._broken else self._recorded.last, PlayStatus.ENDED
+            for listener in tuple(self._listeners):
+                listener.played(self._state())
+
+    async def _play_on(self, batches: Iterator[Sequence[Shot]]) -> None:
+        while batch := await self._read(batches):
+            for shot in batch:
+                due = self._since + (shot.at - self._at) / NANO / self._speed
+                if due > self._clock.time():
+                    await self._clock.sleep_until(due)
+                self._deliver(shot)
+                self._next = shot.at + 1
+
+    async def _read(self, batches: Iterator[Sequence[Shot]]) -> Sequence[Shot]:
+        """Return the next messages; none: it is over."""
+        with self._clock.holding():
+            return await beside(partial(next, batches, ()))
+
+    async def _beat(self) -> None:
+        number = 0
+        async for _ in self._clock.every(BEAT):
+            number += 1
+            for listener in tuple(self._listeners):
+                listener.beat(self._now(), seldom=number % SELDOM == 0)
+
+    def _deliver(self, shot: Shot) -> None:
+        if (channel := self._channels.get(shot.topic)) is not None:
+            for listener in tuple(self._listeners):
+                if (subscription := listener.wants(channel.id)) is not None:
+                    listener.deliver(subscription, shot.at, shot.data)
+
+    # -- how things stood ----------------------------------------------------------------------------------------------
+
+    async def _show(self, at: int) -> None:
+        """Send all clients how things stood just before that moment."""
+        wanted = {
+            place
+            for place, channel in self._channels.items()
+            if channel.schema in STATES and any(one.wants(channel.id) is not None for one in self._listeners)
+        }
+        for shot in await self._last(at - 1, wanted):
+            self._deliver(shot)
+
+    async def _show_newcomers(self) -> None:
+        ask_for("")
+        while self._newcomers:
+            newcomers, self._newcomers = self._newcomers, []
+            wanted = {number - 1 for _, number, _ in newcomers if self._channels[number - 1].schema in STATES}
+            try:
+                found = {shot.topic: shot for shot in await self._last(self._next - 1, wanted)}
+            except (OSError, BadRecording) as error:
+                log.warning("playback of %s: %s", self._recorded.path, error)
+                return
+            for listener, number, subscription in newcomers:
+                if (shot := found.get(number - 1)) is not None and listener.wants(number) == subscription:
+                    listener.deliver(subscription, shot.at, shot.data)
+
+    async def _last(self, at: int, places: set[int]) -> Sequence[Shot]:
+        if not places:
+            return ()
+        with self._clock.holding():
+            return await beside(partial(self._reel.last, at, places))
+
+
+async def open_source(robot: Robot) -> Player:
+    """Return the recording's of a robot that is played back. Raises BadRecording, OSError."""
+    assert robot.stand_in is not None
+    recorded = robot.stand_in.recorded
+    assert recorded is not None
+    return Player(robot, recorded, await beside(partial(Reel, recorded.path)))

@@ -1,0 +1,200 @@
+"""Finds the messages of a recording by their time, and reads only the chunks that it needs for them.
+
+A whole file has an index; one that was cut off is read once, from the front.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import accumulate
+from pathlib import Path
+from typing import IO, NamedTuple
+
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.reader import SeekingReader
+from mcap.records import Channel, Chunk, Message, Schema
+from mcap.stream_reader import breakup_chunk
+from mcap.summary import Summary
+
+from roboglot.recording.reader import DAMAGE, RECORD_MAX, BadRecording, parts, stream
+
+UNPACKED_MAX = 256 << 20  # bytes of one chunk
+TOPICS_MAX = 4096
+RECORD_HEAD = 9  # bytes: the opcode and the length
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """A topic and how its messages are written, as the file has it."""
+
+    name: str
+    encoding: str
+    schema: str
+    schema_encoding: str
+    schema_data: bytes
+
+
+class Shot(NamedTuple):
+    """One message: its time in ns since 1970, the place of its topic in ``Reel.topics``, and its bytes."""
+
+    at: int
+    topic: int
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """One file, and the places of its channels in ``Reel.topics``."""
+
+    path: Path
+    places: Mapping[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class _Chunk:
+    """Where messages from ``first`` to ``last`` stand, and of which topics there are some."""
+
+    first: int
+    last: int
+    part: _Part
+    offset: int
+    topics: frozenset[int]
+
+
+class Reel:
+    """The parts of one recording, each message once, in the order of their times."""
+
+    def __init__(self, path: Path) -> None:
+        """Raises BadRecording, OSError."""
+        self.topics: list[Topic] = []
+        found = [chunk for part in parts(path) for chunk in self._part(part)]
+        if not found:
+            raise BadRecording(f"{path} has no messages")
+        self._chunks = sorted(found, key=lambda chunk: chunk.first)
+        self._ends = list(accumulate((chunk.last for chunk in self._chunks), max))  # of each and all before it
+
+    def play(self, since: int) -> Iterator[Sequence[Shot]]:
+        """Yield all messages at or after that time, some together, none earlier than those yielded before.
+
+        Messages of the same time come together. Raises BadRecording, OSError.
+        """
+        waiting: list[Shot] = []
+        for number, chunk in enumerate(self._chunks, 1):
+            if chunk.last >= since:
+                waiting += (shot for shot in self._read(chunk) if shot.at >= since)
+                waiting.sort(key=_time)
+            until = self._chunks[number].first if number < len(self._chunks) else None
+            ready = len(waiting) if until is None else _before(waiting, until)
+            if ready:
+                yield waiting[:ready]
+                del waiting[:ready]
+
+    def last(self, at: int, topics: Collection[int]) -> list[Shot]:
+        """Return the last message of each of these topics at or before that time. Raises BadRecording, OSError."""
+        found: dict[int, Shot] = {}
+        for number in range(bisect_right(self._chunks, at, key=lambda chunk: chunk.first) - 1, -1, -1):
+            # What was found is final when no earlier chunk reaches beyond it.
+            sought = {place for place in topics if place not in found or found[place].at < self._ends[number]}
+            if not sought:
+                break
+            if sought & self._chunks[number].topics:
+                for shot in self._read(self._chunks[number]):
+                    if shot.at <= at and shot.topic in sought:
+                        known = found.get(shot.topic)
+                        found[shot.topic] = shot if known is None or known.at <= shot.at else known
+        return sorted(found.values(), key=_time)
+
+    # -- files ---------------------------------------------------------------------------------------------------------
+
+    def _part(self, path: Path) -> Iterator[_Chunk]:
+        with path.open("rb") as file:
+            summary = _summary(file)
+            if summary is not None:
+                yield from self._by_index(path, summary)
+            else:
+                file.seek(0)
+                yield from self._by_reading(path, file)
+
+    def _by_index(self, path: Path, summary: Summary) -> Iterator[_Chunk]:
+        part = _Part(path, self._places(summary.channels.values(), summary.schemas))
+        for row in summary.chunk_indexes:
+            topics = frozenset(part.places[channel] for channel in row.message_index_offsets if channel in part.places)
+            if topics:
+                yield _Chunk(row.message_start_time, row.message_end_time, part, row.chunk_start_offset, topics)
+
+    def _by_reading(self, path: Path, file: IO[bytes]) -> Iterator[_Chunk]:
+        schemas: dict[int, Schema] = {}
+        places: dict[int, int] = {}
+        part, offset = _Part(path, places), 0
+        for record in stream(path, file, chunks=True):
+            if isinstance(record, Chunk):
+                with suppress(BadRecording):  # what cannot be read here is passed over there, too
+                    inside = _unpacked(path, record)
+                    schemas |= {schema.id: schema for schema in inside if isinstance(schema, Schema)}
+                    channels = [channel for channel in inside if isinstance(channel, Channel)]
+                    places |= self._places([new for new in channels if new.id not in places], schemas)
+                    heard = {message.channel_id for message in inside if isinstance(message, Message)}
+                    if topics := frozenset(places[channel] for channel in heard if channel in places):
+                        yield _Chunk(record.message_start_time, record.message_end_time, part, offset, topics)
+            offset = file.tell()
+
+    def _places(self, channels: Collection[Channel], schemas: Mapping[int, Schema]) -> dict[int, int]:
+        """Return the places of these channels among the topics, which new ones join."""
+        found = {}
+        for channel in channels:
+            if (schema := schemas.get(channel.schema_id)) is None:
+                continue
+            topic = Topic(channel.topic, channel.message_encoding, schema.name, schema.encoding, schema.data)
+            if topic not in self.topics:
+                if len(self.topics) >= TOPICS_MAX:
+                    continue
+                self.topics.append(topic)
+            found[channel.id] = self.topics.index(topic)
+        return found
+
+    @staticmethod
+    def _read(chunk: _Chunk) -> list[Shot]:
+        path, places = chunk.part.path, chunk.part.places
+        try:
+            with path.open("rb") as file:
+                file.seek(chunk.offset + RECORD_HEAD)
+                inside = _unpacked(path, Chunk.read(ReadDataStream(file)))
+        except (McapError, *DAMAGE) as error:
+            raise BadRecording(f"{path} is damaged: {error}") from None
+        return [
+            Shot(message.log_time, places[message.channel_id], message.data)
+            for message in inside
+            if isinstance(message, Message) and message.channel_id in places
+        ]
+
+
+def _time(shot: Shot) -> int:
+    return shot.at
+
+
+def _before(shots: Sequence[Shot], until: int) -> int:
+    """How many of them, which are in order, come before that time."""
+    return bisect_right(shots, until - 1, key=_time)
+
+
+def _summary(file: IO[bytes]) -> Summary | None:
+    """Return the index of a whole file."""
+    try:
+        summary = SeekingReader(file, record_size_limit=RECORD_MAX).get_summary()
+    except (McapError, OSError, *DAMAGE):
+        return None
+    return summary if summary is not None and summary.chunk_indexes else None
+
+
+def _unpacked(path: Path, chunk: Chunk) -> Sequence[object]:
+    """Return the records of a chunk. Raises BadRecording."""
+    if chunk.uncompressed_size > UNPACKED_MAX:
+        raise BadRecording(f"{path}: a chunk of more than {UNPACKED_MAX} bytes")
+    try:
+        return breakup_chunk(chunk, validate_crc=True)
+    except (McapError, *DAMAGE) as error:
+        raise BadRecording(f"{path} is damaged: {error}") from None

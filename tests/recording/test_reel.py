@@ -1,0 +1,91 @@
+"""Messages are found by their time, whatever chunks they stand in, also where chunks overlap and files are cut off."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from mcap.writer import CompressionType, Writer
+
+from roboglot.recording.reader import BadRecording
+from roboglot.recording.reel import Reel, Shot
+
+MESSAGES = st.lists(st.tuples(st.integers(0, 2), st.integers(1, 60)), min_size=1, max_size=40)
+FLUSHED = st.sets(st.integers(0, 40))  # before which messages a chunk ends
+
+
+def write(path: Path, messages: Sequence[tuple[int, int]], flushed: set[int], *, whole: bool = True) -> None:
+    """Write messages of three topics, each with its number as data."""
+    with path.open("wb") as file:
+        writer = Writer(file, compression=CompressionType.ZSTD)
+        writer.start()
+        schema = writer.register_schema("s", "jsonschema", b"{}")
+        channels = [writer.register_channel(f"/t{number}", "json", schema) for number in range(3)]
+        for number, (topic, at) in enumerate(messages):
+            if number in flushed:
+                writer.flush()
+            writer.add_message(channels[topic], at, struct.pack("<I", number), at)
+        writer.flush()
+        if whole:
+            writer.finish()
+
+
+@settings(max_examples=120, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(MESSAGES, FLUSHED, st.integers(0, 61), st.booleans())
+def test_all_come_from_any_moment_in_their_order(
+    tmp_path: Path, messages: list[tuple[int, int]], flushed: set[int], since: int, whole: bool
+) -> None:
+    path = tmp_path / "r.mcap"
+    write(path, messages, flushed, whole=whole)
+    reel = Reel(path)
+    names = [int(topic.name[2:]) for topic in reel.topics]
+    batches = list(reel.play(since))
+    played = [shot for batch in batches for shot in batch]
+    assert [shot.at for shot in played] == sorted(at for _, at in messages if at >= since)
+    found = {(names[shot.topic], shot.at, shot.data) for shot in played}
+    numbered = enumerate(messages)
+    assert found == {(topic, at, struct.pack("<I", number)) for number, (topic, at) in numbered if at >= since}
+    for before, after in pairwise(batches):  # those of one moment come together
+        assert before[-1].at < after[0].at
+
+
+@settings(max_examples=120, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(MESSAGES, FLUSHED, st.integers(0, 61), st.sets(st.integers(0, 2)), st.booleans())
+def test_the_last_of_each_topic_is_found(
+    tmp_path: Path, messages: list[tuple[int, int]], flushed: set[int], at: int, wanted: set[int], whole: bool
+) -> None:
+    path = tmp_path / "r.mcap"
+    write(path, messages, flushed, whole=whole)
+    reel = Reel(path)
+    places = {int(topic.name[2:]): place for place, topic in enumerate(reel.topics)}
+    found = reel.last(at, {places[topic] for topic in wanted if topic in places})
+    due = {topic: [when for one, when in messages if one == topic and when <= at] for topic in wanted}
+    assert {(shot.topic, shot.at) for shot in found} == {(places[topic], max(at)) for topic, at in due.items() if at}
+    assert all(isinstance(shot, Shot) for shot in found)
+
+
+def test_parts_are_one_recording(tmp_path: Path) -> None:
+    write(tmp_path / "r.mcap", [(0, 1), (1, 2)], set())
+    write(tmp_path / "r-002.mcap", [(1, 3), (2, 4)], set(), whole=False)
+    reel = Reel(tmp_path / "r.mcap")
+    assert [shot.at for batch in reel.play(2) for shot in batch] == [2, 3, 4]
+    assert [topic.name for topic in reel.topics] == ["/t0", "/t1", "/t2"]
+
+
+def test_a_damaged_chunk_is_no_end_of_the_program(tmp_path: Path) -> None:
+    path = tmp_path / "r.mcap"
+    write(path, [(0, at) for at in range(1, 40)], {20})
+    reel = Reel(path)
+    data = bytearray(path.read_bytes())
+    data[110:120] = bytes(10)
+    path.write_bytes(data)
+    with pytest.raises(BadRecording, match="damaged"):
+        list(reel.play(0))
+    (tmp_path / "no.mcap").write_bytes(b"no recording")
+    with pytest.raises(BadRecording):
+        Reel(tmp_path / "no.mcap")
