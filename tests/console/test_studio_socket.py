@@ -93,6 +93,39 @@ async def test_program_is_saved_run_halted_and_stepped(shown: Shown) -> None:
         await studio.until(lambda m: m["type"] == "frame" and "stop task" in m["text"])
 
 
+CALLING = """
+def walk(n):
+    cyberdog.task.block('inside')
+    print(n)
+cyberdog.task.block('first')
+walk(1)
+cyberdog.task.block('second')
+walk(2)
+cyberdog.task.block('third')
+print(3)
+"""
+
+
+async def test_steps_go_over_and_out_of_functions_of_blocks(shown: Shown) -> None:
+    async with page(shown) as studio:
+        assert (await studio.frame(**SAVE, id="1", body=CALLING))["feedback"]["state"] == 0
+        await studio.say(
+            type="debug", id=5, text=json.dumps({"target_id": "t", "operate": "break", "first_block": True})
+        )
+        await studio.kind("debugged")
+        await studio.frame(type="task", operate="run", target_id=["t"], id="2", mode="single", condition="now")
+        blocks = []
+        for id, operate in enumerate(("over_block", "step_block", "out_block", "where"), start=6):
+            await studio.until(lambda m: m["type"] == "frame" and "now state is suspend" in m["text"])
+            await studio.say(type="debug", id=100 + id, text=json.dumps({"target_id": "t", "operate": "where"}))
+            blocks.append(json.loads((await studio.kind("debugged"))["text"])["block"])
+            await studio.say(type="debug", id=id, text=json.dumps({"target_id": "t", "operate": operate}))
+            assert json.loads((await studio.kind("debugged"))["text"])["error"] == ""
+        assert blocks == ["first", "second", "inside", "third"]
+        assert [m["text"] for m in studio.heard if m["type"] == "log"] == ["1", "2"]
+        await studio.frame(type="task", operate="shutdown", target_id=["t"], id="3")
+
+
 async def test_page_lights_only_blocks_of_its_own_program(shown: Shown) -> None:
     async with page(shown) as mine, page(shown) as theirs, page(shown) as every:
         await mine.say(type="open", robot="a", program="t")

@@ -16,6 +16,7 @@ from roboglot.programs.engine.events import (
     Stops,
 )
 from roboglot.programs.engine.run import Run
+from roboglot.programs.language.places import Step
 from tests.programs.playing import PRELUDE, process_state
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
@@ -112,6 +113,63 @@ async def test_busy_program_is_halted_and_its_stops_change(engine: Engine) -> No
     await run.suspend()
     await run.kill()
     assert process_state(run.pid) == ""
+
+
+CALLS = """def inner(n):
+    print(n)
+    return n + 1
+def outer(n):
+    n = inner(n)
+    n = inner(n)
+    return n
+print(outer(1))
+n = outer(5) + inner(7)
+def down(n):
+    if n:
+        down(n - 1)
+    print("d")
+down(2)
+print("end")
+"""
+
+
+async def halts_after(engine: Engine, at: int, *steps: Step) -> list[int]:
+    """Halt at a line first, then take these steps; the lines at which it halted."""
+    run = await engine.start(CALLS, PRELUDE, stops=stops(at))
+    lines: list[int] = []
+    async for event in run:
+        if isinstance(event, Halted):
+            lines.append(event.line)
+            if len(lines) > len(steps):
+                break
+            run.position.stop_at([])
+            run.position.step(steps[len(lines) - 1])
+            run.calls.reply(event.id)
+    await run.kill()
+    return lines
+
+
+async def test_a_step_over_passes_what_is_called(engine: Engine) -> None:
+    over, out, into = Step.OVER, Step.OUT, Step.INTO
+    assert await halts_after(engine, 5, over, over, over, over) == [5, 6, 7, 9, 10]  # from its end to who called it
+    assert await halts_after(engine, 2, out, into, out, out, over) == [2, 6, 2, 7, 9, 10]
+    assert await halts_after(engine, 12, over, over) == [12, 13, 15]  # calls of itself, too
+    assert await halts_after(engine, 11, over, into, over, over, out) == [11, 12, 11, 12, 13, 13]
+    assert await halts_after(engine, 15, out) == [15]
+
+
+async def test_a_stop_counts_inside_of_what_a_step_passes(engine: Engine) -> None:
+    run = await engine.start(CALLS, PRELUDE, stops=stops(2, 8))
+    lines = []
+    async for event in run:
+        if isinstance(event, Halted):
+            lines.append(event.line)
+            run.position.step(Step.OVER)
+            run.calls.reply(event.id)
+            if len(lines) == 4:
+                break
+    await run.kill()
+    assert lines == [8, 2, 3, 6]
 
 
 async def test_run_that_no_one_watches_does_not_halt(engine: Engine) -> None:

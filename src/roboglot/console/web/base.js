@@ -78,7 +78,7 @@ const PATHS = {
   dock: "M5 20V9l7-5 7 5v11M9 20v-6h6v6", copy: "M9 9h11v11H9zM5 15H4V4h11v1", pause: "M8 5v14M16 5v14",
   play: "M7 4l12 8-12 8z", box: "M4 8l8-4 8 4v8l-8 4-8-4zM4 8l8 4 8-4M12 12v8", person: "M12 11a4 4 0 100-8 4 4 0 000 8M4 21c0-5 3-8 8-8s8 3 8 8",
   place: "M6 21V4M6 4h12l-3 4 3 4H6", wall: "M4 20L20 4", stop: "M6 6h12v12H6z", alert: "M12 3l10 18H2zM12 10v5M12 18v.5",
-  step: "M5 5v14l9-7zM18 5v14", undo: "M9 7L4 12l5 5M4 12h11a5 5 0 010 10h-3", redo: "M15 7l5 5-5 5M20 12H9a5 5 0 000 10h3", folder: "M3 6h7l2 3h9v10H3z",
+  step: "M5 5v14l9-7zM18 5v14", over: "M4 12a8 8 0 0115-4M20 3v5h-5M12 18h.01", out: "M12 15V4M8 8l4-4 4 4M5 20h14", undo: "M9 7L4 12l5 5M4 12h11a5 5 0 010 10h-3", redo: "M15 7l5 5-5 5M20 12H9a5 5 0 000 10h3", folder: "M3 6h7l2 3h9v10H3z",
   clock: "M12 3a9 9 0 100 18 9 9 0 000-18M12 7v5l4 2", keys: "M3 6h18v12H3zM7 10h.5M11 10h.5M15 10h.5M7 14h10", dot: "M12 6a6 6 0 100 12 6 6 0 000-12", blocks: "M4 4h7v3h3V4h6v7h-3v3h3v6H4z",
   star: "M12 3l2.8 5.8 6.2.9-4.5 4.4 1 6.2-5.5-3-5.5 3 1-6.2L3 9.7l6.2-.9z", school: "M3 9l9-5 9 5-9 5zM7 11v5c3 2 7 2 10 0v-5",
   leave: "M14 4h6v16h-6M15 12H4M8 8l-4 4 4 4",

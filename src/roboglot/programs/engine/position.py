@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from roboglot.programs.engine.shared_page import Page
+from roboglot.programs.language.places import Step
 from roboglot.programs.library.program import Program
 
 
@@ -40,9 +41,15 @@ class Position:
         """Return the module and the text of a line that the worker reports."""
         return self._program.unit_name(unit), self._program.source_line(unit, line)
 
-    def step(self) -> None:
-        """Halt before the next statement; a waiting or suspended program has to be continued besides."""
-        self._page.stop_next(self.watched)
+    def step(self, step: Step = Step.INTO) -> None:
+        """Halt after a step from here; a waiting or suspended program has to be continued besides."""
+        if self.watched:
+            self._page.order(step)
+
+    @property
+    def at_stop(self) -> bool:
+        """Whether it halts at this line each time."""
+        return self._page.stops(*self._page.place)
 
     def stop_at(self, lines: Iterable[tuple[str, int]]) -> None:
         """Halt before the statements at these lines (module or "", line) and no others.
@@ -59,7 +66,7 @@ class Position:
 
     def clear_step(self) -> None:
         """Cancel ``step``."""
-        self._page.stop_next(False)
+        self._page.take_back()
 
     def close(self) -> None:
         """Release the shared memory; the last place stays."""

@@ -10,10 +10,11 @@ import mmap
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.programs.language.places import WORD, Places
+from roboglot.programs.language.places import WORD, Places, Step
 
 SEARCHED_MAX = 256 * 1024
 """Places that are searched; later ones count as unknown. A longer search would hold up the server."""
+STEP_BITS, ORDERS = 2, 64  # an order of a step is one byte
 FOUND_MAX = 4096
 """Addresses whose places are remembered: a program calls from the same few lines again and again."""
 
@@ -28,6 +29,7 @@ class Page:
         self._places = places
         self._found: dict[int, int] = {}
         self._last = (0, 0)
+        self._orders = 0
 
     @property
     def place(self) -> tuple[int, int]:
@@ -43,9 +45,19 @@ class Page:
                 self._found[address] = number
         return self._places.place(number)
 
-    def stop_next(self, on: bool) -> None:
-        """Halt before whichever statement comes next, or not any more."""
-        self._set(0, on)
+    def order(self, step: Step) -> None:
+        """Halt after a step from here."""
+        self._orders = (self._orders + 1) % ORDERS
+        self._set(0, self._orders << STEP_BITS | step)
+
+    def take_back(self) -> None:
+        """Go on without halting after a step."""
+        self._set(0, 0)
+
+    def stops(self, unit: int, line: int) -> bool:
+        """Whether it halts there each time."""
+        number = self._places.number(unit, line)
+        return not self._memory.closed and number > 0 and bool(self._memory[self._places.stops + number])
 
     def stop_at(self, unit: int, line: int) -> None:
         """Halt there, or where the next statement of the unit begins. ValueError for a line that is not there."""
@@ -53,7 +65,7 @@ class Page:
         if not number:
             raise ValueError(f"there is no line {line}")
         # As long as the worker has not read the program, there are no marks; it moves the stop by itself then.
-        self._set(self._places.next_marked(number, self._marked) or number, True)
+        self._set(self._places.next_marked(number, self._marked) or number, 1)
 
     def clear_stops(self) -> None:
         """Halt nowhere."""
@@ -75,6 +87,6 @@ class Page:
         at = WORD * (1 + number)
         return not self._memory.closed and any(self._memory[at : at + WORD])
 
-    def _set(self, number: int, on: bool) -> None:
+    def _set(self, number: int, value: int) -> None:
         if not self._memory.closed:
-            self._memory[self._places.stops + number] = on
+            self._memory[self._places.stops + number] = value

@@ -7,10 +7,22 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
+from enum import IntEnum
 from itertools import accumulate
 
 WORD = 8
 """Bytes of an entry in the shared memory."""
+
+
+class Step(IntEnum):
+    """Where a program halts that goes on by a step: before which statement."""
+
+    INTO = 1
+    """The next one, in whichever function."""
+    OVER = 2
+    """The next one of the function where it is, or of one that called that."""
+    OUT = 3
+    """The next one of a function that called the one where it is."""
 
 
 class Places:
@@ -45,7 +57,8 @@ class Places:
 
     @property
     def stops(self) -> int:
-        """Where the bytes begin: not 0 where a watched program is to halt; the first says at whichever comes next."""
+        """Where the bytes begin: not 0 where a watched program is to halt. The first has the order of a step: a
+        ``Step`` in its lowest two bits, and above them a number that differs from the last order's."""
         return WORD * (1 + self.count)
 
     def next_marked(self, number: int, marked: Callable[[int], bool]) -> int:

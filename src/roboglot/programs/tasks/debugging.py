@@ -10,9 +10,11 @@ import msgspec
 
 from roboglot.programs.engine.events import Stops
 from roboglot.programs.errors import NotAllowed, ProgramError
+from roboglot.programs.language.places import Step
 from roboglot.programs.tasks.service import ProgramService
 
 STOPS_MAX = 1000  # lines, and as many blocks, of one task
+STEPS = {"step": Step.INTO, "over": Step.OVER, "out": Step.OUT}
 NAME_MAX = 256  # characters of a module's or a block's name
 ID_MAX = 128  # characters of a task's id
 
@@ -27,7 +29,7 @@ class Wish(msgspec.Struct, forbid_unknown_fields=True):
     """
 
     target_id: Annotated[str, msgspec.Meta(min_length=1, max_length=ID_MAX)]
-    operate: Literal["break", "step", "step_block", "go", "where"]
+    operate: Literal["break", "step", "step_block", "over", "over_block", "out", "out_block", "go", "where"]
     lines: Annotated[list[Line], msgspec.Meta(max_length=STOPS_MAX)] = []
     modules: Annotated[dict[Name, list[Line]], msgspec.Meta(max_length=STOPS_MAX)] = {}
     blocks: Annotated[list[Name], msgspec.Meta(max_length=STOPS_MAX)] = []
@@ -65,9 +67,7 @@ async def _do(service: ProgramService, wish: Wish) -> None:
                 frozenset(lines), frozenset(wish.blocks), wish.first, first_block=wish.first_block, watched=wish.watched
             )
             await service.stop_at(wish.target_id, stops)
-        case "step":
-            await service.step(wish.target_id)
-        case "step_block":
-            await service.step(wish.target_id, to_block=True)
         case "go":
             await service.recover(wish.target_id)
+        case verb if (step := STEPS.get(verb.removesuffix("_block"))) is not None:
+            await service.step(wish.target_id, step, to_block=verb.endswith("_block"))

@@ -21,6 +21,7 @@ from roboglot.programs.engine.events import Limits, Stops
 from roboglot.programs.errors import InvalidCondition, LimitReached, NotAllowed, ProgramError
 from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.language import Problem
+from roboglot.programs.language.places import Step
 from roboglot.programs.library.inspection import Inspector, refuse_wrong
 from roboglot.programs.library.library import ModuleLibrary
 from roboglot.programs.stores import ListedProgram, LogEntry, StoredProgram, Stores
@@ -252,19 +253,18 @@ class ProgramService:
             if stops != Stops():
                 self._runner.stops[id] = stops
 
-    async def step(self, id: str, *, to_block: bool = False) -> None:
-        """Run a suspended task up to its next statement, or block; suspend a running one there. Raises ProgramError."""
+    async def step(self, id: str, step: Step = Step.INTO, *, to_block: bool = False) -> None:
+        """Run a task to the next statement, or block, after a step, and suspend it there. Raises ProgramError."""
         async with self._turn():
             await self._check_table(TaskOperation.RECOVER, id)
             run = self._runs.get(id)
             if run is None:
                 raise NotAllowed(f"the task {id} does not run")
             run.check_watched()
-            step = run.step_block if to_block else run.step
             if run.state is TaskState.SUSPEND:
-                await self._runner.recover(run, step)
+                await self._runner.recover(run, lambda: run.step(step, to_block=to_block))
             else:
-                step()
+                run.step(step, to_block=to_block)
 
     async def shutdown(self, ids: Collection[str]) -> dict[str, ProgramError]:
         """End programs and cancel what they do, all before waiting for any; return the refused ones by id."""

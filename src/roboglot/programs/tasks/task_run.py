@@ -33,11 +33,13 @@ from roboglot.programs.errors import NotAllowed
 from roboglot.programs.functions.interrupted import call_cut_off
 from roboglot.programs.functions.results import StateCode, in_short
 from roboglot.programs.functions.session import Session, TaskEnded
-from roboglot.programs.functions.table import SPELLINGS, remember
 from roboglot.programs.functions.table import call as call_function
+from roboglot.programs.functions.table import remember
 from roboglot.programs.language.names import EXCEPTIONS
+from roboglot.programs.language.places import Step
 from roboglot.programs.library.modules import HEADER_LINES
 from roboglot.programs.stores import StoredProgram
+from roboglot.programs.tasks.block_stops import MARKS, BlockStops
 from roboglot.programs.tasks.control import ControlWatch
 from roboglot.programs.tasks.process_time import ProcessTime
 from roboglot.programs.tasks.reports import (
@@ -59,8 +61,6 @@ from roboglot.programs.worker.values import unpack
 log = logging.getLogger(__name__)
 
 _REMEMBERED_MAX = 16 * 1024  # bytes of an answer; the state of a longer one (measurements, lists) is not kept
-_BLOCKS = {"cyberdog.task.block", "cyberdog.task.breakpoint_block"}
-_BLOCKS |= {spelling for spelling, name in SPELLINGS.items() if name in _BLOCKS}
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,8 +116,7 @@ class TaskRun:
         self._journal = journal
         run.calls.answered = journal.answered
         self._replaying = replaying
-        self._stop_blocks = stops.blocks if stops else frozenset[str]()
-        self._stop_next_block = bool(stops and stops.first_block)
+        self._block_stops = BlockStops(run.position, stops)
         self._insights = insights = listeners.insights
         run.noticed = lambda held: insights.publish(Variables(task.id, held))
         self.control = ControlWatch(robot, f"visual {task.id}", lambda text: self.log.write("error", text))
@@ -210,18 +209,14 @@ class TaskRun:
         self.time.stop(False)
         await self._run.resume()
 
-    def step(self) -> None:
-        """Halt before the statement that comes next."""
-        self._run.position.step()
-
-    def step_block(self) -> None:
-        """Halt at the begin of the block that comes next."""
-        self._stop_next_block = True
+    def step(self, step: Step = Step.INTO, *, to_block: bool = False) -> None:
+        """Halt after a step: before a statement, or at the begin of a block."""
+        (self._block_stops if to_block else self._run.position).step(step)
 
     def stop_at(self, stops: Stops) -> None:
         """Halt there and nowhere else; LookupError for a line that isn't there. Lines need a watched program."""
         self._run.position.stop_at(in_units(stops).lines)
-        self._stop_blocks, self._stop_next_block = stops.blocks, stops.first_block
+        self._block_stops.set(stops)
         if stops.first:
             self.step()
 
@@ -259,7 +254,7 @@ class TaskRun:
 
     async def _follow(self, call: Replayed) -> None:
         """Keep what the host knew of a call that is not made again."""
-        if call.name in _BLOCKS and call.args:
+        if call.name in MARKS and call.args:
             self._block = str(call.args[0])
         elif call.name.endswith(".set_log"):
             await call_function(self._session, call.name, call.args, call.kwargs)
@@ -298,7 +293,8 @@ class TaskRun:
 
     async def _halt(self, halted: Halted) -> None:
         self.time.ask(True)
-        await self._at_breakpoint()
+        if not self._block_stops.passes():
+            await self._at_breakpoint()
         self._run.calls.reply(halted.id)
         self.time.ask(False)
 
@@ -319,10 +315,9 @@ class TaskRun:
                     await self._journal.begin(request.name)
                 value = await call_function(self._session, request.name, request.args, request.kwargs)
             await self.log.pace.wait()
-            if request.name in _BLOCKS:
+            if request.name in MARKS:
                 await self._pace.wait()
-                if self._stop_next_block or self._block in self._stop_blocks:
-                    self._stop_next_block = False
+                if self._block_stops.halts(self.block):
                     await self._at_breakpoint()
             elif self._insights.listening:
                 self._insights.publish(

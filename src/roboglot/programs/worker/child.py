@@ -46,6 +46,7 @@ def main(descriptor: int, whereabouts: Whereabouts) -> int:
     except MemoryError as error:
         unit, number = _place(error)
         error.__traceback__ = None  # its frames hold what filled the memory
+        whereabouts.forget()
         del reserve
         gc.collect()
         link.send(_failure("MemoryError", "the program used more memory than it may", unit, number))

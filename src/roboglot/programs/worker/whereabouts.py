@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import ctypes
 import mmap
+import sys
 from collections.abc import Callable
+from types import FrameType
 from typing import Any
 
-from roboglot.programs.language.places import WORD, Places
+from roboglot.programs.language.places import WORD, Places, Step
 
 _ITEMS = ctypes.sizeof(ctypes.c_ssize_t) * 2 + ctypes.sizeof(ctypes.c_void_p)
 """Where a list keeps the address of its items: behind its count of references, its type and its size."""
@@ -27,6 +29,7 @@ class Whereabouts:
         self._places = Places(())
         self._marks: dict[int, object] = {}
         self._numbers: dict[object, int] = {}
+        self._watched: Watched | None = None
         self.cell: list[Any] = [None]
         nowhere = self._marked(0)
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(nowhere))  # the item's own, given up by the first store
@@ -45,7 +48,13 @@ class Whereabouts:
 
     def watched(self, halt: Callable[[], object]) -> Watched:
         """In place of ``cell``, for a program that halts where the host's end of the memory says."""
-        return Watched(self.cell, self._numbers, self._stops(), halt)
+        self._watched = Watched(self.cell, self._numbers, self._stops(), halt)
+        return self._watched
+
+    def forget(self) -> None:
+        """Release the frames of the program."""
+        if self._watched is not None:
+            self._watched.forget()
 
     def settle(self) -> None:
         """All marks are made: where the host wants a halt and no statement begins, it is the next that does."""
@@ -77,15 +86,39 @@ class Whereabouts:
 class Watched:
     """Takes marks as ``cell`` does, and looks at each whether to halt: dearer, for watched programs."""
 
-    __slots__ = ("_cell", "_halt", "_numbers", "_stops")
+    __slots__ = ("_cell", "_frame", "_halt", "_numbers", "_order", "_origin", "_stops")
 
     def __init__(
         self, cell: list[Any], numbers: dict[object, int], stops: memoryview, halt: Callable[[], object]
     ) -> None:
         self._cell, self._numbers, self._stops, self._halt = cell, numbers, stops, halt
+        self._order = 0
+        self._frame: FrameType | None = None  # of the mark before
+        self._origin: FrameType | None = None  # where the order of a step was given
 
     def __setitem__(self, item: int, mark: object) -> None:
         self._cell[item] = mark
-        stops = self._stops
-        if stops[0] or stops[self._numbers[mark]]:
+        stops, frame = self._stops, sys._getframe(1)
+        halts = stops[self._numbers[mark]] or (stops[0] and self._stepped(stops[0], frame))
+        self._frame = frame
+        if halts:
             self._halt()
+
+    def _stepped(self, order: int, here: FrameType) -> bool:
+        """Whether the step is done: over a call, none of those running was called from where the order was given."""
+        if order != self._order:
+            self._order, self._origin = order, self._frame
+        step = order & max(Step)
+        if step == Step.INTO:
+            return True
+        frame = here if step == Step.OUT else here.f_back
+        while frame is not None:
+            if frame is self._origin:
+                return False
+            frame = frame.f_back
+        self._origin = None
+        return True
+
+    def forget(self) -> None:
+        """Release the frames, and what they hold."""
+        self._frame = self._origin = None

@@ -49,6 +49,7 @@ function Bar() {
     <${Button} kind="main" icon="play" label=${t(phase === "paused" ? "studio.go" : "studio.run")} title="F5" disabled=${busy || online.value !== "open"} onClick=${() => runner.run()} />
     <${Button} icon="pause" label=${t("studio.pause")} title="F6" disabled=${phase !== "running"} onClick=${() => runner.pause()} />
     <${Button} icon="step" label=${t("studio.step")} title="F8" disabled=${busy || online.value !== "open"} onClick=${() => runner.step()} />
+    <${Button} compact icon="over" label=${t("studio.over")} title=${`${t("studio.over")} (F10)`} disabled=${phase !== "paused"} onClick=${() => runner.step("over")} /><${Button} compact icon="out" label=${t("studio.out")} title=${`${t("studio.out")} (Shift+F8)`} disabled=${phase !== "paused"} onClick=${() => runner.step("out")} />
     <${Button} icon="stop" label=${t("studio.stop")} title="Shift+F5" disabled=${phase === "idle"} onClick=${() => runner.stop()} />
     ${program.value.kind === "blocks" && html`<${Button} compact icon="dot" label=${t("studio.break.on")} title="F9" onClick=${() => editor.toggleBreak()} />`}
     <span class=${`phase ${phase} ${runner.failure.value ? "failed" : ""}`} role="status" aria-live="polite">${word}</span>
@@ -91,13 +92,13 @@ function Side() {
 const WINDOWS = { library: Library, schedule: Schedule, keys: Keys };
 function App() {
   useEffect(() => {
-    const keys = { F5: () => runner.run(), F6: () => runner.pause(), F8: () => runner.step() };
+    const keys = { F5: () => runner.run(), F6: () => runner.pause(), F8: (e) => runner.step(e.shiftKey ? "out" : "step"), F10: () => runner.step("over") };
     const key = (event) => {
       if (event.key === "Escape" && !event.repeat && !shown.value && !event.defaultPrevented && runner.phase.value !== "idle") { runner.stop(); command("stop"); return; }
       if (event.key === "F5" && event.shiftKey) { event.preventDefault(); runner.stop(); return; }
       if (/^[zy]$/i.test(event.key) && (event.ctrlKey || event.metaKey) && !event.defaultPrevented && program.value.kind === "blocks" && !shown.value
           && !event.target.closest?.("input, textarea, [contenteditable], .blocklyWidgetDiv")) { event.preventDefault(); editor.undo(event.shiftKey || event.key.toLowerCase() === "y"); return; }
-      if (keys[event.key] && !event.ctrlKey) { event.preventDefault(); keys[event.key](); }
+      if (keys[event.key] && !event.ctrlKey && !(event.key === "F10" && event.shiftKey)) { event.preventDefault(); keys[event.key](event); }
     };
     addEventListener("keydown", key);
     return () => removeEventListener("keydown", key);

@@ -27,10 +27,10 @@ export const mine = (id) => id === program.value.id;
 const words = (/** @type {any} */ found) => found[language.value] || found.en || found.text;
 export const failureWords = computed(() => failure.value && words(failure.value));
 
-function stops(step = false) {
+function stops(step = "") {
   const blocks = program.value.kind === "blocks";
   return { target_id: program.value.id, operate: "break", blocks: blocks ? editor.breaks.value : [], lines: blocks ? [] : textBreaks.value,
-    first_block: step && blocks, first: step && !blocks, watched: true };
+    first_block: Boolean(step) && blocks, first: Boolean(step) && !blocks, watched: true };
 }
 
 let postponed = /** @type {(() => unknown) | null} */ (null);
@@ -42,8 +42,8 @@ function orLater(what) {
   return undefined;
 }
 
-/** Start it, or go on where it is held. @param {boolean} [step] */
-export function run(step = false) { return orLater(() => runNow(step)); }
+/** Start it, or go on where it is held, as far as a step. @typedef {"" | "step" | "over" | "out"} Step @param {Step} [step] */
+export function run(step = "") { return orLater(() => runNow(step)); }
 
 async function runNow(step) {
   if (phase.value === "paused") return go(step);
@@ -73,7 +73,7 @@ async function runNow(step) {
 }
 
 async function go(step) {
-  const operate = step ? (program.value.kind === "blocks" ? "step_block" : "step") : "go";
+  const operate = step ? `${step}${program.value.kind === "blocks" ? "_block" : ""}` : "go";
   const answer = await debug({ target_id: program.value.id, operate }).catch(() => null);
   if (!answer) { orLater(() => go(step)); return; } // the link broke meanwhile
   if (answer.error) {
@@ -83,7 +83,7 @@ async function go(step) {
 
 export const pause = () => orLater(() => operate("suspend"));
 export const stop = () => orLater(() => operate("shutdown"));
-export const step = () => run(true);
+export const step = (/** @type {Step} */ how = "step") => run(how);
 
 /** @param {"suspend" | "shutdown" | "recover"} operation @param {string} [id] */
 export async function operate(operation, id = program.value.id) {

@@ -1,0 +1,58 @@
+"""At which blocks a run halts: those with a breakpoint, the next one, and the next one after a step.
+
+A step over or out of a call is the worker's, which knows what called what and halts before statements only. Here the
+halts before it has come to the begin of a block are passed over.
+"""
+
+from __future__ import annotations
+
+from roboglot.programs.engine.events import Stops
+from roboglot.programs.engine.position import Position
+from roboglot.programs.functions.table import SPELLINGS
+from roboglot.programs.language.places import Step
+
+MARKS = {"cyberdog.task.block", "cyberdog.task.breakpoint_block"}
+MARKS |= {spelling for spelling, name in SPELLINGS.items() if name in MARKS}
+
+
+class BlockStops:
+    """Of one run."""
+
+    __slots__ = ("_blocks", "_next", "_position", "_seeking")
+
+    def __init__(self, position: Position, stops: Stops | None) -> None:
+        self._position = position
+        self._seeking = False
+        self.set(stops or Stops())
+
+    def set(self, stops: Stops) -> None:
+        """Halt at these and nowhere else."""
+        self._blocks, self._next = stops.blocks, stops.first_block
+
+    def step(self, step: Step) -> None:
+        """Halt at the begin of the block that comes next after a step."""
+        self._next = step is Step.INTO
+        self._seeking = step is not Step.INTO
+        if self._seeking:
+            self._position.step(step)
+
+    def passes(self) -> bool:
+        """At a halt before a statement: whether it only leads to the block that is looked for."""
+        if not self._seeking or self._position.at_stop:
+            self._seeking = False
+            return False
+        if any(f"{mark}(" in self._position.source_line for mark in MARKS):
+            self._seeking, self._next = False, True
+        else:
+            self._position.step(Step.OVER)
+        return True
+
+    def halts(self, block: str) -> bool:
+        """At the begin of a block: whether to halt there."""
+        if not self._next and block not in self._blocks:
+            return False
+        self._next = False
+        if self._seeking:
+            self._seeking = False
+            self._position.clear_step()
+        return True
