@@ -97,7 +97,7 @@ def test_everyone_who_opens_the_list_sees_each_change(tmp_path: Path, url: str) 
         assert {identity.name for identity in two.identities()} == set(found), "what was refused changed nothing"
 
 
-def test_programs_that_write_at_once_keep_one_whole_chain(tmp_path: Path, url: str) -> None:
+def test_programs_that_write_at_once_keep_one_chain(tmp_path: Path, url: str) -> None:
     def write(robot: str) -> None:
         with open_trail(tmp_path, url) as trail:
             for number in range(0, 30, 3):
@@ -139,7 +139,7 @@ class Breaking:
         return result
 
 
-async def test_rows_are_kept_once_where_the_connection_breaks_at_the_end(
+async def test_rows_are_kept_once_where_connection_breaks(
     tmp_path: Path, url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(audit, "AGAIN_SECONDS", 0.01)
@@ -168,7 +168,7 @@ def test_a_changed_or_missing_row_is_found(tmp_path: Path) -> None:
 
 
 @needs_postgresql
-def test_the_server_refuses_to_change_the_audit_and_a_change_is_found(server: PostgreSQLServer, tmp_path: Path) -> None:
+def test_server_refuses_changed_audit_and_change_is_found(server: PostgreSQLServer, tmp_path: Path) -> None:
     with open_trail(tmp_path, server.url) as trail:
         trail.add([note(n) for n in range(9)])
         with psycopg.connect(server.url, autocommit=True) as connection:
@@ -183,7 +183,7 @@ def test_the_server_refuses_to_change_the_audit_and_a_change_is_found(server: Po
 
 
 @needs_postgresql
-async def test_programs_of_a_fleet_have_one_list_and_one_audit(server: PostgreSQLServer, tmp_path: Path) -> None:
+async def test_programs_of_fleet_share_list_and_audit(server: PostgreSQLServer, tmp_path: Path) -> None:
     base = load_config(None, {"data": str(tmp_path / "data"), "world": "empty", "lockstep": True})
     runtime = Runtime(
         replace(
@@ -224,9 +224,7 @@ def access(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 @needs_postgresql
-def test_a_folders_list_is_copied_to_the_server_and_replaces_no_one_there(
-    server: PostgreSQLServer, tmp_path: Path
-) -> None:
+def test_folders_list_is_copied_and_replaces_no_one(server: PostgreSQLServer, tmp_path: Path) -> None:
     with (
         contextlib.closing(open_store(tmp_path)) as local,
         contextlib.closing(open_store(tmp_path, server.url)) as there,
@@ -240,7 +238,7 @@ def test_a_folders_list_is_copied_to_the_server_and_replaces_no_one_there(
 
 
 @needs_postgresql
-async def test_while_the_server_is_away_rights_stay_and_end_and_what_happens_is_kept(
+async def test_server_away_rights_stay_and_rows_are_kept(
     server: PostgreSQLServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(audit, "AGAIN_SECONDS", 0.05)
@@ -291,7 +289,7 @@ async def until(condition: Callable[[], bool]) -> None:
             await asyncio.sleep(0.02)
 
 
-def test_rows_that_cannot_be_written_at_the_end_are_counted(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_rows_not_written_at_end_are_counted(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     class Gone:
         def add(self, _: object) -> None:
             raise DatabaseError("nobody there")
@@ -302,7 +300,7 @@ def test_rows_that_cannot_be_written_at_the_end_are_counted(tmp_path: Path, capl
     assert caplog.records[-1].getMessage() == "1 rows of the audit are lost: nobody there"
 
 
-def test_an_older_programs_files_are_brought_up_to_date(tmp_path: Path) -> None:
+def test_older_programs_files_are_brought_up_to_date(tmp_path: Path) -> None:
     """Files of the version before had the same tables, and no number of a version."""
     with open_trail(tmp_path) as trail:
         trail.add([note(1), note(2)])
@@ -325,7 +323,7 @@ def test_an_older_programs_files_are_brought_up_to_date(tmp_path: Path) -> None:
 
 
 @needs_postgresql
-def test_an_older_programs_database_is_brought_up_to_date(server: PostgreSQLServer, tmp_path: Path) -> None:
+def test_older_programs_database_is_brought_up_to_date(server: PostgreSQLServer, tmp_path: Path) -> None:
     files = resources.files("roboglot.storage.schema.postgresql")
     with psycopg.connect(server.url, autocommit=True) as connection:
         connection.execute("CREATE TABLE roboglot_schema (version INTEGER PRIMARY KEY)")

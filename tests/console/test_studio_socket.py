@@ -106,7 +106,7 @@ print(3)
 """
 
 
-async def test_steps_go_over_and_out_of_functions_of_blocks(shown: Shown) -> None:
+async def test_steps_go_over_and_out_of_functions(shown: Shown) -> None:
     async with page(shown) as studio:
         assert (await studio.frame(**SAVE, id="1", body=CALLING))["feedback"]["state"] == 0
         await studio.say(

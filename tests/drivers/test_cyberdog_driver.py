@@ -250,7 +250,7 @@ async def test_it_announces_what_it_adds(driven: Robot, until: Until) -> None:
     assert set(driven.interfaces) - kept_here == APPROXIMATIONS.keys()
 
 
-async def test_its_tap_tells_what_the_dog_hears_and_answers(driven: Robot, robot: Robot, until: Until) -> None:
+async def test_its_tap_tells_what_dog_hears_and_answers(driven: Robot, robot: Robot, until: Until) -> None:
     here: list[Exchange] = []
     there: list[Exchange] = []
     leave = driven.tap.listen(here.append), robot.tap.listen(there.append)

@@ -53,7 +53,7 @@ async def test_both_ends_of_rest_tell_the_same(driven: Robot, robot: Robot, forw
     await both_ends("slamware", robot, driven, forward)
 
 
-async def test_both_ends_of_the_text_protocol_tell_the_same(driven_ep: Robot, robot: Robot, forward: Forward) -> None:
+async def test_both_ends_of_text_protocol_tell_same(driven_ep: Robot, robot: Robot, forward: Forward) -> None:
     await both_ends("robomaster", robot, driven_ep, forward)
 
 

@@ -77,7 +77,7 @@ def test_parts_are_one_recording(tmp_path: Path) -> None:
     assert [topic.name for topic in reel.topics] == ["/t0", "/t1", "/t2"]
 
 
-def test_a_damaged_chunk_is_no_end_of_the_program(tmp_path: Path) -> None:
+def test_damaged_chunk_is_no_end_of_program(tmp_path: Path) -> None:
     path = tmp_path / "r.mcap"
     write(path, [(0, at) for at in range(1, 40)], {20})
     reel = Reel(path)

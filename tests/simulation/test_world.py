@@ -209,7 +209,7 @@ def busy():
     time.sleep(0.001)
 
 
-async def test_a_patient_clock_waits_for_a_world_that_is_too_slow(caplog):
+async def test_patient_clock_waits_for_slow_world(caplog):
     clock = PatientClock(speed=20_000.0)  # of which no machine simulates the half
     world = World(load_world("empty"), [RobotPlacement("a", start=Pose(2, 5))], clock=clock)
     world.equip(Robot("a", world.description_of("a"), clock))

@@ -158,7 +158,7 @@ async def test_a_step_over_passes_what_is_called(engine: Engine) -> None:
     assert await halts_after(engine, 15, out) == [15]
 
 
-async def test_a_stop_counts_inside_of_what_a_step_passes(engine: Engine) -> None:
+async def test_stop_counts_inside_of_what_step_passes(engine: Engine) -> None:
     run = await engine.start(CALLS, PRELUDE, stops=stops(2, 8))
     lines = []
     async for event in run:

@@ -123,7 +123,7 @@ def recorded(film: Path, topic: str, which: Callable[[int], bool] = lambda _: Tr
     return [(record.at, record.data) for record in read_messages(film, topic) if which(record.at)]
 
 
-async def test_it_says_what_there_is_to_play_and_begins(playing: Scene, film: Path) -> None:
+async def test_says_what_there_is_and_begins(playing: Scene, film: Path) -> None:
     recording = await filmed(film)
     viewer = await playing.connect()
     await viewer.until(lambda: states(viewer))
@@ -138,7 +138,7 @@ async def test_it_says_what_there_is_to_play_and_begins(playing: Scene, film: Pa
     assert {"/a/scan", "/a/pose", "/tf", "/truth/a/pose"} <= shown
 
 
-async def test_every_message_comes_once_byte_for_byte_in_its_order(playing: Scene, film: Path) -> None:
+async def test_every_message_comes_once_in_its_order(playing: Scene, film: Path) -> None:
     viewer = await playing.connect()
     await viewer.topic("/a/pose")
     await ask(viewer, PAUSED, seek=0)
@@ -151,7 +151,7 @@ async def test_every_message_comes_once_byte_for_byte_in_its_order(playing: Scen
     assert states(viewer)[-1].time == (await filmed(film)).last
 
 
-async def test_time_passes_at_the_wanted_speed_and_stands_still_in_a_pause(playing: Scene, film: Path) -> None:
+async def test_time_passes_at_wanted_speed_and_pauses(playing: Scene, film: Path) -> None:
     first = (await filmed(film)).first
     viewer = await playing.connect()
     number = await viewer.subscribe("/a/pose")
@@ -195,7 +195,7 @@ async def test_a_jump_shows_how_things_stood_then(playing: Scene, film: Path) ->
     assert (await ask(viewer, PAUSED, seek=2**63)).time == recording.last
 
 
-async def test_all_clients_see_the_same_and_after_the_last_it_is_wound_back(playing: Scene, film: Path) -> None:
+async def test_all_clients_see_same_and_last_rewinds(playing: Scene, film: Path) -> None:
     first = (await filmed(film)).first
     one, other = await playing.connect(), await playing.connect()
     old = await playing.connect("foxglove.websocket.v1")
@@ -252,7 +252,7 @@ async def test_a_live_robot_cannot_be_wound_back(scene: Scene) -> None:
     assert "playbackControl" not in json.dumps(viewer.said["serverInfo"])
 
 
-async def test_a_file_that_breaks_off_is_played_to_where_it_breaks(film: Path, opened: Opened, tmp_path: Path) -> None:
+async def test_broken_file_is_played_to_its_break(film: Path, opened: Opened, tmp_path: Path) -> None:
     recording = await filmed(film)
     cut = copied(film, tmp_path / "cut.mcap", whole=False)
     end = read_recording(cut).last
@@ -266,7 +266,7 @@ async def test_a_file_that_breaks_off_is_played_to_where_it_breaks(film: Path, o
     assert states(viewer)[-1].time == end
 
 
-async def test_a_file_that_is_gone_ends_it_in_words(film: Path, opened: Opened, tmp_path: Path) -> None:
+async def test_file_that_is_gone_ends_it_in_words(film: Path, opened: Opened, tmp_path: Path) -> None:
     await filmed(film)
     copy = copied(film, tmp_path / "copy.mcap")
     scene = await opened(robots=[{"name": "a", "body": f"recording:{copy}#a", "address": ADDRESS}])
