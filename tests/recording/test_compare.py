@@ -6,6 +6,7 @@ import random
 import xml.etree.ElementTree as ET
 
 import msgspec
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -14,6 +15,7 @@ from roboglot.recording.comparing import reports
 from roboglot.recording.comparing.comparison import compare
 from roboglot.recording.comparing.masks import STRICT, How, Mask, Rule
 from roboglot.recording.matching import normal, rewritten
+from roboglot.recording.reader import pair
 
 MUTATIONS, FOUND_MIN, ROUNDS = 500, 0.95, 7
 
@@ -152,3 +154,13 @@ def test_ids_of_two_protocols_are_made_by_clients() -> None:
     frames = [normal("visual", b'{"type":"task","id":"%s","target_id":["t"]}' % n) for n in (b"a1", b"b2")]
     assert frames[0].text == frames[1].text
     assert rewritten(b'{"feedback":{"id":"a1"}}', frames[0].fresh, frames[1].fresh) == b'{"feedback":{"id":"b2"}}'
+
+
+@pytest.mark.parametrize("door", ["cyberdog", "driver/cyberdog"])
+def test_a_dogs_several_answers_stay_with_their_request(door: str) -> None:
+    """Two requests of one operation; the newer one is answered twice, and the older one never."""
+    rest = ("a", door, "127.0.0.1:5", "x")
+    asked = [Exchange(at, *rest, Direction.REQUEST, "1004", b"{}") for at in (1.0, 2.0)]
+    answers = [Exchange(at, *rest, Direction.REPLY, "1004", b"{}", "ok", "", at - 2.0) for at in (3.0, 4.0)]
+    older, newer = pair([*asked, *answers])[0]
+    assert (older.replies, newer.replies) == ([], answers)

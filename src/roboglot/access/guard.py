@@ -65,8 +65,8 @@ class Tunnelled(NamedTuple):
 class Guard:
     """One for all robots. ``start`` begins to follow the list; ``reload`` reads it at once.
 
-    ``shared``: the server's database that keeps list and audit for a fleet, and that whoever opened it closes; without
-    it they are files in ``folder``. Raises OSError, ValueError, sqlite3.Error, DatabaseError.
+    ``shared``: the server's database that keeps list and audit for a fleet; its owner closes it. Without it they are
+    files in ``folder``. Raises OSError, ValueError, sqlite3.Error, DatabaseError.
     """
 
     def __init__(

@@ -15,7 +15,7 @@ from mcap.exceptions import McapError
 from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
 
-from roboglot.model.tap import Direction, Exchange
+from roboglot.model.tap import DRIVER, Direction, Exchange
 from roboglot.recording.messages import decode_exchange
 
 log = logging.getLogger(__name__)
@@ -121,7 +121,8 @@ def _answer(open_ones: list[Asked], number: int, reply: Exchange) -> None:
     # A dog's answers on the way do not say when they were asked for: they belong to the newest request.
     best = min(exact, key=lambda asked: (len(asked.numbered) > 0, asked.number)) if exact else open_ones[-1]
     best.numbered.append((number, reply))
-    if len(open_ones) > 1 and best.request.door != "cyberdog":  # a dog answers one request more than once
+    # A dog answers one request more than once, at its door and to its driver.
+    if len(open_ones) > 1 and best.request.door.removeprefix(DRIVER) != "cyberdog":
         open_ones.remove(best)
     del open_ones[:-64]
 

@@ -71,7 +71,7 @@ class ControlLink(asyncio.Protocol):
         self._transport.write(text.encode())
         if self._noting is not None:
             self._noting.sent(number, text)
-        why = "nobody waits for it any more"
+        why = "the caller stopped waiting"
         try:
             return await self._clock.wait_for(answer, timeout)
         except TimeoutError:

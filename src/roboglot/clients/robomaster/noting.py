@@ -37,7 +37,7 @@ class Noting:
             self.line.reply(asked[0], b"", LOST, why, asked[1])
 
     def heard(self, data: bytes) -> None:
-        """The robot pushed something, or told of an event."""
+        """The robot pushed telemetry, or reported an event."""
         if self.line.watched:
             words = " ".join(data.decode("utf-8", "replace").split(None, 2)[:2])
             key = "> game_msg push" if words == "game msg" else f"> {words}"

@@ -6,7 +6,7 @@ CREATE TABLE IF NOT EXISTS allowed (
     identity TEXT NOT NULL REFERENCES identity (name) ON DELETE CASCADE,
     robot TEXT NOT NULL, rights TEXT NOT NULL, until REAL, PRIMARY KEY (identity, robot)
 ) STRICT;
--- Counted up by every change, whoever makes it: running robots look at it.
+-- Counted up by every change, from any program: running robots look at it.
 CREATE TABLE IF NOT EXISTS access_version (number INTEGER NOT NULL) STRICT;
 INSERT INTO access_version SELECT 1 WHERE NOT EXISTS (SELECT * FROM access_version);
 CREATE TRIGGER IF NOT EXISTS identity_added AFTER INSERT ON identity BEGIN UPDATE access_version SET number = number + 1; END;

@@ -12,7 +12,7 @@ CREATE TABLE allowed (
     until DOUBLE PRECISION, -- seconds since 1970; NULL: for good
     PRIMARY KEY (identity, robot)
 );
--- Counted up by every change, whoever makes it: running robots look at it.
+-- Counted up by every change, from any program: running robots look at it.
 CREATE TABLE access_version (number BIGINT NOT NULL);
 INSERT INTO access_version (number) VALUES (1);
 CREATE FUNCTION count_access_change() RETURNS TRIGGER LANGUAGE plpgsql AS

@@ -1,1 +1,1 @@
-"""Chapter "motion": velocities, moves, navigation, docking: whatever the robot does as one of its actions."""
+"""Chapter "motion": velocities, moves, navigation, docking: what the robot does as actions."""
