@@ -28,7 +28,6 @@ WIDE = {  # classes with more, and why
     "RoboMasterClient": "to be split",
     "RobotServer": "to be split",
     "SimulatedBase": "to be split",
-    "SimulatedFirmware": "to be split",
     "SimulatedGimbal": "to be split",
     "SimulatedLegs": "to be split",
     "Slam": "to be split",

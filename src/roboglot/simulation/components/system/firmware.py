@@ -1,4 +1,4 @@
-"""Firmware: downloads at the link's pace, installs at the disk's, reboots. What runs is kept in the settings."""
+"""Firmware: downloads at the link's pace, installs at the disk's, reboots."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import hashlib
 import re
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, Any
+from typing import Annotated
 
-from msgspec import Meta, Struct, convert, to_builtins
+from msgspec import Meta, Struct
 
 from roboglot.model.actions import Action, ActionStatus, OnBusy
 from roboglot.model.components.energy.battery import Battery
@@ -28,7 +28,6 @@ from roboglot.model.components.system.firmware import (
     Module,
 )
 from roboglot.model.components.system.network import Network
-from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import Blocked, InvalidGoal, NotFound, Refused
 from roboglot.model.events import FirmwareChanged, ModuleRestarted, Rebooted, Rebooting
 from roboglot.model.robot import Robot
@@ -36,10 +35,9 @@ from roboglot.model.sensing import Supply
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Positive
 from roboglot.simulation.components.motion.base import SimulatedBase
+from roboglot.simulation.components.system.firmware_record import FirmwareRecord
 
 PACKAGE = "firmware package"  # under this name it takes room on the disk
-INSTALLED, PENDING, AUTOMATIC = "firmware.installed", "firmware.pending", "firmware.automatic"
-DOWNLOADED = "firmware.downloaded"
 CHARGE_MIN = 0.3  # for an installation
 LOOK_EVERY = 60.0  # s between looks for a newer version
 AFTER_MAX = 86_400.0  # s
@@ -59,15 +57,13 @@ class FirmwareSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedFirmware(Firmware):
-    """The installed version and what waits for a reboot live in the settings; the offer is the body's description's."""
+    """What runs is in the record; the offer is the body's description's."""
 
     def __init__(self, section: FirmwareSection, robot: Robot, base: SimulatedBase) -> None:
         self._section, self._robot, self._base = section, robot, base
         self._clock = robot.clock
         self._progress = FirmwareProgress()
-        self._kept: dict[str, object] = {}  # for a robot without settings
-        self._awake = False  # whether it knows what an earlier life left
-        self._booted: Any = None  # what that life had installed, without a reboot since: it runs by now
+        self._record = FirmwareRecord(robot, section.version, section.modules)
         self._restarting: asyncio.Task[None] | None = None
         self._updating: asyncio.Task[None] | None = None
         self._next_look = LOOK_EVERY
@@ -77,11 +73,13 @@ class SimulatedFirmware(Firmware):
 
     @property
     def version(self) -> str:
-        return self._installed()[0]
+        self._wake()
+        return self._record.installed[0]
 
     @property
     def modules(self) -> Mapping[str, str]:
-        return self._installed()[1]
+        self._wake()
+        return self._record.installed[1]
 
     @property
     def progress(self) -> FirmwareProgress:
@@ -99,10 +97,10 @@ class SimulatedFirmware(Firmware):
 
     @property
     def automatic(self) -> bool:
-        return bool(self._read(AUTOMATIC, False))
+        return self._record.automatic
 
     async def set_automatic(self, on: bool) -> None:
-        await self._write(AUTOMATIC, on)
+        await self._record.set_automatic(on)
 
     @property
     def remaining(self) -> float | None:
@@ -131,13 +129,13 @@ class SimulatedFirmware(Firmware):
 
         async def run(action: Action) -> None:
             self._robot[Disk].take(PACKAGE, package.size)
-            await self._write(DOWNLOADED, None)
+            await self._record.put_downloaded(None)
             try:
                 await self._go_through(action, FirmwareState.DOWNLOADING, package, self._section.download_rate)
             except BaseException:
                 self._robot[Disk].release(PACKAGE)
                 raise
-            await self._write(DOWNLOADED, to_builtins(package))
+            await self._record.put_downloaded(package)
             self._tell(action, FirmwareProgress(FirmwareState.DOWNLOADED, 1.0, package))
 
         return self._robot.actions.start("download firmware", run, resources=[FIRMWARE], goal=package, source=source)
@@ -156,8 +154,8 @@ class SimulatedFirmware(Firmware):
             self._base.lock(FIRMWARE, "the robot is being updated")
             try:
                 await self._go_through(action, FirmwareState.INSTALLING, package, self._section.install_rate)
-                await self._write(PENDING, [package.version, {**self.modules, **package.modules}])
-                await self._write(DOWNLOADED, None)
+                await self._record.put_pending(package.version, {**self.modules, **package.modules})
+                await self._record.put_downloaded(None)
             finally:
                 self._base.unlock(FIRMWARE)
             self._robot[Disk].release(PACKAGE)
@@ -172,7 +170,7 @@ class SimulatedFirmware(Firmware):
             raise Refused("firmware is not thrown away while an update is under way")
         self._robot[Disk].release(PACKAGE)
         self._become(FirmwareProgress())
-        await self._write(DOWNLOADED, None)
+        await self._record.put_downloaded(None)
 
     async def _go_through(self, action: Action, state: FirmwareState, package: FirmwarePackage, rate: float) -> None:
         """A percent at a time; given up, it is as if it had not begun; failed, it says why."""
@@ -214,11 +212,7 @@ class SimulatedFirmware(Firmware):
         if Legs in robot:
             await robot[Legs].lie_down().done()
         await self._clock.sleep(seconds)
-        pending = self._read(PENDING, None)
-        if pending:
-            await self._write(INSTALLED, pending)
-            await self._write(PENDING, None)
-            self._booted = None
+        await self._record.boot()
         self._base.unlock("reboot")
         self._tell(action, FirmwareProgress())
         robot.events.publish(Rebooted(stamp=self._clock.time()))
@@ -274,22 +268,11 @@ class SimulatedFirmware(Firmware):
             if task:
                 task.cancel()
 
-    # -- what is kept ------------------------------------------------------------------------------------------------
-
     def _wake(self) -> None:
         """Take up what an earlier life left, once: starting this program is a reboot, too."""
-        if self._awake or Settings not in self._robot:
-            return
-        self._awake, self._booted = True, self._read(PENDING, None)
-        if left := self._read(DOWNLOADED, None):
-            package = convert(left, FirmwarePackage)
+        if package := self._record.wake():
             self._robot[Disk].take(PACKAGE, package.size)
             self._progress = FirmwareProgress(FirmwareState.DOWNLOADED, 1.0, package)
-
-    def _installed(self) -> tuple[str, Mapping[str, str]]:
-        self._wake()
-        kept: Any = self._booted or self._read(INSTALLED, (self._section.version, self._section.modules))
-        return kept[0], kept[1]
 
     def _tell(self, action: Action, progress: FirmwareProgress) -> None:
         action.report(progress)
@@ -298,16 +281,6 @@ class SimulatedFirmware(Firmware):
     def _become(self, progress: FirmwareProgress) -> None:
         self._progress = progress
         self._robot.events.publish(FirmwareChanged(stamp=self._clock.time(), progress=progress))
-
-    def _read(self, key: str, default: object) -> object:
-        value = self._robot[Settings].get(key) if Settings in self._robot else self._kept.get(key)
-        return default if value is None else value
-
-    async def _write(self, key: str, value: object) -> None:
-        if Settings in self._robot:
-            await self._robot[Settings].put(key, value)
-        else:
-            self._kept[key] = value
 
 
 def _numbers(version: str) -> tuple[int, ...]:

@@ -1,0 +1,75 @@
+"""What a robot keeps of its firmware over reboots and crashes: in its settings, where it has some."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from msgspec import convert, to_builtins
+
+from roboglot.model.components.system.firmware import FirmwarePackage
+from roboglot.model.components.system.settings import Settings
+from roboglot.model.robot import Robot
+
+INSTALLED, PENDING, AUTOMATIC = "firmware.installed", "firmware.pending", "firmware.automatic"
+DOWNLOADED = "firmware.downloaded"
+
+
+class FirmwareRecord:
+    """What is installed, what waits for a reboot, what was downloaded; ``version`` and ``modules`` are the factory's.
+
+    What is put here is safe on disk when the call returns.
+    """
+
+    def __init__(self, robot: Robot, version: str, modules: Mapping[str, str]) -> None:
+        self._robot, self._factory = robot, (version, modules)
+        self._kept: dict[str, object] = {}  # for a robot without settings
+        self._awake = False  # whether it knows what an earlier life left
+        self._booted: Any = None  # what that life had installed, without a reboot since: it runs by now
+
+    def wake(self) -> FirmwarePackage | None:
+        """Take up what an earlier life left, once; return what it had downloaded."""
+        if self._awake or Settings not in self._robot:
+            return None
+        self._awake, self._booted = True, self._read(PENDING)
+        left = self._read(DOWNLOADED)
+        return convert(left, FirmwarePackage) if left else None
+
+    @property
+    def installed(self) -> tuple[str, Mapping[str, str]]:
+        """Versions of the whole and of its modules, as they run now."""
+        kept: Any = self._booted or self._read(INSTALLED) or self._factory
+        return kept[0], kept[1]
+
+    @property
+    def automatic(self) -> bool:
+        """True if the robot updates itself."""
+        return bool(self._read(AUTOMATIC))
+
+    async def set_automatic(self, on: bool) -> None:
+        """Have the robot update itself, or not."""
+        await self._write(AUTOMATIC, on)
+
+    async def put_downloaded(self, package: FirmwarePackage | None) -> None:
+        """Keep what was downloaded; None: nothing."""
+        await self._write(DOWNLOADED, to_builtins(package))
+
+    async def put_pending(self, version: str, modules: Mapping[str, str]) -> None:
+        """Keep what runs after the next reboot."""
+        await self._write(PENDING, [version, modules])
+
+    async def boot(self) -> None:
+        """From now on, what waited for a reboot runs."""
+        if pending := self._read(PENDING):
+            await self._write(INSTALLED, pending)
+            await self._write(PENDING, None)
+            self._booted = None
+
+    def _read(self, key: str) -> object:
+        return self._robot[Settings].get(key) if Settings in self._robot else self._kept.get(key)
+
+    async def _write(self, key: str, value: object) -> None:
+        if Settings in self._robot:
+            await self._robot[Settings].put(key, value)
+        else:
+            self._kept[key] = value
