@@ -15,10 +15,12 @@ from roboglot.clients.visual import TextLink
 from roboglot.model.robot import Robot
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.tasks.service import ProgramService
-from roboglot.protocols import websocket
+from roboglot.protocols import websocket_writer
 from roboglot.protocols.visual.config import VisualConfig
 from roboglot.protocols.visual.server import VisualDoor
-from roboglot.protocols.websocket import CONNECTIONS_MAX, MESSAGE_MAX, OPENING_MAX, UNSENT_MAX
+from roboglot.protocols.websocket import CONNECTIONS_MAX
+from roboglot.protocols.websocket_opening import MESSAGE_MAX, OPENING_MAX
+from roboglot.protocols.websocket_writer import UNSENT_MAX
 from roboglot.storage.database import Database
 from roboglot.storage.programs import program_stores
 
@@ -343,15 +345,15 @@ async def started_printing(address: str) -> TextLink:
 async def test_program_waits_for_slow_reader_of_its_log(
     door: VisualDoor, address: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(websocket, "UNSENT_MAX", 1024 * 1024)
-    monkeypatch.setattr(websocket, "STALLED_SECONDS_MAX", 600.0)
+    monkeypatch.setattr(websocket_writer, "UNSENT_MAX", 1024 * 1024)
+    monkeypatch.setattr(websocket_writer, "STALLED_SECONDS_MAX", 600.0)
     slow = await TextLink.open(address, "/log")
     written: list[str] = []
     door._service.log_entries.join(lambda _, entry: written.append(entry.text))
     link = await started_printing(address)
     assert door._socket is not None
     async with asyncio.timeout(60):
-        while all(connection._has_room.is_set() for connection in door._socket.connections):  # noqa: ASYNC110
+        while all(connection.writer.has_room for connection in door._socket.connections):  # noqa: ASYNC110
             await asyncio.sleep(0.01)
     assert len(written) < LINES
     read = [json.loads(await anext(slow))["text"] for _ in range(LINES)]
@@ -363,7 +365,7 @@ async def test_program_waits_for_slow_reader_of_its_log(
 async def test_a_program_waits_only_for_readers_that_read(
     door: VisualDoor, address: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(websocket, "STALLED_SECONDS_MAX", 0.2)
+    monkeypatch.setattr(websocket_writer, "STALLED_SECONDS_MAX", 0.2)
     _, asleep = await opened(address, "/log")
     asleep.transport.pause_reading()  # type: ignore[attr-defined]
     link = await started_printing(address)
@@ -377,13 +379,13 @@ async def test_a_program_waits_only_for_readers_that_read(
 async def test_who_waits_for_a_reader_can_be_ended(
     door: VisualDoor, address: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(websocket, "STALLED_SECONDS_MAX", 600.0)
+    monkeypatch.setattr(websocket_writer, "STALLED_SECONDS_MAX", 600.0)
     _, asleep = await opened(address, "/log")
     asleep.transport.pause_reading()  # type: ignore[attr-defined]
     link = await started_printing(address)
     assert door._socket is not None
     async with asyncio.timeout(60):
-        while all(connection._has_room.is_set() for connection in door._socket.connections):  # noqa: ASYNC110
+        while all(connection.writer.has_room for connection in door._socket.connections):  # noqa: ASYNC110
             await asyncio.sleep(0.01)
     assert (await ask(link, id="3", type="task", operate="shutdown", target_id=["t"]))["state"] == 0
     await link.close()

@@ -1,0 +1,171 @@
+"""The request with which a client opens a WebSocket: read, checked and answered."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable, Mapping
+from contextvars import copy_context
+from dataclasses import dataclass
+from http import HTTPStatus
+from typing import TYPE_CHECKING
+
+from roboglot.model.admission import NO_PROOF, Admission, Forbidden, Proof, ProofKind, Unknown
+from roboglot.model.client_context import ask_for
+from roboglot.protocols.browsers import Browsers, of_texts
+from roboglot.protocols.channels import Channel
+from roboglot.protocols.websocket_writer import Writer
+
+if TYPE_CHECKING:
+    from websockets.http11 import Request
+    from websockets.server import ServerProtocol
+
+log = logging.getLogger(__name__)
+
+OPENING_MAX = 8192  # bytes of a request
+MESSAGE_MAX = 8 * 1024 * 1024  # bytes of a text, whole or in pieces
+OPENING_SECONDS_MAX = 10.0
+HEAD_END = b"\r\n\r\n"
+
+
+@dataclass(frozen=True, slots=True)
+class Entrance:
+    """Where clients of a door come in: its channels by their paths, and what asks who they are."""
+
+    door: str
+    channels: Mapping[str, Channel]
+    browsers: Browsers
+    admission: Admission
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """A client that came in; ``early`` is what it sent after its request. ``identity`` is empty if nobody asked."""
+
+    channel: Channel
+    protocol: ServerProtocol
+    identity: str
+    early: bytes
+
+
+class Opening:
+    """Takes what a client sends until ``opened`` is called; too slow a client is disconnected.
+
+    ``wait_for`` has something awaited in the background, and nothing more read meanwhile.
+    """
+
+    def __init__(
+        self,
+        entrance: Entrance,
+        writer: Writer,
+        wait_for: Callable[[Awaitable[None]], None],
+        opened: Callable[[Opened], None],
+    ) -> None:
+        self._entrance, self._writer, self._wait_for, self._opened = entrance, writer, wait_for, opened
+        self._host = self._name = ""
+        self._head = bytearray()
+        self._early = b""  # received after the request, before it was accepted
+        self._protocol: ServerProtocol | None = None  # once the request is complete
+        self._timer = asyncio.get_running_loop().call_later(OPENING_SECONDS_MAX, writer.abort)
+
+    def begin(self, host: str, name: str) -> None:
+        """Expect the request of the client at ``host``; ``name``: with its port."""
+        self._host, self._name = host, name
+
+    def close(self) -> None:
+        """The client is gone, or refused."""
+        self._timer.cancel()
+
+    def receive(self, data: bytes) -> None:
+        """Answer the request once it is complete."""
+        from websockets.http11 import Request
+        from websockets.server import ServerProtocol
+
+        if self._protocol is not None:
+            self._early += data
+            return
+        self._head += data
+        head, end, rest = bytes(self._head).partition(HEAD_END)
+        if not end and len(self._head) <= OPENING_MAX:
+            return
+        self._protocol = protocol = ServerProtocol(max_size=MESSAGE_MAX, logger=log.getChild("library"))
+        if not end:
+            self._refuse(protocol, HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE, "the request is too long")
+            return
+        self._timer.cancel()
+        self._early = rest
+        protocol.receive_data(head + end)
+        requests = protocol.events_received()
+        if requests and isinstance(requests[0], Request):
+            self._check(protocol, requests[0])
+        else:  # not HTTP
+            self._writer.close()
+
+    def _check(self, protocol: ServerProtocol, request: Request) -> None:
+        from websockets.typing import Subprotocol
+
+        entrance, path = self._entrance, request.path.partition("?")[0]
+        channel = entrance.channels.get(path)
+        if channel is None:
+            self._refuse(protocol, HTTPStatus.NOT_FOUND, f"there are {' and '.join(entrance.channels)}")
+            return
+        protocol.available_subprotocols = [Subprotocol(name) for name in channel.subprotocols] or None
+        response = protocol.accept(request)
+        headers = {name.lower(): value for name, value in request.headers.raw_items()}
+        if response.status_code != HTTPStatus.SWITCHING_PROTOCOLS:
+            protocol.send_response(response)
+            self._writer.flush(protocol)
+        elif refusal := entrance.browsers.refusal(of_texts(headers, "GET")):
+            self._refuse(protocol, HTTPStatus.FORBIDDEN, refusal)
+        elif not entrance.admission.asks:
+            self._accept(protocol, request, channel)
+        else:
+            self._authenticate(protocol, request, channel, headers.get("authorization", ""))
+
+    def _authenticate(self, protocol: ServerProtocol, request: Request, channel: Channel, authorization: str) -> None:
+        """Find out who it is, in the background where that is not known at once."""
+        proof = Proof(ProofKind.HTTP, authorization) if authorization else NO_PROOF
+        who = self._entrance.admission.known(self._name, proof)
+        if who is not None:
+            self._authorize(protocol, request, channel, who)
+        else:
+            self._wait_for(self._admit(protocol, request, channel, proof))
+
+    async def _admit(self, protocol: ServerProtocol, request: Request, channel: Channel, proof: Proof) -> None:
+        try:
+            who = await self._entrance.admission.admit(self._name, proof)
+        except Unknown as unknown:
+            ask = {"WWW-Authenticate": 'Basic realm="roboglot"'}
+            self._refuse(protocol, HTTPStatus.UNAUTHORIZED, str(unknown), ask)
+        else:
+            self._authorize(protocol, request, channel, who)
+
+    def _authorize(self, protocol: ServerProtocol, request: Request, channel: Channel, who: str) -> None:
+        path = request.path.partition("?")[0]
+        try:
+            copy_context().run(self._check_right, f"open {path}", channel, who)
+        except Forbidden as forbidden:
+            self._refuse(protocol, HTTPStatus.FORBIDDEN, str(forbidden))
+        else:
+            self._accept(protocol, request, channel, who)
+
+    def _check_right(self, operation: str, channel: Channel, who: str) -> None:
+        """Raise Forbidden if the client may not open the channel."""
+        door = self._entrance.door
+        ask_for(f"{door} {who or self._host}", self._name, who)
+        self._entrance.admission.check(door, operation, channel.right)
+
+    def _accept(self, protocol: ServerProtocol, request: Request, channel: Channel, who: str = "") -> None:
+        if self._writer.lost:
+            return
+        protocol.send_response(protocol.accept(request))
+        self._writer.flush(protocol)
+        self._opened(Opened(channel, protocol, who, self._early))
+
+    def _refuse(
+        self, protocol: ServerProtocol, status: HTTPStatus, reason: str, headers: Mapping[str, str] | None = None
+    ) -> None:
+        response = protocol.reject(status, f"{reason}\n")
+        response.headers.update(headers or {})
+        protocol.send_response(response)
+        self._writer.flush(protocol)
