@@ -24,7 +24,6 @@ WIDE = {  # classes with more, and why
     "PipeEnd": "to be split",
     "ProgramService": "to be split",
     "QueueDelivery": "to be split",
-    "RoboMasterClient": "to be split",
     "RobotServer": "to be split",
     "SimulatedBase": "to be split",
     "SimulatedGimbal": "to be split",
@@ -39,7 +38,8 @@ COLUMNS_MAX = 120  # of a line of docs; table rows, code and what is generated m
 CHAPTERLESS = {  # modules of a vendor's package that belong to no chapter of its manual
     "wire": "annexb channel cloud codes commands geometry lines messages orders proto relay replies requests telemetry "
     "text versions zenoh",
-    "clients": "calls client cloud control datagrams errors events http link media noting pairing running texts values",
+    "clients": "calls client cloud control datagrams errors events http link listeners media noting pairing running "
+    "search texts values",
     "drivers": "capabilities components driver media_feed motion state telemetry vocabulary watchdog watchdog_process",
 }
 SOURCES = sorted(p for p in (ROOT / "src").rglob("*.py") if not p.name.endswith(GENERATED))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
 from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass
@@ -30,18 +29,18 @@ from roboglot.clients.robomaster.control import ControlLink, connect
 from roboglot.clients.robomaster.datagrams import PUSH_PORT, PushPort
 from roboglot.clients.robomaster.errors import RoboMasterRefused
 from roboglot.clients.robomaster.events import EventLink
+from roboglot.clients.robomaster.listeners import Listeners
 from roboglot.clients.robomaster.media import access_units, opus_packets
 from roboglot.clients.robomaster.noting import Noting
+from roboglot.clients.robomaster.search import Search
 from roboglot.model.clock import Clock, RealClock
-from roboglot.model.feed import Feed, Viewer
+from roboglot.model.feed import Viewer
 from roboglot.model.tap import Line
 from roboglot.wire.robomaster.annexb import AccessUnit
 from roboglot.wire.robomaster.replies import Reply
-from roboglot.wire.robomaster.telemetry import Telemetry, hear
+from roboglot.wire.robomaster.telemetry import Telemetry
 
 log = logging.getLogger(__name__)
-BACK_OFF = (0.5, 1.0, 2.0, 5.0)  # s between attempts to connect again; the last one goes on
-QUEUE_MAX = 512  # pushes and events that wait for a slow watcher, who then loses them
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,13 +93,11 @@ class RoboMasterClient:
         self._ports, self._local, self._reconnect = ports, local, reconnect
         self._pushes = pushes or PushPort(local or "", ports.push)
         self._detach: Callable[[], None] | None = None
-        self._events = EventLink(self.clock, ports.event, self._hear)
+        self._listeners = Listeners()
+        self._events = EventLink(self.clock, ports.event, self._listeners.hear)
         self._link: ControlLink | None = None
         self._noting: Noting | None = None
-        self._seeking: asyncio.Task[None] | None = None
-        self._listeners: list[tuple[Callable[[Telemetry], object], tuple[type[Telemetry], ...]]] = []
-        self._feeds: set[Feed[Telemetry]] = set()
-        self._at_connect: list[Callable[[], Awaitable[object]]] = []
+        self._search = Search(self.clock, host, self._open, lambda: self.state is LinkState.CONNECTED)
         self._at_change: list[Callable[[LinkState], object]] = []
 
     async def __aenter__(self) -> RoboMasterClient:
@@ -117,21 +114,19 @@ class RoboMasterClient:
         """
         if self.state is LinkState.CONNECTED:
             return
-        if self._seeking:
-            self._seeking.cancel()
+        self._search.cancel()
         try:
             await self._open()
         except ClientError:
-            if self.state is LinkState.LOST:
-                self._begin_to_seek()
+            if self.state is LinkState.LOST and self._reconnect:
+                self._search.begin()
             raise
         await self._events.open(self.host)
 
     async def close(self) -> None:
         """Hang up: the robot stops what this client commanded, and leaves SDK mode when it was the last one."""
         self._change(LinkState.CLOSED)
-        if self._seeking:
-            self._seeking.cancel()
+        self._search.cancel()
         self._events.close()
         if self._link:
             self._link.close()
@@ -139,12 +134,11 @@ class RoboMasterClient:
         if self._detach:
             self._detach()
             self._detach = None
-        for feed in tuple(self._feeds):
-            feed.close()
+        self._listeners.close()
 
     def note_in(self, line: Line) -> None:
         """Note there what is asked, answered and heard from now on; before ``connect``."""
-        self._noting = Noting(line)
+        self._noting = self._listeners.noting = Noting(line)
 
     @property
     def as_robots(self) -> bool:
@@ -207,23 +201,12 @@ class RoboMasterClient:
         """
         if self._detach is None:
             address = self._link.peer_host if self._link else self.host
-            self._detach = self._pushes.attach(address, self._hear)
-        entry = (heard, kinds)
-        self._listeners.append(entry)
-        return lambda: self._listeners.remove(entry) if entry in self._listeners else None
+            self._detach = self._pushes.attach(address, self._listeners.hear)
+        return self._listeners.add(heard, kinds)
 
     def watch(self, *kinds: type[Telemetry]) -> Viewer[Telemetry]:
         """The same as an async iterator; close it, or use ``with``. It ends with the client."""
-        stop: list[Callable[[], None]] = []
-
-        def end() -> None:
-            stop.pop()()
-            self._feeds.discard(feed)
-
-        feed: Feed[Telemetry] = Feed(lambda: stop.append(self.listen(feed.push, *kinds)), end, queue_max=QUEUE_MAX)
-        viewer = feed.subscribe()
-        self._feeds.add(feed)
-        return viewer
+        return self._listeners.view(lambda heard: self.listen(heard, *kinds))
 
     def video(self) -> AsyncIterator[AccessUnit]:
         """Pictures as H.264 access units from a keyframe on; they flow while ``stream.on()``. Ends with LinkLost."""
@@ -233,19 +216,11 @@ class RoboMasterClient:
         """Opus packets of 20 ms; they flow while ``audio.on()``. Ends with LinkLost."""
         return opus_packets(self.clock, self.host, self._ports.audio)
 
-    def _hear(self, data: bytes) -> None:
-        if self._noting is not None:
-            self._noting.heard(data)
-        for item in hear(data):
-            for heard, kinds in tuple(self._listeners):
-                if not kinds or isinstance(item, kinds):
-                    heard(item)
-
     # -- the link ------------------------------------------------------------------------------------------------------
 
     def at_connect(self, hook: Callable[[], Awaitable[object]]) -> None:
         """Await ``hook`` after every reconnection: a new session begins with everything off."""
-        self._at_connect.append(hook)
+        self._search.at_find(hook)
 
     def at_change(self, hook: Callable[[LinkState], object]) -> None:
         """Call ``hook`` whenever ``state`` changes."""
@@ -273,22 +248,5 @@ class RoboMasterClient:
             return
         log.info("robomaster %s: %s", self.host, why)
         self._change(LinkState.LOST)
-        if self._seeking is None or self._seeking.done():
-            self._begin_to_seek()
-
-    def _begin_to_seek(self) -> None:
-        if self._reconnect:
-            self._seeking = asyncio.get_running_loop().create_task(self._seek(), name=f"seek {self.host}")
-
-    async def _seek(self) -> None:
-        """Try until it is there again."""
-        for attempt in range(1 << 31):
-            await self.clock.sleep(BACK_OFF[min(attempt, len(BACK_OFF) - 1)])
-            try:
-                await self._open()
-                for hook in self._at_connect:
-                    await hook()
-            except ClientError as error:
-                log.debug("robomaster %s: %s", self.host, error)
-            if self.state is LinkState.CONNECTED:
-                return
+        if self._reconnect and not self._search.going_on:
+            self._search.begin()

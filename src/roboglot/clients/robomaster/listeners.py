@@ -1,0 +1,55 @@
+"""Who listens to what a robot says by itself: functions and watchers, each to the kinds it wants."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from roboglot.clients.robomaster.noting import Noting
+from roboglot.model.feed import Feed, Viewer
+from roboglot.wire.robomaster.telemetry import Telemetry, hear
+
+QUEUE_MAX = 512  # pushes and events that wait for a slow watcher, who then loses them
+
+Listener = Callable[[Telemetry], object]
+
+
+class Listeners:
+    """Those of one client, until ``close``; ``noting``, where there is one, keeps what was heard."""
+
+    def __init__(self) -> None:
+        self.noting: Noting | None = None
+        self._listeners: list[tuple[Listener, tuple[type[Telemetry], ...]]] = []
+        self._feeds: set[Feed[Telemetry]] = set()
+
+    def add(self, heard: Listener, kinds: tuple[type[Telemetry], ...]) -> Callable[[], None]:
+        """Call ``heard`` with everything of ``kinds`` (none: all); returns what ends it."""
+        entry = (heard, kinds)
+        self._listeners.append(entry)
+        return lambda: self._listeners.remove(entry) if entry in self._listeners else None
+
+    def view(self, listen: Callable[[Listener], Callable[[], None]]) -> Viewer[Telemetry]:
+        """Return a viewer of what ``listen`` hears; it begins to listen when it is first needed."""
+        stop: list[Callable[[], None]] = []
+
+        def end() -> None:
+            stop.pop()()
+            self._feeds.discard(feed)
+
+        feed: Feed[Telemetry] = Feed(lambda: stop.append(listen(feed.push)), end, queue_max=QUEUE_MAX)
+        viewer = feed.subscribe()
+        self._feeds.add(feed)
+        return viewer
+
+    def hear(self, data: bytes) -> None:
+        """Hand on what a datagram or an event's line says."""
+        if self.noting is not None:
+            self.noting.heard(data)
+        for item in hear(data):
+            for heard, kinds in tuple(self._listeners):
+                if not kinds or isinstance(item, kinds):
+                    heard(item)
+
+    def close(self) -> None:
+        """End every viewer."""
+        for feed in tuple(self._feeds):
+            feed.close()
