@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar, cast
 
+import psycopg
 import pytest
 
 from roboglot.config import Config, ConsoleConfig, RobotConfig
@@ -21,8 +25,10 @@ from roboglot.storage.homes import Homes, Occupied
 from roboglot.storage.opening import open_database
 from roboglot.storage.residence import HOLD, LEASE, PERIOD, Residence, holder_of
 from roboglot.storage.silence import GAP_MAX, Silence
-from roboglot.storage.transactions import DatabaseError, Transactions
+from roboglot.storage.transactions import Connection, DatabaseError, Transactions
 from tests.storage.postgresql_server import PostgreSQLServer, needs_postgresql
+
+T = TypeVar("T")
 
 
 class Watch:
@@ -166,7 +172,7 @@ async def test_robot_that_another_program_took_stands_and_refuses(tmp_path: Path
         driving = robot[Driving].drive(Twist(0.2, 0.0, 0.0))
         held = (await homes.all())["a"]
         assert held.holder == holder_of(config.data)
-        await homes.take({"a": "10.0.0.2"}, "another", {"a": held})
+        await homes.take({"a": "10.0.0.2"}, "another", await homes.signs())
         assert runtime._residence is not None
         await runtime._residence.renew()
         assert isinstance(runtime.clock, LockstepClock)
@@ -225,7 +231,7 @@ async def test_waiting_program_takes_robots_when_freed(
     async def freed_meanwhile(seconds: float) -> None:
         watch.now += seconds
         if watch.now - began > 1.0:
-            await homes.free((await homes.all()).values())
+            await homes.free(await homes.signs(), ["a", "b"])
 
     monkeypatch.setattr(timing.asyncio, "sleep", freed_meanwhile)
     await new.take()
@@ -252,9 +258,9 @@ async def test_only_silence_that_was_watched_frees(database: Transactions, watch
 async def test_renewal_that_comes_before_freeing_keeps_the_robot(database: Transactions, watch: Watch) -> None:
     old, homes = home(database, "old", watch), Homes(database)
     await old.take()
-    seen = (await homes.all()).values()
+    seen = await homes.signs()
     await old.renew()
-    assert await homes.free(seen) == []
+    assert await homes.free(seen, ["a", "b"]) == []
     assert {h.holder for h in (await homes.all()).values()} == {"old"}
 
 
@@ -265,13 +271,68 @@ async def test_freed_robot_returns_to_its_program_if_unclaimed(database: Transac
     await old.take()
     watch.now += HOLD
     old.look()
-    await homes.free((await homes.all()).values())
+    await homes.free(await homes.signs(), ["a", "b"])
     await old.renew()
     assert not old.why_not("a")
     assert {(h.holder, h.epoch) for h in (await homes.all()).values()} == {("old", 2)}
-    await homes.free((await homes.all()).values())
+    await homes.free(await homes.signs(), ["a", "b"])
     await other.take()
     await other.close()  # what the robot stored then is not what the old program has in memory
     await old.renew()
     assert "another program" in old.why_not("a")
     assert lost == ["a", "b", "a", "b"]
+
+
+class Held:
+    """Leaves the transaction of a call open until it is told to end it."""
+
+    def __init__(self, database: Transactions) -> None:
+        self._database, self.done, self.go = database, threading.Event(), threading.Event()
+
+    async def run(self, work: Callable[[Connection], T]) -> T:
+        def held(connection: Connection) -> T:
+            result = work(connection)
+            self.done.set()
+            assert self.go.wait(20.0)
+            return result
+
+        return await self._database.run(held)
+
+
+def wait_for_a_lock(url: str) -> None:
+    """Return when a transaction waits for another's."""
+    query, end = "SELECT count(*) FROM pg_stat_activity WHERE wait_event_type = 'Lock'", time.monotonic() + 20.0
+    with psycopg.connect(url, autocommit=True) as connection:
+        while connection.execute(query).fetchone() == (0,):
+            assert time.monotonic() < end
+            connection.execute("SELECT pg_sleep(0.01)")
+
+
+@needs_postgresql
+@pytest.mark.parametrize("first", ["take", "renew"])
+async def test_renewal_during_a_takeover_confirms_nothing(server: PostgreSQLServer, first: str) -> None:
+    server.empty()
+    one, two = open_database(Path(), server.url), open_database(Path(), server.url)
+    held = Held(one)
+    slow, fast = Homes(cast(Transactions, held)), Homes(two)
+    await fast.take({"a": "", "b": ""}, "old", {})
+    signs = await fast.signs()
+    calls = {
+        "take": lambda homes: homes.take({"a": "", "b": ""}, "new", signs),
+        "renew": lambda homes: homes.renew("old"),
+    }
+    second = "renew" if first == "take" else "take"
+    begun = asyncio.create_task(calls.pop(first)(slow))
+    assert await asyncio.to_thread(held.done.wait, 20.0)
+    meanwhile = asyncio.create_task(calls[second](fast))
+    await asyncio.to_thread(wait_for_a_lock, server.url)
+    held.go.set()
+    if first == "take":
+        assert await begun == {"a": 2, "b": 2}
+        assert await meanwhile == {}
+    else:
+        assert await begun == {"a": 1, "b": 1}
+        with pytest.raises(Occupied):
+            await meanwhile
+    one.close()
+    two.close()

@@ -1,7 +1,8 @@
 """Registry of robots' homes: which program runs which robot, under which epoch. Knows no robot and no clock.
 
-A program that has a robot counts its renewals up. Who wants the robot compares the row with one seen earlier, by a
-clock of its own: no machine's date matters.
+A program that has robots counts its renewals up. Who wants one of them compares the count with one seen earlier, by a
+clock of its own: no machine's date matters. Who changes what belongs to a program, or renews it, changes the row with
+its count first, so that only one does.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from roboglot.storage.transactions import Connection, Transactions
 
 @dataclass(frozen=True, slots=True)
 class Home:
-    """One robot's home: its program, the address of its doors, and how often the program renewed it.
+    """One robot's home: its program, and the address of its doors.
 
     ``gateway``: HOST:PORT where `roboglot connect` reaches it, empty: nowhere; ``certificate``: its SHA-256 there.
     """
@@ -23,17 +24,16 @@ class Home:
     holder: str
     address: str
     epoch: int
-    renewals: int
     gateway: str = ""
     certificate: str = ""
 
 
 class Occupied(Exception):
-    """Another program has one of the robots; ``homes`` are those it has."""
+    """Other programs have some of the robots: ``homes``; ``signs`` are those programs' renewals."""
 
-    def __init__(self, homes: Mapping[str, Home]) -> None:
+    def __init__(self, homes: Mapping[str, Home], signs: Mapping[str, int]) -> None:
         super().__init__(", ".join(homes))
-        self.homes = homes
+        self.homes, self.signs = homes, signs
 
 
 class Homes:
@@ -42,20 +42,24 @@ class Homes:
     def __init__(self, database: Transactions) -> None:
         self._database = database
 
-    async def take(self, addresses: Mapping[str, str], holder: str, silent: Mapping[str, Home]) -> dict[str, int]:
+    async def take(self, addresses: Mapping[str, str], holder: str, silent: Mapping[str, int]) -> dict[str, int]:
         """Give all these robots to ``holder``, each with a new epoch, which is returned. Raises Occupied for none.
 
-        A robot is free that is new, was released, was this holder's before, or is still as it is in ``silent``.
+        A robot is free that is new, was released, was this holder's before, or whose holder has renewed no further than
+        ``silent`` says.
         """
 
         def work(connection: Connection) -> dict[str, int]:
+            free = {"", holder, *_locked(connection, silent, holder)}
             taken = {
                 robot: epoch
                 for robot in sorted(addresses)  # always in this order, or two programs could wait for each other
-                if (epoch := _take(connection, robot, addresses[robot], holder, silent.get(robot)))
+                if (epoch := _take(connection, robot, addresses[robot], holder, free))
             }
             if left := addresses.keys() - taken.keys():
-                raise Occupied({robot: home for robot, home in _all(connection).items() if robot in left})
+                homes = {robot: home for robot, home in _all(connection).items() if robot in left}
+                held = {home.holder for home in homes.values()}
+                raise Occupied(homes, {name: count for name, count in _signs(connection).items() if name in held})
             return taken
 
         return await self._database.run(work)
@@ -64,11 +68,15 @@ class Homes:
         """Renew all that ``holder`` has; return the epochs of these robots."""
 
         def work(connection: Connection) -> dict[str, int]:
-            connection.execute("UPDATE robot_home SET renewals=renewals+1 WHERE holder=?", (holder,))
+            connection.execute("UPDATE robot_holder SET renewals=renewals+1 WHERE holder=?", (holder,))
             query = "SELECT robot, epoch FROM robot_home WHERE holder=?"
             return dict(connection.execute(query, (holder,)))
 
         return await self._database.run(work)
+
+    async def signs(self) -> dict[str, int]:
+        """Return how often each program has renewed."""
+        return await self._database.read(_signs)
 
     async def announce(self, holder: str, gateway: str, certificate: str) -> None:
         """Say where clients reach the robots that ``holder`` has."""
@@ -87,22 +95,24 @@ class Homes:
         rows = [(holder, robot, epochs[robot]) for robot in sorted(epochs)]
         await self._database.run(lambda connection: connection.executemany(query, rows))
 
-    async def free(self, silent: Collection[Home]) -> list[str]:
-        """Release those homes that are still exactly so; return their robots."""
-        query = "UPDATE robot_home SET holder='' WHERE robot=? AND holder=? AND epoch=? AND renewals=?"
+    async def free(self, silent: Mapping[str, int], robots: Collection[str]) -> list[str]:
+        """Release those of these robots whose holder has renewed no further than that; return them."""
 
         def work(connection: Connection) -> list[str]:
-            return [
-                home.robot
-                for home in sorted(silent, key=lambda home: home.robot)
-                if connection.execute(query, (home.robot, home.holder, home.epoch, home.renewals)).rowcount == 1
+            held = [
+                (robot, holder)
+                for holder in _locked(connection, silent)
+                for (robot,) in connection.execute("SELECT robot FROM robot_home WHERE holder=?", (holder,)).fetchall()
+                if robot in robots
             ]
+            query = "UPDATE robot_home SET holder='' WHERE robot=? AND holder=?"
+            return [row[0] for row in sorted(held) if connection.execute(query, row).rowcount == 1]
 
         return await self._database.run(work)
 
     async def take_back(self, epochs: Mapping[str, int], holder: str) -> dict[str, int]:
         """Give ``holder`` those robots again that were freed and that no other had since; return their new epochs."""
-        query = "UPDATE robot_home SET holder=?, epoch=epoch+1, renewals=0 WHERE robot=? AND holder='' AND epoch=?"
+        query = "UPDATE robot_home SET holder=?, epoch=epoch+1 WHERE robot=? AND holder='' AND epoch=?"
 
         def work(connection: Connection) -> dict[str, int]:
             return {
@@ -118,22 +128,43 @@ class Homes:
         return await self._database.read(_all)
 
 
-def _take(connection: Connection, robot: str, address: str, holder: str, silent: Home | None) -> int:
-    """Return the new epoch; 0 if another has it."""
-    epoch, renewals = (silent.epoch, silent.renewals) if silent else (-1, -1)
+def _locked(connection: Connection, silent: Mapping[str, int], holder: str = "") -> list[str]:
+    """Return those in ``silent`` who have renewed no further; none of them can until the transaction ends.
+
+    ``holder``: a program that takes robots, which is a sign of it.
+    """
+    still = []
+    for name in sorted({holder, *silent} - {""}):  # always in this order, or two programs could wait for each other
+        if name == holder:
+            query = "INSERT INTO robot_holder (holder, renewals) VALUES (?, 1)"
+            changed = " ON CONFLICT (holder) DO UPDATE SET renewals=robot_holder.renewals+1"
+            connection.execute(query + changed, (holder,))
+            continue
+        query = "UPDATE robot_holder SET renewals=renewals WHERE holder=? AND renewals=?"
+        if connection.execute(query, (name, silent[name])).rowcount == 1:
+            still.append(name)
+    return still
+
+
+def _take(connection: Connection, robot: str, address: str, holder: str, free: Collection[str]) -> int:
+    """Return the new epoch; 0 if a holder has it who is none of those in ``free``."""
+    marks = ", ".join("?" * len(free))
     taken = connection.execute(
-        "UPDATE robot_home SET holder=?, address=?, epoch=epoch+1, renewals=0, gateway='', certificate=''"
-        " WHERE robot=? AND (holder='' OR holder=? OR (epoch=? AND renewals=?))",
-        (holder, address, robot, holder, epoch, renewals),
+        "UPDATE robot_home SET holder=?, address=?, epoch=epoch+1, gateway='', certificate=''"
+        f" WHERE robot=? AND holder IN ({marks})",
+        (holder, address, robot, *sorted(free)),
     )
     if taken.rowcount != 1:
         added = connection.execute(
-            "INSERT INTO robot_home (robot, holder, address, epoch, renewals) VALUES (?, ?, ?, 1, 0)"
-            " ON CONFLICT (robot) DO NOTHING",
+            "INSERT INTO robot_home (robot, holder, address, epoch) VALUES (?, ?, ?, 1) ON CONFLICT (robot) DO NOTHING",
             (robot, holder, address),
         )
         return 1 if added.rowcount == 1 else 0
     return int(connection.execute("SELECT epoch FROM robot_home WHERE robot=?", (robot,)).fetchone()[0])
+
+
+def _signs(connection: Connection) -> dict[str, int]:
+    return dict(connection.execute("SELECT holder, renewals FROM robot_holder"))
 
 
 def _all(connection: Connection) -> dict[str, Home]:
@@ -141,6 +172,6 @@ def _all(connection: Connection) -> dict[str, Home]:
 
 
 def _rows(connection: Connection, which: str, values: Sequence[str] = ()) -> dict[str, Home]:
-    columns = "robot, holder, address, epoch, renewals, gateway, certificate"
+    columns = "robot, holder, address, epoch, gateway, certificate"
     rows = connection.execute(f"SELECT {columns} FROM robot_home {which}", values)
     return {row[0]: Home(*row) for row in rows}

@@ -14,7 +14,7 @@ import uuid
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from roboglot.storage.homes import Home, Homes, Occupied
+from roboglot.storage.homes import Homes, Occupied
 from roboglot.storage.transactions import DatabaseError
 
 log = logging.getLogger(__name__)
@@ -67,23 +67,23 @@ class Residence:
 
     async def take(self) -> None:
         """Take the robots, if need be after the wait for a program that is gone. Raises OSError if one is in use."""
-        began, silent = self._now(), dict[str, Home]()
+        began, silent = self._now(), dict[str, int]()
         try:
             try:
                 self._epochs = await self._homes.take(self._addresses, self._holder, silent)
             except Occupied as others:
                 log.info("robots %s are held by another program: waiting %g s for a sign of it", others, LEASE)
-                began = await self._wait_for(others.homes)
+                began = await self._wait_for(others.signs)
         except Occupied as others:
             raise OSError(f"another program runs robot {others}") from None
         except DatabaseError as error:
             raise OSError(f"the registry of robots: {error}") from None
         self._until = began + HOLD
 
-    async def _wait_for(self, held: Mapping[str, Home]) -> float:
-        """Take the robots when they are released, or have shown no sign for ``LEASE`` s; return when that began.
+    async def _wait_for(self, signs: Mapping[str, int]) -> float:
+        """Take the robots when they are released, or no sign of their holders came for ``LEASE`` s.
 
-        Raises Occupied, DatabaseError.
+        Returns when that began. Raises Occupied, DatabaseError.
         """
         end = self._now() + LEASE
         while (left := end - self._now()) > 0:
@@ -93,7 +93,7 @@ class Residence:
                 self._epochs = await self._homes.take(self._addresses, self._holder, {})
                 return began
         began = self._now()
-        self._epochs = await self._homes.take(self._addresses, self._holder, held)
+        self._epochs = await self._homes.take(self._addresses, self._holder, signs)
         return began
 
     async def announce(self, gateway: str, certificate: str) -> None:

@@ -11,7 +11,7 @@ import logging
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
-from roboglot.storage.homes import Home, Homes
+from roboglot.storage.homes import Homes
 from roboglot.storage.residence import LEASE, PERIOD, uptime
 from roboglot.storage.transactions import DatabaseError
 
@@ -21,9 +21,9 @@ GAP_MAX = 2.0  # s without a look, after which silence is counted anew
 
 @dataclass(frozen=True, slots=True)
 class _Sight:
-    """A home as it was first seen, and when."""
+    """How often a program had renewed when it was first seen so, and when that was."""
 
-    home: Home
+    renewals: int
     since: float
 
 
@@ -37,22 +37,25 @@ class Silence:
         self._homes, self._robots, self._now = homes, frozenset(robots), now
         self._seen: dict[str, _Sight] = {}
         self._looked = -float("inf")
+        self._done: dict[str, int] = {}  # programs whose robots were freed, and how often they had renewed
 
     async def look(self) -> list[str]:
         """Look once; return the robots that were freed. Raises DatabaseError."""
         began = self._now()
-        homes = await self._homes.all()
+        signs = await self._homes.signs()
         ended = self._now()
         if ended - self._looked > GAP_MAX:
             self._seen.clear()
         self._looked = ended
-        held = {robot: homes[robot] for robot in self._robots & homes.keys() if homes[robot].holder}
+        self._done = {holder: count for holder, count in self._done.items() if signs.get(holder) == count}
         self._seen = {
-            robot: sight if (sight := self._seen.get(robot)) and sight.home == home else _Sight(home, ended)
-            for robot, home in held.items()
+            holder: sight if (sight := self._seen.get(holder)) and sight.renewals == count else _Sight(count, ended)
+            for holder, count in signs.items()
+            if holder not in self._done
         }
-        silent = [sight.home for sight in self._seen.values() if began - sight.since >= LEASE]
-        freed = await self._homes.free(silent) if silent else []
+        silent = {holder: sight.renewals for holder, sight in self._seen.items() if began - sight.since >= LEASE}
+        freed = await self._homes.free(silent, self._robots) if silent else []
+        self._done |= silent
         for robot in freed:
             log.warning("robot %s is free: its program showed no sign for %g s", robot, LEASE)
         return freed
