@@ -51,6 +51,26 @@ async def test_a_robot_carried_elsewhere_finds_itself(tour: Tour) -> None:
 
 
 @pytest.mark.world("office")
+@pytest.mark.parametrize(
+    ("x", "y", "deg", "towards"), [(20.0, 10.2, 170.0, 0.0), (13.0, 6.6, -60.0, 0.0), (9.5, 9.7, 30.0, -30.0)]
+)
+async def test_who_is_carried_on_is_found_there(tour: Tour, x: float, y: float, deg: float, towards: float) -> None:
+    await tour.go((12.0, 9.8))
+    await tour.go((12.0, 6.5))
+    for turned in (0.0, 100.0, -130.0):
+        await carried(tour, x, y, deg + turned)
+        action = tour.robot_finds_itself()
+        for step in range(1, 9):  # the hands have not put it down yet when the search begins
+            ahead = Pose(x, y, math.radians(towards)).compose(Pose(0.08 * step))
+            tour.world.hands.place("a", Pose(ahead.x, ahead.y, math.radians(deg + turned)))
+            await tour.clock.advance(0.1)
+        await tour.end_of(action)
+        assert action.status is ActionStatus.SUCCEEDED, action.reason
+        assert tour.error[0] < 0.02
+        assert tour.error[1] < 1.0
+
+
+@pytest.mark.world("office")
 async def test_a_kidnapped_robot_says_so_and_recovers(tour: Tour) -> None:
     await tour.go((12.0, 9.8))
     await tour.go((12.0, 6.5))

@@ -88,9 +88,9 @@ class LidarLocalization(Localization):
         deadline = self._robot.clock.time() + SEARCH_SECONDS
         while True:
             found, odometry = await self._look(region)
-            if len(found) == 1:
-                return self._believe(found[0], odometry)
-            if found:  # another scan from the same place says no more
+            if len(found) == 1 and await self._settle(found[0], odometry):
+                return
+            if len(found) > 1:  # another scan from the same place says no more
                 raise NotLocalized(f"{len(found)} places look like what the lidar sees: drive to where they differ")
             if self._robot.clock.time() > deadline:
                 if not self.started:
@@ -112,7 +112,9 @@ class LidarLocalization(Localization):
             found, odometry = await self._look(region)
             place = hypotheses.narrow(found, odometry)
             if place is not None:
-                return self._believe(place, odometry)
+                if await self._settle(place, odometry):
+                    return
+                hypotheses = Hypotheses()
             if not await go_on(self._robot, self._belief.reader, source):
                 await self._robot.clock.sleep(SEARCH_PERIOD)
         count = len(hypotheses.places)
@@ -126,7 +128,12 @@ class LidarLocalization(Localization):
         odometry, work = search
         return await computed(self._robot.clock, work), odometry
 
-    def _believe(self, place: Match, odometry: Pose) -> None:
+    async def _settle(self, place: Match, odometry: Pose) -> bool:
+        """Believe ``place`` and match newer scans there; whether the robot stands where they say."""
+        from roboglot.autonomy.slam.settling import settle  # needs the kernels, which are loaded now
+
         assert self.estimator is not None
         self.estimator.believe(place, odometry)
+        stands = await settle(self._robot.clock, self.estimator, self._belief)
         self._robot.events.publish(PoseJumped(stamp=self._robot.clock.time(), pose=self._belief.pose))
+        return stands

@@ -27,6 +27,7 @@ POINTS_MIN = 15  # that must fit before a match is believed
 KNOWN_SHARE = 0.4  # of all points; when fewer lie on known ground, quality suffers
 SEARCH_STEP = math.radians(1.0)
 SEARCH_POINTS_MAX = 180
+WIDE = (0.5, math.radians(20.0))  # m, rad that are searched around a place in doubt
 UNKNOWN_SCORE = 50  # of 255, for a point where nothing is known: better than in floor that was seen free
 EDGE_COST = 0.1  # of a perfect score: what a pose at the edge of the window must fit better than one in its middle
 FREE = np.diag((0.1**2, 0.1**2, 0.05**2))  # variances that leave the match to the scan

@@ -26,6 +26,7 @@ from roboglot.autonomy.slam.matcher import (
     ITERATIONS_MAX,
     MATCH_POINTS_MAX,
     POINTS_MIN,
+    WIDE,
     Match,
     fit,
     places,
@@ -63,7 +64,7 @@ STILL, STILL_YAW = 0.002, math.radians(0.1)  # less than this between scans is s
 STILL_PERIOD = 0.5  # s between two matches while standing
 STANDING_PERIOD = 10.0  # s between two steps of the trajectory while standing
 LOST_QUALITY, LOST_PERIOD = 0.4, 1.0  # below this it looks around, once in so many seconds
-WIDE, NARROW = (0.5, math.radians(20.0)), (0.2, math.radians(5.0))  # m, rad around the belief that are searched
+NARROW = (0.2, math.radians(5.0))  # m, rad around the belief that are searched after a doubtful step
 DOUBT_SHARE, DOUBT_SIGMAS = 0.85, 3.0  # a worse fit than usual, or a pose so far from odometry's: match without it
 LEARNS_AFTER = 1.0  # m after a contradiction from which corrections say something of odometry again
 DISPLACED_QUALITY = 0.15  # of a robot that was shoved, until the next scans
@@ -127,6 +128,11 @@ class Slam:
         known = None if self._is_unsure or belief.in_doubt else belief.map_to_odom.compose(odometry)
         grid = belief.map
         return (odometry, lambda: places(grid, scan, region, known=known)) if len(scan.points) >= POINTS_MIN else None
+
+    @property
+    def newest(self) -> ScanTaken | None:
+        """The newest scan."""
+        return self._newest
 
     @property
     def way(self) -> float:
