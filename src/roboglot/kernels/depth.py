@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from roboglot.kernels.arrays import FloatArray
 from roboglot.kernels.compiled import kernel
 
 LOW, FLOOR = 0.10, 0.04  # m above the floor: what is lower is stepped over; is floor, for sure
 STEEP = 0.7  # rise per way from which a surface is a wall
 NEAR = 2.5  # m from base_link within which depth is precise enough
 
-Floats = NDArray[np.float64]
-
 
 @kernel("Tuple((float64[:,::1], float64[:,::1]))(float64[:,:,::1], float64[:,::1], float64[::1], float64)")
-def sort_out(rays: Floats, ways: Floats, eye: Floats, height: float) -> tuple[Floats, Floats]:
+def sort_out(rays: FloatArray, ways: FloatArray, eye: FloatArray, height: float) -> tuple[FloatArray, FloatArray]:
     """What stands, and where there is floor: x and y in base_link (n, 2; m), row by row.
 
     ``rays`` (rows from above, columns, 3) go out from ``eye`` (3), both in base_link; ``ways`` (rows, columns) is how

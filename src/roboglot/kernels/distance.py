@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from roboglot.kernels.arrays import ByteArray, SingleArray
 from roboglot.kernels.compiled import kernel
 
 
 @kernel("float32[:,::1](uint8[:,::1], float64)")
-def _along_columns(marked: Any, cap: float) -> Any:
+def _along_columns(marked: ByteArray, cap: float) -> SingleArray:
     """Distance in cells to the nearest marked cell of the same column, ``cap`` at most: down, then up."""
     height, width = marked.shape
     away = np.empty((height, width), np.float32)
@@ -33,7 +32,7 @@ def _along_columns(marked: Any, cap: float) -> Any:
 
 
 @kernel("float32[:,::1](uint8[:,::1], float64)")
-def distances(marked: Any, cap: float) -> Any:
+def distances(marked: ByteArray, cap: float) -> SingleArray:
     """Distance in cells from each cell's centre to the nearest cell with ``marked`` != 0; ``cap`` where farther."""
     away = _along_columns(marked, cap)
     height, width = away.shape

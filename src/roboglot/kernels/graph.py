@@ -5,10 +5,9 @@ Loops instead of array expressions: Numba compiles them ten times as fast, and t
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from roboglot.kernels.arrays import FloatArray, Int32Array
 from roboglot.kernels.compiled import kernel
 from roboglot.kernels.linear import invert
 
@@ -19,7 +18,14 @@ ROBUST = 9.0  # squared standard deviations beyond which an edge loses its influ
 
 
 @kernel("void(float64[:,::1], int32[:,::1], float64[:,::1], float64[:,::1], float64[:,:,::1], float64[:,::1])")
-def _linearise(poses: Any, pairs: Any, measured: Any, weights: Any, slopes: Any, system: Any) -> None:
+def _linearise(
+    poses: FloatArray,
+    pairs: Int32Array,
+    measured: FloatArray,
+    weights: FloatArray,
+    slopes: FloatArray,
+    system: FloatArray,
+) -> None:
     """Per edge: the Jacobian (3, 6) by its two poses, and (3 residuals, 3 weights after the robust cut)."""
     for k in range(pairs.shape[0]):
         i, j = pairs[k, 0], pairs[k, 1]
@@ -44,7 +50,7 @@ def _linearise(poses: Any, pairs: Any, measured: Any, weights: Any, slopes: Any,
 
 
 @kernel("void(int32[:,::1], float64[:,:,::1], float64[:,::1], float64[:,::1], float64[:,::1])")
-def _apply(pairs: Any, slopes: Any, system: Any, step: Any, result: Any) -> None:
+def _apply(pairs: Int32Array, slopes: FloatArray, system: FloatArray, step: FloatArray, result: FloatArray) -> None:
     """``result`` = normal matrix times ``step`` (n, 3); the first pose is held."""
     for i in range(result.shape[0]):
         result[i, 0], result[i, 1], result[i, 2] = 0.0, 0.0, 0.0
@@ -62,7 +68,7 @@ def _apply(pairs: Any, slopes: Any, system: Any, step: Any, result: Any) -> None
 
 
 @kernel("Tuple((float64[:,:,::1], float64[:,:,::1]))(int64, int32[:,::1], float64[:,:,::1], float64[:,::1])")
-def _chain(count: int, pairs: Any, slopes: Any, system: Any) -> Any:
+def _chain(count: int, pairs: Int32Array, slopes: FloatArray, system: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The part of the normal matrix along the chain of poses, factorised: inverted blocks, and those beside them."""
     blocks, beside = np.zeros((count, 3, 3)), np.zeros((count, 3, 3))
     for k in range(pairs.shape[0]):
@@ -90,7 +96,7 @@ def _chain(count: int, pairs: Any, slopes: Any, system: Any) -> Any:
 
 
 @kernel("void(float64[:,:,::1], float64[:,:,::1], float64[:,::1], float64[:,::1])")
-def _solve_chain(blocks: Any, beside: Any, right: Any, result: Any) -> None:
+def _solve_chain(blocks: FloatArray, beside: FloatArray, right: FloatArray, result: FloatArray) -> None:
     """``result`` = inverse of the chain's part times ``right``."""
     count = right.shape[0]
     for i in range(count):
@@ -113,7 +119,7 @@ def _solve_chain(blocks: Any, beside: Any, right: Any, result: Any) -> None:
 
 
 @kernel("float64(float64[:,::1], float64[:,::1])")
-def _product(left: Any, right: Any) -> Any:
+def _product(left: FloatArray, right: FloatArray) -> float:
     """The sum of the products of the elements."""
     total = 0.0
     for i in range(left.shape[0]):
@@ -123,7 +129,7 @@ def _product(left: Any, right: Any) -> Any:
 
 
 @kernel("void(float64[:,::1], float64, float64[:,::1])")
-def _follow(direction: Any, share: float, fresh: Any) -> None:
+def _follow(direction: FloatArray, share: float, fresh: FloatArray) -> None:
     """``direction`` = ``fresh`` + ``share`` of what it was."""
     for i in range(direction.shape[0]):
         for c in range(3):
@@ -131,7 +137,7 @@ def _follow(direction: Any, share: float, fresh: Any) -> None:
 
 
 @kernel("float64[:,::1](int64, int32[:,::1], float64[:,:,::1], float64[:,::1])")
-def _solve(count: int, pairs: Any, slopes: Any, system: Any) -> Any:
+def _solve(count: int, pairs: Int32Array, slopes: FloatArray, system: FloatArray) -> FloatArray:
     """The Gauss-Newton step, by conjugate gradients after the chain's part, which is solved exactly."""
     right = np.zeros((count, 3))
     for k in range(pairs.shape[0]):
@@ -162,7 +168,9 @@ def _solve(count: int, pairs: Any, slopes: Any, system: Any) -> Any:
 
 
 @kernel("float64[:,::1](float64[:,::1], int32[:,::1], float64[:,::1], float64[:,::1], int64)")
-def relaxed(poses: Any, pairs: Any, measured: Any, weights: Any, iterations: int) -> Any:
+def relaxed(
+    poses: FloatArray, pairs: Int32Array, measured: FloatArray, weights: FloatArray, iterations: int
+) -> FloatArray:
     """``poses`` (n, 3: x, y, yaw) moved so that they fit the edges best; the first one stays.
 
     Edge k says that pose ``pairs[k, 1]`` lies at ``measured[k]`` in the frame of pose ``pairs[k, 0]``; ``weights`` are

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
+from roboglot.kernels.arrays import FloatArray
 from roboglot.kernels.compiled import kernel
 
 
 @kernel("void(float64[:,::1])")
-def invert(matrix: Any) -> None:
+def invert(matrix: FloatArray) -> None:
     """Turn a symmetric positive definite 3x3 matrix into its inverse, by cofactors."""
     a, b, c = matrix[0, 0], matrix[0, 1], matrix[0, 2]
     d, e, f = matrix[1, 1], matrix[1, 2], matrix[2, 2]

@@ -6,10 +6,9 @@ finer than the cells. Surfaces seen from their other side are ignored: thin wall
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from roboglot.kernels.arrays import FloatArray, Int16Array, SingleArray
 from roboglot.kernels.compiled import kernel
 from roboglot.kernels.linear import invert
 from roboglot.kernels.occupancy import is_surface
@@ -25,8 +24,8 @@ CORRELATION = 0.1  # points are not independent: share of their information that
 
 @kernel("UniTuple(float64, 5)(float32[:,:,::1], int16[:,::1], float64, float64, float64, float64, float64)")
 def surface_near(
-    surface: Any, evidence: Any, x: float, y: float, beam_x: float, beam_y: float, resolution: float
-) -> Any:
+    surface: SingleArray, evidence: Int16Array, x: float, y: float, beam_x: float, beam_y: float, resolution: float
+) -> tuple[float, float, float, float, float]:
     """The surface around (x, y) as seen along the beam: mean x and y, normal x and y (0, 0: unclear), weight."""
     height, width = evidence.shape
     col, row = int(np.floor(x / resolution)), int(np.floor(y / resolution))
@@ -67,7 +66,7 @@ def surface_near(
 
 
 @kernel()
-def _add(system: Any, nx: float, ny: float, turn: float, residual: float, weight: float) -> None:
+def _add(system: FloatArray, nx: float, ny: float, turn: float, residual: float, weight: float) -> None:
     """Add one linear equation to the upper triangle (6) and right side (3) of the normal equations."""
     system[0] += weight * nx * nx
     system[1] += weight * nx * ny
@@ -82,15 +81,15 @@ def _add(system: Any, nx: float, ny: float, turn: float, residual: float, weight
 
 @kernel()
 def _linearise(
-    surface: Any,
-    evidence: Any,
-    points: Any,
-    pose: Any,
-    sensor: Any,
+    surface: SingleArray,
+    evidence: Int16Array,
+    points: FloatArray,
+    pose: FloatArray,
+    sensor: FloatArray,
     resolution: float,
     reach: float,
-    lines: Any,
-    system: Any,
+    lines: FloatArray,
+    system: FloatArray,
 ) -> tuple[int, int]:
     """Fill the normal equations at ``pose``; returns how many points fit a surface, how many lie in known cells.
 
@@ -143,8 +142,15 @@ def _linearise(
     "float64[:,::1](float32[:,:,::1], int16[:,::1], float64[:,::1], float64, float64, float64, float64[::1], float64)"
 )
 def gaps(
-    surface: Any, evidence: Any, points: Any, x: float, y: float, yaw: float, sensor: Any, resolution: float
-) -> Any:
+    surface: SingleArray,
+    evidence: Int16Array,
+    points: FloatArray,
+    x: float,
+    y: float,
+    yaw: float,
+    sensor: FloatArray,
+    resolution: float,
+) -> FloatArray:
     """How far (m) each of ``points`` lies off its surface with base_link at the pose, and the surface's weight (n, 2).
 
     inf and 0: there is none near. The more hits made the surface, the greater is its weight.
@@ -170,7 +176,7 @@ def gaps(
 
 
 @kernel("void(float64[:,::1], float64[::1], float64[:,::1])")
-def _covariance(information: Any, system: Any, result: Any) -> None:
+def _covariance(information: FloatArray, system: FloatArray, result: FloatArray) -> None:
     """``result`` = inverse of a symmetric 3x3 matrix plus the normal equations' upper triangle."""
     index = 0
     for i in range(3):
@@ -187,16 +193,16 @@ def _covariance(information: Any, system: Any, result: Any) -> None:
     " float64, int64)",
 )
 def match(
-    surface: Any,
-    evidence: Any,
-    points: Any,
-    start: Any,
-    prior: Any,
-    covariance: Any,
-    sensor: Any,
+    surface: SingleArray,
+    evidence: Int16Array,
+    points: FloatArray,
+    start: FloatArray,
+    prior: FloatArray,
+    covariance: FloatArray,
+    sensor: FloatArray,
     resolution: float,
     iterations: int,
-) -> Any:
+) -> tuple[FloatArray, FloatArray, float, int, int]:
     """The pose (x, y from the grid's corner, yaw) at which ``points`` (n, 2; base_link, m) fit the grid best.
 
     Begins at ``start``; ``covariance`` (3, 3) is the prior's; ``sensor`` the lidar's x, y in base_link. Returns the

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from roboglot.kernels.arrays import ByteArray, FloatArray, Int16Array, IntArray, SingleArray
 from roboglot.kernels.compiled import kernel
 from roboglot.kernels.distance import distances
 
 
 @kernel("boolean(int16[:,::1], int64, int64)")
-def _beside_occupied(evidence: Any, row: int, col: int) -> Any:
+def _beside_occupied(evidence: Int16Array, row: int, col: int) -> bool:
     """Whether the cell or one of its eight neighbours is occupied."""
     for r in range(max(0, row - 1), min(evidence.shape[0], row + 2)):
         for c in range(max(0, col - 1), min(evidence.shape[1], col + 2)):
@@ -23,7 +22,16 @@ def _beside_occupied(evidence: Any, row: int, col: int) -> Any:
 @kernel(
     "void(int16[:,::1], float32[:,::1], float64[:,::1], uint8[::1], float64, float64, float64, float64)",
 )
-def remember(evidence: Any, seen: Any, ends: Any, hit: Any, x: float, y: float, now: float, resolution: float) -> None:
+def remember(
+    evidence: Int16Array,
+    seen: SingleArray,
+    ends: FloatArray,
+    hit: ByteArray,
+    x: float,
+    y: float,
+    now: float,
+    resolution: float,
+) -> None:
     """Note the time ``now`` (> 0) in cells with a hit that the map does not explain; 0 in those that rays pass.
 
     ``ends`` (n, 2) and (x, y) are metres from the grid's corner.
@@ -48,15 +56,15 @@ def remember(evidence: Any, seen: Any, ends: Any, hit: Any, x: float, y: float, 
     "float32[:,::1](int16[:,::1], float32[:,::1], float64, float64, float64, float64, float64, float64)",
 )
 def inflated_cost(
-    evidence: Any,
-    seen: Any,
+    evidence: Int16Array,
+    seen: SingleArray,
     since: float,
     resolution: float,
     radius: float,
     reach: float,
     near_cost: float,
     unknown_cost: float,
-) -> Any:
+) -> SingleArray:
     """Cost per cell for a robot of ``radius`` m: inf where it would touch, 1 + ``near_cost`` beside that, falling to 1
     at ``reach`` m from obstacles; ``unknown_cost`` more where nothing is known. Obstacles: evidence above 0, or
     ``seen`` not before ``since``.
@@ -83,7 +91,7 @@ def inflated_cost(
 
 
 @kernel("float64(float64[:,::1], float64[:,::1], float64, float64, float64)")
-def free_way(path: Any, points: Any, x: float, y: float, radius: float) -> Any:
+def free_way(path: FloatArray, points: FloatArray, x: float, y: float, radius: float) -> float:
     """How far a disc of ``radius`` can go along ``path`` (n, 2; m, dense) before it touches one of ``points``.
 
     inf: all the way.
@@ -103,7 +111,7 @@ def free_way(path: Any, points: Any, x: float, y: float, radius: float) -> Any:
 
 
 @kernel("int64[::1](float32[:,::1], float64, float64, float64)")
-def nearest_open(cost: Any, row: float, col: float, reach: float) -> Any:
+def nearest_open(cost: SingleArray, row: float, col: float, reach: float) -> IntArray:
     """(row, column) of the open cell whose centre is nearest to a place and within ``reach`` of it, all in cells.
 
     ``row`` and ``col`` count from the grid's corner, so that a cell's centre lies at halves. Empty: all are closed.
@@ -120,7 +128,7 @@ def nearest_open(cost: Any, row: float, col: float, reach: float) -> Any:
 
 
 @kernel("int16[:,::1](int16[:,::1], int64)")
-def without_things(evidence: Any, size: int) -> Any:
+def without_things(evidence: Int16Array, size: int) -> Int16Array:
     """A copy in which everything is free that is occupied, at most ``size`` cells long and wide, and touches nothing.
 
     What touches: cells with at most one free cell between them belong together, as an echo's neighbours do.
@@ -156,7 +164,15 @@ def without_things(evidence: Any, size: int) -> Any:
 @kernel(
     "void(float32[:,::1], int16[:,::1], float32[:,::1], float64, uint8[:,::1], float64, float64)",
 )
-def reopen(cost: Any, evidence: Any, seen: Any, since: float, trodden: Any, reach: float, value: float) -> None:
+def reopen(
+    cost: SingleArray,
+    evidence: Int16Array,
+    seen: SingleArray,
+    since: float,
+    trodden: ByteArray,
+    reach: float,
+    value: float,
+) -> None:
     """Open the cells of ``cost`` that are ``trodden`` and have no obstacle within ``reach`` cells.
 
     They cost ``value``, and more by the square of the cells that something is closer than ``reach`` + 3. Obstacles as

@@ -7,14 +7,10 @@ the hits towards the sensor; ``marks`` int32: the number of the last scan that t
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from roboglot.kernels.arrays import ByteArray, FloatArray, Int16Array, Int32Array, SingleArray
 from roboglot.kernels.compiled import kernel
-
-Cells = NDArray[np.int16]
 
 HIT = 100
 MISS = -50
@@ -28,7 +24,7 @@ GRAZING = 0.35  # sine of the angle below which a ray passes along a surface
 
 
 @kernel("boolean(int16[:,::1], int64, int64)")
-def is_surface(evidence: Cells, row: int, col: int) -> bool:
+def is_surface(evidence: Int16Array, row: int, col: int) -> bool:
     """Return True if hits in this cell belong to a surface: it is occupied, or beside an occupied one.
 
     Echoes scatter to both sides of a wall. Those on the near side lie in cells that rays have cleared; without them
@@ -42,7 +38,9 @@ def is_surface(evidence: Cells, row: int, col: int) -> bool:
 
 
 @kernel("boolean(int16[:,::1], float32[:,:,::1], int64, int64, float64, float64, float64)")
-def _is_grazed(evidence: Any, surface: Any, row: int, col: int, dx: float, dy: float, resolution: float) -> Any:
+def _is_grazed(
+    evidence: Int16Array, surface: SingleArray, row: int, col: int, dx: float, dy: float, resolution: float
+) -> bool:
     """Return True if a ray along (dx, dy) grazes the surface in an occupied cell, which then carries no evidence."""
     count = mean_x = mean_y = xx = xy = yy = 0.0
     for r in range(max(0, row - 2), min(evidence.shape[0], row + 3)):
@@ -64,7 +62,7 @@ def _is_grazed(evidence: Any, surface: Any, row: int, col: int, dx: float, dy: f
     xx, yy = xx / count - (mean_x / count) ** 2, yy / count - (mean_y / count) ** 2
     xy = xy / count - mean_x * mean_y / (count * count)
     angle = 0.5 * np.arctan2(2.0 * xy, xx - yy)
-    return abs(dy * np.cos(angle) - dx * np.sin(angle)) < GRAZING
+    return bool(abs(dy * np.cos(angle) - dx * np.sin(angle)) < GRAZING)
 
 
 @kernel(
@@ -72,9 +70,9 @@ def _is_grazed(evidence: Any, surface: Any, row: int, col: int, dx: float, dy: f
     " float64)"
 )
 def _clear_ray(
-    evidence: Any,
-    surface: Any,
-    marks: Any,
+    evidence: Int16Array,
+    surface: SingleArray,
+    marks: Int32Array,
     scan: int,
     end_x: float,
     end_y: float,
@@ -126,7 +124,15 @@ def _clear_ray(
 
 @kernel("void(int16[:,::1], float32[:,:,::1], int32[:,::1], int64, float64[:,::1], int64, float64, float64, float64)")
 def _clear_between(
-    evidence: Any, surface: Any, marks: Any, scan: int, ends: Any, i: int, x: float, y: float, resolution: float
+    evidence: Int16Array,
+    surface: SingleArray,
+    marks: Int32Array,
+    scan: int,
+    ends: FloatArray,
+    i: int,
+    x: float,
+    y: float,
+    resolution: float,
 ) -> None:
     """Clear the floor between ray ``i`` and the next one where they are more than a cell apart."""
     j = (i + 1) % ends.shape[0]
@@ -151,12 +157,12 @@ def _clear_between(
     " float64, float64, boolean, float64)",
 )
 def integrate(
-    evidence: Any,
-    surface: Any,
-    marks: Any,
+    evidence: Int16Array,
+    surface: SingleArray,
+    marks: Int32Array,
     scan: int,
-    ends: Any,
-    hit: Any,
+    ends: FloatArray,
+    hit: ByteArray,
     x: float,
     y: float,
     fill: bool,
@@ -204,7 +210,7 @@ UNKNOWN, FITTING, HIDDEN, FLOATING, CROSSING = 0, 1, 2, 3, 4  # what the map say
 
 
 @kernel("boolean(int16[:,::1], float64, float64)")
-def _is_occupied_near(evidence: Cells, col: float, row: float) -> bool:
+def _is_occupied_near(evidence: Int16Array, col: float, row: float) -> bool:
     """Return True if the cell at (col, row) or one beside it is occupied."""
     middle_row, middle_col = int(np.floor(row)), int(np.floor(col))
     for r in range(max(0, middle_row - 1), min(evidence.shape[0], middle_row + 2)):
@@ -216,7 +222,7 @@ def _is_occupied_near(evidence: Cells, col: float, row: float) -> bool:
 
 @kernel("boolean(int16[:,::1], float64, float64, float64, float64, float64, boolean, float64)")
 def _is_pierced(
-    evidence: Cells, x: float, y: float, end_x: float, end_y: float, slack: float, wide: bool, resolution: float
+    evidence: Int16Array, x: float, y: float, end_x: float, end_y: float, slack: float, wide: bool, resolution: float
 ) -> bool:
     """Return True if the ray passes through an occupied cell more than ``slack`` m before its end.
 
@@ -239,7 +245,9 @@ def _is_pierced(
 
 
 @kernel("uint8[::1](int16[:,::1], float64[:,::1], float64, float64, float64, float64)")
-def verdicts(evidence: Any, points: Any, x: float, y: float, slack: float, resolution: float) -> Any:
+def verdicts(
+    evidence: Int16Array, points: FloatArray, x: float, y: float, slack: float, resolution: float
+) -> ByteArray:
     """What the map says of each echo at ``points`` (n, 2; m from the grid's corner), seen from (x, y).
 
     FITTING: on or beside an occupied cell; CROSSING: so, but the ray passes through a wall more than ``slack`` m before

@@ -6,18 +6,15 @@ A bound for a square of places is the sum, over the scan's points, of the best f
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from roboglot.kernels.arrays import ByteArray, FloatArray, Int32Array, IntArray
 from roboglot.kernels.compiled import kernel
 
-Bytes = NDArray[np.uint8]
 STACK_MAX = 64  # three squares wait on each level at most
 
 
-def pyramid(field: Bytes, levels: int) -> Bytes:
+def pyramid(field: ByteArray, levels: int) -> ByteArray:
     """Level k holds at [row + pad, col + pad] the highest of field[row : row + 2**k, col : col + 2**k].
 
     ``pad`` is 2**(levels - 1): squares may begin before the field does.
@@ -35,7 +32,7 @@ def pyramid(field: Bytes, levels: int) -> Bytes:
 
 
 @kernel("int64(uint8[:,:,::1], int64, int32[:,::1], int64, int64, int64)")
-def _bound(fields: Any, level: int, offsets: Any, row: int, col: int, enough: int) -> Any:
+def _bound(fields: ByteArray, level: int, offsets: Int32Array, row: int, col: int, enough: int) -> int:
     """Upper bound of the score of all places in the square at (row, col); 0 as soon as it cannot exceed ``enough``."""
     pad = 1 << (fields.shape[0] - 1)
     height, width = fields.shape[1], fields.shape[2]
@@ -46,11 +43,11 @@ def _bound(fields: Any, level: int, offsets: Any, row: int, col: int, enough: in
             total += fields[level, r, c]
         if i & 15 == 15 and total + 255 * (count - 1 - i) <= enough:
             return 0
-    return total if total > enough else 0
+    return int(total) if total > enough else 0
 
 
 @kernel("int32[:,:,::1](float64[:,::1], int64, float64)")
-def turned_offsets(points: Any, headings: int, resolution: float) -> Any:
+def turned_offsets(points: FloatArray, headings: int, resolution: float) -> Int32Array:
     """For each heading the (row, column) of each point (n, 2; m) relative to the cell in whose middle base_link is."""
     result = np.empty((headings, points.shape[0], 2), np.int32)
     for heading in range(headings):
@@ -63,7 +60,7 @@ def turned_offsets(points: Any, headings: int, resolution: float) -> Any:
 
 
 @kernel("int64[:,::1](uint8[:,:,::1], uint8[:,:,::1], int32[:,:,::1], int64)")
-def _roots(fields: Any, floors: Any, offsets: Any, enough: int) -> Any:
+def _roots(fields: ByteArray, floors: ByteArray, offsets: Int32Array, enough: int) -> IntArray:
     """The largest squares with floor in them, for every heading: (bound, heading, row, col)."""
     top = fields.shape[0] - 1
     size = 1 << top
@@ -83,7 +80,7 @@ def _roots(fields: Any, floors: Any, offsets: Any, enough: int) -> Any:
 
 
 @kernel("boolean(int64[:,::1], int64, int64, int64, int64, int64, int64)")
-def _is_taken(taken: Any, heading: int, row: int, col: int, apart: int, turned: int, headings: int) -> Any:
+def _is_taken(taken: IntArray, heading: int, row: int, col: int, apart: int, turned: int, headings: int) -> bool:
     """Whether (heading, row, col) lies within ``apart`` cells and ``turned`` headings of one that was found before."""
     for k in range(taken.shape[0]):
         turn = abs(heading - taken[k, 0])
@@ -99,13 +96,20 @@ def _is_taken(taken: Any, heading: int, row: int, col: int, apart: int, turned: 
     " int64[:,::1])",
 )
 def _best_below(
-    fields: Any, floors: Any, offsets: Any, enough: int, taken: Any, apart: int, turned: int, roots: Any
-) -> Any:
+    fields: ByteArray,
+    floors: ByteArray,
+    offsets: Int32Array,
+    enough: int,
+    taken: IntArray,
+    apart: int,
+    turned: int,
+    roots: IntArray,
+) -> tuple[int, int, int, int]:
     """The best (score, heading, row, col) above ``enough``, away from ``taken``, in the squares ``roots``."""
     top = fields.shape[0] - 1
     pad = 1 << top
     height, width = fields.shape[1] - pad, fields.shape[2] - pad
-    best = (np.int64(0), np.int64(0), np.int64(0), np.int64(0))
+    best = (0, 0, 0, 0)
     stack, children = np.empty((STACK_MAX, 4), np.int64), np.empty((4, 3), np.int64)
     for root in range(roots.shape[0]):
         bound, heading = roots[root, 0], roots[root, 1]
@@ -152,10 +156,10 @@ class PlaceSearch:
     ``apart``: cells and headings within which two places are one.
     """
 
-    def __init__(self, fields: Bytes, floors: Bytes, offsets: Any, apart: tuple[int, int]) -> None:
+    def __init__(self, fields: ByteArray, floors: ByteArray, offsets: Int32Array, apart: tuple[int, int]) -> None:
         self._fields, self._floors, self._offsets, self._apart = fields, floors, offsets, apart
-        self._taken: NDArray[np.int64] = np.empty((0, 3), np.int64)
-        self._roots: NDArray[np.int64] | None = None
+        self._taken: IntArray = np.empty((0, 3), np.int64)
+        self._roots: IntArray | None = None
 
     def next(self, enough: int) -> tuple[int, int, int, int]:
         """(score, heading, row, col) of the next place that scores above ``enough``, no less than asked for before.
@@ -167,4 +171,4 @@ class PlaceSearch:
             self._roots = np.ascontiguousarray(roots[np.argsort(-roots[:, 0], kind="stable")])
         found = _best_below(self._fields, self._floors, self._offsets, enough, self._taken, *self._apart, self._roots)
         self._taken = np.concatenate((self._taken, np.array([found[1:]], np.int64)))
-        return tuple(int(value) for value in found)  # type: ignore[return-value]
+        return found

@@ -7,17 +7,16 @@ v = (p7 x + p8 y + p9) z + p10, with x, y in pixels.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from roboglot.kernels.arrays import ByteArray, FloatArray, Int32Array, SingleArray, Uint16Array
 from roboglot.kernels.compiled import kernel
 
 NEAR = 0.03  # m in front of the eye
 
 
 @kernel(error_model="numpy")
-def _clipped(quad: Any, polygon: Any) -> int:
+def _clipped(quad: FloatArray, polygon: FloatArray) -> int:
     """The part of ``quad`` (4 x 3, camera frame) in front of NEAR into ``polygon``; its number of corners."""
     count = 0
     for i in range(4):
@@ -35,7 +34,9 @@ def _clipped(quad: Any, polygon: Any) -> int:
 
 
 @kernel(error_model="numpy")
-def _plane(quad: Any, mapping: Any, rotation: Any, eye: Any, lens: Any, plane: Any) -> bool:
+def _plane(
+    quad: FloatArray, mapping: FloatArray, rotation: FloatArray, eye: FloatArray, lens: FloatArray, plane: FloatArray
+) -> bool:
     """The coefficients of a quad's plane; False if it is seen from behind or edge on."""
     ax, ay, az = quad[1, 0] - quad[0, 0], quad[1, 1] - quad[0, 1], quad[1, 2] - quad[0, 2]
     bx, by, bz = quad[2, 0] - quad[0, 0], quad[2, 1] - quad[0, 1], quad[2, 2] - quad[0, 2]
@@ -63,7 +64,15 @@ def _plane(quad: Any, mapping: Any, rotation: Any, eye: Any, lens: Any, plane: A
 
 
 @kernel(error_model="numpy")
-def _fill(polygon: Any, count: int, number: int, plane: Any, ends: Any, depth: Any, seen: Any) -> None:
+def _fill(
+    polygon: FloatArray,
+    count: int,
+    number: int,
+    plane: FloatArray,
+    ends: FloatArray,
+    depth: SingleArray,
+    seen: Uint16Array,
+) -> None:
     """Write ``number`` wherever the projected polygon (pixels) is the nearest so far."""
     height, width = depth.shape
     low, high = polygon[0, 1], polygon[0, 1]
@@ -105,17 +114,17 @@ def _fill(polygon: Any, count: int, number: int, plane: Any, ends: Any, depth: A
     error_model="numpy",
 )
 def draw(
-    corners: Any,
-    mappings: Any,
-    rooms: Any,
-    visible: Any,
-    rotation: Any,
-    eye: Any,
-    lens: Any,
-    planes: Any,
-    sources: Any,
-    depth: Any,
-    seen: Any,
+    corners: FloatArray,
+    mappings: FloatArray,
+    rooms: Int32Array,
+    visible: ByteArray,
+    rotation: FloatArray,
+    eye: FloatArray,
+    lens: FloatArray,
+    planes: FloatArray,
+    sources: Int32Array,
+    depth: SingleArray,
+    seen: Uint16Array,
     first: int,
 ) -> int:
     """Draw quads (n x 4 x 3, world, counter-clockwise from outside) of rooms that are ``visible``; returns how many.

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from roboglot.kernels.arrays import ByteArray
 from roboglot.kernels.compiled import kernel
 
 ROOMS_MAX = 255  # room 0 is outside
 
 
 @kernel("int64(uint8[:,::1], uint8[:,::1])")
-def label(walls: Any, rooms: Any) -> int:
+def label(walls: ByteArray, rooms: ByteArray) -> int:
     """Number connected cells that are not ``walls`` 1, 2 … in ``rooms``; wall cells get a neighbour's number.
 
     Rooms beyond ROOMS_MAX share the last number. Returns how many rooms there are.
@@ -54,7 +53,7 @@ def label(walls: Any, rooms: Any) -> int:
 
 
 @kernel("void(uint8[:,::1], uint8[:,::1], float64, float64, float64, float64, uint8[::1])")
-def look(solid: Any, rooms: Any, x: float, y: float, yaw: float, spread: float, visible: Any) -> None:
+def look(solid: ByteArray, rooms: ByteArray, x: float, y: float, yaw: float, spread: float, visible: ByteArray) -> None:
     """Mark in ``visible`` every room whose cells are met within ``spread`` rad around ``yaw`` before a solid cell.
 
     (x, y) in cells. The first three cells never stop a look: a wall's cell may reach a little beyond the wall.

@@ -7,10 +7,9 @@ distance are exact at the ends of short strips and linear in between.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from roboglot.kernels.arrays import ByteArray, FloatArray, Int32Array, SingleArray, Uint16Array, Uint32Array
 from roboglot.kernels.compiled import kernel
 from roboglot.kernels.planes import FIRST
 
@@ -21,16 +20,16 @@ LEVELS = 8  # 256, 128 ... 2 texels a side
 OFFSETS = np.concatenate(([0], np.cumsum([4 ** (8 - level) for level in range(LEVELS)]))).astype(np.int64)
 ONE = 4294967296.0  # a texture's width in whole numbers: its fraction fills 32 bits
 U, S = np.uint32, np.int32
-WHITE: Any = S(235)
-HALF: Any = S((128 << 16) + (1 << 15))
-PAIR: Any = U(0x00FF00FF)
+WHITE = S(235)
+HALF = S((128 << 16) + (1 << 15))
+PAIR = U(0x00FF00FF)
 FAR = 80.0  # m
 HAZE = 0.045  # 1/m: how fast light fades with the distance from the eye
 DARKEST = 0.35
 
 
 @kernel(error_model="numpy", inline="always")
-def _at(planes: Any, k: int, x: float, y: float) -> tuple[Any, Any, Any]:
+def _at(planes: FloatArray, k: int, x: float, y: float) -> tuple[float, float, float]:
     """Distance ahead and texture coordinates at a pixel."""
     near = planes[k, 0] * x + planes[k, 1] * y + planes[k, 2]
     z = 1.0 / max(near, 1.0 / FAR)
@@ -40,7 +39,7 @@ def _at(planes: Any, k: int, x: float, y: float) -> tuple[Any, Any, Any]:
 
 
 @kernel(error_model="numpy", inline="always")
-def _texels(planes: Any, k: int, z: float, u: float, v: float) -> Any:
+def _texels(planes: FloatArray, k: int, z: float, u: float, v: float) -> float:
     """How many of a texture's 256 texels lie between two pixels there, between sharp and calm."""
     across = abs(planes[k, 3] - (u - planes[k, 6]) * planes[k, 0]) + abs(
         planes[k, 7] - (v - planes[k, 10]) * planes[k, 0]
@@ -48,11 +47,11 @@ def _texels(planes: Any, k: int, z: float, u: float, v: float) -> Any:
     along = abs(planes[k, 4] - (u - planes[k, 6]) * planes[k, 1]) + abs(
         planes[k, 8] - (v - planes[k, 10]) * planes[k, 1]
     )
-    return 256.0 * z * max(0.5 * max(across, along), min(across, along))
+    return float(256.0 * z * max(0.5 * max(across, along), min(across, along)))
 
 
 @kernel(error_model="numpy", inline="always")
-def _level(texels: float) -> Any:
+def _level(texels: float) -> int:
     """Which copy of the texture has about one texel per pixel."""
     level = 0
     while texels > 1.0 and level < LEVELS - 1:
@@ -62,14 +61,16 @@ def _level(texels: float) -> Any:
 
 
 @kernel(error_model="numpy", inline="always")
-def _light(paints: Any, k: int, z: float, gain: float) -> Any:
+def _light(paints: SingleArray, k: int, z: float, gain: float) -> float:
     """Brightness of a surface z metres ahead."""
     fade = DARKEST + (1.0 - DARKEST) / (1.0 + HAZE * z)
-    return gain * paints[k, 6] * (1.0 + paints[k, 7] * (fade - 1.0))
+    return float(gain * paints[k, 6] * (1.0 + paints[k, 7] * (fade - 1.0)))
 
 
 @kernel(error_model="numpy", inline="always")
-def _paint_flat(luma: Any, row: int, x0: int, x1: int, light: float, light_end: float, paints: Any, k: int) -> None:
+def _paint_flat(
+    luma: ByteArray, row: int, x0: int, x1: int, light: float, light_end: float, paints: SingleArray, k: int
+) -> None:
     count, line = x1 - x0, luma[np.uintp(row)]
     value, step = (
         S(light * paints[k, 0] * 65536.0) + S(16 << 16),
@@ -80,7 +81,9 @@ def _paint_flat(luma: Any, row: int, x0: int, x1: int, light: float, light_end: 
 
 
 @kernel(error_model="numpy", inline="always")
-def _fetch(texels: Any, places: Any, count: int, masks: Any, texture: int, level: int, uv: Any) -> None:
+def _fetch(
+    texels: Uint32Array, places: Uint32Array, count: int, masks: Uint32Array, texture: int, level: int, uv: FloatArray
+) -> None:
     """The texels of ``count`` pixels. Where they lie is worked out first: without the look-up it is wide arithmetic."""
     u, v = U(np.int64(uv[0] * ONE)), U(np.int64(uv[1] * ONE))
     du, dv = U(np.int64(uv[2] * ONE)), U(np.int64(uv[3] * ONE))
@@ -94,8 +97,8 @@ def _fetch(texels: Any, places: Any, count: int, masks: Any, texture: int, level
 
 @kernel(error_model="numpy", inline="always")
 def _paint_textured(
-    luma: Any, row: int, x0: int, x1: int, texels: Any, level: int, uv: Any, light: float, light_end: float,
-    paints: Any, k: int,
+    luma: ByteArray, row: int, x0: int, x1: int, texels: Uint32Array, level: int, uv: FloatArray,
+    light: float, light_end: float, paints: SingleArray, k: int,
 ) -> None:  # fmt: skip
     """``texels`` were fetched; ``uv``: u and v at x0 and their steps per pixel, in textures.
 
@@ -125,7 +128,16 @@ def _paint_textured(
 
 @kernel(error_model="numpy", inline="always")
 def _paint_chroma(
-    blue: Any, red: Any, row: int, x0: int, x1: int, texels: Any, level: int, light: float, paints: Any, k: int
+    blue: ByteArray,
+    red: ByteArray,
+    row: int,
+    x0: int,
+    x1: int,
+    texels: Uint32Array,
+    level: int,
+    light: float,
+    paints: SingleArray,
+    k: int,
 ) -> None:
     """Every second pixel of an even row; ``level`` below 0: no texture."""
     bright = 65536.0 * min(light, 1.0)
@@ -145,7 +157,7 @@ def _paint_chroma(
 
 
 @kernel(error_model="numpy", inline="always")
-def _cell(cells: Any, frame: Any, u: float, v: float) -> Any:
+def _cell(cells: ByteArray, frame: FloatArray, u: float, v: float) -> int:
     """What ``cells`` says at a place of the floor."""
     column = int(min(max((u - frame[0]) * frame[2], 0.0), cells.shape[1] - 1.0))
     row = int(min(max((v - frame[1]) * frame[2], 0.0), cells.shape[0] - 1.0))
@@ -153,7 +165,7 @@ def _cell(cells: Any, frame: Any, u: float, v: float) -> Any:
 
 
 @kernel(error_model="numpy", inline="always")
-def _shadow(cells: Any, frame: Any, u: float, v: float) -> Any:
+def _shadow(cells: ByteArray, frame: FloatArray, u: float, v: float) -> float:
     """Smooth brightness 0..1 of a place of the floor."""
     column = min(max((u - frame[0]) * frame[2] - 0.5, 0.0), cells.shape[1] - 1.001)
     row = min(max((v - frame[1]) * frame[2] - 0.5, 0.0), cells.shape[0] - 1.001)
@@ -161,11 +173,11 @@ def _shadow(cells: Any, frame: Any, u: float, v: float) -> Any:
     part, down = column - j, row - i
     upper = cells[i, j] + (float(cells[i, j + 1]) - cells[i, j]) * part
     lower = cells[i + 1, j] + (float(cells[i + 1, j + 1]) - cells[i + 1, j]) * part
-    return (upper + (lower - upper) * down) / 255.0
+    return float((upper + (lower - upper) * down) / 255.0)
 
 
 @kernel(error_model="numpy", inline="always")
-def _run(seen: Any, y: int, x: int, limit: int) -> Any:
+def _run(seen: Uint16Array, y: int, x: int, limit: int) -> int:
     """Where the run of equal numbers that begins at (x, y) ends, at ``limit`` if not before."""
     number, end = seen[y, x], x
     while end + BLOCK <= limit:
@@ -186,19 +198,19 @@ def _run(seen: Any, y: int, x: int, limit: int) -> Any:
     error_model="numpy",
 )
 def shade(
-    seen: Any,
-    planes: Any,
-    sources: Any,
-    paints: Any,
-    textures: Any,
-    masks: Any,
-    grounds: Any,
-    shadows: Any,
-    frame: Any,
+    seen: Uint16Array,
+    planes: FloatArray,
+    sources: Int32Array,
+    paints: SingleArray,
+    textures: Int32Array,
+    masks: Uint32Array,
+    grounds: ByteArray,
+    shadows: ByteArray,
+    frame: FloatArray,
     gain: float,
-    luma: Any,
-    blue: Any,
-    red: Any,
+    luma: ByteArray,
+    blue: ByteArray,
+    red: ByteArray,
 ) -> None:
     """Colour what ``raster.draw`` found. Planes 0 and 1 are floor and ceiling.
 

@@ -9,9 +9,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from roboglot.kernels.arrays import FloatArray
 from roboglot.kernels.compiled import kernel
 
-Floats = NDArray[np.float64]
 SPHERE, CAPSULE, CYLINDER, BOX = 2, 3, 5, 6  # as in MuJoCo's mjtGeom
 
 
@@ -108,12 +108,12 @@ def _along(
 @kernel("int64(int32[::1], float64[:,::1], float64[::1], float64[::1], float64, int64[::1], float64[::1])")
 def _reached(
     kinds: NDArray[np.int32],
-    places: Floats,
-    bounds: Floats,
-    origin: Floats,
+    places: FloatArray,
+    bounds: FloatArray,
+    origin: FloatArray,
     reach: float,
     chosen: NDArray[np.int64],
-    nearest: Floats,
+    nearest: FloatArray,
 ) -> int:
     """How many solids may be met: ``chosen`` gets their rows, ``nearest`` how near at least (m), the nearest first."""
     count = 0
@@ -139,14 +139,14 @@ def _reached(
 )
 def cast(
     kinds: NDArray[np.int32],
-    places: Floats,
-    turns: Floats,
-    sizes: Floats,
-    bounds: Floats,
-    origin: Floats,
-    directions: Floats,
+    places: FloatArray,
+    turns: FloatArray,
+    sizes: FloatArray,
+    bounds: FloatArray,
+    origin: FloatArray,
+    directions: FloatArray,
     reach: float,
-) -> Floats:
+) -> FloatArray:
     """Distances (m) from ``origin`` along ``directions`` (k, 3; of length 1); inf where nothing is within ``reach``.
 
     Solids by row: kind, middle (3), rotation into the world (9, row by row), half extents (3) and the radius of the

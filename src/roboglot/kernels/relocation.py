@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from roboglot.kernels.arrays import ByteArray, FloatArray, Int16Array
 from roboglot.kernels.compiled import kernel
 
 
 @kernel("uint8[:,::1](int16[:,::1])")
-def likelihood_field(evidence: Any) -> Any:
+def likelihood_field(evidence: Int16Array) -> ByteArray:
     """255 in occupied cells, less in the two rings around them, 0 elsewhere."""
     height, width = evidence.shape
     field = np.zeros((height, width), np.uint8)
@@ -30,15 +29,15 @@ def likelihood_field(evidence: Any) -> Any:
     "UniTuple(float64, 4)(uint8[:,::1], float64[:,::1], float64[::1], float64, float64, float64, float64, float64)",
 )
 def correlate(
-    field: Any,
-    points: Any,
-    centre: Any,
+    field: ByteArray,
+    points: FloatArray,
+    centre: FloatArray,
     resolution: float,
     reach: float,
     turn: float,
     turn_step: float,
     edge_cost: float,
-) -> Any:
+) -> tuple[float, float, float, float]:
     """The best of all poses within ``reach`` m (in cells) and ``turn`` rad around ``centre``: x, y, yaw, score 0..1.
 
     ``points`` (n, 2) are in base_link, ``centre`` is (x, y from the grid's corner, yaw). A pose at the window's edge

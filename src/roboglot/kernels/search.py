@@ -6,10 +6,9 @@ again when a cheaper way to it turns up within its bucket; the search ends when 
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from roboglot.kernels.arrays import Int8Array, Int32Array, SingleArray
 from roboglot.kernels.compiled import kernel
 
 DIAGONAL = np.sqrt(2.0)
@@ -19,7 +18,7 @@ ENTRIES = 65_536  # waiting cells at the start; grows
 
 
 @kernel("int32[:,::1](int8[::1], int64, int64, int64)")
-def _trace(came: Any, start: int, goal: int, width: int) -> Any:
+def _trace(came: Int8Array, start: int, goal: int, width: int) -> Int32Array:
     """The cells from start to goal; ``came`` holds the step (0-8) by which each was reached."""
     count, cell = 1, goal
     while cell != start:
@@ -37,17 +36,19 @@ def _trace(came: Any, start: int, goal: int, width: int) -> Any:
 
 
 @kernel("float64(int64, int64)")
-def _least_cost(rows: int, columns: int) -> Any:
+def _least_cost(rows: int, columns: int) -> float:
     """What the way over so many rows and columns costs at least: octile distance on open floor."""
     rows, columns = abs(rows), abs(columns)
-    return max(rows, columns) + (DIAGONAL - 1.0) * min(rows, columns)
+    return float(max(rows, columns) + (DIAGONAL - 1.0) * min(rows, columns))
 
 
 @kernel(
     "boolean(float32[:,::1], int64, int64, int64, int64, float32[::1], int8[::1])",
     error_model="numpy",
 )
-def _search(cost: Any, start_row: int, start_col: int, goal_row: int, goal_col: int, paid: Any, came: Any) -> Any:
+def _search(
+    cost: SingleArray, start_row: int, start_col: int, goal_row: int, goal_col: int, paid: SingleArray, came: Int8Array
+) -> bool:
     """Fill ``paid`` (1 + cost; 0: not reached) and ``came`` until the goal's are final; True if it was reached."""
     height, width = cost.shape
     ground, goal = cost.ravel(), goal_row * width + goal_col
@@ -104,10 +105,10 @@ def _search(cost: Any, start_row: int, start_col: int, goal_row: int, goal_col: 
                         places[i], asked[i], below[i] = old_places[i], old_asked[i], old_below[i]
             places[fresh], asked[fresh], below[fresh] = (r << 16) | c, value, heads[place]
             heads[place], waiting = fresh, waiting + 1
-    return paid[goal] > 0.0
+    return bool(paid[goal] > 0.0)
 
 
-def shortest_path(cost: Any, start_row: int, start_col: int, goal_row: int, goal_col: int) -> Any:
+def shortest_path(cost: SingleArray, start_row: int, start_col: int, goal_row: int, goal_col: int) -> Int32Array:
     """Cells (row, column; int32) from start to goal with the least cost; no cell if there is no way.
 
     A step costs its length in cells times the mean ``cost`` (float32, >= 1, inf: closed) of its two cells; diagonal
@@ -123,7 +124,7 @@ def shortest_path(cost: Any, start_row: int, start_col: int, goal_row: int, goal
     return _trace(came, start_row * width + start_col, goal_row * width + goal_col, width)
 
 
-def ways_from(cost: Any, row: int, col: int) -> Any:
+def ways_from(cost: SingleArray, row: int, col: int) -> SingleArray:
     """What the cheapest way to each cell costs (float32, shape of ``cost``), by the same rules; inf: there is none."""
     height, width = cost.shape
     # The goal lies below the grid, where no way leads: the search ends when all is found.

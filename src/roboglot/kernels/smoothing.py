@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from roboglot.kernels.arrays import Int32Array, SingleArray
 from roboglot.kernels.compiled import kernel
 
 SIGHT_MAX = 160  # cells of path that one straight line may replace
@@ -13,7 +12,7 @@ STEP = 0.5  # cells between two samples of a line
 
 
 @kernel("float64(float32[:,::1], float64, float64, float64, float64)")
-def line_cost(cost: Any, row0: float, col0: float, row1: float, col1: float) -> Any:
+def line_cost(cost: SingleArray, row0: float, col0: float, row1: float, col1: float) -> float:
     """Cost of the straight line between two points (in cells; a cell's centre has whole numbers); inf if closed."""
     length = np.sqrt((row1 - row0) ** 2 + (col1 - col0) ** 2)
     count = max(1, int(np.ceil(length / STEP)))
@@ -24,11 +23,11 @@ def line_cost(cost: Any, row0: float, col0: float, row1: float, col1: float) -> 
         if not np.isfinite(value):
             return np.inf
         total += value * (0.5 if i == 0 or i == count else 1.0)
-    return total * length / count
+    return float(total * length / count)
 
 
 @kernel("int32[::1](float32[:,::1], int32[:,::1], float64)")
-def corners(cost: Any, path: Any, slack: float) -> Any:
+def corners(cost: SingleArray, path: Int32Array, slack: float) -> Int32Array:
     """Indices of the cells of ``path`` to keep: between two of them the line costs at most ``slack`` times the path."""
     count = path.shape[0]
     kept = np.empty(max(count, 1), np.int32)

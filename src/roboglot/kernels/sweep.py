@@ -5,17 +5,17 @@ own functions.
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
+from roboglot.kernels.arrays import FloatArray, SingleArray
 from roboglot.kernels.compiled import kernel
 
 GRAZE = 1e-9  # m2: an edge seen along itself; rounding would put it anywhere, even at the eye
 
 
 @kernel("boolean(float64[::1], float64, float64, float64, float64, float64)")
-def _hidden(ranges: Any, x: float, y: float, sine: float, near: float, step: float) -> bool:
+def _hidden(ranges: FloatArray, x: float, y: float, sine: float, near: float, step: float) -> bool:
     """True if all rays that might meet a circle end before it; (x, y) points to it, ``sine`` is of half its angle.
 
     Looks at some rays too many: the angle comes from a polynomial that is ten times as quick as the arc tangent.
@@ -40,7 +40,9 @@ def _hidden(ranges: Any, x: float, y: float, sine: float, near: float, step: flo
 
 
 @kernel("float64[::1](float64[:,::1], float64[:,::1], float64[:,::1], float64, float64, float64, float64)")
-def sweep(edges: Any, circles: Any, directions: Any, x: float, y: float, yaw: float, reach: float) -> Any:
+def sweep(
+    edges: FloatArray, circles: FloatArray, directions: FloatArray, x: float, y: float, yaw: float, reach: float
+) -> FloatArray:
     """Distances (m) from (x, y) along ``directions``, turned by ``yaw``; inf beyond ``reach``.
 
     ``directions`` (rays, 2) begin at -pi and go round evenly. ``edges`` (n, 4) have their solid to the left of the way
@@ -94,7 +96,7 @@ def sweep(edges: Any, circles: Any, directions: Any, x: float, y: float, yaw: fl
 
 
 @kernel("float32[::1](float64[::1], float32[::1], float64, float64, float64)")
-def blur(exact: Any, noise: Any, sigma: float, low: float, high: float) -> Any:
+def blur(exact: FloatArray, noise: SingleArray, sigma: float, low: float, high: float) -> SingleArray:
     """Distances with ``noise`` (standard normal) of ``sigma`` m; NaN below ``low``, inf beyond ``high``."""
     ranges = np.empty_like(noise)
     spread, nearest, farthest = np.float32(sigma), np.float32(low), np.float32(high)

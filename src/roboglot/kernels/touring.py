@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from roboglot.kernels.arrays import FloatArray, IntArray
 from roboglot.kernels.compiled import kernel
 
 EXACT_MAX = 12  # places besides the start that are ordered exactly
@@ -14,7 +13,7 @@ GAIN_MIN = 1e-9  # less is no improvement
 
 
 @kernel("int64[::1](float64[:,::1], boolean)")
-def _exact(costs: Any, closed: bool) -> Any:
+def _exact(costs: FloatArray, closed: bool) -> IntArray:
     """Held and Karp: the cheapest order of all places, beginning with place 0; at most EXACT_MAX + 1 places."""
     count = costs.shape[0] - 1
     best, came = np.empty((1 << count, count)), np.empty((1 << count, count), np.int64)
@@ -49,7 +48,7 @@ def _exact(costs: Any, closed: bool) -> Any:
 
 
 @kernel("int64[::1](float64[:,::1])")
-def _nearest_next(costs: Any) -> Any:
+def _nearest_next(costs: FloatArray) -> IntArray:
     """Always on to the nearest place left."""
     count = costs.shape[0]
     order, left = np.empty(count, np.int64), np.empty(count, np.int64)
@@ -65,13 +64,13 @@ def _nearest_next(costs: Any) -> Any:
 
 
 @kernel("float64(float64[:,::1], int64, int64)")
-def _step(costs: Any, a: int, b: int) -> Any:
+def _step(costs: FloatArray, a: int, b: int) -> float:
     """The cost from a to b; b below 0: the tour ends with a."""
     return costs[a, b] if b >= 0 else 0.0
 
 
 @kernel("void(int64[::1], int64, int64)")
-def _turn_round(order: Any, first: int, last: int) -> None:
+def _turn_round(order: IntArray, first: int, last: int) -> None:
     """Put the places from ``first`` to ``last`` into the opposite order."""
     while first < last:
         order[first], order[last] = order[last], order[first]
@@ -79,7 +78,7 @@ def _turn_round(order: Any, first: int, last: int) -> None:
 
 
 @kernel("void(int64[::1], int64, int64, int64)")
-def _swap_runs(order: Any, first: int, second: int, end: int) -> None:
+def _swap_runs(order: IntArray, first: int, second: int, end: int) -> None:
     """Put the places from ``second`` to before ``end`` in front of those from ``first`` on."""
     _turn_round(order, first, end - 1)
     _turn_round(order, first, first + end - second - 1)
@@ -87,7 +86,7 @@ def _swap_runs(order: Any, first: int, second: int, end: int) -> None:
 
 
 @kernel("boolean(float64[:,::1], int64[::1], boolean)")
-def _improve(costs: Any, order: Any, closed: bool) -> Any:
+def _improve(costs: FloatArray, order: IntArray, closed: bool) -> bool:
     """One pass of 2-opt and Or-opt over ``order``, in place; whether anything got better. Costs are symmetric."""
     count, better = order.shape[0], False
     end = 0 if closed else -1  # what follows the last place
@@ -124,7 +123,7 @@ def _improve(costs: Any, order: Any, closed: bool) -> Any:
 
 
 @kernel("int64[::1](float64[:,::1], int64, boolean)")
-def visiting_order(costs: Any, passes: int, closed: bool) -> Any:
+def visiting_order(costs: FloatArray, passes: int, closed: bool) -> IntArray:
     """The places 0 to n-1 in the order of a short tour from place 0, and back to it if ``closed``.
 
     ``costs`` (n, n) symmetric, finite. Exact up to EXACT_MAX places besides the start; beyond, at most ``passes``
