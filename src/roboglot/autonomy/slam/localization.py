@@ -130,7 +130,7 @@ class LidarLocalization(Localization):
 
     async def _settle(self, place: Match, odometry: Pose) -> bool:
         """Believe ``place`` and match newer scans there; whether the robot stands where they say."""
-        from roboglot.autonomy.slam.settling import settle  # needs the kernels, which are loaded now
+        from roboglot.autonomy.slam.look_around import settle  # needs the kernels, which are loaded now
 
         assert self.estimator is not None
         self.estimator.believe(place, odometry)

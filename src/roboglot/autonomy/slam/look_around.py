@@ -1,6 +1,8 @@
-"""Which of several places that look alike it is: drive on a little, look again, and keep those that still fit.
+"""Looking again: whether the one place that was found is right, or which of several that look alike.
 
-A lidar that sees all around learns nothing by turning, so the robot goes where the scan shows room.
+A newer scan must fit the one, too: the robot may be carried on while the search looks at a scan. Of several, those are
+kept that still fit after driving on a little. A lidar that sees all around learns nothing by turning, so the robot goes
+where the scan shows room. Needs the kernels.
 """
 
 from __future__ import annotations
@@ -11,12 +13,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from roboglot.autonomy.slam.matcher import PLACES_MAX, Match
+from roboglot.autonomy.slam.belief import Belief
+from roboglot.autonomy.slam.matcher import FREE, PLACE_AGREEMENT, PLACES_MAX, WIDE, Match, fit, search
 from roboglot.autonomy.slam.scan_points import ScanPoints, ScanReader
+from roboglot.autonomy.slam.slam import Slam
 from roboglot.model.actions import Action, ActionStatus
+from roboglot.model.clock import Clock
 from roboglot.model.components.energy.battery import DockContact
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.events import ScanTaken
 from roboglot.model.geometry import ORIGIN, Pose, wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import LaserScan
@@ -28,6 +34,36 @@ PERIOD = 0.1  # s between two looks ahead
 SPEED = 0.25  # m/s
 AHEAD = math.radians(120.0)  # it does not go back where it came from, unless nothing else is open
 SAME, SAME_YAW = 0.25, math.radians(8.0)  # between where a place should be by odometry now and where it is found
+SETTLE_SECONDS = 5.0  # that newer scans may take to agree
+LISTEN_PERIOD = 0.05  # s between two looks for a newer scan
+SETTLED, SETTLED_YAW = 0.02, math.radians(1.0)  # m, rad between two scans of a robot that stands where it was found
+
+
+async def settle(clock: Clock, estimator: Slam, belief: Belief) -> bool:
+    """Believe what newer scans say around the found place, until one confirms it; False if they do not fit there."""
+    end, seen = clock.time() + SETTLE_SECONDS, estimator.newest
+    while clock.time() < end:
+        await clock.sleep(LISTEN_PERIOD)
+        newest = estimator.newest
+        if newest is None or newest is seen:
+            continue
+        seen, expected = newest, belief.map_to_odom.compose(newest.odometry)
+        found = _matched(belief, newest)
+        if found is None:
+            return False
+        estimator.believe(found, newest.odometry)
+        off, turned = found.pose.distance_to(expected), abs(wrap_angle(found.pose.yaw - expected.yaw))
+        if off < SETTLED and turned < SETTLED_YAW:
+            return True
+    return False
+
+
+def _matched(belief: Belief, newest: ScanTaken) -> Match | None:
+    """Where the scan fits around the believed place; None if it does not."""
+    scan, expected = belief.reader.read(newest.scan), belief.map_to_odom.compose(newest.odometry)
+    start = search(belief.map, scan, expected, WIDE)
+    found = max((fit(belief.map, scan, pose, FREE) for pose in (expected, start)), key=lambda match: match.fit)
+    return found if found.agreement >= PLACE_AGREEMENT else None
 
 
 @dataclass(slots=True)
