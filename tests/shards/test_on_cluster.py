@@ -131,6 +131,7 @@ def test_manifest_has_only_known_fields_and_locked_ray(name: str) -> None:
     document = msgspec.convert(yaml.safe_load((KUBERAY / name).read_text()), type=RayCluster | RayJob)
     cluster = document.spec if isinstance(document, RayCluster) else document.spec.ray_cluster_spec
     assert document.api_version == "ray.io/v1"
+    assert re.fullmatch("[a-z]([-a-z0-9]{0,45}[a-z0-9])?", document.metadata.name)  # the operator's rule
     locked = re.search(r"^ray==([\d.]+)", LOCK.read_text(), re.MULTILINE)
     assert locked
     assert cluster.ray_version == locked[1]
