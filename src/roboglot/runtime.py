@@ -26,7 +26,7 @@ from roboglot.console.desk import World as ConsoleWorld
 from roboglot.console.recordings import Recordings
 from roboglot.console.server import Console
 from roboglot.console.studio.lessons import FOLDER
-from roboglot.console.studio.programs import Programs, Studio
+from roboglot.console.studio.programs import ClassHome, Programs, Studio
 from roboglot.fleet import build_fleet, origin_of
 from roboglot.hosting.exclusive import lock_folder
 from roboglot.model.client_context import concerning
@@ -126,9 +126,12 @@ class RobotDoors:
 class Runtime:
     """One world, its robots, their doors. ``start`` returns when every door answers; ``close`` takes under a second."""
 
-    def __init__(self, config: Config, doors: tuple[DoorType, ...] = DOORS) -> None:
+    def __init__(
+        self, config: Config, doors: tuple[DoorType, ...] = DOORS, *, class_home: ClassHome | None = None
+    ) -> None:
+        """``class_home``: the classroom that this world shares with others."""
         refuse_unguarded(config)
-        self.config = config
+        self.config, self._class_home = config, class_home
         self._lock = lock_folder(config.data)
         running = PatientClock if config.patient else RealClock
         self.clock: Clock = LockstepClock() if config.lockstep else running(config.speed)
@@ -273,7 +276,9 @@ class Runtime:
 
         bodies = {robot.name: robot.body for robot in self.config.robots}
         world = ConsoleWorld(self.config.world, version("roboglot"), self.clock, self.config.seed, bodies)
-        studio = Studio(self._programs, self._rehearsals, self._scene_of, (FOLDER, self.config.data / "lessons"))
+        data, home = self.config.data, self._class_home
+        folders = (FOLDER, data / "lessons")
+        studio = Studio(self._programs, self._rehearsals, self._scene_of, folders, data / "classes", home)
 
         def running() -> int:
             return 0 if self._engine is None else self._engine.running

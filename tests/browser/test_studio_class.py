@@ -66,8 +66,8 @@ async def test_a_class_from_its_code_to_its_results(studio: Open) -> None:
     async with teacher.expect_download() as saved:
         await teacher.click("text=Results as a table")
     text = await asyncio.to_thread(Path(await (await saved.value).path()).read_text, "utf-8-sig")
-    assert text.splitlines()[0].startswith('"name","robot","stars"')
-    assert text.splitlines()[1].startswith('"Anna","a","0","yes"')
+    assert text.splitlines()[0].startswith('"name","world","robot","stars"')
+    assert text.splitlines()[1].startswith('"Anna","","a","0","yes"')
     await anna.reload()  # still in the class
     await until(anna, f"document.querySelector('#panel')?.textContent.includes('{code}')")
     await anna.context.close()

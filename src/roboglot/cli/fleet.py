@@ -246,6 +246,7 @@ def _keeper(plan: FleetPlan, folder: Path, memory_max: int, on: str, detached: b
 
 
 async def _serve(keeper: Callable[[], Keeper], folder: Path) -> int:
+    from roboglot.shards.classes import FleetClasses
     from roboglot.shards.desk import FleetDesk
     from roboglot.shards.supervisor import State
 
@@ -253,8 +254,9 @@ async def _serve(keeper: Callable[[], Keeper], folder: Path) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, stop.set)
     supervisor = keeper()
-    desk = FleetDesk(supervisor, folder)
+    desk, classes = FleetDesk(supervisor, folder), FleetClasses(folder)
     ending = asyncio.ensure_future(stop.wait())
+    await classes.open()  # shards look for it when they start
     starting = asyncio.ensure_future(supervisor.start())
     try:
         await desk.open()
@@ -275,6 +277,7 @@ async def _serve(keeper: Callable[[], Keeper], folder: Path) -> int:
         ending.cancel()
         await desk.close()
         await supervisor.close()
+        await classes.close()
     return 0
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 from importlib import import_module
 from typing import TYPE_CHECKING, TypeVar, cast
@@ -12,7 +11,7 @@ from msgspec import MsgspecError
 
 from roboglot.console.api import Api
 from roboglot.console.assets import Assets
-from roboglot.console.desk import Desk
+from roboglot.console.desk import CLIENT, Desk
 from roboglot.console.http import Problem, Receive, Scope, Send, answer, answer_json
 from roboglot.console.live import Page
 from roboglot.console.people.classes import Classes
@@ -22,12 +21,14 @@ from roboglot.console.people.signing import Signing
 from roboglot.console.settings import MESSAGE_MAX, VIEWERS_MAX
 from roboglot.console.studio.channel import MESSAGE_MAX as STUDIO_MESSAGE_MAX
 from roboglot.console.studio.channel import Session
-from roboglot.console.studio.classroom import Classroom
+from roboglot.console.studio.class_link import Hello, LinkedRoom
+from roboglot.console.studio.classroom import Classroom, World
+from roboglot.console.verbs.robots import stop
 from roboglot.extras import MissingExtra, explaining
 from roboglot.model.admission import Right, Unknown
 from roboglot.model.background import load
 from roboglot.model.client_context import client, identity
-from roboglot.model.errors import RobotError
+from roboglot.model.errors import NotFound
 from roboglot.protocols.browsers import Browsers, of_rows
 
 if TYPE_CHECKING:
@@ -35,21 +36,24 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 P = TypeVar("P", Page, Session)
+QUERY_MAX = 500  # bytes that are passed on to the log-in page
 GOING_AWAY, BAD_DATA, POLICY, TRY_LATER = 1001, 1003, 1008, 1013
 
 
 class Application:
     """One console's. ``pages`` and ``sessions`` (of the studio) are those open now."""
 
-    def __init__(self, desk: Desk, browsers: Browsers) -> None:
+    def __init__(self, desk: Desk, browsers: Browsers, classroom: Classroom | None, page: str) -> None:
+        """``classroom``: the one of this program; without it the one of ``desk.studio.home``. ``page``: our address."""
         self._desk, self._browsers = desk, browsers
         self._assets = Assets()
         self.pages: set[Page] = set()
         self.sessions: set[Session] = set()
-        self._classroom = Classroom(self._stop)
+        self._ending: set[asyncio.Task[None]] = set()  # classes
+        self._classroom = self._enter_classroom(classroom, page)
         self._listening: dict[asyncio.Task[None], str] = {}  # and who is at the other end
         self._login = Sessions()
-        self._classes = Classes(desk, self._classroom, self._listening.values, self._put_out)
+        self._classes = Classes(desk, self._classroom, self._stop, self._listening.values, self._put_out)
         self._api = Api(desk, self._classes)
         self._signing = Signing(desk, self._login, self._classes)
         for robot in desk.robots.values():
@@ -57,7 +61,9 @@ class Application:
         self._metrics: Metrics | None = None  # from the first scrape on
 
     async def close(self) -> None:
-        """Hang up on the pages' video calls and stop counting."""
+        """Hang up on the pages' video calls and the classroom, and stop counting."""
+        if isinstance(self._classroom, LinkedRoom):
+            await self._classroom.end()
         if self._metrics is not None:
             self._metrics.close()
         await self._api.calls.close()
@@ -68,12 +74,27 @@ class Application:
         elif scope["type"] == "websocket":
             await self._serve_socket(scope, receive, send)
 
+    def _enter_classroom(self, own: Classroom | None, page: str) -> Classroom | LinkedRoom:
+        if (home := self._desk.studio.home) is not None:
+            return LinkedRoom(home.path, Hello(home.world, page), self._stop, self._end_class)
+        room = own or Classroom()
+        room.worlds[""] = World("", page, self._stop, self._end_class)
+        return room
+
+    def _end_class(self, code: str) -> None:
+        task = asyncio.get_running_loop().create_task(self._classes.end(code), name="end of a class")
+        self._ending.add(task)
+        task.add_done_callback(self._ending.discard)
+
     async def _stop(self, name: str) -> None:
-        """End every program and motion of a robot."""
-        if (programs := self._desk.studio.programs.get(name)) is not None:
-            await programs.service.shutdown([figures.target_id for figures in programs.service.running()])
-        with contextlib.suppress(RobotError):
-            await self._desk.command(name, "stop", {}, client())
+        """End every program and motion of a robot; who asks has been found to be its teacher. Raises RobotError."""
+        robot = self._desk.robots.get(name)
+        if robot is None:
+            raise NotFound(f"there is no robot {name!r}")
+        with robot.admission.noting(CLIENT, "stop"):
+            if (programs := self._desk.studio.programs.get(name)) is not None:
+                await programs.service.shutdown([figures.target_id for figures in programs.service.running()])
+            await stop(robot)
 
     def _refusal(self, scope: Scope, method: str) -> str:
         return self._browsers.refusal(of_rows(scope["headers"], method))
@@ -121,7 +142,8 @@ class Application:
 
     async def _serve_file(self, scope: Scope, send: Send) -> None:
         if scope["path"] in ("/studio", "/studio/") and not await self._knows(scope):
-            await answer(send, 303, b"text/plain", b"", [(b"location", b"/?to=studio")])
+            asked = scope["query_string"][:QUERY_MAX]  # a class and a name, from the page of another world
+            await answer(send, 303, b"text/plain", b"", [(b"location", b"/?to=studio" + (asked and b"&" + asked))])
             return
         asset = self._assets.find(scope["path"])
         if asset is None:

@@ -23,6 +23,7 @@ from roboglot.transport.tls import Tls
 
 if TYPE_CHECKING:
     from roboglot.console.application import Application
+    from roboglot.console.studio.classroom import Classroom
 
 log = logging.getLogger(__name__)
 BACKLOG = 64
@@ -79,7 +80,9 @@ class Console:
         from roboglot.console.application import Application
         from roboglot.console.studio.channel import MESSAGE_MAX as STUDIO_MESSAGE_MAX
 
-        self._application = Application(self._desk, Browsers("[console]", self._config.origins, self._config.hosts))
+        browsers = Browsers("[console]", self._config.origins, self._config.hosts)
+        classroom = await asyncio.to_thread(self._build_classroom)
+        self._application = Application(self._desk, browsers, classroom, self.address)
         config = Config(
             self._application,
             ws="wsproto",
@@ -102,6 +105,13 @@ class Console:
         self._tasks.append(loop.create_task(self._beat(self._application), name="console beat"))
         if self._config.otlp:
             self._tasks.append(loop.create_task(self._push(self._application), name="metrics to a collector"))
+
+    def _build_classroom(self) -> Classroom | None:
+        from roboglot.console.studio.class_files import ClassFiles
+        from roboglot.console.studio.classroom import Classroom
+
+        folder = self._desk.studio.classes
+        return Classroom(ClassFiles(folder)) if folder is not None and self._desk.studio.home is None else None
 
     async def _push(self, application: Application) -> None:
         """Send metrics to the collector."""

@@ -10,7 +10,7 @@ from typing import Any
 
 import msgspec
 
-from roboglot.config import ROBOTS_MAX, Config, is_loopback, refuse_unguarded
+from roboglot.config import ROBOTS_MAX, Config, ConsoleConfig, is_loopback, refuse_unguarded
 from roboglot.shards.shard import settings_of
 
 WORLDS_MAX = 500
@@ -77,7 +77,7 @@ def plan_fleet(
         settings["robots"] = [
             {**robot, "name": f"{robot.get('name', 'a')}{number}", "address": next(addresses)} for robot in robots
         ]
-        settings["console"] = _console(template, settings["robots"][0]["address"])
+        settings["console"] = _console(template, settings["robots"][0]["address"], number)
         settings["seed"] = int(template.get("seed", 1)) + number - 1
         shards.append(ShardPlan(f"w{number}", settings))
     plan = FleetPlan(
@@ -119,9 +119,11 @@ def _robots(count: int) -> list[dict[str, Any]]:
     return [{"name": f"r{number}_", "body": "universal"} for number in range(1, count + 1)]
 
 
-def _console(template: dict[str, Any], address: str) -> dict[str, Any]:
+def _console(template: dict[str, Any], address: str, number: int) -> dict[str, Any]:
     """Return the console's settings: on the address of the world's first robot, where the template has none."""
     given = dict(template.get("console", {}))
+    if given.get("address") and (port := given.get("port", ConsoleConfig().port)):  # one for all: a port for each
+        given["port"] = port + number - 1
     return {"address": address, **given} if is_loopback(address) else {"enabled": False, **given}
 
 

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from roboglot.config import Config, config_of
+from roboglot.console.studio.programs import ClassHome
 from roboglot.hosting import open_files
 from roboglot.hosting.exclusive import FolderInUse
 from roboglot.hosting.logs import set_up_logging
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from roboglot.runtime import Runtime
 
 log = logging.getLogger(__name__)
+CLASS_SOCKET = "class"  # in the fleet's folder
 SETTINGS = "shard.json"  # in the shard's folder, as in a configuration file
 PERIOD = 1.0  # s between two beats
 WEIGHED = 10  # beats between two looks at the memory, which cost 3 ms
@@ -54,10 +56,16 @@ def run(folder: str, link: socket.socket) -> int:
         return 1
     prepare()
     if config.lockstep:
-        return asyncio.run(_serve(config, reporter))
+        return asyncio.run(_serve(config, reporter, _class_home(Path(folder))))
     import uvloop
 
-    return uvloop.run(_serve(config, reporter))
+    return uvloop.run(_serve(config, reporter, _class_home(Path(folder))))
+
+
+def _class_home(folder: Path) -> ClassHome | None:
+    """Return where the fleet's classroom listens, by the shard's folder; None: there is none."""
+    path = folder.parent.parent / CLASS_SOCKET
+    return ClassHome(path, folder.name) if path.exists() else None
 
 
 class Reporter:
@@ -90,7 +98,7 @@ class Reporter:
         loop.add_reader(self._link, look)
 
 
-async def _serve(config: Config, reporter: Reporter) -> int:
+async def _serve(config: Config, reporter: Reporter, class_home: ClassHome | None) -> int:
     from roboglot.runtime import Runtime
 
     stop, loop = asyncio.Event(), asyncio.get_running_loop()
@@ -99,7 +107,7 @@ async def _serve(config: Config, reporter: Reporter) -> int:
         loop.add_signal_handler(signal.SIGTERM, stop.set)
     reporter.watch(stop)
     try:
-        runtime = Runtime(config)
+        runtime = Runtime(config, class_home=class_home)
     except (FolderInUse, ValueError, OSError, sqlite3.Error) as error:
         # A predecessor that was killed may hold folder and addresses for a moment; wrong settings stay wrong.
         reporter.send(Refusal(str(error), lasting=isinstance(error, ValueError)))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import secrets
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Awaitable, Callable, Collection
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
@@ -17,7 +17,7 @@ import msgspec
 
 from roboglot.console.desk import CLIENT, Desk
 from roboglot.console.http import Problem
-from roboglot.console.studio import classroom
+from roboglot.console.studio import class_wishes, classroom
 from roboglot.model.admission import Proof, Right
 from roboglot.model.components.system.lease import Lease
 from roboglot.model.errors import Forbidden, NotFound, Refused, RobotError
@@ -25,7 +25,7 @@ from roboglot.model.errors import Forbidden, NotFound, Refused, RobotError
 MINUTES_MAX = 600
 NAME_MAX = 30  # characters of a pupil's name
 TEACHER = f"{CLIENT} teacher"  # who has control of a robot that is locked
-Name = Annotated[str, msgspec.Meta(max_length=classroom.NAME_MAX)]
+Name = Annotated[str, msgspec.Meta(max_length=class_wishes.NAME_MAX)]
 
 
 class Wish(msgspec.Struct, forbid_unknown_fields=True):
@@ -45,6 +45,16 @@ class Seat:
     robot: str
     code: str
     proof: Proof | None
+    studio: bool  # the class was opened there
+
+
+@dataclass(frozen=True, slots=True)
+class Elsewhere:
+    """Where a pupil is to sign in: the console of the world that is theirs."""
+
+    page: str
+    code: str
+    name: str
 
 
 @dataclass(slots=True)
@@ -58,48 +68,78 @@ class Lesson:
 
 
 class Classes:
-    """The one class of a console. ``present``: who has a page open; ``put_out`` ends the sessions and pages of one."""
+    """The one class of a console. ``present``: who has a page open; ``put_out`` ends the sessions and pages of one.
+
+    ``stop`` ends all programs and motion of a robot.
+    """
 
     def __init__(
         self,
         desk: Desk,
-        room: classroom.Classroom,
+        room: classroom.Room,
+        stop: Callable[[str], Awaitable[None]],
         present: Callable[[], Collection[str]],
         put_out: Callable[[str], None],
         now: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._desk, self._room, self._present, self._put_out, self._now = desk, room, present, put_out, now
+        self._desk, self._room, self._stop = desk, room, stop
+        self._present, self._put_out, self._now = present, put_out, now
         self._lesson: Lesson | None = None
+        self._studio: dict[str, Lesson] = {}  # classes that were opened in the studio, here or in another world
 
     # -- pupils --------------------------------------------------------------------------------------------------------
 
-    async def join(self, code: str, name: str) -> Seat:
+    async def join(self, code: str, name: str) -> Seat | Elsewhere:
         """Give a pupil a robot: the same as before, else a free one, else the one that the fewest share.
 
         Raises Problem.
         """
-        lesson, name = self._lesson, name.strip()
+        name = name.strip()
+        lesson = self._lesson
         if lesson is None or not secrets.compare_digest(code.strip().upper().encode(), lesson.code.encode()):
-            raise Problem(401, "there is no class with this code")
-        if lesson.until < self._now():
+            lesson = None
+        elif lesson.until < self._now():
             raise Problem(401, "this class is over")
         if not 0 < len(name) <= NAME_MAX or not name.isprintable() or set(name) & set(":@"):
             raise Problem(400, f"a name has 1 to {NAME_MAX} characters, without : and @")
-        identity = f"{name.replace(' ', '-')}@{lesson.code}"
+        name = name.replace(" ", "-")
+        if lesson is None:
+            place = await self._admit(code, name)
+            if place.page:
+                return Elsewhere(place.page, place.code, name)
+            lesson = self._studio.setdefault(place.code, Lesson(place.code, "", 0.0))
+            lesson.until = self._now() + place.seconds
+        return await self._seat(lesson, f"{name}@{lesson.code}")
+
+    async def _admit(self, code: str, name: str) -> classroom.Place:
+        try:
+            return await self._room.admit(code.strip().upper(), name)
+        except NotFound as error:
+            raise Problem(401, str(error)) from None
+        except Refused as error:
+            raise Problem(409, str(error)) from None
+
+    async def _seat(self, lesson: Lesson, identity: str) -> Seat:
         if identity in lesson.seats and identity in self._present():
-            raise Problem(409, f"{name} is in the class already")
+            raise Problem(409, f"{identity.partition('@')[0]} is in the class already")
         if identity not in lesson.seats and len(lesson.seats) >= classroom.PUPILS_MAX:
             raise Problem(409, f"the class has {classroom.PUPILS_MAX} pupils")
         robot = lesson.seats[identity].robot if identity in lesson.seats else self._least_used(lesson)
         admission = self._desk.robots[robot].admission
         proof = await admission.invite(identity, frozenset({Right.PROGRAM}), lesson.until - self._now())
-        seat = lesson.seats[identity] = Seat(identity, robot, lesson.code, proof)
+        seat = lesson.seats[identity] = Seat(identity, robot, lesson.code, proof, lesson is not self._lesson)
         self._desk.pupils.add(identity)
         return seat
 
     def _least_used(self, lesson: Lesson) -> str:
         taken = [seat.robot for seat in lesson.seats.values()]
         return min(self._desk.robots, key=taken.count)
+
+    async def end(self, code: str) -> None:
+        """A class of the studio is over: its pupils have robots no more."""
+        if (lesson := self._studio.pop(code, None)) is not None:
+            for seat in list(lesson.seats.values()):
+                await self._give_back(lesson, seat)
 
     # -- the teacher ---------------------------------------------------------------------------------------------------
 
@@ -131,7 +171,7 @@ class Classes:
     async def _do(self, wish: Wish) -> dict[str, object]:
         self._check_teacher()
         if wish.do == "open":
-            self._open(wish)
+            await self._open(wish)
             return self.look()
         lesson = self._lesson
         if lesson is None:
@@ -145,28 +185,29 @@ class Classes:
             for seat in seats:
                 await self._give_back(lesson, seat)
         if wish.do == "close":
-            self._room.classes.pop(lesson.code, None)
             self._lesson = None
+            with contextlib.suppress(Refused):
+                await self._room.close(lesson.code)
         return self.look()
 
-    def _open(self, wish: Wish) -> None:
+    async def _open(self, wish: Wish) -> None:
         if self._lesson is not None:
             raise Refused(f"class {self._lesson.code} is open")
         code = "".join(secrets.choice(classroom.CODE_LETTERS) for _ in range(classroom.CODE_LENGTH))
         self._lesson = Lesson(code, wish.name.strip(), self._now() + wish.minutes * 60.0)
-        self._room.classes[code] = classroom.Class(code, wish.name.strip())  # the studio's page joins by the same code
+        await self._room.open(code, wish.name.strip())  # the studio's page joins by the same code
 
     async def _do_with(self, do: str, name: str) -> None:
         robot, locked = self._desk.robots[name], self._desk.locked
         if do == "lock" and name not in locked:
             locked.add(name)
-            await self._room.stop(name)
+            await self._stop(name)
             await robot[Lease].take(TEACHER)
         elif do in ("unlock", "close") and name in locked:
             locked.discard(name)
             await robot[Lease].release()
         if do in ("reset", "give_back", "close"):
-            await self._room.stop(name)
+            await self._stop(name)
         if do == "reset":
             if name not in {placed.name for placed in self._desk.stage.robots}:
                 raise Refused(f"robot {name} is a real one: carry it back by hand")

@@ -10,7 +10,7 @@ import msgspec
 
 from roboglot.console.desk import Desk
 from roboglot.console.http import Problem, Receive, Scope, Send, answer_json, read_json
-from roboglot.console.people.classes import Classes
+from roboglot.console.people.classes import Classes, Elsewhere
 from roboglot.console.people.entry import address_of, admission_of, cookie_of
 from roboglot.console.people.sessions import Sessions, cookie_name, set_cookie
 from roboglot.console.settings import JOIN_TRIES
@@ -55,6 +55,9 @@ class Signing:
         except msgspec.ValidationError as error:
             raise Problem(400, str(error)) from None
         token, answer = await self._sign_in(address_of(scope), shown)
+        if not token:  # the pupil's world is another
+            await answer_json(send, answer)
+            return True
         self._sessions.end(cookie_of(scope))  # a session that others may know is not carried on
         await answer_json(send, answer, 200, [set_cookie(name, token, secure=secure)])
         return True
@@ -82,8 +85,11 @@ class Signing:
             raise Problem(429, "too many wrong codes from your address: wait a minute")
         seat = await self._classes.join(shown.code, shown.name)
         self._tries.give_back(host)
+        if isinstance(seat, Elsewhere):
+            return "", {"elsewhere": seat.page, "code": seat.code, "name": seat.name}
         token = self._sessions.open(seat.proof or NO_PROOF, seat.identity, seat.robot, seat.code)
-        return token, {"name": seat.identity, "robot": seat.robot}
+        answer: dict[str, object] = {"name": seat.identity, "robot": seat.robot}
+        return token, answer | ({"studio": seat.code} if seat.studio else {})
 
 
 def _header(shown: Shown) -> str:

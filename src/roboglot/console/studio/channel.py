@@ -20,10 +20,13 @@ from typing import Annotated, Any
 import msgspec
 
 from roboglot.console.desk import CLIENT, Desk
-from roboglot.console.studio.classroom import Classroom, Member
+from roboglot.console.studio.class_map import draw_map
+from roboglot.console.studio.class_wishes import Member
+from roboglot.console.studio.classroom import Room
 from roboglot.console.studio.mistakes import explain
 from roboglot.console.studio.programs import Programs
 from roboglot.console.studio.trial import Trial, TrialEnd, TrialWish
+from roboglot.model.client_context import identity
 from roboglot.model.errors import NotFound, RobotError
 from roboglot.operations import Right
 from roboglot.programs.errors import ProgramError
@@ -39,6 +42,7 @@ MESSAGE_MAX = FRAME_MAX + 64 * 1024  # characters of one message of a page
 MESSAGES_PER_SECOND_MAX = 50
 PENDING_MAX = 16  # messages of one page that are being answered
 LIGHT_EVERY = 0.02  # s: a page is shown the newest block at most so often
+DRAW_EVERY = 2.0  # s between two maps of a pupil's robot for the teacher
 WAITING_MAX = 2000  # messages that wait for a page that reads slowly; beyond, the oldest insights are dropped
 _BLOCK = re.compile(r'"block": \{"type": "(begin|end)"')
 Send = Callable[[str], Awaitable[None]]
@@ -96,7 +100,7 @@ class Session:
 
     longest = 0  # bytes of a frame: no limit
 
-    def __init__(self, desk: Desk, classroom: Classroom, send: Send) -> None:
+    def __init__(self, desk: Desk, classroom: Room, send: Send) -> None:
         self._desk, self._send = desk, send
         self._programs: Programs | None = None
         self._shown = ""  # the program; empty: all
@@ -107,6 +111,7 @@ class Session:
         self._pending: set[asyncio.Task[None]] = set()
         self._trial = Trial(self.tell)
         self._seat = classroom.seat(self.tell)
+        self._drawn = -DRAW_EVERY
         self._allowance, self._counted_at = 2.0 * MESSAGES_PER_SECOND_MAX, time.monotonic()
 
     async def run(self) -> None:
@@ -128,8 +133,9 @@ class Session:
 
     def tell(self, message: dict[str, Any]) -> None:
         """Send a message when its turn comes."""
-        if message["type"] in ("variables", "grid"):  # only the newest counts
-            same = (m for m in self._waiting if m["type"] == message["type"] and m.get("task") == message.get("task"))
+        if message["type"] in ("variables", "grid", "map"):  # only the newest counts
+            kind = [message.get(key) for key in ("type", "task", "name")]
+            same = (m for m in self._waiting if [m.get(key) for key in ("type", "task", "name")] == kind)
             if (old := next(same, None)) is not None:
                 old.update(message)
                 return
@@ -194,7 +200,8 @@ class Session:
         except RobotError as error:
             self.tell({"type": "opened", "robot": name, "error": str(error)})
             return
-        self._programs, self._seat.robot = programs, name
+        self._programs = programs
+        self._seat.at(name)
         service = programs.service
         self._leaving = [
             programs.frames.attach(self),
@@ -211,8 +218,7 @@ class Session:
 
     async def _do(self, message: Message) -> None:
         if isinstance(message, Member):
-            robots = self._desk.robots.values()
-            await self._seat.take(message, may_teach=all(robot.admission.may(Right.ADMIN) for robot in robots))
+            await self._take_class(message)
             return
         programs = self._programs
         if programs is None:
@@ -232,6 +238,17 @@ class Session:
                 await self._trial.take(message, self._desk.studio, programs)
             case TrialEnd():
                 self._trial.close()
+
+    async def _take_class(self, wish: Member) -> None:
+        if wish.do == "join" and (who := identity()) in self._desk.pupils:  # signed in by a code: as nobody else
+            name, _, code = who.rpartition("@")
+            wish = msgspec.structs.replace(wish, name=name, code=code)
+        await self._seat.take(wish, may_teach=self._desk.may_teach)
+        now = time.monotonic()
+        if wish.do == "doing" and self._programs is not None and now - self._drawn >= DRAW_EVERY:
+            self._drawn = now
+            if picture := await draw_map(self._programs.robot):
+                self._seat.draw(picture)
 
     async def _fetch(self, programs: Programs, wish: Fetch) -> None:
         service = programs.service

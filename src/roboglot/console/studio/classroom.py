@@ -1,46 +1,51 @@
-"""Classes: a teacher opens one, pupils join by its code, the teacher sees what each one's program does. In memory.
+"""Classes: a teacher opens one, pupils join by its code, the teacher sees what each one's program does.
 
-A class lives as long as the program. Every pupil works on a robot of the same world; the pages choose which.
+Pupils work in one world, each with a robot of it, or, where several programs share a classroom, each in a world of
+their own. Knows no socket: a page is a seat, wherever its socket is.
 """
 
 from __future__ import annotations
 
+import asyncio
+import logging
 import secrets
+import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal
+from typing import Protocol
 
 import msgspec
 
+from roboglot.console.studio.class_files import Bag, ClassFiles
+from roboglot.console.studio.class_wishes import Doing, Member
 from roboglot.model.errors import NotFound, Refused
 
+log = logging.getLogger(__name__)
 CODE_LETTERS, CODE_LENGTH = "ABCDEFGHJKLMNPQRSTUVWXYZ23456789", 6
 CLASSES_MAX, PUPILS_MAX = 20, 60
-NAME_MAX, WORDS_MAX, STYLE_MAX = 40, 300, 400_000  # characters
-Tell = Callable[[dict[str, Any]], None]
-Words = Annotated[str, msgspec.Meta(max_length=WORDS_MAX)]
+NOWHERE = "-"  # the world of who has none yet
+GRID_EVERY = 0.1  # s between two grids of one class
+OPEN_SECONDS = 90 * 60.0  # from a teacher's coming: so long its code lets pupils in where others are asked who they are
+Tell = Callable[[dict[str, object]], None]
 
 
-class Doing(msgspec.Struct, frozen=True):
-    """What a pupil's page shows."""
+@dataclass(frozen=True, slots=True)
+class World:
+    """A program whose robots pupils work with: where its pages are, how it ends all that a robot does, and a class."""
 
-    phase: Words = "idle"
-    lit: Words = ""
-    program: Words = ""
-    error: Words = ""
-    mission: Words = ""
-    stars: Annotated[int, msgspec.Meta(ge=0, le=1000)] = 0
+    name: str
+    page: str
+    stop: Callable[[str], Awaitable[None]]
+    end: Callable[[str], None]
 
 
-class Member(msgspec.Struct, tag="class", tag_field="type"):
-    """What a page wishes of its class."""
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a pupil is to be: ``page`` is another world's, empty for the one that asked; for how long (s)."""
 
-    do: Literal["open", "join", "leave", "doing", "hand_in", "stop_all", "look"]
-    id: int = 0
-    code: Annotated[str, msgspec.Meta(max_length=12)] = ""
-    name: Annotated[str, msgspec.Meta(max_length=NAME_MAX)] = ""
-    doing: Doing = Doing()
-    style: Annotated[str, msgspec.Meta(max_length=STYLE_MAX)] = ""
+    code: str
+    page: str
+    seconds: float
 
 
 @dataclass(slots=True)
@@ -48,44 +53,101 @@ class Pupil:
     """One who has joined; ``seat`` is None while the page is away."""
 
     name: str
-    seat: Seat | None
+    world: str = ""
+    robot: str = ""
+    seat: Seat | None = None
     doing: Doing = field(default_factory=Doing)
-    style: str = ""
-    handed: str = ""  # what was handed in last
-    handed_stars: int = 0
+    bag: Bag = field(default_factory=Bag)
 
 
-@dataclass(slots=True)
 class Class:
-    """A class and its teachers' pages."""
+    """A class and its teachers' pages. ``only``: the one world that it is for; empty: all."""
 
-    code: str
-    name: str
-    pupils: dict[str, Pupil] = field(default_factory=dict)
-    teachers: set[Seat] = field(default_factory=set)
+    def __init__(self, code: str, name: str, only: str = "") -> None:
+        self.code, self.name, self.only = code, name, only
+        self.until = 0.0
+        self.pupils: dict[str, Pupil] = {}
+        self.teachers: set[Seat] = set()
+        self._due: asyncio.TimerHandle | None = None
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nobody is there."""
+        return not self.teachers and all(pupil.seat is None for pupil in self.pupils.values())
+
+    def enrol(self, name: str) -> Pupil:
+        """Return the pupil of that name, a new one if there is none. Raises Refused."""
+        if name not in self.pupils:
+            if len(self.pupils) >= PUPILS_MAX:
+                raise Refused(f"the class has {PUPILS_MAX} pupils")
+            self.pupils[name] = Pupil(name, world=NOWHERE, bag=Bag(name))
+        return self.pupils[name]
 
     def tell_teachers(self) -> None:
-        """Have every teacher's page show the grid anew."""
+        """Have every teacher's page show the grid anew, soon."""
+        if self._due is None:
+            self._due = asyncio.get_running_loop().call_later(GRID_EVERY, self._tell)
+
+    def _tell(self) -> None:
+        self._due = None
         rows = [
-            {"name": p.name, "robot": p.seat.robot if p.seat else "", "here": p.seat is not None}
+            {"name": p.name, "world": p.world, "robot": p.robot, "here": p.seat is not None}
             | msgspec.to_builtins(p.doing)
-            | {"handed": bool(p.handed), "handed_stars": p.handed_stars}
+            | {"handed": bool(p.bag.handed), "handed_stars": p.bag.stars}
             for p in self.pupils.values()
         ]
         for seat in self.teachers:
             seat.tell({"type": "grid", "code": self.code, "name": self.name, "pupils": rows})
 
 
+class Seated(Protocol):
+    """One page's place in a classroom."""
+
+    async def take(self, wish: Member, *, may_teach: bool) -> None:
+        """Do what the page wishes. Raises NotFound, Refused, unless its ``tell`` is told so."""
+
+    def at(self, robot: str) -> None:
+        """The page works with this robot from now on."""
+
+    def draw(self, picture: str) -> None:
+        """Show teachers the robot's map, a PNG in base64."""
+
+    def leave(self) -> None:
+        """The page goes, or goes elsewhere; what a pupil did stays."""
+
+
+class Room(Protocol):
+    """A classroom, wherever it is."""
+
+    def seat(self, tell: Tell) -> Seated:
+        """Return a place for a page."""
+
+    async def open(self, code: str, name: str) -> None:
+        """Have a class for this program's own world."""
+
+    async def close(self, code: str) -> None:
+        """End a class, with what was handed in."""
+
+    async def admit(self, code: str, name: str) -> Place:
+        """Return where one who shows a class's code is to be. Raises NotFound, Refused."""
+
+
 class Classroom:
-    """All classes of one console. ``stop`` ends all programs and motion of a robot."""
+    """All classes of one console, or of the consoles of all ``worlds``. What pupils hand in is kept in ``files``."""
 
-    def __init__(self, stop: Callable[[str], Awaitable[None]]) -> None:
-        self.stop = stop
+    def __init__(self, files: ClassFiles | None = None, now: Callable[[], float] = time.monotonic) -> None:
+        self._files, self._writing, self.now = files, asyncio.Lock(), now
+        self.worlds: dict[str, World] = {}
         self.classes: dict[str, Class] = {}
+        for sheet in files.load() if files else []:
+            kept = self.classes[sheet.code] = Class(sheet.code, sheet.name, sheet.only)
+            for bag in sheet.bags:
+                doing = Doing(stars=bag.all_stars, program=bag.program)
+                kept.pupils[bag.name] = Pupil(bag.name, bag.world, "", None, doing, bag)
 
-    def seat(self, tell: Tell) -> Seat:
-        """A page that may take part."""
-        return Seat(self, tell)
+    def seat(self, tell: Tell, world: str = "") -> Seat:
+        """Return a place for a page of a world."""
+        return Seat(self, tell, world)
 
     def find(self, code: str) -> Class:
         """Return a class. Raises NotFound."""
@@ -94,81 +156,177 @@ class Classroom:
             raise NotFound(f"there is no class {code!r}")
         return found
 
+    async def open(self, code: str, name: str) -> None:
+        """Have a class for this program's own world. Raises Refused."""
+        await self.begin(name, code)
+
+    async def close(self, code: str) -> None:
+        """End it, with what was handed in."""
+        await self.end(code)
+
+    async def begin(self, name: str, code: str = "", only: str = "") -> Class:
+        """Open a class; where there are too many, the oldest one that nobody is in gives way. Raises Refused."""
+        if len(self.classes) >= CLASSES_MAX:
+            if (oldest := next((one for one in self.classes.values() if one.is_empty), None)) is None:
+                raise Refused(f"{CLASSES_MAX} classes are open")
+            await self.end(oldest.code)
+        code = code or "".join(secrets.choice(CODE_LETTERS) for _ in range(CODE_LENGTH))
+        opened = self.classes[code] = Class(code, name, only)
+        if self._files is not None:
+            try:
+                await asyncio.to_thread(self._files.begin, code, name, only)
+            except OSError as error:
+                log.error("cannot keep class %s: %s", code, error)
+        return opened
+
+    async def end(self, code: str) -> None:
+        """Forget a class, with what was handed in; whoever is in it is told."""
+        if (ended := self.classes.pop(code, None)) is None:
+            return
+        for seat in [*ended.teachers, *(pupil.seat for pupil in ended.pupils.values() if pupil.seat is not None)]:
+            seat.leave()
+            seat.tell({"type": "ended"})
+        for world in self.worlds.values():
+            world.end(code)
+        if self._files is not None:
+            await asyncio.to_thread(self._files.end, code)
+
+    async def admit(self, code: str, name: str, at: str = "") -> Place:
+        """Return where one who shows a class's code at a world's sign-in is to be. Raises NotFound, Refused."""
+        joined = self.find(code)
+        seconds = joined.until - self.now()
+        if seconds <= 0.0:
+            raise NotFound("this class is over, unless its teacher comes back")
+        pupil = joined.enrol(name)
+        elsewhere = self.place(joined, pupil, at)
+        await self.keep(joined.code, pupil)
+        return Place(joined.code, "" if elsewhere is None else elsewhere.page, seconds)
+
+    async def keep(self, code: str, pupil: Pupil) -> None:
+        """Write down what is kept of a pupil. Raises Refused if it cannot be kept."""
+        if self._files is None:
+            return
+        try:
+            async with self._writing:  # one after the other, so that the newest stays
+                await asyncio.to_thread(self._files.keep, code, pupil.bag)
+        except OSError as error:
+            log.error("cannot keep what %s handed in: %s", pupil.name, error)
+            raise Refused("it cannot be kept: the disk of the teacher's machine does not take it") from None
+
+    def place(self, joined: Class, pupil: Pupil, at: str) -> World | None:
+        """Return the world that a pupil is to go to from the page's: their own, else one that the fewest share."""
+        choices = [joined.only] if joined.only in self.worlds else list(self.worlds)
+        if pupil.world not in choices:
+            taken = [one.world for one in joined.pupils.values()]
+            pupil.world = min(choices, key=lambda name: (taken.count(name), name != at), default=at)
+        pupil.bag.world = pupil.world
+        return None if pupil.world == at else self.worlds[pupil.world]
+
+    async def stop_all(self, taught: Class) -> None:
+        """End what the robots of all pupils do, of those whose page is away, too. Raises Refused."""
+        robots = dict.fromkeys((p.world, p.robot) for p in taught.pupils.values() if p.robot)
+        found = [(self.worlds.get(world), world, robot) for world, robot in robots]
+        stops = [world.stop(robot) for world, _, robot in found if world is not None]
+        failed = [f"{world} {robot}".strip() for there, world, robot in found if there is None]
+        ends = await asyncio.gather(*stops, return_exceptions=True)
+        failed += [str(error) for error in ends if isinstance(error, BaseException)]
+        if failed:
+            raise Refused(f"not stopped: {', '.join(failed)}")
+
 
 class Seat:
     """One page's place: nobody's, a teacher's or a pupil's."""
 
-    def __init__(self, room: Classroom, tell: Tell) -> None:
-        self._room, self.tell = room, tell
-        self.robot = ""
+    def __init__(self, room: Classroom, tell: Tell, world: str) -> None:
+        self._room, self.tell, self._world = room, tell, world
+        self._robot = ""
         self._class: Class | None = None
         self._pupil: Pupil | None = None
+
+    def at(self, robot: str) -> None:
+        """The page works with this robot from now on."""
+        self._robot = robot
+        if self._pupil is not None and self._class is not None:
+            self._pupil.robot = robot
+            self._class.tell_teachers()
 
     async def take(self, wish: Member, *, may_teach: bool) -> None:
         """Do what the page wishes. Raises NotFound, Refused."""
         match wish.do:
             case "open":
-                self._open(wish, may_teach)
+                await self._open(wish, may_teach)
             case "join":
-                self._join(wish)
+                await self._join(wish)
             case "leave":
                 self.leave()
             case "doing" | "hand_in":
-                self._note(wish)
+                await self._note(wish)
+            case "close":
+                await self._room.end(self._taught().code)
             case "stop_all":
-                for pupil in self._taught().pupils.values():
-                    if pupil.seat is not None:
-                        await self._room.stop(pupil.seat.robot)
+                await self._room.stop_all(self._taught())
             case "look":
                 shown = self._taught().pupils.get(wish.name)
                 if shown is None:
                     raise NotFound(f"there is no pupil {wish.name!r}")
-                style = shown.handed or shown.style
+                style = shown.bag.handed or shown.bag.style
                 self.tell({"type": "looked", "id": wish.id, "name": shown.name, "style": style})
 
-    def _open(self, wish: Member, may_teach: bool) -> None:
+    async def _open(self, wish: Member, may_teach: bool) -> None:
         """Open a class, or with its code come back to it as its teacher."""
         if not may_teach:
             raise Refused("only who may do everything with the robots opens a class")
-        if wish.code:
-            opened = self._room.find(wish.code)
-        else:
-            if len(self._room.classes) >= CLASSES_MAX:
-                raise Refused(f"{CLASSES_MAX} classes are open")
-            code = "".join(secrets.choice(CODE_LETTERS) for _ in range(CODE_LENGTH))
-            opened = self._room.classes[code] = Class(code, wish.name.strip())
+        opened = self._room.find(wish.code) if wish.code else await self._room.begin(wish.name.strip())
         self.leave()
         self._class = opened
+        opened.until = self._room.now() + OPEN_SECONDS
         opened.teachers.add(self)
         opened.tell_teachers()
 
-    def _join(self, wish: Member) -> None:
+    async def _join(self, wish: Member) -> None:
         name, joined = wish.name.strip(), self._room.find(wish.code)
         if not name or not name.isprintable():
             raise Refused("a name is needed")
         self.leave()
-        pupil = joined.pupils.get(name)
-        if pupil is not None and pupil.seat is not None:
+        pupil = joined.enrol(name)
+        if pupil.seat is not None:
             raise Refused(f"{name} is in the class already")
-        if pupil is None:
-            if len(joined.pupils) >= PUPILS_MAX:
-                raise Refused(f"the class has {PUPILS_MAX} pupils")
-            pupil = joined.pupils[name] = Pupil(name, self)
-        pupil.seat, self._class, self._pupil = self, joined, pupil
-        number = list(joined.pupils).index(name)
-        self.tell({"type": "joined", "code": joined.code, "name": name, "class": joined.name, "number": number})
+        pupil.bag.style = wish.style or pupil.bag.style
+        before = pupil.bag.world
+        elsewhere = self._room.place(joined, pupil, self._world)
+        if elsewhere is not None:
+            self.tell({"type": "elsewhere", "code": joined.code, "name": name, "page": elsewhere.page})
+            joined.tell_teachers()
+        else:
+            self._sit(joined, pupil, pupil.bag.style if wish.carry else "")
+        if pupil.bag.world != before:
+            await self._room.keep(joined.code, pupil)
+
+    def _sit(self, joined: Class, pupil: Pupil, style: str) -> None:
+        """``style``: the program that the page is to go on with; nothing: with its own."""
+        pupil.seat, self._class, self._pupil, name = self, joined, pupil, pupil.name
+        number = [one.name for one in joined.pupils.values() if one.world == self._world].index(name)
+        words: dict[str, object] = {"code": joined.code, "name": name, "class": joined.name, "style": style}
+        self.tell({"type": "joined", "number": number, **words})
+        self.at(self._robot)
+
+    async def _note(self, wish: Member) -> None:
+        joined, pupil = self._class, self._pupil
+        if joined is None or pupil is None:
+            return
+        pupil.doing, bag = wish.doing, pupil.bag
+        bag.style, bag.program, bag.all_stars = wish.style or bag.style, wish.doing.program, wish.doing.stars
+        if wish.do == "hand_in":
+            bag.handed, bag.stars = bag.style, wish.doing.stars
+            await self._room.keep(joined.code, pupil)
+            self.tell({"type": "handed"})
         joined.tell_teachers()
 
-    def _note(self, wish: Member) -> None:
-        if self._class is None or self._pupil is None:
-            return
-        self._pupil.doing = wish.doing
-        if wish.style:
-            self._pupil.style = wish.style
-        if wish.do == "hand_in":
-            self._pupil.handed, self._pupil.handed_stars = wish.style or self._pupil.style, wish.doing.stars
-            self.tell({"type": "handed"})
-        self._class.tell_teachers()
+    def draw(self, picture: str) -> None:
+        """Show teachers the robot's map, a PNG in base64."""
+        if self._class is not None and self._pupil is not None:
+            for seat in self._class.teachers:
+                seat.tell({"type": "map", "name": self._pupil.name, "png": picture})
 
     def _taught(self) -> Class:
         if self._class is None or self not in self._class.teachers:

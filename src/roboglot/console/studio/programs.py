@@ -23,13 +23,26 @@ class Programs:
 
 
 @dataclass(frozen=True, slots=True)
+class ClassHome:
+    """Where the classroom listens that several worlds share, and the name of this world there."""
+
+    path: Path
+    world: str
+
+
+@dataclass(frozen=True, slots=True)
 class Studio:
-    """One console's. ``folders``: of missions, read at every look, so that a teacher sees a new one at once."""
+    """One console's. ``folders``: of missions, read at every look, so that a teacher sees a new one at once.
+
+    ``classes``: the folder of what is handed in; ``home``: the classroom is elsewhere, and so is that folder.
+    """
 
     programs: Mapping[str, Programs] = field(default_factory=dict)
     rehearse: Rehearse | None = None
     scene_of: SceneOf | None = None
     folders: Sequence[Path] = (FOLDER,)
+    classes: Path | None = None
+    home: ClassHome | None = None
 
     def lessons(self) -> dict[str, Lesson]:
         """All missions by their names."""

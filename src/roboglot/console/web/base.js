@@ -20,6 +20,17 @@ export const language = kept("language", PREFERRED);
 export const theme = kept("theme", matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark");
 export const person = kept("person", `guest-${Math.random().toString(36).slice(2, 6)}`);
 
+/** The studio of the world that a pupil is sent to, in the same language. @param {{page?: string, elsewhere?: string, code: string, name: string}} given */
+export function elsewhere(given) {
+  const there = new URL("/studio/", given.page ?? given.elsewhere);
+  if (/^(0\.0\.0\.0|\[::\])$/.test(there.hostname)) there.hostname = location.hostname; // it listens on all addresses
+  there.search = String(new URLSearchParams({ class: given.code, name: given.name, language: language.value, theme: theme.value }));
+  return there.href;
+}
+const sent = new URLSearchParams(location.search); // by it
+if (/^(en|zh)$/.test(sent.get("language") ?? "")) language.value = String(sent.get("language"));
+if (/^(light|dark)$/.test(sent.get("theme") ?? "")) theme.value = String(sent.get("theme"));
+
 /** @type {import("@preact/signals").Signal<Record<string, Record<string, string>>>} */
 const words = signal({});
 

@@ -1,0 +1,98 @@
+"""Files of classes: a folder for each, in it the class's name and what each pupil handed in. Blocks: call it aside."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import os
+import shutil
+from pathlib import Path
+from typing import TypeVar
+
+import msgspec
+
+T = TypeVar("T")
+log = logging.getLogger(__name__)
+CLASS = "class.json"
+CLASSES_MAX, BAGS_MAX, FILE_MAX = 20, 60, 4_000_000  # folders, files of one, bytes of a file that are read
+
+
+class Bag(msgspec.Struct):
+    """What is kept of a pupil: the program as it was last seen and as it was handed in, and in which world."""
+
+    name: str = ""
+    world: str = "-"
+    program: str = ""
+    style: str = ""
+    handed: str = ""
+    stars: int = 0  # when it was handed in
+    all_stars: int = 0
+
+
+class Sheet(msgspec.Struct):
+    """A class."""
+
+    code: str
+    name: str
+    only: str = ""
+    bags: list[Bag] = []
+
+
+class ClassFiles:
+    """In one folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def load(self) -> list[Sheet]:
+        """Return all classes, the oldest first; what cannot be read is left out with a warning."""
+        try:
+            folders = sorted((f for f in self._folder.iterdir() if f.is_dir()), key=lambda f: f.stat().st_mtime)
+        except FileNotFoundError:
+            return []
+        return [sheet for folder in folders[-CLASSES_MAX:] if (sheet := _read_class(folder)) is not None]
+
+    def begin(self, code: str, name: str, only: str) -> None:
+        """Keep a class. Raises OSError."""
+        folder = self._folder / code
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        _write(folder / CLASS, msgspec.json.encode(Sheet(code, name, only)))
+
+    def keep(self, code: str, bag: Bag) -> None:
+        """Keep what a pupil handed in, in place of what was there. Raises OSError."""
+        name = hashlib.sha256(bag.name.encode("utf-8", "surrogatepass")).hexdigest()[:24]
+        _write(self._folder / code / f"{name}.json", msgspec.json.encode(bag))
+
+    def end(self, code: str) -> None:
+        """Delete a class."""
+        shutil.rmtree(self._folder / code, ignore_errors=True)
+
+
+def _read_class(folder: Path) -> Sheet | None:
+    try:
+        sheet = _read(folder / CLASS, Sheet)
+        if sheet.code != folder.name:
+            raise ValueError(f"it is of class {sheet.code!r}")
+        files = sorted(file for file in folder.glob("*.json") if file.name != CLASS)
+        sheet.bags = [_read(file, Bag) for file in files[:BAGS_MAX]]
+    except (OSError, ValueError, msgspec.MsgspecError) as error:
+        log.warning("left out the class in %s: %s", folder, error)
+        return None
+    return sheet
+
+
+def _read(file: Path, kind: type[T]) -> T:
+    if file.stat().st_size > FILE_MAX:
+        raise ValueError(f"{file.name} is longer than {FILE_MAX} bytes")
+    return msgspec.json.decode(file.read_bytes(), type=kind)
+
+
+def _write(file: Path, data: bytes) -> None:
+    """Write so that a crash leaves the old file or the new one."""
+    fresh = file.with_suffix(".new")
+    with fresh.open("wb") as opened:
+        os.fchmod(opened.fileno(), 0o600)
+        opened.write(data)
+        opened.flush()
+        os.fsync(opened.fileno())
+    fresh.replace(file)

@@ -1,0 +1,265 @@
+"""A classroom in another process of this machine, which the consoles of several worlds share: lines over a socket.
+
+The words of both ends, and the end of a console: its pages' seats are there as if the classroom were here.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+import msgspec
+
+from roboglot.console.studio.class_wishes import Member
+from roboglot.console.studio.classroom import Place, Tell
+from roboglot.model.errors import NotFound, Refused, RobotError
+
+log = logging.getLogger(__name__)
+LINE_MAX = 4 << 20  # bytes
+ADMIT_SECONDS = 10.0
+ADMITTING_MAX = 64  # who wait for the answer
+AGAIN = 1.0  # s until the other end is tried anew
+
+
+class Hello(msgspec.Struct, tag=True, frozen=True):
+    """To the classroom, first: the console of which world this is, and where its pages are."""
+
+    world: str
+    page: str
+
+
+class Wished(msgspec.Struct, tag=True, frozen=True):
+    """To the classroom: what a page wishes."""
+
+    seat: int
+    wish: Member
+    may_teach: bool
+
+
+class At(msgspec.Struct, tag=True, frozen=True):
+    """To the classroom: which robot a page works with."""
+
+    seat: int
+    robot: str
+
+
+class Drawn(msgspec.Struct, tag=True, frozen=True):
+    """To the classroom: the map of that robot, a PNG in base64."""
+
+    seat: int
+    png: str
+
+
+class Left(msgspec.Struct, tag=True, frozen=True):
+    """To the classroom: a page has gone."""
+
+    seat: int
+
+
+class Opened(msgspec.Struct, tag=True, frozen=True):
+    """To the classroom: a class for this world alone."""
+
+    code: str
+    name: str
+
+
+class Closed(msgspec.Struct, tag=True, frozen=True):
+    """To the classroom: that class is over."""
+
+    code: str
+
+
+class Stopped(msgspec.Struct, tag=True, frozen=True):
+    """To the classroom: the answer to ``Stop``; why not, or nothing."""
+
+    id: int
+    why: str = ""
+
+
+class Shows(msgspec.Struct, tag=True, frozen=True):
+    """To the classroom: one who signs in shows a class's code."""
+
+    id: int
+    code: str
+    name: str
+
+
+class Admitted(msgspec.Struct, tag=True, frozen=True):
+    """From the classroom: the answer to ``Shows``; why not, or a ``Place``."""
+
+    id: int
+    why: str = ""
+    code: str = ""
+    page: str = ""
+    seconds: float = 0.0
+
+
+class Ended(msgspec.Struct, tag=True, frozen=True):
+    """From the classroom: a class is over."""
+
+    code: str
+
+
+class Told(msgspec.Struct, tag=True, frozen=True):
+    """From the classroom: what a page is to hear."""
+
+    seat: int
+    message: dict[str, object]
+
+
+class Stop(msgspec.Struct, tag=True, frozen=True):
+    """From the classroom: end all that a robot does."""
+
+    id: int
+    robot: str
+
+
+ToRoom = Hello | Wished | At | Drawn | Left | Opened | Closed | Stopped | Shows
+FromRoom = Told | Stop | Admitted | Ended
+_decode = msgspec.json.Decoder(FromRoom).decode
+
+
+def line(message: ToRoom | FromRoom) -> bytes:
+    """Return a message as it is sent."""
+    return msgspec.json.encode(message) + b"\n"
+
+
+class LinkedRoom:
+    """The classroom at ``path``, for the console of one world.
+
+    ``stop`` ends all that a robot does; ``ended`` hears the code of a class that is over.
+    """
+
+    def __init__(
+        self, path: Path, hello: Hello, stop: Callable[[str], Awaitable[None]], ended: Callable[[str], None]
+    ) -> None:
+        self._path, self._hello, self._stop, self._ended = path, hello, stop, ended
+        self._admitting: dict[int, asyncio.Future[Admitted]] = {}
+        self._seats: dict[int, LinkedSeat] = {}
+        self._next = 1
+        self._writer: asyncio.StreamWriter | None = None
+        self._stopping: set[asyncio.Task[None]] = set()
+        self._task = asyncio.get_running_loop().create_task(self._run(), name="classroom of several worlds")
+
+    def seat(self, tell: Tell) -> LinkedSeat:
+        """Return a place for a page."""
+        self._next += 1
+        return LinkedSeat(self, self._next, tell)
+
+    async def open(self, code: str, name: str) -> None:
+        """Have a class for this program's own world. Raises Refused."""
+        self.send(Opened(code, name))
+
+    async def close(self, code: str) -> None:
+        """End it. Raises Refused."""
+        self.send(Closed(code))
+
+    async def admit(self, code: str, name: str) -> Place:
+        """Return where one who shows a class's code is to be. Raises NotFound, Refused."""
+        if len(self._admitting) >= ADMITTING_MAX:
+            raise Refused("too many sign in at once")
+        self._next += 1
+        id = self._next
+        self.send(Shows(id, code, name))
+        self._admitting[id] = asyncio.get_running_loop().create_future()
+        try:
+            async with asyncio.timeout(ADMIT_SECONDS):
+                found = await self._admitting[id]
+        except TimeoutError:
+            raise Refused("the class does not answer") from None
+        finally:
+            del self._admitting[id]
+        if found.why:
+            raise NotFound(found.why)
+        return Place(found.code, found.page, found.seconds)
+
+    async def end(self) -> None:
+        """Hang up."""
+        self._task.cancel()
+        await asyncio.gather(self._task, *self._stopping, return_exceptions=True)
+
+    def send(self, message: ToRoom, seat: LinkedSeat | None = None) -> None:
+        """Say something to the classroom. Raises Refused if it cannot be reached."""
+        if self._writer is None or self._writer.is_closing():
+            raise Refused("the class is out of reach")
+        if seat is not None:
+            self._seats[seat.number] = seat
+        self._writer.write(line(message))
+
+    def forget(self, seat: LinkedSeat) -> None:
+        """A page has gone."""
+        if self._seats.pop(seat.number, None) is not None and self._writer is not None:
+            self._writer.write(line(Left(seat.number)))
+
+    async def _run(self) -> None:
+        while True:
+            try:
+                await self._talk()
+            except (OSError, ValueError, msgspec.MsgspecError) as error:
+                log.warning("the class is out of reach: %s", error)
+            await asyncio.sleep(AGAIN)
+
+    async def _talk(self) -> None:
+        reader, writer = await asyncio.open_unix_connection(self._path, limit=LINE_MAX)
+        try:
+            writer.write(line(self._hello))
+            self._writer = writer
+            while text := await reader.readline():
+                self._hear(_decode(text))
+        finally:
+            self._writer = None
+            writer.transport.abort()
+            seats, self._seats = self._seats, {}
+            for seat in seats.values():
+                seat.tell({"type": "left"})
+
+    def _hear(self, message: FromRoom) -> None:
+        match message:
+            case Stop():
+                task = asyncio.get_running_loop().create_task(self._do_stop(message), name=f"stop {message.robot}")
+                self._stopping.add(task)
+                task.add_done_callback(self._stopping.discard)
+            case Told(seat=number, message=told):
+                if (seat := self._seats.get(number)) is not None:
+                    seat.tell(told)
+            case Admitted(id=id):
+                if (waiting := self._admitting.get(id)) is not None and not waiting.done():
+                    waiting.set_result(message)
+            case Ended(code=code):
+                self._ended(code)
+
+    async def _do_stop(self, wish: Stop) -> None:
+        why = ""
+        try:
+            await self._stop(wish.robot)
+        except (RobotError, OSError) as error:
+            why = f"{wish.robot}: {error}"
+        if self._writer is not None:
+            self._writer.write(line(Stopped(wish.id, why)))
+
+
+class LinkedSeat:
+    """One page's place there; it is taken with the page's first wish."""
+
+    def __init__(self, room: LinkedRoom, number: int, tell: Tell) -> None:
+        self._room, self.number, self.tell = room, number, tell
+        self._robot = ""
+
+    async def take(self, wish: Member, *, may_teach: bool) -> None:
+        """Pass it on; ``tell`` hears what becomes of it. Raises Refused if the classroom is out of reach."""
+        self._room.send(At(self.number, self._robot), self)
+        self._room.send(Wished(self.number, wish, may_teach), self)
+
+    def at(self, robot: str) -> None:
+        """The page works with this robot from now on: told with its next wish."""
+        self._robot = robot
+
+    def draw(self, picture: str) -> None:
+        """Show teachers the robot's map, a PNG in base64. Raises Refused."""
+        self._room.send(Drawn(self.number, picture), self)
+
+    def leave(self) -> None:
+        """The page goes."""
+        self._room.forget(self)

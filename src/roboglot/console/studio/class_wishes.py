@@ -1,0 +1,33 @@
+"""What a page wishes of its class, as it says so."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import msgspec
+
+NAME_MAX, WORDS_MAX, STYLE_MAX = 40, 300, 400_000  # characters
+Words = Annotated[str, msgspec.Meta(max_length=WORDS_MAX)]
+
+
+class Doing(msgspec.Struct, frozen=True):
+    """What a pupil's page shows."""
+
+    phase: Words = "idle"
+    lit: Words = ""
+    program: Words = ""
+    error: Words = ""
+    mission: Words = ""
+    stars: Annotated[int, msgspec.Meta(ge=0, le=1000)] = 0
+
+
+class Member(msgspec.Struct, tag="class", tag_field="type"):
+    """What a page wishes of its class."""
+
+    do: Literal["open", "join", "leave", "doing", "hand_in", "stop_all", "look", "close"]
+    id: int = 0
+    code: Annotated[str, msgspec.Meta(max_length=12)] = ""
+    name: Annotated[str, msgspec.Meta(max_length=NAME_MAX)] = ""
+    doing: Doing = Doing()
+    style: Annotated[str, msgspec.Meta(max_length=STYLE_MAX)] = ""
+    carry: bool = False  # the page has come from another world, and wants the program that was last seen

@@ -1,0 +1,217 @@
+"""The classroom that the consoles of a fleet's worlds share: a world for each pupil, one grid for the teacher.
+
+It is in the supervisor, so that it outlives a world that dies, and listens in the fleet's folder.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import os
+import socket
+from collections.abc import Coroutine
+from pathlib import Path
+
+import msgspec
+
+from roboglot.console.studio.class_files import ClassFiles
+from roboglot.console.studio.class_link import (
+    LINE_MAX,
+    Admitted,
+    At,
+    Closed,
+    Drawn,
+    Ended,
+    Hello,
+    Left,
+    Opened,
+    Shows,
+    Stop,
+    Stopped,
+    Told,
+    ToRoom,
+    Wished,
+    line,
+)
+from roboglot.console.studio.classroom import Classroom, Seat, World
+from roboglot.model.errors import Refused, RobotError
+from roboglot.shards.shard import CLASS_SOCKET
+
+log = logging.getLogger(__name__)
+FOLDER = "classes"
+PENDING_MAX = 256  # wishes of one world that are being answered
+SEATS_MAX = 200  # pages of one world
+UNREAD_MAX = 32 << 20  # bytes that a world has not read: it hangs, and is hung up on
+STOP_SECONDS = 10.0
+_decode = msgspec.json.Decoder(ToRoom).decode
+
+
+class FleetClasses:
+    """Of the fleet in one folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._server: asyncio.Server | None = None
+        self._worlds: set[asyncio.Task[None]] = set()
+
+    async def open(self) -> None:
+        """Listen. Where that cannot be worlds are up all the same, without classes, and a warning says so."""
+        path = self._folder / CLASS_SOCKET
+        listening = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            room = await asyncio.to_thread(Classroom, ClassFiles(self._folder / FOLDER))
+            path.unlink(missing_ok=True)  # left by a program that was killed; the folder is ours alone
+            os.fchmod(listening.fileno(), 0o600)
+            listening.bind(bytes(path))
+
+            async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+                task = asyncio.current_task()
+                assert task is not None
+                self._worlds.add(task)
+                task.add_done_callback(self._worlds.discard)
+                await _Link(room, writer).serve(reader)
+
+            self._server = await asyncio.start_unix_server(serve, sock=listening, limit=LINE_MAX)
+        except OSError as error:
+            listening.close()
+            log.warning("there are no classes in this fleet: %s: %s", path, error)
+
+    async def close(self) -> None:
+        """Stop listening and hang up."""
+        if self._server is None:
+            return
+        self._server.close()
+        for task in list(self._worlds):
+            task.cancel()
+        await asyncio.gather(*self._worlds, return_exceptions=True)
+        (self._folder / CLASS_SOCKET).unlink(missing_ok=True)
+
+
+class _Link:
+    """One world's console."""
+
+    def __init__(self, room: Classroom, writer: asyncio.StreamWriter) -> None:
+        self._room, self._writer = room, writer
+        self._world = ""
+        self._seats: dict[int, Seat] = {}
+        self._stops: dict[int, asyncio.Future[str]] = {}
+        self._pending: set[asyncio.Task[None]] = set()
+
+    async def serve(self, reader: asyncio.StreamReader) -> None:
+        """Until it hangs up."""
+        mine = None
+        try:
+            hello = _decode(await reader.readline())
+            if not isinstance(hello, Hello):
+                raise ValueError("it said no name")
+            self._world = hello.world
+            mine = self._room.worlds[hello.world] = World(hello.world, hello.page, self._stop, self._end)
+            while text := await reader.readline():
+                await self._hear(_decode(text))
+        except (OSError, ValueError, msgspec.MsgspecError, RecursionError) as error:
+            log.warning("hung up on world %s: %s", self._world, error)
+        finally:
+            if mine is not None and self._room.worlds.get(self._world) is mine:
+                del self._room.worlds[self._world]
+            for seat in self._seats.values():
+                seat.leave()
+            for waiting in self._stops.values():
+                waiting.cancel()
+            for task in self._pending:
+                task.cancel()
+            self._writer.transport.abort()
+
+    async def _hear(self, message: ToRoom) -> None:
+        match message:
+            case Opened() | Closed():
+                await self._change(message)
+            case Shows():
+                self._begin(self._admit(message), "admit a pupil")
+            case Stopped(id=id, why=why):
+                if (waiting := self._stops.get(id)) is not None and not waiting.done():
+                    waiting.set_result(why)
+            case Hello():
+                raise ValueError("it said its name twice")
+            case _:
+                self._hear_page(message)
+
+    def _hear_page(self, message: Wished | At | Drawn | Left) -> None:
+        match message:
+            case Wished():
+                self._take(self._seat(message.seat), message)
+            case At(seat=number, robot=robot):
+                self._seat(number).at(robot)
+            case Drawn(seat=number, png=png):
+                self._seat(number).draw(png)
+            case Left(seat=number):
+                if (seat := self._seats.pop(number, None)) is not None:
+                    seat.leave()
+
+    async def _change(self, message: Opened | Closed) -> None:
+        """Open or close the class of one world."""
+        found = self._room.classes.get(message.code)
+        if isinstance(message, Closed):
+            if found is not None and found.only == self._world:
+                await self._room.end(message.code)
+        elif found is None:
+            with contextlib.suppress(Refused):  # too many: the console's own class is open all the same
+                await self._room.begin(message.name, message.code, self._world)
+
+    def _seat(self, number: int) -> Seat:
+        if number not in self._seats:
+            if len(self._seats) >= SEATS_MAX:
+                raise ValueError(f"more than {SEATS_MAX} pages")
+            self._seats[number] = self._room.seat(lambda told: self._tell(number, told), self._world)
+        return self._seats[number]
+
+    def _take(self, seat: Seat, wished: Wished) -> None:
+        if len(self._pending) >= PENDING_MAX:
+            seat.tell({"type": "refused", "id": wished.wish.id, "why": "too much is being answered"})
+            return
+
+        async def take() -> None:
+            try:
+                await seat.take(wished.wish, may_teach=wished.may_teach)
+            except (RobotError, ValueError) as error:
+                seat.tell({"type": "refused", "id": wished.wish.id, "why": str(error)})
+
+        self._begin(take(), f"class {wished.wish.do}")
+
+    def _begin(self, what: Coroutine[None, None, None], name: str) -> None:
+        task = asyncio.get_running_loop().create_task(what, name=name)
+        self._pending.add(task)
+        task.add_done_callback(self._pending.discard)
+
+    async def _admit(self, shows: Shows) -> None:
+        try:
+            place = await self._room.admit(shows.code, shows.name, self._world)
+            answer = Admitted(shows.id, "", place.code, place.page, place.seconds)
+        except RobotError as error:
+            answer = Admitted(shows.id, str(error))
+        self._writer.write(line(answer))
+
+    def _end(self, code: str) -> None:
+        """Say that a class is over."""
+        self._writer.write(line(Ended(code)))
+
+    def _tell(self, number: int, message: dict[str, object]) -> None:
+        if number in self._seats and not self._writer.is_closing():
+            self._writer.write(line(Told(number, message)))
+            if self._writer.transport.get_write_buffer_size() > UNREAD_MAX:
+                self._writer.transport.abort()
+
+    async def _stop(self, robot: str) -> None:
+        """End all that a robot does. Raises Refused."""
+        id = max(self._stops, default=0) + 1
+        self._stops[id] = asyncio.get_running_loop().create_future()
+        try:
+            self._writer.write(line(Stop(id, robot)))
+            async with asyncio.timeout(STOP_SECONDS):
+                why = await self._stops[id]
+        except (TimeoutError, OSError):
+            why = f"{robot} in {self._world} does not answer"
+        finally:
+            del self._stops[id]
+        if why:
+            raise Refused(why)

@@ -1,0 +1,104 @@
+"""Pupils of a fleet where names are asked for: a class's code lets them in, each into the world that is theirs."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
+
+import pytest
+from websockets.asyncio.client import connect
+from websockets.exceptions import ConnectionClosed
+
+from roboglot.access.store import Grant, open_store
+from roboglot.config import AccessConfig
+from roboglot.operations import Right
+from roboglot.shards.classes import FleetClasses
+from tests.console.conftest import ADDRESS, Shown
+from tests.console.test_classes import asked, grid, opened, world
+from tests.console.test_studio_socket import SAVE, Page
+
+PASSWORD = "a long enough secret"
+
+
+def post(url: str, shows: dict[str, str]) -> tuple[int, dict[str, Any], str]:
+    """What a log-in page is answered, and the cookie."""
+    try:
+        with urlopen(Request(f"{url}/api/sign_in", data=json.dumps(shows).encode()), timeout=30) as reply:
+            return reply.status, json.loads(reply.read()), str(reply.headers["set-cookie"] or "").partition(";")[0]
+    except HTTPError as error:
+        return error.code, json.loads(error.read()), ""
+
+
+async def signed(shown: Shown, **shows: str) -> tuple[int, dict[str, Any], str]:
+    return await asyncio.to_thread(post, shown.url, shows)
+
+
+@asynccontextmanager
+async def paged(shown: Shown, cookie: str) -> AsyncIterator[Page]:
+    """The studio of who has this cookie."""
+    url = shown.url.replace("http", "ws") + "/studio"
+    async with connect(url, max_size=None, additional_headers={"Cookie": cookie}) as socket:
+        made = Page(socket)
+        await made.say(type="open", robot="a")
+        await made.kind("opened")
+        yield made
+
+
+async def test_a_code_lets_pupils_into_their_worlds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
+    classes, asking = FleetClasses(tmp_path), AccessConfig(on=True, local=False)
+    await classes.open()
+    other = ADDRESS.replace(".92.", ".93.")
+    (tmp_path / "w1").mkdir()
+    store = open_store(tmp_path / "w1")
+    store.add_person("mx", PASSWORD, [Grant("*", frozenset({Right.ADMIN}))])
+    store.close()
+    async with (
+        world(tmp_path, "w1", ADDRESS, access=asking) as first,
+        world(tmp_path, "w2", other, access=asking) as second,
+    ):
+        _, _, cookie = await signed(first, name="mx", password=PASSWORD)
+        async with paged(first, cookie) as teacher:
+            code = await opened(teacher)
+            assert (await signed(second, name="Anna", code="AAAAAA"))[0] == 401
+            status, anna, key = await signed(first, name="Anna", code=code.lower())
+            assert (status, anna["robot"], anna["studio"]) == (200, "a", code)
+            assert key
+            status, ben, none = await signed(first, name="Ben B", code=code)
+            assert (status, ben, none) == (200, {"elsewhere": second.url, "code": code, "name": "Ben-B"}, "")
+            status, _, key = await signed(second, name=ben["name"], code=code)
+            assert status == 200
+            async with paged(second, key) as page:
+                await asked(page, do="join", code="ZZZZZZ", name="Anna", id=3)  # as who he is, whatever he says
+                assert (await page.kind("joined"))["name"] == "Ben-B"
+                await grid(teacher, name="Ben-B", world="w2", here=True)
+                answer = await page.frame(**SAVE, id="1", body="print(1)\n")
+                assert answer["feedback"]["state"] == 0
+                await asked(page, do="open", id=4, name="mine")
+                assert "opens a class" in (await page.kind("refused"))["why"]
+                await asked(teacher, do="close")
+                assert (await teacher.kind("ended"))["type"] == "ended"
+                with pytest.raises(ConnectionClosed):  # his right has ended with the class
+                    await page.kind("no more")
+            assert (await signed(second, name="Ben-B", code=code))[0] == 401
+    await classes.close()
+
+
+async def test_an_old_class_lets_nobody_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Until its teacher comes back."""
+    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
+    asking = AccessConfig(on=True, local=True)
+    async with world(tmp_path, "w", ADDRESS, shared=False, access=asking) as shown, paged(shown, "") as teacher:
+        code = await opened(teacher)
+        assert (await signed(shown, name="Anna", code=code))[0] == 200
+        monkeypatch.setattr("roboglot.console.studio.classroom.OPEN_SECONDS", 0.0)
+        await asked(teacher, do="open", code=code)
+        await grid(teacher, name="Anna")
+        status, answer, _ = await signed(shown, name="Ben", code=code)
+        assert (status, answer["error"]) == (401, "this class is over, unless its teacher comes back")
