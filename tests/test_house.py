@@ -23,7 +23,6 @@ WIDE = {  # classes with more, and why
     "Hull": "to be split",
     "PipeEnd": "to be split",
     "ProgramService": "to be split",
-    "QueueDelivery": "to be split",
     "RobotServer": "to be split",
     "SimulatedBase": "to be split",
     "SimulatedGimbal": "to be split",

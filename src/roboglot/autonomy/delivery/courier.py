@@ -1,0 +1,181 @@
+"""Carries out a robot's orders, one after the other, and takes it to rest when there is nothing to do."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Coroutine
+
+from roboglot.autonomy.delivery.delivery_round import Round
+from roboglot.autonomy.delivery.drive import Driver, Failed
+from roboglot.autonomy.delivery.follow_up import follow_up
+from roboglot.autonomy.delivery.handover import Ears
+from roboglot.autonomy.delivery.order_book import OrderBook
+from roboglot.autonomy.delivery.readiness import Readiness
+from roboglot.autonomy.delivery.rules import PARKING, place_of_type
+from roboglot.model.components.logistics.delivery import Failure, Order, OrderKind, OrderStatus, Phase, Policy
+from roboglot.model.components.motion.driving import BASE
+from roboglot.model.errors import RobotError
+from roboglot.model.events import DeliveryNews
+from roboglot.model.robot import Robot
+
+log = logging.getLogger(__name__)
+HOURS_LOOK = 10.0  # s between looks at the clock while there is nothing to do
+BASE_LOOK = 1.0  # s between looks whether another client still drives the robot
+
+
+class Courier:
+    """Works through the book from the first ``wake`` to ``close``. ``changing`` is held to add or call off orders."""
+
+    def __init__(self, robot: Robot, book: OrderBook, driver: Driver, ears: Ears) -> None:
+        self._robot, self._book, self._driver, self._ears = robot, book, driver, ears
+        self.changing = asyncio.Lock()
+        self.readiness = Readiness(robot, self, driver.report)
+        self.phase = Phase.IDLE
+        self.current: str | None = None
+        self._woken = asyncio.Event()
+        self._job: asyncio.Task[None] | None = None
+        self._worker: asyncio.Task[None] | None = None
+        self._giving_up: asyncio.Task[None] | None = None
+
+    def close(self) -> None:
+        """Leave the book as it is."""
+        self.readiness.close()
+        for task in (self._worker, self._job, self._giving_up):
+            if task:
+                task.cancel()
+
+    @property
+    def policy(self) -> Policy:
+        """The rules of delivery."""
+        return self._book.policy
+
+    @property
+    def delivers(self) -> bool:
+        """Whether there ever was an order."""
+        return self._worker is not None
+
+    def wake(self) -> None:
+        """Look again at what is to be done."""
+        self._woken.set()
+        if self._worker is None:
+            self._worker = asyncio.get_running_loop().create_task(self._work(), name=f"{self._robot.id} delivers")
+        if self.phase in (Phase.RETURNING, Phase.GOING_HOME) and self._next():
+            self._stop_job()
+
+    async def call_off(self, order: Order, failure: Failure | None = None) -> None:
+        """End an order that is under way, or before it begins; ``failure`` says why."""
+        if order.status.ended or order.status is OrderStatus.CANCELING:
+            return
+        running = order.id == self.current
+        status = OrderStatus.CANCELING if running else OrderStatus.CANCELED
+        await self._book.change(order.id, status=status, failure=failure)
+        if running:
+            self._stop_job()
+
+    def drop_current(self) -> None:
+        """Do no more for the order under way, whose end is in the book already."""
+        if self.current:
+            self._stop_job()
+
+    def give_up(self) -> None:
+        """Cancel all orders: the battery is low."""
+        self._giving_up = asyncio.get_running_loop().create_task(self._give_up(), name=f"{self._robot.id} battery low")
+
+    async def _give_up(self) -> None:
+        async with self.changing:
+            for order in self._book.open:
+                await self.call_off(order, Failure.BATTERY_LOW)
+        if self.phase is Phase.RETURNING:
+            self._stop_job()
+        self.wake()
+
+    def _stop_job(self) -> None:
+        if self._job:
+            self._job.cancel()
+
+    def _next(self) -> Order | None:
+        """The order to begin now."""
+        if not self._driver.allowed or not self.readiness.works:
+            return None
+        return next((order for order in self._book.open if order.status is OrderStatus.READY), None)
+
+    async def _work(self) -> None:
+        while True:
+            self._woken.clear()
+            self.readiness.look_at_hours()
+            if order := self._next():
+                if self._robot.actions.running(BASE):
+                    await self._robot.clock.sleep(BASE_LOOK)  # the current driver may finish
+                    continue
+                await self._carry_out(order)
+            elif self.readiness.rest_due and self._driver.allowed and not self.readiness.lost:
+                await self._rest()
+            else:
+                await self._wait()
+
+    async def _wait(self) -> None:
+        if not self._book.policy.hours and not self._book.policy.rest_days:
+            await self._woken.wait()
+            return
+        try:
+            await self._robot.clock.wait_for(self._woken.wait(), HOURS_LOOK)
+        except TimeoutError:
+            return
+
+    async def _carry_out(self, order: Order) -> None:
+        began = order.began_at or self._robot.clock.epoch()
+        order = await self._book.change(order.id, status=OrderStatus.RUNNING, began_at=began)
+        self.current, self.phase, self.readiness.rest_due = order.id, Phase.WORKING, True
+        station = order.request.kind is OrderKind.STATION
+        self._driver.report(DeliveryNews.STATION_STARTED if station else DeliveryNews.ORDER_STARTED)
+        failure: Failure | None = None
+        try:
+            if await self._do(Round(self._robot, self._book, self._driver, self._ears, order).run()):
+                status = OrderStatus.SUCCEEDED
+            else:
+                status = OrderStatus.CANCELED
+        except Failed as error:
+            status, failure = OrderStatus.FAILED, error.failure
+        except RobotError as error:
+            log.info("robot %s: order %s failed: %s", self._robot.id, order.number, error)
+            status, failure = OrderStatus.FAILED, Failure.REFUSED
+        self.phase, self.current = Phase.IDLE, None
+        order = self._book.get(order.id)
+        if not order.status.ended:
+            order = await self._book.change(order.id, status=status, failure=failure or order.failure)
+        if status is OrderStatus.FAILED:
+            await follow_up(self._robot, self._book, self._driver, self.readiness, order)
+
+    async def _do(self, work: Coroutine[None, None, None]) -> bool:
+        """Do it as a task that others may cancel; False if they did."""
+        self._job = job = asyncio.get_running_loop().create_task(work, name=f"{self._robot.id} delivery job")
+        try:
+            await asyncio.wait({job})
+        finally:
+            job.cancel()
+            self._job = None
+        if job.cancelled():
+            return False
+        job.result()
+        return True
+
+    async def _rest(self) -> None:
+        """To the parking place, or onto the dock; there at once off work and with a low battery."""
+        robot, readiness = self._robot, self.readiness
+        readiness.rest_due = False
+        docked = readiness.docked
+        parking = place_of_type(robot, PARKING) if readiness.parks else None
+        try:
+            if parking:
+                self.phase = Phase.RETURNING
+                await self._do(self._driver.go(parking, self._book.policy, self._book.policy.return_speed))
+            elif not docked and readiness.has_home:
+                self.phase = Phase.GOING_HOME
+                await self._do(self._driver.go_home(self._book.policy))
+        except Failed as error:
+            log.info("robot %s could not go to rest: %s", robot.id, error)
+            if error.failure is Failure.NOT_LOCALIZED:
+                readiness.lose()
+        finally:
+            self.phase = Phase.IDLE
