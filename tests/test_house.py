@@ -29,7 +29,6 @@ WIDE = {  # classes with more, and why
     "SimulatedLegs": "to be split",
     "Slam": "to be split",
     "Stage": "to be split",
-    "TaskRun": "to be split",
 }
 GENERATED = ("_pb2.py", "_pb2_grpc.py")
 WORDS_MAX = 5  # in 10,000 lines

@@ -150,7 +150,7 @@ class Runner:
             return
         await living.revive()
         if history.interrupted:
-            living.write("error", f"the server ended during {history.interrupted}: it is not repeated")
+            living.log.write("error", f"the server ended during {history.interrupted}: it is not repeated")
         self._supervisors.add(self._supervise(living), f"task {task.id}")
 
     async def _living(
@@ -193,9 +193,9 @@ class Runner:
         """Kill a run and store the state of its task."""
         run = self.runs[id]
         await run.kill()
-        run.write("note", why)
+        run.log.write("note", why)
         state = await self._put_away(run, run.state, TaskOperation.SHUTDOWN)
-        run.end_block()
+        run.host.end_block()
         return state
 
     async def suspend(self, run: TaskRun) -> None:
@@ -237,13 +237,13 @@ class Runner:
         """Store and report the end of a program."""
         id = run.task.id
         for words in filter(None, (outcome.error, run.control.summary)):
-            run.write("error", words)
+            run.log.write("error", words)
         await self._put_away(run, TaskState.RUN, TaskOperation.STOP)
         if outcome.reason is not ExitReason.FINISHED:
             self.reports.publish(TaskReport(id, TaskOperation.RUN, outcome.error, CannotExecute(outcome.error)))
         elif words := run.control.summary:
             self.reports.publish(TaskReport(id, TaskOperation.RUN, words, CannotExecute(words)))
-        run.end_block()
+        run.host.end_block()
         self.reports.publish(TaskReport(id, TaskOperation.STOP, "stop task"))
 
     async def _put_away(self, run: TaskRun, before: TaskState, operation: TaskOperation) -> TaskState:

@@ -383,7 +383,7 @@ class ProgramService:
             if task.mode == "cycle":
                 self._wait_for_its_time(task)
             if (run := self._runs.get(id)) is not None:
-                run.write("note", f"its time came again while it was in {run.state}: not started a second time")
+                run.log.write("note", f"its time came again while it was in {run.state}: not started a second time")
                 return
             if task.state != TaskState.RUN_WAIT:
                 return

@@ -10,8 +10,6 @@ import logging
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, replace
 
-import msgspec
-
 from roboglot.model.client_context import ask_for
 from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
@@ -31,17 +29,16 @@ from roboglot.programs.engine.share import metered
 from roboglot.programs.engine.usage import usage_of
 from roboglot.programs.errors import NotAllowed
 from roboglot.programs.functions.interrupted import call_cut_off
-from roboglot.programs.functions.results import StateCode, in_short
+from roboglot.programs.functions.results import in_short
 from roboglot.programs.functions.session import Session, TaskEnded
 from roboglot.programs.functions.table import call as call_function
-from roboglot.programs.functions.table import remember
-from roboglot.programs.language.names import EXCEPTIONS
 from roboglot.programs.language.places import Step
 from roboglot.programs.library.modules import HEADER_LINES
 from roboglot.programs.stores import StoredProgram
 from roboglot.programs.tasks.block_stops import MARKS, BlockStops
 from roboglot.programs.tasks.control import ControlWatch
 from roboglot.programs.tasks.process_time import ProcessTime
+from roboglot.programs.tasks.replay import Replay
 from roboglot.programs.tasks.reports import (
     Audience,
     Insight,
@@ -50,17 +47,14 @@ from roboglot.programs.tasks.reports import (
     Reading,
     Report,
     RunFigures,
-    TaskReport,
     Variables,
     done,
 )
+from roboglot.programs.tasks.run_host import RunHost
 from roboglot.programs.tasks.run_log import RunLog
 from roboglot.programs.tasks.states import TaskOperation, TaskState
-from roboglot.programs.worker.values import unpack
 
 log = logging.getLogger(__name__)
-
-_REMEMBERED_MAX = 16 * 1024  # bytes of an answer; the state of a longer one (measurements, lists) is not kept
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,25 +97,23 @@ class TaskRun:
         self.task = task
         self.state = TaskState.RUN_WAIT
         self._run = run
-        self._session = Session(robot, task.id, self)
+        self.log = RunLog(robot.clock, run, listeners.log_pace, lambda entry: listeners.logged(task.id, entry))
+        self.host = RunHost(task.id, self.log, listeners.report, listeners.at_breakpoint)
+        self._session = self.host.session = Session(robot, task.id, self.host)
         self._clock = robot.clock
         self._began = robot.clock.time()
         self._report = listeners.report
-        self._at_breakpoint = listeners.at_breakpoint
         self._pace = pace
-        self.log = RunLog(robot.clock, run, listeners.log_pace, lambda entry: listeners.logged(task.id, entry))
-        self._block: str | None = None
         self._answering: asyncio.Task[None] | None = None
         self._ended_itself = False
         self._journal = journal
         run.calls.answered = journal.answered
-        self._replaying = replaying
+        self._replay = Replay(self._session, self.host, replaying)
         self._block_stops = BlockStops(run.position, stops)
         self._insights = insights = listeners.insights
         run.noticed = lambda held: insights.publish(Variables(task.id, held))
         self.control = ControlWatch(robot, f"visual {task.id}", lambda text: self.log.write("error", text))
         self.time = ProcessTime(robot.clock)
-        self._ahead = 0.0  # s that the program's time.monotonic is ahead of the clock, which began anew after a crash
 
     @property
     def line(self) -> int:
@@ -152,7 +144,7 @@ class TaskRun:
     @property
     def block(self) -> str:
         """The block that is open, "" for none."""
-        return self._block or ""
+        return self.host.block
 
     async def execute(self) -> Outcome:
         """Answer the program's calls until it is over; what it had begun on the robot is called off then."""
@@ -166,7 +158,8 @@ class TaskRun:
                     case Output(text=text):
                         await self.log.print(text)
                     case Replayed():
-                        await self._follow(event)
+                        await self._replay.follow(event)
+                        await self._followed()
                     case Call():
                         if event.interrupted:
                             await self._followed()
@@ -190,7 +183,7 @@ class TaskRun:
         """Instead of a start: the program does again what it did, and is found suspended where it was lost."""
         self.state = TaskState.SUSPEND
         self._session.pause()
-        if not self._replaying:
+        if not self._replay.left:
             await self._hold()
 
     async def close_journal(self) -> None:
@@ -232,51 +225,10 @@ class TaskRun:
         await self._run.wait()
         self.log.close()
 
-    def begin_block(self, id: str) -> None:
-        """End the block before, begin this one: the two always alternate (0.2.1.2.2.2)."""
-        self.end_block()
-        self._block = id
-        self._report_block("begin", id)
-
-    def end_block(self) -> None:
-        """End the block that is open, if one is."""
-        if self._block is not None:
-            self._report_block("end", self._block)
-            self._block = None
-
-    async def breakpoint(self) -> None:
-        """The program asked to be suspended here."""
-        await self._at_breakpoint()
-
-    def write(self, level: str, text: str) -> None:
-        """Add to the log what a function has to say."""
-        self.log.write(level, text)
-
-    async def _follow(self, call: Replayed) -> None:
-        """Keep what the host knew of a call that is not made again."""
-        if call.name in MARKS and call.args:
-            self._block = str(call.args[0])
-        elif call.name.endswith(".set_log"):
-            await call_function(self._session, call.name, call.args, call.kwargs)
-        elif call.name == "time.monotonic":
-            answer = msgspec.json.decode(call.answer).get("value")
-            self._ahead = max(0.0, float(answer) - self._clock.time()) if isinstance(answer, (int, float)) else 0.0
-        elif len(call.answer) <= _REMEMBERED_MAX:
-            self._remember(call)
-        await self._followed()
-
-    def _remember(self, call: Replayed) -> None:
-        """Restore the state of the call's group, which ``cyberdog.motion.state`` and the like read."""
-        answer = msgspec.json.decode(call.answer)
-        if answer["t"] == "value":
-            remember(self._session, call.name, unpack(answer["value"]))
-        elif answer["type"] not in EXCEPTIONS:
-            remember(self._session, call.name, RobotError(answer["message"]))
-
     async def _followed(self) -> None:
         """One call more that is behind the program; after the last it is held where it was lost."""
-        self._replaying -= 1
-        if not self._replaying and self.state is TaskState.SUSPEND:
+        self._replay.left -= 1
+        if not self._replay.left and self.state is TaskState.SUSPEND:
             await self._hold()
 
     async def _hold(self) -> None:
@@ -285,16 +237,10 @@ class TaskRun:
         await self._run.suspend()
         self._report(done(TaskOperation.SUSPEND, self.task.id, TaskState.SUSPEND))
 
-    def _report_block(self, kind: str, id: str) -> None:
-        last = self._session.last_state.fields
-        code = last["code"]
-        words = "run task" if code == StateCode.SUCCESS else f"run task. {last['describe']}"
-        self._report(TaskReport(self.task.id, TaskOperation.RUN, words, block=(kind, id), block_status=StateCode(code)))
-
     async def _halt(self, halted: Halted) -> None:
         self.time.ask(True)
         if not self._block_stops.passes():
-            await self._at_breakpoint()
+            await self.host.breakpoint()
         self._run.calls.reply(halted.id)
         self.time.ask(False)
 
@@ -318,13 +264,13 @@ class TaskRun:
             if request.name in MARKS:
                 await self._pace.wait()
                 if self._block_stops.halts(self.block):
-                    await self._at_breakpoint()
+                    await self.host.breakpoint()
             elif self._insights.listening:
                 self._insights.publish(
                     Reading(self.task.id, self.line, self.module, self.block, request.name, in_short(value))
                 )
             if request.name == "time.monotonic" and isinstance(value, float):
-                value += self._ahead
+                value += self._replay.ahead
             self._run.calls.reply(request.id, value)
         except TaskEnded:
             self._ended_itself = True
