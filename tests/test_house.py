@@ -22,7 +22,6 @@ WIDE = {  # classes with more, and why
     "Hands": "to be split",
     "Hull": "to be split",
     "PipeEnd": "to be split",
-    "ProgramService": "to be split",
     "RobotServer": "to be split",
     "SimulatedBase": "to be split",
     "SimulatedGimbal": "to be split",

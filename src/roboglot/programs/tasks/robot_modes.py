@@ -10,8 +10,10 @@ from enum import StrEnum
 
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.energy.power import Power, PowerMode
+from roboglot.model.components.system.disk import Disk
 from roboglot.model.components.system.firmware import Firmware, FirmwareState
 from roboglot.model.robot import Robot
+from roboglot.programs.errors import LimitReached, NotAllowed
 from roboglot.programs.tasks.states import TaskOperation
 
 PROTECTED_BELOW = 0.20  # charge
@@ -69,3 +71,14 @@ def mode_of(robot: Robot) -> RobotMode:
     if charge < LOW_POWER_BELOW or power in (PowerMode.LOW_POWER, PowerMode.WAKING_UP):
         return RobotMode.LOW_POWER
     return RobotMode.PROTECTED if charge < PROTECTED_BELOW else RobotMode.ACTIVE
+
+
+def check_mode(robot: Robot, operation: TaskOperation) -> None:
+    """Raise ProgramError if the robot's mode forbids ``operation`` (0.2.2.3), or a full disk does."""
+    mode = mode_of(robot)
+    if operation not in ALLOWED[mode]:
+        raise NotAllowed(
+            f"The current robot is in [{mode}] mode and does not support <{operation}> operation.",
+        )
+    if operation is TaskOperation.SAVE and Disk in robot and robot[Disk].free <= 0:
+        raise LimitReached("the disk is full")

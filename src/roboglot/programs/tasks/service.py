@@ -6,26 +6,22 @@ What is to be acknowledged is in the store first. Knows no frame and no socket: 
 from __future__ import annotations
 
 import asyncio
-import logging
-from collections.abc import AsyncIterator, Collection
-from contextlib import asynccontextmanager
+from collections.abc import Collection
 from dataclasses import replace
 from datetime import UTC, tzinfo
+from functools import partial
 
-from roboglot.conditions import BadCondition
 from roboglot.model.client_context import identity
-from roboglot.model.components.system.disk import Disk
 from roboglot.model.robot import Robot
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.engine.events import Limits, Stops
-from roboglot.programs.errors import InvalidCondition, LimitReached, NotAllowed, ProgramError
+from roboglot.programs.errors import LimitReached, NotAllowed, ProgramError
 from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.language import Problem
 from roboglot.programs.language.places import Step
 from roboglot.programs.library.inspection import Inspector, refuse_wrong
 from roboglot.programs.library.library import ModuleLibrary
 from roboglot.programs.stores import ListedProgram, LogEntry, StoredProgram, Stores
-from roboglot.programs.tasks.calendar import due_of
 from roboglot.programs.tasks.owners import act_for_owner
 from roboglot.programs.tasks.recovery import settle
 from roboglot.programs.tasks.reports import (
@@ -34,9 +30,8 @@ from roboglot.programs.tasks.reports import (
     Whereabouts,
     done,
 )
-from roboglot.programs.tasks.robot_modes import ALLOWED, mode_of
+from roboglot.programs.tasks.robot_modes import check_mode
 from roboglot.programs.tasks.runner import Background, Runner
-from roboglot.programs.tasks.schedule import Schedule
 from roboglot.programs.tasks.states import (
     DEBUG,
     TaskOperation,
@@ -44,8 +39,8 @@ from roboglot.programs.tasks.states import (
     next_state,
     state_after,
 )
-
-log = logging.getLogger(__name__)
+from roboglot.programs.tasks.timetable import Timetable
+from roboglot.programs.tasks.turns import Turns
 
 TASKS_MAX = 10_000
 
@@ -63,13 +58,13 @@ class ProgramService:
     ) -> None:
         self.robot = robot
         self._engine = engine
-        self._zone = zone
         self._store = stores.tasks
         self._journals = stores.journals
         self._inspector = Inspector(engine, ability_set())
         # Changes of state happen one after the other; what takes long (checking a body) happens before.
         self._lock = asyncio.Lock()
-        self.library = ModuleLibrary(stores.modules, self._inspector, self._lock, self.allow)
+        self._timetable = Timetable(robot.clock, zone, lambda id, _: self._fires.add(self._fire(id), f"fire {id}"))
+        self.library = ModuleLibrary(stores.modules, self._inspector, self._lock, partial(check_mode, robot))
         self._runner = Runner(
             robot,
             engine,
@@ -78,15 +73,13 @@ class ProgramService:
             self._lock,
             limits=limits or Limits(),
             zone=zone,
-            ended=self._wait_again,
+            ended=self._timetable.wait_again,
         )
         self.reports, self.log_entries, self.pace = self._runner.reports, self._runner.log_entries, self._runner.pace
         self.insights, self.log_pace = self._runner.insights, self._runner.log_pace
         self._runs = self._runner.runs
-        self._schedule = Schedule(robot.clock, lambda id, _: self._fires.add(self._fire(id), f"fire {id}"))
         self._fires = Background()
-        self._closed = True
-        self._lost = settle(stores, robot.clock.epoch())
+        self._turns = Turns(robot.clock, self._lock, stores.tasks, self._runner, settle(stores, robot.clock.epoch()))
 
     def start(self) -> None:
         """Let tasks run when their time comes, first those whose time came meanwhile, and ``@reboot``.
@@ -94,40 +87,30 @@ class ProgramService:
         The engine warms up in the background, so that the first program starts as fast as the others.
         """
         self._engine.open_soon()
-        self._closed = False
-        if self._lost:
-            self._fires.add(self._revive(), "revive")
+        self._turns.closed = False
+        if self._turns.lost:
+            self._fires.add(self._turns.restore(), "revive")
         for task in self._store.in_states_now([TaskState.RUN_WAIT]):
             if task.mode == "cycle" and task.condition.strip() == "@reboot":
-                self._schedule.set(task.id, self.robot.clock.epoch())
+                self._timetable.set(task.id, self.robot.clock.epoch())
             else:
-                self._wait_for_its_time(task)
+                self._timetable.wait(task)
 
     async def close(self) -> None:
         """End every run; the tasks are as if a user had ended them. What waits for its time goes on waiting."""
-        self._closed = True
-        self._schedule.clear()
+        self._turns.closed = True
+        self._timetable.clear()
         for id in tuple(self._runs):
             async with self._lock:
                 if id in self._runs:
                     await self._runner.end(id, "the server was stopped")
         await self._fires.done()
         await self._runner.done()
-        self._schedule.clear()
-
-    def allow(self, operation: TaskOperation) -> None:
-        """Raise ProgramError if the robot's mode forbids ``operation`` (0.2.2.3), or a full disk does."""
-        mode = mode_of(self.robot)
-        if operation not in ALLOWED[mode]:
-            raise NotAllowed(
-                f"The current robot is in [{mode}] mode and does not support <{operation}> operation.",
-            )
-        if operation is TaskOperation.SAVE and Disk in self.robot and self.robot[Disk].free <= 0:
-            raise LimitReached("the disk is full")
+        self._timetable.clear()
 
     async def tasks(self, ids: Collection[str] = ()) -> list[ListedProgram]:
         """Return those of ``ids`` that exist, or all, by id; the debug task is hidden."""
-        self.allow(TaskOperation.INQUIRY)
+        check_mode(self.robot, TaskOperation.INQUIRY)
         return [task for task in await self._store.all(ids) if task.id != DEBUG]
 
     async def log(self, id: str) -> list[LogEntry]:
@@ -161,7 +144,7 @@ class ProgramService:
         """Add or replace a task (its ``state`` is not looked at). One that is wrong is kept, too, and refused."""
         await self._check_table(TaskOperation.SAVE, task.id)
         problems, names = await self._inspector.inspect(task.body, self.library.functions)
-        async with self._turn():
+        async with self._turns.take():
             uses = self.library.ids(names)
             await self._keep(
                 replace(task, due=None, owner=identity()), TaskOperation.SAVE, correct=not problems, uses=uses
@@ -170,9 +153,9 @@ class ProgramService:
 
     async def debug(self, task: StoredProgram) -> None:
         """Save under the id debug and run at once; a debug run before this one is ended."""
-        self.allow(TaskOperation.DEBUG)
+        check_mode(self.robot, TaskOperation.DEBUG)
         problems, names = await self._inspector.inspect(task.body, self.library.functions)
-        async with self._turn():
+        async with self._turns.take():
             uses = self.library.ids(names)
             if DEBUG in self._runs:
                 await self._runner.end(DEBUG, "another debug run took over")
@@ -187,17 +170,17 @@ class ProgramService:
 
     async def run(self, id: str, mode: str = "", condition: str = "") -> None:
         """Run a saved task at its time; ``mode`` and ``condition``, where given, replace what is stored."""
-        async with self._turn():
+        async with self._turns.take():
             state = await self._check_table(TaskOperation.RUN, id)
             task = await self._store.get(id)
             assert task is not None, "the table refuses to run what does not exist"
             task = replace(task, mode=mode or task.mode, condition=condition or task.condition, owner=identity())
-            due = self._due(task)
+            due = self._timetable.due(task)
             if state is TaskState.RUN:  # no second instance; what changed counts the next time
                 await self._store.put(task)
-                self._schedule.drop(id)
+                self._timetable.drop(id)
                 if task.mode == "cycle":
-                    self._wait_for_its_time(task)
+                    self._timetable.wait(task)
                 return
             if due is None and task.condition.strip() != "@reboot":
                 raise NotAllowed(f"the time of {task.condition!r} is past or never comes")
@@ -210,12 +193,12 @@ class ProgramService:
             if now:
                 await self._runner.start(task, uses)
             elif due is not None:
-                self._schedule.set(id, due)
+                self._timetable.set(id, due)
 
     async def refusal(self, operation: TaskOperation, id: str) -> ProgramError | None:
         """Return the error that ``operation`` would raise now, or None."""
-        if id in self._lost:
-            await self._revive()
+        if id in self._turns.lost:
+            await self._turns.restore()
         try:
             await self._check_table(operation, id)
         except ProgramError as refusal:
@@ -224,13 +207,13 @@ class ProgramService:
 
     async def suspend(self, id: str) -> None:
         """Suspend the program and the motion that it started."""
-        async with self._turn():
+        async with self._turns.take():
             await self._check_table(TaskOperation.SUSPEND, id)
             await self._runner.suspend(self._runs[id])
 
     async def recover(self, id: str) -> None:
         """Continue the program and its motion."""
-        async with self._turn():
+        async with self._turns.take():
             await self._check_table(TaskOperation.RECOVER, id)
             await self._runner.recover(self._runs[id])
 
@@ -239,7 +222,7 @@ class ProgramService:
 
         Counts from its next start, or at once if it is watched. Raises ProgramError.
         """
-        async with self._turn():
+        async with self._turns.take():
             run = self._runs.get(id)
             if run is None and id != DEBUG and await self._store.get(id) is None:
                 raise NotAllowed(f"there is no task {id}")
@@ -255,7 +238,7 @@ class ProgramService:
 
     async def step(self, id: str, step: Step = Step.INTO, *, to_block: bool = False) -> None:
         """Run a task to the next statement, or block, after a step, and suspend it there. Raises ProgramError."""
-        async with self._turn():
+        async with self._turns.take():
             await self._check_table(TaskOperation.RECOVER, id)
             run = self._runs.get(id)
             if run is None:
@@ -269,7 +252,7 @@ class ProgramService:
     async def shutdown(self, ids: Collection[str]) -> dict[str, ProgramError]:
         """End programs and cancel what they do, all before waiting for any; return the refused ones by id."""
         refused: dict[str, ProgramError] = {}
-        async with self._turn():
+        async with self._turns.take():
             states: dict[str, TaskState] = {}
             for id in ids:
                 try:
@@ -289,12 +272,12 @@ class ProgramService:
         task = await self._store.get(id)
         state = state_after(before, TaskOperation.SHUTDOWN, task.mode if task else "")
         await self._store.set_state(id, state)
-        self._schedule.drop(id)
+        self._timetable.drop(id)
         return state
 
     async def delete(self, id: str) -> None:
         """Delete a task and its log; do nothing if it does not exist."""
-        async with self._turn():
+        async with self._turns.take():
             await self._check_table(TaskOperation.DELETE, id)
             await self._store.remove(id)
             self._runner.stops.pop(id, None)
@@ -302,36 +285,19 @@ class ProgramService:
     async def end_of(self, owner: str, why: str) -> None:
         """End what runs for ``owner``."""
         for id in [id for id, run in self._runs.items() if run.task.owner == owner]:
-            async with self._turn():
+            async with self._turns.take():
                 if id in self._runs:
                     await self._runner.end(id, why)
 
-    @asynccontextmanager
-    async def _turn(self) -> AsyncIterator[None]:
-        """Hold the lock, once interrupted runs are restored: suspended, until a user recovers them."""
-        async with self._lock:
-            with self.robot.clock.holding():
-                while self._lost and not self._closed:
-                    try:
-                        if (task := await self._store.get(id := next(iter(self._lost)))) is not None:
-                            await self._runner.revive(task, self._lost[id])
-                    finally:
-                        del self._lost[id]
-                yield
-
-    async def _revive(self) -> None:
-        async with self._turn():
-            pass
-
     async def _check_table(self, operation: TaskOperation, id: str) -> TaskState:
         """Return the task's current state if the tables allow ``operation``. Raises NotAllowed."""
-        self.allow(operation)
+        check_mode(self.robot, operation)
         if (run := self._runs.get(id)) is not None:
             state = run.state
         else:
             task = await self._store.get(id)
             state = TaskState(task.state) if task else TaskState.NULL
-            if state.alive and id not in self._lost:  # its end could not be written down
+            if state.alive and id not in self._turns.lost:  # its end could not be written down
                 state = TaskState.SHUTDOWN
         if next_state(state, operation) is None:
             words = f"The current operation({operation}) is illegal: {id} is in {state}."
@@ -350,45 +316,21 @@ class ProgramService:
         await self._store.put(kept, uses)
         return kept
 
-    def _due(self, task: StoredProgram) -> float | None:
-        """Return when the task runs next, None: never or at the next start. Raises InvalidCondition."""
-        try:
-            return due_of(task.mode, task.condition, self.robot.clock.epoch(), self._zone)
-        except BadCondition as error:
-            raise InvalidCondition(f"condition: {error}") from None
-
-    def _wait_for_its_time(self, task: StoredProgram) -> None:
-        """Put a task in run_wait on the schedule."""
-        try:
-            due = self._due(task) if task.mode == "cycle" else task.due or self.robot.clock.epoch()
-        except ProgramError as refusal:
-            log.warning("the task %s will not run: %s", task.id, refusal)
-            return
-        if due is not None:
-            self._schedule.set(task.id, due)
-
-    def _wait_again(self, task: StoredProgram, state: TaskState) -> None:
-        """A run has ended: a cycle waits for its next round."""
-        if state is TaskState.RUN_WAIT:
-            self._wait_for_its_time(task)
-        else:
-            self._schedule.drop(task.id)
-
     async def _fire(self, id: str) -> None:
         """Start a task at its scheduled time."""
-        async with self._turn():
+        async with self._turns.take():
             task = await self._store.get(id)
-            if task is None or self._closed:
+            if task is None or self._turns.closed:
                 return
             if task.mode == "cycle":
-                self._wait_for_its_time(task)
+                self._timetable.wait(task)
             if (run := self._runs.get(id)) is not None:
                 run.log.write("note", f"its time came again while it was in {run.state}: not started a second time")
                 return
             if task.state != TaskState.RUN_WAIT:
                 return
             try:
-                self.allow(TaskOperation.START)
+                check_mode(self.robot, TaskOperation.START)
                 act_for_owner(self.robot, task)
                 uses = await self._store.uses(id)
                 await self._runner.check_startable(uses)

@@ -10,6 +10,7 @@ from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.programs.functions.senses.people import known_words
+from roboglot.programs.tasks.robot_modes import check_mode
 from roboglot.programs.tasks.states import TaskOperation
 from roboglot.protocols.visual.context import Context
 from roboglot.protocols.visual.table import TABLE
@@ -32,7 +33,7 @@ Item = dict[str, str]
 async def inquire(context: Context) -> None:
     """List the saved maps, the preset points of the newest, the robot's members, or the words it listens for."""
     request = context.request
-    context.service.allow(TaskOperation.INQUIRY)
+    check_mode(context.service.robot, TaskOperation.INQUIRY)
     try:
         items = await _items(context.robot, request)
     except RobotError as error:
