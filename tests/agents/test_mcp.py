@@ -3,7 +3,6 @@
 import asyncio
 import contextlib
 import json
-import socket
 import sys
 from collections.abc import AsyncIterator
 from typing import Any
@@ -16,6 +15,7 @@ from roboglot.agents.console import ConsoleClient
 from roboglot.agents.server import make_server
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.geometry import Pose
+from roboglot.testing.addresses import free_port
 from tests.console.conftest import Shown
 
 TOOLS = {"robots", "where_am_i", "look", "map_picture", "go_to", "drive", "stop", "run_program", "rehearse"}
@@ -68,9 +68,7 @@ async def test_over_standard_input(shown: Shown) -> None:
 
 
 async def test_over_streamable_http(shown: Shown) -> None:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     arguments = ("-m", "roboglot", "mcp", "--console", shown.url, "--http", str(port))
     process = await asyncio.create_subprocess_exec(sys.executable, *arguments, stderr=asyncio.subprocess.PIPE)
     try:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import os
-import socket
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
@@ -13,11 +12,11 @@ from typing import Any
 import pytest
 import pytest_asyncio
 
+from roboglot.testing.addresses import free_addresses, free_port, give_back
 from tests.browser.served import until
 from tests.browser.test_studio import READY
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
-ADDRESS = "127.0.93.1"
 HALTED = {
     "blocks": {
         "languageVersion": 0,
@@ -41,21 +40,14 @@ HELD = "(studio.runner.phase.value === 'paused' ? document.querySelector('.lit')
 Life = Callable[[], Awaitable[asyncio.subprocess.Process]]
 
 
-def _port() -> int:
-    with socket.socket() as probe:
-        probe.bind((ADDRESS, 0))
-        port: int = probe.getsockname()[1]
-        return port
-
-
 @pytest_asyncio.fixture(loop_scope="session")
 async def server(tmp_path: Path) -> AsyncIterator[tuple[str, Life]]:
     """Where a server of its own is, and what starts it; the last life is ended with the test."""
-    port, lives = _port(), []
+    address, port, lives = free_addresses(1), free_port(), []
     settings = tmp_path / "settings.toml"
     settings.write_text(
-        f'data = "{tmp_path / "data"}"\nworld = "empty"\n[console]\naddress = "{ADDRESS}"\nport = {port}\n'
-        f'[[robots]]\nname = "a"\nbody = "cyberdog2"\naddress = "{ADDRESS}"\n'
+        f'data = "{tmp_path / "data"}"\nworld = "empty"\n[console]\naddress = "{address}"\nport = {port}\n'
+        f'[[robots]]\nname = "a"\nbody = "cyberdog2"\naddress = "{address}"\n'
     )
 
     async def start() -> asyncio.subprocess.Process:
@@ -67,7 +59,7 @@ async def server(tmp_path: Path) -> AsyncIterator[tuple[str, Life]]:
         lives.append(life)
         for _ in range(1200):
             try:
-                _, writer = await asyncio.open_connection(ADDRESS, port)
+                _, writer = await asyncio.open_connection(address, port)
             except OSError:
                 assert life.returncode is None, f"the server ended with {life.returncode}"
                 await asyncio.sleep(0.05)
@@ -76,11 +68,12 @@ async def server(tmp_path: Path) -> AsyncIterator[tuple[str, Life]]:
                 return life
         raise TimeoutError("the server did not start")
 
-    yield f"http://{ADDRESS}:{port}", start
+    yield f"http://{address}:{port}", start
     for life in lives:
         if life.returncode is None:
             life.kill()
         await life.wait()
+    give_back([address])
 
 
 async def test_a_killed_server_gives_the_program_back(server: tuple[str, Life], browser: Any) -> None:

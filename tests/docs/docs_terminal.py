@@ -11,7 +11,6 @@ import asyncio
 import gc
 import os
 import re
-import socket
 import sys
 from collections.abc import AsyncIterator, Awaitable
 from contextlib import asynccontextmanager
@@ -26,6 +25,7 @@ from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.runtime import Runtime
+from roboglot.testing.addresses import free_port
 
 ROOT = Path(__file__).parents[2]
 TICK, PAUSE = 0.1, 0.01  # s of the robot, of the machine
@@ -159,12 +159,6 @@ def commands(block: str) -> list[str]:
         inside = bare.count("'") % 2 if not bare.startswith("bash -c") else bare.count('"') % 2
         open_one = bool(inside) or text.endswith("\\")
     return found
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 @asynccontextmanager

@@ -14,7 +14,6 @@ from roboglot.simulation.world.world import World
 from tests.drivers.rig import Rig
 
 BACKS = ("slamware", "robomaster", "cyberdog")
-PAUSES = {"slamware": 0.0, "robomaster": 0.0, "cyberdog": 0.003}  # real s; gRPC has threads of its own
 SPEED = 0.3  # m/s
 Connect = Callable[[], AbstractAsyncContextManager[Robot]]
 

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import random
-import socket
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
@@ -14,9 +11,9 @@ from roboglot.model.robot import Robot
 from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.testing import Forward
+from roboglot.testing.addresses import free_port
 
 PATIENCE = 20  # real seconds, of a busy machine
-PORTS = (20_000, 32_000)
 EP_ADDRESS = "127.0.0.78"
 
 
@@ -59,31 +56,16 @@ class Script:
         return await asked
 
 
-def free_port() -> int:
-    """A TCP port that no one has now, and that the system gives to no outgoing connection meanwhile."""
-    for port in random.sample(range(*PORTS), 100):
-        with socket.socket() as probe, contextlib.suppress(OSError):
-            probe.bind(("", port))
-            return port
-    raise OSError("no free port")
-
-
 def ep_config() -> RoboMasterConfig:
     """Free ports for all."""
-    with (
-        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one,
-        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as two,
-    ):
-        one.bind(("127.0.0.1", 0))
-        two.bind(("127.0.0.1", 0))
-        return RoboMasterConfig(
-            control_port=0,
-            event_port=0,
-            video_port=0,
-            audio_port=0,
-            push_port=one.getsockname()[1],
-            broadcast_port=two.getsockname()[1],
-        )
+    return RoboMasterConfig(
+        control_port=0,
+        event_port=0,
+        video_port=0,
+        audio_port=0,
+        push_port=free_port(),
+        broadcast_port=free_port(),
+    )
 
 
 def url_of(door: RoboMasterDoor) -> str:

@@ -24,7 +24,7 @@ from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.storage.database import Database
 from roboglot.testing import Forward
-from tests.drivers.bad_link import PAUSES, Connect
+from tests.drivers.bad_link import Connect
 from tests.drivers.chain import EP_ADDRESS, Drive, Open, OpenRest, TextClient, Until, ep_config, url_of
 from tests.drivers.rig import Rig, rig, time_passes
 
@@ -158,7 +158,7 @@ def connect(way: Rig, drive: Drive, forward: Forward) -> Connect:
 
     @asynccontextmanager
     async def connected() -> AsyncIterator[Robot]:
-        async with time_passes(forward, pause=PAUSES[way.back]):
+        async with time_passes(forward, threads=way.back == "cyberdog"):
             robot = await drive(way.url)
             if way.back == "cyberdog" and not way.fault.refusing:
                 await bad_link.until(robot.clock, lambda: robot[Localization].enabled)

@@ -17,9 +17,10 @@ from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
-from tests.drivers.chain import EP_ADDRESS, free_port
+from roboglot.testing.addresses import free_port
+from tests.drivers.chain import EP_ADDRESS
 from tests.drivers.link_proxy import Fault, Proxy, UdpProxy
-from tests.drivers.pace import breath
+from tests.drivers.pace import settle
 
 Door = SlamwareDoor | RoboMasterDoor | CyberDogDoor
 HOST = "127.0.0.1"
@@ -123,14 +124,14 @@ async def rig(back: str, robot: Robot, folder: Path) -> AsyncIterator[Rig]:
 
 
 @asynccontextmanager
-async def time_passes(forward: object, *, step: float = 0.02, pause: float = 0.0) -> AsyncIterator[None]:
-    """Robot time passes by itself: ``pause`` real s for each ``step`` robot s, for gRPC has threads of its own."""
+async def time_passes(forward: object, *, step: float = 0.02, threads: bool = True) -> AsyncIterator[None]:
+    """Robot time passes by itself, ``step`` s after the other; waits for ``threads``, which keep no robot time."""
     over = False
 
     async def pass_time() -> None:
         while not over:
             await forward(seconds=step)  # type: ignore[operator]
-            await breath(pause)
+            await (settle() if threads else asyncio.sleep(0))
 
     task = asyncio.ensure_future(pass_time())
     try:

@@ -39,11 +39,11 @@ from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
 from roboglot.storage.programs import program_stores
 from roboglot.testing import Forward
-from tests.drivers.chain import Drive, free_port
+from roboglot.testing.addresses import free_port
+from tests.drivers.chain import Drive
 from tests.drivers.rig import time_passes
 
 pytestmark = pytest.mark.world("empty", body="cyberdog2")
-PAUSE = 0.004  # real s for 0.02 robot s
 PATIENCE = 30  # real s
 
 
@@ -76,7 +76,7 @@ async def driven(
     door = CyberDogDoor(robot, "127.0.0.1", config, tmp_path, frames=frames)
     export_client(tmp_path / "cyberdog", tmp_path / "driver")
     await door.start()
-    async with time_passes(forward, pause=PAUSE):
+    async with time_passes(forward):
         yield await drive(f"cyberdog://127.0.0.1:{door.port}?certs={tmp_path / 'driver'}&app={config.app_port}")
         await door.close()
 

@@ -50,10 +50,12 @@ from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward, assert_pose
-from tests.drivers.chain import Drive, Open, Until, free_port
+from roboglot.testing.addresses import free_port
+from tests.drivers.chain import Drive, Open, Until
+from tests.drivers.pace import settle
 
 pytestmark = pytest.mark.world("office", body="cyberdog2")
-STEP, PAUSE = 0.02, 0.004  # robot s, real s
+STEP = 0.02  # robot s
 
 
 @pytest.fixture
@@ -65,7 +67,7 @@ def until(forward: Forward) -> Until:
             if condition():
                 return
             await forward(seconds=STEP)
-            await asyncio.sleep(PAUSE)
+            await settle()
         raise AssertionError("it did not happen")
 
     return wait
@@ -155,7 +157,7 @@ async def test_a_script_in_front_drives_and_stops_it(
     await asyncio.sleep(0.02)
     for _ in range(50):
         await forward(seconds=STEP)
-        await asyncio.sleep(PAUSE)
+        await settle()
     before = world.truth.pose_of("a")
     await forward(seconds=1)
     assert world.truth.pose_of("a").distance_to(before) < 0.02

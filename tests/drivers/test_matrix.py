@@ -19,10 +19,11 @@ from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward, assert_pose
-from tests.drivers.chain import EP_ADDRESS, Drive, ep_config, free_port, url_of
+from roboglot.testing.addresses import free_port
+from tests.drivers.chain import EP_ADDRESS, Drive, ep_config, url_of
 from tests.drivers.fronts import Front, front
+from tests.drivers.rig import time_passes
 
-STEP, PAUSE = 0.02, 0.003  # robot s, real s: gRPC has threads of its own
 # Every driver and every door once; the other cells are slow.
 QUICK = {("robomaster", "visual"), ("cyberdog", "robomaster"), ("slamware", "cyberdog"), ("robomaster", "slamware")}
 CELLS = [
@@ -69,18 +70,10 @@ async def url(back: str, robot: Robot, tmp_path: Path) -> AsyncIterator[str]:
 
 
 @pytest.fixture
-async def passing(forward: Forward) -> AsyncIterator[None]:
+async def passing(forward: Forward, back: str, door: str) -> AsyncIterator[None]:
     """Robot time passes by itself."""
-
-    async def pass_time() -> None:
-        while True:
-            await forward(seconds=STEP)
-            await asyncio.sleep(PAUSE)
-
-    task = asyncio.ensure_future(pass_time())
-    yield
-    task.cancel()
-    await asyncio.gather(task, return_exceptions=True)
+    async with time_passes(forward, threads="cyberdog" in {back, door}):
+        yield
 
 
 @pytest.mark.world("office")

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from roboglot.clients.cyberdog import Certificates, CyberDogClient
+from roboglot.testing.addresses import free_port
 from roboglot.testing.process import served
 from roboglot.wire.cyberdog.chapters.motion.motion import Motion
 
@@ -69,7 +70,7 @@ async def test_the_page_refuses_what_is_no_offer(length: str | None, body: bytes
 async def test_a_browser_shows_moving_pictures(tmp_path: Path) -> None:
     example = _example()
     seen: list[Any] = []
-    port = _free_port()
+    port = free_port()
     arguments = ("--robot", "a=cyberdog2", "--world", "playground", "--app", f"127.0.0.1:{port}")
     with served(tmp_path / "data", *arguments, address=ADDRESS) as robot:
         certificates = Certificates.load(robot.data / "cyberdog" / "tls")
@@ -92,9 +93,3 @@ async def test_a_browser_shows_moving_pictures(tmp_path: Path) -> None:
                 page.shutdown()
                 page.server_close()
     assert (seen[-1]["width"], seen[-1]["height"]) == (1280, 720)
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import signal
-import socket
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -14,6 +13,7 @@ import pytest
 from roboglot.clients.cyberdog import Certificates, CyberDogClient
 from roboglot.clients.cyberdog.values import FilesLeft, Grid, Label, UpdateProgress
 from roboglot.clients.errors import ClientError
+from roboglot.testing.addresses import free_port
 from roboglot.testing.process import ServedRobot, served
 from roboglot.wire.cyberdog.codes import TaskType
 
@@ -23,12 +23,6 @@ FILE = {"version": "1.3.2.0", "type": "FULL_PACKAGE", "md5": "0" * 32, "fileSize
 SMALL = {**FILE, "fileSize": 30_000_000}  # 1.5 s to fetch, 3 s to install
 MODULE = {"product": "l91", "device": "l91.NX", "module": "l91.NX.OTA",
           "current": {"version": None}, "latest": {"version": "1.3.2.0", "packages": [FILE]}}  # fmt: skip
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 @asynccontextmanager

@@ -1,14 +1,19 @@
-"""Loopback addresses for robots: of each process and xdist worker its own, with every vendor's ports free."""
+"""Loopback addresses for robots, with every vendor's ports free, and free ports: each xdist worker has its own."""
 
 from __future__ import annotations
 
+import itertools
 import os
 import socket
 from collections.abc import Iterable
 
 FREE_TRIES = 100
 PROBED = (1448, 40923, 50052, 50053)
+PORTS = range(20_000, 32_000)
+PORT_SHARES = 24  # workers that each have their own
+PORT_STRIDE = 37  # ports by which processes of one worker number begin apart
 _given: set[str] = set()
+_ports_given = itertools.count()
 
 
 def give_back(addresses: Iterable[str]) -> None:
@@ -18,7 +23,7 @@ def give_back(addresses: Iterable[str]) -> None:
 
 def free_addresses(count: int) -> str:
     """Return the first of so many loopback addresses in a row that no one on this machine uses for robots."""
-    worker = int("".join(filter(str.isdigit, os.environ.get("PYTEST_XDIST_WORKER", ""))) or 0) % 250
+    worker = _worker() % 250
     for attempt in range(FREE_TRIES):
         block = (os.getpid() + 7 * attempt) % 120
         first = 1 + (attempt * 16) % 128
@@ -44,8 +49,29 @@ def _is_free(address: str) -> bool:
 
 
 def free_port() -> int:
-    """Return a TCP port of 127.0.0.1 that is free now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
+    """Return a port that is free now on every address, for TCP and UDP, and that no one else is given soon.
+
+    It lies below those that the system gives to outgoing connections. Each xdist worker has its own; a process gets
+    none twice before it has had all of its own. Raises OSError if none is free.
+    """
+    worker, count = _worker() % PORT_SHARES, len(PORTS) // PORT_SHARES
+    for _ in range(count):
+        port = PORTS[worker * count + (os.getpid() * PORT_STRIDE + next(_ports_given)) % count]
+        if _is_port_free(port):
+            return port
+    raise OSError(f"none of {count} ports is free")
+
+
+def _is_port_free(port: int) -> bool:
+    with socket.socket() as stream, socket.socket(type=socket.SOCK_DGRAM) as datagrams:
+        try:
+            stream.bind(("", port))
+            datagrams.bind(("", port))
+        except OSError:
+            return False
+    return True
+
+
+def _worker() -> int:
+    """Return the number of this process among xdist's workers."""
+    return int("".join(filter(str.isdigit, os.environ.get("PYTEST_XDIST_WORKER", ""))) or 0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import socket
 from collections.abc import AsyncIterator
 from pathlib import Path
 
@@ -15,14 +14,10 @@ from roboglot.protocols.cyberdog.certificates import export_client
 from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.testing import Forward
+from roboglot.testing.addresses import free_port
+from tests.drivers.pace import settle
 
 ADDRESS = "127.0.0.37"
-
-
-def free_port(address: str) -> int:
-    with socket.socket() as probe:
-        probe.bind((address, 0))
-        return int(probe.getsockname()[1])
 
 
 @pytest.fixture(scope="session")
@@ -39,7 +34,7 @@ def certificates(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Certif
 
 @pytest.fixture
 async def door(robot: Robot, data: Path, forward: Forward) -> AsyncIterator[CyberDogDoor]:
-    opened = CyberDogDoor(robot, ADDRESS, CyberDogConfig(port=0, app_port=free_port("127.0.0.1")), data)
+    opened = CyberDogDoor(robot, ADDRESS, CyberDogConfig(port=0, app_port=free_port()), data)
     await opened.start()
     passing = asyncio.ensure_future(_pass_time(forward))
     yield opened
@@ -53,6 +48,7 @@ async def _pass_time(forward: Forward) -> None:
     while True:
         await forward(seconds=0.05)
         await asyncio.sleep(0.01)
+        await settle()
 
 
 @pytest.fixture

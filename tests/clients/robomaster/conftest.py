@@ -1,7 +1,6 @@
 """Our own door on free ports, in this process and in lockstep, and a client of it."""
 
 import asyncio
-import socket
 from collections.abc import AsyncIterator, Awaitable, Callable
 from typing import Any
 
@@ -10,16 +9,10 @@ import pytest
 from roboglot.clients.robomaster.client import Ports, RoboMasterClient
 from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
+from roboglot.testing.addresses import free_port
 
 ADDRESS = "127.0.0.9"
 Run = Callable[[Awaitable[Any]], Awaitable[Any]]
-
-
-def free_udp_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
 
 
 @pytest.fixture
@@ -30,8 +23,8 @@ def profile(request) -> str:
 @pytest.fixture
 async def door(robot, profile) -> AsyncIterator[RoboMasterDoor]:
     config = RoboMasterConfig(
-        control_port=0, event_port=0, video_port=0, audio_port=0, push_port=free_udp_port(),
-        broadcast_port=free_udp_port(), profile=profile,
+        control_port=0, event_port=0, video_port=0, audio_port=0, push_port=free_port(),
+        broadcast_port=free_port(), profile=profile,
     )  # fmt: skip
     opened = RoboMasterDoor(robot, ADDRESS, config)
     await opened.start()

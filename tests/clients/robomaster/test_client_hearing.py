@@ -11,6 +11,7 @@ from roboglot.clients.robomaster.client import RoboMasterClient
 from roboglot.clients.robomaster.datagrams import PushPort, discover
 from roboglot.model.components.interaction.armor import PlatePlace
 from roboglot.model.components.interaction.input_device import InputDevice, MouseButton
+from roboglot.testing.addresses import free_port
 from roboglot.wire.robomaster.telemetry import (
     AdapterLevel,
     ArmorHit,
@@ -91,9 +92,7 @@ async def test_two_robots_share_push_port_and_are_distinguished() -> None:
     """By the address that a datagram comes from."""
     import socket
 
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        number = probe.getsockname()[1]
+    number = free_port()
     port, heard = PushPort("127.0.0.1", number), []
     stops = [port.attach(f"127.0.0.{n}", lambda data, n=n: heard.append((n, data))) for n in (31, 32)]  # type: ignore[misc]
     with contextlib.ExitStack() as stack:

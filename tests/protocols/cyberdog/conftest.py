@@ -19,7 +19,7 @@ from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.simulation.world.world import RobotPlacement, World
 from roboglot.simulation.world.world_files import load_world
 from roboglot.testing import Forward
-from tests.drivers.pace import breath
+from tests.drivers.pace import settle
 from tests.protocols.cyberdog.phone import ADDRESS, PATIENCE, App, Client, Messages, Pems
 
 
@@ -30,13 +30,13 @@ def messages(tmp_path_factory: pytest.TempPathFactory) -> Messages:
 
 @pytest.fixture
 def passing(forward: Forward) -> Callable[[Callable[[], object]], Awaitable[None]]:
-    """``await passing(condition)``: robot time passes, a little faster than outside, until ``condition`` holds."""
+    """``await passing(condition)``: robot time passes until ``condition`` holds."""
 
     async def wait(condition: Callable[[], object]) -> None:
         async with asyncio.timeout(4 * PATIENCE):
             while not condition():
                 await forward(seconds=0.1)
-                await breath(0.005)
+                await settle()
 
     return wait
 

@@ -16,7 +16,7 @@ from grpc_tools import protoc
 
 import roboglot.wire.cyberdog.proto as proto
 from roboglot.testing import Forward
-from tests.drivers.pace import breath
+from tests.drivers.pace import settle
 
 ADDRESS = "127.0.0.17"
 PHONE = "127.0.0.1"  # where a client on this machine seems to call from
@@ -155,7 +155,7 @@ async def answered(client: Client, code: int, params: Any, forward: Forward, sec
     """The answer to a request that takes robot time."""
     asking = asyncio.ensure_future(client.ask(code, params))
     for _ in range(int(seconds / 0.1)):
-        await breath(0.002)
+        await settle()
         if asking.done():
             break
         await forward(seconds=0.1)

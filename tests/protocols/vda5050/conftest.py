@@ -19,6 +19,7 @@ from roboglot.config import load_config
 from roboglot.model.clock import LockstepClock
 from roboglot.protocols import DOORS, sections
 from roboglot.runtime import Runtime
+from roboglot.testing.addresses import free_port
 from tests.protocols.vda5050.orders import encoded
 
 mqtt = pytest.importorskip("paho.mqtt.client", reason="needs paho-mqtt, which aiomqtt brings")
@@ -42,8 +43,7 @@ def broker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
     """The port of a mosquitto of our own."""
     if MOSQUITTO is None:
         pytest.skip("needs mosquitto: apt-get install mosquitto")
-    with socket.create_server((ADDRESS, 0)) as free:
-        port = int(free.getsockname()[1])
+    port = free_port()
     file = tmp_path_factory.mktemp("mosquitto") / "conf"
     file.write_text(f"listener {port} {ADDRESS}\nallow_anonymous true\n")
     process = subprocess.Popen([MOSQUITTO, "-c", str(file)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)

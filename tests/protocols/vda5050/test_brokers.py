@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import os
-import socket
 import subprocess
 from collections import Counter
 from collections.abc import Iterator
@@ -19,6 +18,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from roboglot.model.tap import Direction, Exchange
+from roboglot.testing.addresses import free_port
 from roboglot.wire.vda5050.versions import ErrorKind
 from tests.protocols.vda5050.conftest import ADDRESS, MOSQUITTO, PATIENCE, Opened, Yard, listening
 from tests.protocols.vda5050.orders import action, instant, valid_orders
@@ -31,8 +31,7 @@ BATCH = 50  # the robot's queue holds 64 messages
 @pytest.fixture(params=["mosquitto", "amqtt"])
 def any_broker(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
     """The port of one broker of each kind."""
-    with socket.create_server((ADDRESS, 0)) as free:
-        port = int(free.getsockname()[1])
+    port = free_port()
     folder = tmp_path_factory.mktemp(request.param)
     if request.param == "mosquitto":
         if MOSQUITTO is None:
