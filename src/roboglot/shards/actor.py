@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 import os
+import secrets
 import socket
 import threading
 import time
@@ -22,14 +23,21 @@ STOP_SECONDS = 12.0
 LINES_MAX = 2000  # log lines kept until the fleet fetches them
 EXIT_ENDED = 1
 NODE_DIGITS = 12  # of a node's id
+RUN_BITS = 53  # of the number of a run, which JSON keeps whole
 
 
 class Condition(msgspec.Struct):
-    """How a shard is: what it reported last, and where it runs. ``lines`` are those logged since the last look."""
+    """How a shard is: what it reported last, and where it runs. ``lines`` are those logged since the last look.
+
+    ``ready`` is left out where the asker has it already: a hundred robots' endpoints are long. ``run`` is another
+    number in every process: those of two machines may have the same pid.
+    """
 
     pid: int
     node: str
+    run: int
     serving: bool
+    up: bool
     ready: Ready | None
     beat: Beat | None
     refusal: Refusal | None
@@ -60,6 +68,7 @@ class ShardActor:
         from roboglot.shards.shard import SETTINGS
 
         self._node = ray.get_runtime_context().get_node_id()[:NODE_DIGITS]
+        self._run = secrets.randbits(RUN_BITS) or 1
         self._lines = _Lines()
         self._stopping = False
         self._ready: Ready | None = None
@@ -82,14 +91,14 @@ class ShardActor:
         self._serving = threading.Thread(target=self._serve, args=(str(place), theirs), name="shard", daemon=True)
         self._serving.start()
 
-    def look(self) -> bytes:
-        """Return its Condition, encoded."""
+    def look(self, known: int) -> bytes:
+        """Return its Condition, encoded. ``known``: the run of which the asker has what is ready."""
         with self._turn:
             self._hear()
             lines = [self._lines.kept.popleft() for _ in range(len(self._lines.kept))]
-            serving = self._serving.is_alive()
-            known = (self._ready, self._beat, self._refusal)
-            return msgspec.json.encode(Condition(os.getpid(), self._node, serving, *known, lines))
+            serving, up = self._serving.is_alive(), self._ready is not None
+            told = (None if known == self._run else self._ready, self._beat, self._refusal)
+            return msgspec.json.encode(Condition(os.getpid(), self._node, self._run, serving, up, *told, lines))
 
     def stop(self) -> bytes:
         """Close robots and doors in order."""

@@ -92,7 +92,7 @@ class Reference(Protocol):
 class Call(Protocol):
     """A method of an actor."""
 
-    def remote(self) -> Reference:
+    def remote(self, *values: int) -> Reference:
         """Call it."""
 
 
@@ -116,6 +116,7 @@ class ClusterFleet:
         self._mark = hashlib.sha256(str(folder).encode()).hexdigest()[:8]
         self._actors: dict[str, Actor] = {}
         self._nodes: dict[str, str] = {}
+        self._runs: dict[str, int] = {}
         self._watch: asyncio.Task[None] | None = None
         self._silence: asyncio.Task[None] | None = None
         self._changed = asyncio.Event()
@@ -198,6 +199,7 @@ class ClusterFleet:
             scheduling_strategy="SPREAD",
         )
         self._actors[plan.name] = actor.remote(plan.settings, str(shard.folder), of_node=not self._local)
+        self._runs.pop(plan.name, None)
         shard.ready, shard.beat = None, Beat(0.0, 0, 0.0)
         self._turn_to(shard, State.STARTING)
 
@@ -220,8 +222,9 @@ class ClusterFleet:
         actor = self._actors.get(shard.plan.name)
         if actor is None or shard.state in (State.STOPPING, State.STOPPED):
             return
+        known = self._runs.get(shard.plan.name, 0) if shard.ready else 0
         try:
-            answer = await asyncio.wait_for(_answer(actor.look.remote()), LOOK_MAX)
+            answer = await asyncio.wait_for(_answer(actor.look.remote(known)), LOOK_MAX)
         except (RayActorError, TimeoutError):
             self._missed(shard)
             return
@@ -241,18 +244,20 @@ class ClusterFleet:
 
     def _seen(self, shard: Shard, condition: Condition) -> None:
         _keep(shard.folder / LOG_FILE, condition.lines)
-        if shard.pid and (condition.pid, condition.node) != (shard.pid, self._nodes.get(shard.plan.name)):
-            shard.restarts += 1
-            log.warning("shard %s was started again on %s", shard.plan.name, condition.node)
-        shard.pid, self._nodes[shard.plan.name] = condition.pid, condition.node
-        shard.heard, shard.ready = self._loop.time(), condition.ready
+        name = shard.plan.name
+        if self._runs.get(name, condition.run) != condition.run:
+            shard.restarts, shard.ready = shard.restarts + 1, None
+            log.warning("shard %s was started again on %s", name, condition.node)
+        shard.pid, self._nodes[name], self._runs[name] = condition.pid, condition.node, condition.run
+        shard.heard = self._loop.time()
+        shard.ready = (condition.ready or shard.ready) if condition.up else None
         shard.beat = condition.beat or shard.beat
         if condition.refusal is not None:
             shard.reason = condition.refusal.reason
             state = State.FAILED if condition.refusal.lasting else State.STARTING  # Ray tries that again
-            log.warning("shard %s did not start: %s", shard.plan.name, shard.reason)
+            log.warning("shard %s did not start: %s", name, shard.reason)
         else:
-            state = State.READY if condition.ready and condition.serving else State.STARTING
+            state = State.READY if shard.ready and condition.serving else State.STARTING
         if state is State.READY:
             shard.reason = ""
         if state is not shard.state:
