@@ -26,7 +26,6 @@ WIDE = {  # classes with more, and why
     "SimulatedBase": "to be split",
     "SimulatedGimbal": "to be split",
     "SimulatedLegs": "to be split",
-    "Slam": "to be split",
     "Stage": "to be split",
 }
 GENERATED = ("_pb2.py", "_pb2_grpc.py")

@@ -27,7 +27,7 @@ from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.inertial_displacement import InertialDisplacement
 from roboglot.autonomy.slam.localization import LidarLocalization
 from roboglot.autonomy.slam.mapping import LidarMapping
-from roboglot.autonomy.slam.odometry_memory import OdometryMemory
+from roboglot.autonomy.slam.odometry.memory import OdometryMemory
 from roboglot.autonomy.stairs.alignment import SeenStairAlignment
 from roboglot.autonomy.training import HeardWords
 from roboglot.kernels import NAVIGATION, loading

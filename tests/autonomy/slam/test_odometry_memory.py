@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from roboglot.autonomy.slam.odometry_memory import KEY
-from roboglot.autonomy.slam.odometry_noise import FACTOR_MAX, SCALE_BIAS_MAX, Doubt, LearntBias, LearntNoise
+from roboglot.autonomy.slam.odometry.memory import KEY
+from roboglot.autonomy.slam.odometry.noise import FACTOR_MAX, SCALE_BIAS_MAX, Doubt, LearntBias, LearntNoise
 from roboglot.config import RobotConfig
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import LockstepClock
@@ -38,11 +38,11 @@ async def test_what_was_learnt_outlives_a_restart(tmp_path: Path) -> None:
         await fleet.start(wait=True)
         robot = fleet.robots["a"]
         assert robot[Odometry].noise.along == 0.02
-        learnt.append(robot[Localization].estimator.learnt)  # type: ignore[attr-defined]
+        learnt.append(robot[Localization].estimator.odometry.kept)  # type: ignore[attr-defined]
         await clock.advance(1.0)
         robot[Driving].move_by(Pose(3.0), speed=0.6)
         await clock.advance(8.0)
-        learnt.append(robot[Localization].estimator.learnt)  # type: ignore[attr-defined]
+        learnt.append(robot[Localization].estimator.odometry.kept)  # type: ignore[attr-defined]
         await fleet.close()
         assert robot[Settings].get(KEY) == learnt[-1]
     database.close()

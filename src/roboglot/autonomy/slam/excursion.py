@@ -14,7 +14,7 @@ from roboglot.autonomy.slam.belief import SURE, Belief
 from roboglot.autonomy.slam.certainty import supported
 from roboglot.autonomy.slam.evidence import EvidenceGrid
 from roboglot.autonomy.slam.matcher import POINTS_MIN, fit
-from roboglot.autonomy.slam.odometry_noise import LearntNoise
+from roboglot.autonomy.slam.odometry.noise import LearntNoise
 from roboglot.autonomy.slam.painting import paint
 from roboglot.autonomy.slam.scan_points import ScanPoints
 from roboglot.model.geometry import Pose, wrap_angle

@@ -58,4 +58,4 @@ def map_recording(recording: DriveLog, progress: Callable[[int], None] = lambda 
         progress(done)
     slam.settle()
     slam.close()
-    return MappedDrive(belief.map.occupancy(), slam.trajectory(), seconds, qualities, news, slam.noise.factors)
+    return MappedDrive(belief.map.occupancy(), slam.trajectory(), seconds, qualities, news, slam.odometry.noise.factors)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +32,7 @@ from roboglot.autonomy.slam.matcher import (
     places,
     search,
 )
-from roboglot.autonomy.slam.odometry_noise import Doubt, LearntBias, LearntNoise
+from roboglot.autonomy.slam.odometry.learner import Correction, OdometryLearner
 from roboglot.autonomy.slam.scan_points import ECHO_SHARE_MIN, ScanPoints
 from roboglot.autonomy.slam.slip import SlipWatch
 from roboglot.autonomy.slam.trajectory import Trajectory, TrajectoryPoint
@@ -62,11 +62,9 @@ SURE_QUALITY = 0.85  # agreement from which the map need not be asked what it de
 SILENCE_PERIOD = 0.5  # s between two looks at whether scans come
 STILL, STILL_YAW = 0.002, math.radians(0.1)  # less than this between scans is standing
 STILL_PERIOD = 0.5  # s between two matches while standing
-STANDING_PERIOD = 10.0  # s between two steps of the trajectory while standing
 LOST_QUALITY, LOST_PERIOD = 0.4, 1.0  # below this it looks around, once in so many seconds
 NARROW = (0.2, math.radians(5.0))  # m, rad around the belief that are searched after a doubtful step
 DOUBT_SHARE, DOUBT_SIGMAS = 0.85, 3.0  # a worse fit than usual, or a pose so far from odometry's: match without it
-LEARNS_AFTER = 1.0  # m after a contradiction from which corrections say something of odometry again
 DISPLACED_QUALITY = 0.15  # of a robot that was shoved, until the next scans
 JUMP, JUMP_YAW = 0.2, math.radians(10.0)  # corrections beyond this are reported as a jump
 
@@ -82,18 +80,20 @@ class Slam:
         self._matched_at = self._searched_at = -math.inf
         self._agreement = self._known = 1.0
         self._contradicted = False  # whether the newest match was dropped for what the wheels say
-        self._witness, self._learns_from = WheelWitness(), 0.0  # m driven
+        self._witness = WheelWitness()
         self._newest: ScanTaken | None = None
-        self.noise, self.bias = LearntNoise(belief.odometry.noise), LearntBias()
+        self.odometry = OdometryLearner(belief.odometry.noise)
         self.whereabouts = Whereabouts(belief, robot.events)
         self._looked_at, self._looking = -math.inf, False
         self._mapped_from = 0.0  # m driven from which scans are added to the map again
         self._search: asyncio.Task[None] | None = None
         self._slip, self._displacement = SlipWatch(robot.description.radius), DisplacementWatch()
-        self._trajectory, self._trajectory_map = Trajectory(), belief.map
+        self._trajectory = Trajectory(belief)
         self._loops, self._way = LoopCloser(belief), 0.0  # m driven
         self._adding = Adding(robot, belief, self._loops)
-        self._excursions = Excursions(belief, self.noise, lambda scan, pose: self._adding.paint(scan, pose, self._way))
+        self._excursions = Excursions(
+            belief, self.odometry.noise, lambda scan, pose: self._adding.paint(scan, pose, self._way)
+        )
         listen = robot.events.listen
         self._listeners = [listen(ScanTaken, self._take), listen(PoseJumped, self._jumped)]
         self._timer = robot.clock.call_later(SILENCE_PERIOD, self._listen)
@@ -109,16 +109,6 @@ class Slam:
         clock = self._robot.clock
         self.whereabouts.check_silence(clock.time())
         self._timer = clock.call_later(SILENCE_PERIOD, self._listen)
-
-    @property
-    def learnt(self) -> dict[str, float]:
-        """What is known of this robot's odometry, to be kept for its next start."""
-        return self.noise.kept | self.bias.kept
-
-    def remember(self, learnt: Mapping[str, object]) -> None:
-        """Go on from what was ``learnt`` before."""
-        self.noise.restore(learnt)
-        self.bias.restore(learnt)
 
     def placing(self, region: Region | None) -> tuple[Pose, Callable[[], list[Match]]] | None:
         """Odometry at the newest scan, and what finds the map's (``region``'s) places like it, in any thread."""
@@ -193,7 +183,7 @@ class Slam:
         moved = self._step if 0.0 < seconds < GAP_MAX else None
         self._matched_odometry, self._matched_at = odometry, event.stamp
         self._way += way
-        belief.covariance = self.bias.spread(self.noise.spread(belief.covariance, way, turn), moved or Pose(), seconds)
+        belief.covariance = self.odometry.spread(belief.covariance, way, turn, moved, seconds)
         if belief.map.scans:
             self._correct(scan, odometry, event.stamp, moved, seconds)
         else:
@@ -205,16 +195,7 @@ class Slam:
             self._adding.add(scan, pose, event.stamp, self._way)
         sure = self._may_add and self._agreement >= TRUSTED and self._known > NEW_GROUND
         self._excursions.take(scan, odometry, self._step, turn, sure=sure)
-        self._follow_way(event.stamp, odometry, drives=way >= STILL or turn >= STILL_YAW)
-
-    def _follow_way(self, stamp: float, odometry: Pose, *, drives: bool) -> None:
-        """Add to the trajectory, now and then while standing; another map begins another one."""
-        belief, trajectory = self._belief, self._trajectory
-        if self._trajectory_map is not belief.map:
-            self._trajectory_map = belief.map
-            trajectory.clear()
-        if drives or stamp - trajectory.newest >= STANDING_PERIOD:
-            trajectory.add(stamp, belief.map_to_odom.compose(odometry), belief.covariance, self._loops.anchor)
+        self._trajectory.follow(event.stamp, odometry, self._loops.anchor, drives=way >= STILL or turn >= STILL_YAW)
 
     @property
     def _is_unsure(self) -> bool:
@@ -236,7 +217,9 @@ class Slam:
         """
         belief = self._belief
         if belief.localizing and moved:
-            belief.move_to(belief.map_to_odom.compose(odometry).compose(self.bias.missing(moved, seconds)), odometry)
+            belief.move_to(
+                belief.map_to_odom.compose(odometry).compose(self.odometry.bias.missing(moved, seconds)), odometry
+            )
         before = belief.map_to_odom.compose(odometry)
         iterations = ITERATIONS_MAX if belief.localizing else 0
         prior, start = belief.covariance, self._coarse(scan, before, stamp) if belief.localizing else before
@@ -257,9 +240,11 @@ class Slam:
         if best.fit < POINTS_MIN or best.agreement < AGREEMENT_MIN:
             return
         shoved = self._check_displaced(before, best, prior, stamp)
-        if shoved is None and driven is None:
-            still = self._way >= self._learns_from and is_well_painted(belief.map, scan, best.pose)
-            self._learn(before, best, prior, moved, seconds, still=still)
+        if shoved is None and driven is None and _is_sure(best):
+            still = self.odometry.learns(self._way) and is_well_painted(belief.map, scan, best.pose)
+            moved = moved if belief.lost is None else None
+            correction = Correction(before, best, prior, self._step, moved, seconds)
+            self.odometry.learn(correction, self._way, still=still)
         belief.covariance = prior if driven else best.covariance
         belief.move_to(best.pose, odometry)
         if shoved is not None:
@@ -274,12 +259,12 @@ class Slam:
             return None
         driven = self._witness.contest(self._belief.map, scan, before, best, prior, self._step)
         if driven is not None:
-            self._learns_from = self._way + LEARNS_AFTER
+            self.odometry.contradict(self._way)
         return driven
 
     def _check_displaced(self, before: Pose, best: Match, prior: NDArray[np.float64], stamp: float) -> float | None:
         """How far something else than its wheels has moved the robot; None if nothing did, as far as scans tell."""
-        if self._belief.in_doubt or best.agreement < TRUSTED or best.known < KNOWN_SURE * best.points:
+        if self._belief.in_doubt or not _is_sure(best):
             self._displacement.forget(stamp)
             return None
         return self._displacement.check(stamp, before, best.pose, prior, math.hypot(self._step.x, self._step.y))
@@ -290,25 +275,6 @@ class Slam:
         self._belief.search, self._belief.quality = True, min(self._belief.quality, DISPLACED_QUALITY)
         self.whereabouts.be_displaced(stamp)
         self._robot.events.publish(RobotDisplaced(stamp=stamp, distance=shoved))
-
-    def _learn(
-        self, before: Pose, best: Match, prior: NDArray[np.float64], moved: Pose | None, seconds: float, *, still: bool
-    ) -> None:
-        """What the correction from ``before`` says of odometry; only if all around is ``still``, how bad it is."""
-        if best.agreement < TRUSTED or best.known < KNOWN_SURE * best.points:
-            return  # what is wrong here may be the match
-        here, after = best.pose, best.covariance
-        off = (here.x - before.x, here.y - before.y, wrap_angle(here.yaw - before.yaw))
-        step = self._step
-        self.noise.learn(off, prior, after, here.yaw - step.yaw + math.atan2(step.y, step.x), rising=still)
-        if moved is None or self._belief.lost is not None:
-            return
-        c, s = abs(math.cos(here.yaw)), abs(math.sin(here.yaw))
-        seen_x, seen_y = (1.0 - after[k, k] / prior[k, k] for k in (0, 1))
-        seen = (c * seen_x + s * seen_y, s * seen_x + c * seen_y) if self._way >= self._learns_from else (0.0, 0.0)
-        newest = self.noise.newest
-        doubt = Doubt(float(max(after[0, 0], after[1, 1])) + newest.way, float(after[2, 2]) + newest.yaw)
-        self.bias.learn(moved, seconds, here.relative_to(before), seen, doubt)
 
     def _judge(self, best: Match, scan: ScanPoints, odometry: Pose, stamp: float, usual: float) -> None:
         """Ask the map whether the scan can have been taken there; look everywhere when it fits worse than ``usual``."""
@@ -391,3 +357,8 @@ class Slam:
         shift = straightened.distance_to(pose)
         self._robot.events.publish(LoopClosed(stamp=stamp, shift=shift, moved=self._loops.moved))
         self._robot.events.publish(PoseJumped(stamp=stamp, pose=straightened))
+
+
+def _is_sure(best: Match) -> bool:
+    """Whether an error there is odometry's: otherwise, what is wrong may be the match."""
+    return best.agreement >= TRUSTED and best.known >= KNOWN_SURE * best.points

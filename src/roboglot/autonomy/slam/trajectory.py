@@ -10,9 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from roboglot.autonomy.slam.belief import Belief
 from roboglot.model.geometry import Pose
 
 STEPS_MAX = 500_000  # scans; the older half is forgotten beyond
+STANDING_PERIOD = 10.0  # s between two steps while standing
 FIELDS = 11  # stamp, keyframe, x, y, yaw, and the covariance's upper triangle
 
 
@@ -27,15 +29,25 @@ class TrajectoryPoint:
 
 
 class Trajectory:
-    """Takes a step for every scan that was matched; ``newest``: its stamp (s)."""
+    """Takes a step of ``belief`` for every scan that was matched; ``newest``: its stamp (s)."""
 
-    def __init__(self) -> None:
+    def __init__(self, belief: Belief) -> None:
+        self._belief, self._map = belief, belief.map
         self._steps = array("d")
         self.newest = -math.inf
 
     def clear(self) -> None:
         """Forget all: another map is used from now on."""
         self._steps, self.newest = array("d"), -math.inf
+
+    def follow(self, stamp: float, odometry: Pose, anchor: tuple[int, Pose] | None, *, drives: bool) -> None:
+        """Add where the belief is, now and then while standing; another map begins another trajectory."""
+        belief = self._belief
+        if self._map is not belief.map:
+            self._map = belief.map
+            self.clear()
+        if drives or stamp - self.newest >= STANDING_PERIOD:
+            self.add(stamp, belief.map_to_odom.compose(odometry), belief.covariance, anchor)
 
     def add(self, stamp: float, pose: Pose, covariance: NDArray[np.float64], anchor: tuple[int, Pose] | None) -> None:
         """``anchor``: number and pose of the keyframe that the step goes with; without one the step stays put."""

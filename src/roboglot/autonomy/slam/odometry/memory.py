@@ -25,7 +25,7 @@ class OdometryMemory:
         self._writing: asyncio.Task[None] | None = None
         kept = robot[Settings].get(KEY, {})
         if isinstance(kept, dict):
-            slam.remember(kept)
+            slam.odometry.restore(kept)
 
     async def close(self) -> None:
         """Write what was learnt last."""
@@ -42,4 +42,4 @@ class OdometryMemory:
 
     async def _put(self) -> None:
         self._kept_at = self._slam.way
-        await self._robot[Settings].keep(KEY, self._slam.learnt)
+        await self._robot[Settings].keep(KEY, self._slam.odometry.kept)

@@ -1,0 +1,84 @@
+"""Learns from corrections by matches how a robot's odometry errs; keeps apart what other reasons may have."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.autonomy.slam.matcher import Match
+from roboglot.autonomy.slam.odometry.noise import Doubt, LearntBias, LearntNoise
+from roboglot.model.components.sensing.odometry import OdometryNoise
+from roboglot.model.geometry import Pose, wrap_angle
+
+LEARNS_AFTER = 1.0  # m after a contradiction from which corrections say something of odometry again
+
+
+@dataclass(frozen=True, slots=True)
+class Correction:
+    """A match moved the pose from ``before``, with ``prior`` covariance, to ``best``; odometry had made a ``step``.
+
+    ``moved`` is the same step, made in ``seconds``; None if it says nothing of odometry's constant errors.
+    """
+
+    before: Pose
+    best: Match
+    prior: NDArray[np.float64]
+    step: Pose
+    moved: Pose | None
+    seconds: float
+
+
+class OdometryLearner:
+    """``noise``: how far odometry may be wrong; ``bias``: what it gets wrong all the time."""
+
+    def __init__(self, described: OdometryNoise) -> None:
+        self.noise, self.bias = LearntNoise(described), LearntBias()
+        self._learns_from = 0.0  # m driven
+
+    @property
+    def kept(self) -> dict[str, float]:
+        """What is known of this robot's odometry, to be kept for its next start."""
+        return self.noise.kept | self.bias.kept
+
+    def restore(self, kept: Mapping[str, object]) -> None:
+        """Go on from what was ``kept`` before."""
+        self.noise.restore(kept)
+        self.bias.restore(kept)
+
+    def spread(
+        self, covariance: NDArray[np.float64], way: float, turn: float, moved: Pose | None, seconds: float
+    ) -> NDArray[np.float64]:
+        """``covariance`` (x, y, yaw) after ``way`` m and ``turn`` rad; ``moved`` in ``seconds``, if known."""
+        return self.bias.spread(self.noise.spread(covariance, way, turn), moved or Pose(), seconds)
+
+    def contradict(self, driven: float) -> None:
+        """The wheels contradicted a match at ``driven`` m: for a while, corrections say less of odometry."""
+        self._learns_from = driven + LEARNS_AFTER
+
+    def learns(self, driven: float) -> bool:
+        """Whether corrections say all of odometry (again) after ``driven`` m."""
+        return driven >= self._learns_from
+
+    def learn(self, correction: Correction, driven: float, *, still: bool) -> None:
+        """What a correction at ``driven`` m says of odometry; only if all around is ``still``, how bad it is."""
+        before, here, after, prior = (
+            correction.before,
+            correction.best.pose,
+            correction.best.covariance,
+            correction.prior,
+        )
+        off = (here.x - before.x, here.y - before.y, wrap_angle(here.yaw - before.yaw))
+        step = correction.step
+        self.noise.learn(off, prior, after, here.yaw - step.yaw + math.atan2(step.y, step.x), rising=still)
+        if correction.moved is None:
+            return
+        c, s = abs(math.cos(here.yaw)), abs(math.sin(here.yaw))
+        seen_x, seen_y = (1.0 - after[k, k] / prior[k, k] for k in (0, 1))
+        seen = (c * seen_x + s * seen_y, s * seen_x + c * seen_y) if self.learns(driven) else (0.0, 0.0)
+        newest = self.noise.newest
+        doubt = Doubt(float(max(after[0, 0], after[1, 1])) + newest.way, float(after[2, 2]) + newest.yaw)
+        self.bias.learn(correction.moved, correction.seconds, here.relative_to(before), seen, doubt)
