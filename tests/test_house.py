@@ -23,7 +23,6 @@ WIDE = {  # classes with more, and why
     "Hull": "to be split",
     "PipeEnd": "to be split",
     "RobotServer": "to be split",
-    "SimulatedBase": "to be split",
     "SimulatedGimbal": "to be split",
     "SimulatedLegs": "to be split",
     "Stage": "to be split",

@@ -256,7 +256,7 @@ async def test_who_lies_gets_up_first(stand: Make) -> None:
 async def test_base_that_would_not_drive_refuses_at_once(stand: Make) -> None:
     dog = await stand()
     await dog.put(0.7, 10.0, 0.0)
-    dog.robot[Base].lock("test", "a cable")  # type: ignore[attr-defined]
+    dog.robot[Base].locks.lock("test", "a cable")  # type: ignore[attr-defined]
     with pytest.raises(Refused):
         dog.alignment.align(UP)
 

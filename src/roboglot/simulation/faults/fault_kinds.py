@@ -218,8 +218,8 @@ def lift_door_blocked(target: Target, *, floor: int | None = None) -> Undo:
 @_kind()
 def motor_fault(target: Target, *, wheel: str = "front_left") -> Undo:
     base = target.part(Base, SimulatedBase)
-    base.kill_wheels(frozenset({wheel}))
-    return lambda: base.kill_wheels(frozenset())
+    base.wheels.kill(frozenset({wheel}))
+    return lambda: base.wheels.kill(frozenset())
 
 
 @_kind()

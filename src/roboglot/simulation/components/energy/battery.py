@@ -133,9 +133,9 @@ class SimulatedBattery(Battery):
         """Plug a charger in, or pull it out; a robot on a wire does not drive."""
         self._wire = wire
         if wire:
-            self._base.lock("wire", "the robot is charging by wire")
+            self._base.locks.lock("wire", "the robot is charging by wire")
         else:
-            self._base.unlock("wire")
+            self._base.locks.unlock("wire")
 
     def reset(self) -> None:
         """Be charged as at the start, with no wire plugged in; age and cycles stay."""
@@ -171,9 +171,9 @@ class SimulatedBattery(Battery):
         self._drawn += max(0.0, -power) * seconds / 3600.0
         self._feel(power, seconds)
         if self._charge == 0.0:
-            self._base.lock("battery", "the battery is empty")
+            self._base.locks.lock("battery", "the battery is empty")
         elif self._charge >= REVIVED:
-            self._base.unlock("battery")
+            self._base.locks.unlock("battery")
         if (state := self._words()) != self._published:
             self._published = state
             self._events.publish(BatteryChanged(stamp=stamp, percentage=self._charge, charging=self._charging))

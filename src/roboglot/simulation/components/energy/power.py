@@ -138,9 +138,9 @@ class SimulatedPower(Power):
         self._mode, self._lying_since = mode, None
         awake = mode is PowerMode.AWAKE
         if awake:
-            self._base.unlock(POWER)
+            self._base.locks.unlock(POWER)
         else:
-            self._base.lock(POWER, f"the robot is {mode}")
+            self._base.locks.lock(POWER, f"the robot is {mode}")
         if self._legs:
             self._legs.off = "" if awake else f"the robot is {mode}"
         if self._lidar:

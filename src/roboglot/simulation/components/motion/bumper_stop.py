@@ -30,7 +30,7 @@ class BumperStop:
         if not bumper.touched:
             self.duty.end()
             return
-        base.touch(bumper.bearings)
+        base.hindrances.touching = bumper.bearings
         if not base.collides:
             return
         base.cut()

@@ -73,7 +73,7 @@ class SimulatedEmergencyBraking(EmergencyBraking):
     def _hold(self, stamp: float, *, ahead: bool, behind: bool) -> None:
         left = max(0.0, self._free[0] if ahead else self._free[1])
         reason = f"something is {left:.2f} m {'ahead' if ahead else 'behind'}"
-        self._base.bar(WHO, ahead=ahead, behind=behind, reason=reason)
+        self._base.hindrances.bar(WHO, ahead=ahead, behind=behind, reason=reason)
         if (ahead or behind) and not self._braking:
             self._events.publish(ObstacleBraked(stamp=stamp, distance=self._free[0] if ahead else self._free[1]))
         self._braking = ahead or behind

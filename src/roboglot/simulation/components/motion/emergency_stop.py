@@ -59,7 +59,7 @@ class SimulatedEmergencyStop(EmergencyStop):
         if released:
             self._hold(BRAKE, "the brake is released")
         else:
-            self._base.unlock(BRAKE)
+            self._base.locks.unlock(BRAKE)
         self._base.roll_freely(released)
         self._robot.events.publish(BrakeChanged(stamp=self._robot.clock.time(), released=released))
 
@@ -70,12 +70,12 @@ class SimulatedEmergencyStop(EmergencyStop):
         if engaged:
             self._hold(WHO, "the emergency stop is engaged")
         else:
-            self._base.unlock(WHO)
+            self._base.locks.unlock(WHO)
         self._robot.events.publish(EmergencyStopChanged(stamp=self._robot.clock.time(), engaged=engaged))
 
     def _hold(self, who: str, reason: str) -> None:
         """Stop every motion."""
-        self._base.lock(who, EmergencyStopped(reason))
+        self._base.locks.lock(who, EmergencyStopped(reason))
         self._base.cut()
         for action in self._robot.actions.running(BASE):
             action.cancel(reason)

@@ -26,12 +26,12 @@ class FallGuard:
         if not hull.edges.near:
             self.duty.end()
         if hull.rise < FALLEN_BELOW and hull.hand is None and not self._footing.carries(hull.elevation):
-            self._base.lock(FALLEN, Refused("the robot fell down"))
+            self._base.locks.lock(FALLEN, Refused("the robot fell down"))
             self._base.cut()
 
     def displaced(self) -> None:
         """Unlock the wheels: the robot was put on them again."""
-        self._base.unlock(FALLEN)
+        self._base.locks.unlock(FALLEN)
 
 
 def _fit(fit: Fitting) -> FallGuard:

@@ -320,7 +320,7 @@ class SimulatedGimbal(Gimbal):
     def _steer(self) -> None:
         """Have the base turn after the gimbal, unless something else than hands drives it."""
         drivers = self._robot.actions.running(BASE)
-        if self._base.locked or not all(isinstance(driver.goal, Twist | WheelSpeeds) for driver in drivers):
+        if self._base.locks.held or not all(isinstance(driver.goal, Twist | WheelSpeeds) for driver in drivers):
             self._base.steer = None
             return
         off, top = self._yaw.position, self._base.limits.twist.yaw

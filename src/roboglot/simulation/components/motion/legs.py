@@ -163,13 +163,13 @@ class SimulatedLegs(Legs):
 
     async def _brake(self) -> None:
         """Return when the wheels stand still; who cancels meanwhile finds the robot standing as before."""
-        self._base.lock(LEGS, "the robot changes its posture")
+        self._base.locks.lock(LEGS, "the robot changes its posture")
         try:
             while self._base.velocity != STILL:
                 await self._clock.sleep(LOOK)
         except BaseException:
             if self._posture is Posture.STANDING:
-                self._base.unlock(LEGS)
+                self._base.locks.unlock(LEGS)
             raise
 
     def _become(self, posture: Posture) -> None:
@@ -178,9 +178,9 @@ class SimulatedLegs(Legs):
         self._posture = posture
         self.duty.begin()
         if posture is Posture.STANDING:
-            self._base.unlock(LEGS)
+            self._base.locks.unlock(LEGS)
         else:
-            self._base.lock(LEGS, f"the robot cannot drive while {posture}")
+            self._base.locks.lock(LEGS, f"the robot cannot drive while {posture}")
         self._robot.events.publish(PostureChanged(stamp=self._clock.time(), posture=posture))
 
     # -- how the body is held, how it walks --------------------------------------------------------------------------
@@ -349,7 +349,7 @@ class SimulatedLegs(Legs):
         """Swing the body with the gait; after a stand the default gait returns."""
         velocity, gait, body = self._base.velocity, self._gait, self._body
         on_a_leash = gait is Gait.TROT_PASSIVE
-        if on_a_leash and self._hull.leash and not (self._base.locked or self._robot.actions.running(BASE)):
+        if on_a_leash and self._hull.leash and not (self._base.locks.held or self._robot.actions.running(BASE)):
             with suppress(Collided):  # it stands against what it is pulled into
                 self._base.set_velocity(led(self._hull.leash, self._hull.turned))
         if not (velocity.x or velocity.y or velocity.yaw):

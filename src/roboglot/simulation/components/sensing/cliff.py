@@ -73,7 +73,7 @@ class SimulatedCliff(Cliff):
             return
         ahead, behind = any("front" in zone for zone in seen), "rear" in seen
         reason = f"the floor ends {'ahead' if ahead else 'behind'}"
-        self._base.bar(WHO, ahead=ahead, behind=behind, reason=reason)
+        self._base.hindrances.bar(WHO, ahead=ahead, behind=behind, reason=reason)
         for zone in self.zones:
             if zone in seen and zone not in before:
                 self._events.publish(CliffDetected(stamp=stamp, zone=zone))

@@ -151,13 +151,13 @@ class SimulatedFirmware(Firmware):
                 raise Refused("the battery is too low for an update")
             if self._robot.actions.running(BASE):
                 raise Refused("the robot is on its way")
-            self._base.lock(FIRMWARE, "the robot is being updated")
+            self._base.locks.lock(FIRMWARE, "the robot is being updated")
             try:
                 await self._go_through(action, FirmwareState.INSTALLING, package, self._section.install_rate)
                 await self._record.put_pending(package.version, {**self.modules, **package.modules})
                 await self._record.put_downloaded(None)
             finally:
-                self._base.unlock(FIRMWARE)
+                self._base.locks.unlock(FIRMWARE)
             self._robot[Disk].release(PACKAGE)
             self._tell(action, FirmwareProgress(FirmwareState.INSTALLED, 1.0, package))
 
@@ -203,7 +203,7 @@ class SimulatedFirmware(Firmware):
 
     async def _restart(self, action: Action) -> None:
         robot, seconds = self._robot, self._section.reboot_time
-        self._base.lock("reboot", "the robot restarts")
+        self._base.locks.lock("reboot", "the robot restarts")
         robot.events.publish(Rebooting(stamp=self._clock.time(), seconds=seconds))
         self._tell(action, replace(self._progress, state=FirmwareState.REBOOTING, share=0.0))
         for other in robot.actions.running():
@@ -213,7 +213,7 @@ class SimulatedFirmware(Firmware):
             await robot[Legs].lie_down().done()
         await self._clock.sleep(seconds)
         await self._record.boot()
-        self._base.unlock("reboot")
+        self._base.locks.unlock("reboot")
         self._tell(action, FirmwareProgress())
         robot.events.publish(Rebooted(stamp=self._clock.time()))
 
@@ -226,7 +226,7 @@ class SimulatedFirmware(Firmware):
             robot, lock = self._robot, f"restart of {module}"
             for action in robot.actions.running(BASE):
                 action.cancel(f"the {module} restarts")
-            self._base.lock(lock, f"the {module} restarts")
+            self._base.locks.lock(lock, f"the {module} restarts")
             self._module = module
             try:
                 if module is Module.BASE and EmergencyStop in robot:
@@ -235,7 +235,7 @@ class SimulatedFirmware(Firmware):
                 await self._clock.sleep(RESTART_SECONDS[module])
             finally:
                 self._module = None
-                self._base.unlock(lock)
+                self._base.locks.unlock(lock)
             robot.events.publish(ModuleRestarted(stamp=self._clock.time(), module=module))
 
         return self._robot.actions.start(

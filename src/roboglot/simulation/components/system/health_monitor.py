@@ -65,8 +65,8 @@ def _is_in_doubt(localization: Localization, quality: float) -> bool:
 
 
 WATCHES = (
-    _Watch(Base, MOTOR_ALARM, "base", ERROR, "a wheel's motor does not turn", lambda base: base.dead_wheels),
-    _Watch(Base, "fallen", "base", FATAL, "the robot fell down", lambda base: base.locked_by("fallen")),
+    _Watch(Base, MOTOR_ALARM, "base", ERROR, "a wheel's motor does not turn", lambda base: base.wheels.dead),
+    _Watch(Base, "fallen", "base", FATAL, "the robot fell down", lambda base: base.locks.held_by("fallen")),
     _Watch(Battery, "battery low", "battery", WARNING, "low battery", lambda it: it.charge < it.low),
     _Watch(Battery, "battery empty", "battery", ERROR, "battery all but empty", lambda it: it.charge < EMPTY),
     _Watch(Battery, "battery hot", "battery", ERROR, "the battery is hot", lambda it: it.temperature > HOT),

@@ -1,0 +1,63 @@
+"""Kinematics of a base's wheels, both ways: mecanum, or a differential drive with one motor a side."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from roboglot.model.components.motion.base import WheelSpeeds
+from roboglot.model.geometry import Twist
+from roboglot.simulation.bodies.body import BaseSection
+
+
+def four(wheels: WheelSpeeds) -> tuple[float, float, float, float]:
+    """Front left and right, rear left and right."""
+    return wheels.front_left, wheels.front_right, wheels.rear_left, wheels.rear_right
+
+
+class Wheels:
+    """``radius`` and ``lever`` (m): from turning wheels to a moving and a turning body.
+
+    ``dead``: wheels (field names of WheelSpeeds) whose motors give nothing.
+    """
+
+    def __init__(self, section: BaseSection) -> None:
+        self.mecanum = section.drive == "mecanum"
+        self.radius = section.wheel_radius
+        self.lever = (section.wheel_base + section.track) / 2 if self.mecanum else section.track / 2
+        self.dead: frozenset[str] = frozenset()
+
+    def kill(self, wheels: frozenset[str]) -> None:
+        """These motors give nothing from now on: their wheels drag."""
+        if wheels - set(WheelSpeeds.__slots__):
+            raise ValueError(f"a wheel is one of {', '.join(WheelSpeeds.__slots__)}")
+        if not self.mecanum:  # one motor a side
+            sides = {wheel.split("_")[1] for wheel in wheels}
+            wheels = frozenset(wheel for wheel in WheelSpeeds.__slots__ if wheel.split("_")[1] in sides)
+        self.dead = wheels
+
+    def driven(self, wheels: WheelSpeeds) -> WheelSpeeds:
+        """Those that have a motor; the others stand."""
+        return replace(wheels, **dict.fromkeys(self.dead, 0.0))
+
+    def speeds_of(self, twist: Twist) -> WheelSpeeds:
+        """How the wheels turn while the body moves at ``twist``."""
+        turn = self.lever * twist.yaw
+        if not self.mecanum:
+            left, right = (twist.x - turn) / self.radius, (twist.x + turn) / self.radius
+            return WheelSpeeds(left, right, left, right)
+        return WheelSpeeds(
+            front_left=(twist.x - twist.y - turn) / self.radius,
+            front_right=(twist.x + twist.y + turn) / self.radius,
+            rear_left=(twist.x + twist.y - turn) / self.radius,
+            rear_right=(twist.x - twist.y + turn) / self.radius,
+        )
+
+    def twist_of(self, wheels: WheelSpeeds) -> Twist:
+        """What four wheels that disagree do to the body: the mean; the rest is slip."""
+        fl, fr, rl, rr = four(wheels)
+        quarter = self.radius / 4
+        if not self.mecanum:
+            return Twist((fl + fr + rl + rr) * quarter, 0.0, (-fl + fr - rl + rr) * quarter / self.lever)
+        return Twist(
+            (fl + fr + rl + rr) * quarter, (-fl + fr + rl - rr) * quarter, (-fl + fr - rl + rr) * quarter / self.lever
+        )
