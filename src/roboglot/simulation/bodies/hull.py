@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 from roboglot.model.geometry import LEVEL as STRAIGHT
 from roboglot.model.geometry import Point, Pose, Twist, wrap_angle
 from roboglot.simulation.bodies.body import Body
+from roboglot.simulation.bodies.hull_legs import HullLegs
 from roboglot.simulation.bodies.schedule import Duty
 from roboglot.simulation.bodies.support import GRAVITY, SETTLED, Nearness, Support
 from roboglot.simulation.building.terrain import Ground
 
 DRIVE_GAIN = 150.0  # 1/s: how fast the body takes on the wheels' velocity: in one step of physics, or it swings
-LEG_GAIN = 8000.0  # N/m, of the servo that holds the torso
-TORSO = 0.4  # of the mass; the rest is the chassis
 LEVEL = (0.0, 0.0)
 FALLING = 0.05  # m/s up or down at which one looks whether the wheels still stand
 TIPPED = 1.0  # rad
@@ -69,7 +68,7 @@ class Hull:
         self._q, self._v = int(model.joint(f"{name} x").qposadr[0]), int(model.joint(f"{name} x").dofadr[0])
         first = model.actuator(f"{name} x").id
         self._drive = slice(first, first + 3)
-        self._ctrl, self._applied = data.ctrl, data.qfrc_applied
+        self._applied = data.qfrc_applied
         self.mass = float(model.body_subtreemass[model.body(name).id])
         self._solid = [model.geom(f"{name} {part}").id for part in ("chassis", "torso")]
         self._tilts = ground.uneven
@@ -84,12 +83,10 @@ class Hull:
         self.standing = 1.0  # share of the wheels that touch the ground
         self.overturned = False
         self._belly: int | None = None
+        self.legs: HullLegs | None = None
         if body.legs:
-            torso = model.joint(f"{name} torso")
-            self._belly, self._sinking = int(torso.qposadr[0]), int(torso.dofadr[0])
-            self._legs = model.actuator(f"{name} torso").id
-            self._leg_gains = (model.actuator_gainprm[self._legs].copy(), model.actuator_biasprm[self._legs].copy())
-        self._sag = body.hull.mass * TORSO * GRAVITY / LEG_GAIN
+            self.legs = HullLegs(model, data, name, body)
+            self._belly, self._sinking = self.legs.torso, self.legs.sinking
         self._level = slice(self._q, self._q + 4), slice(self._v, self._v + 4)  # x, y, z, yaw and their rates
         self._rates = slice(self._v, self._v + 4 + 2 * self._tilts + bool(body.legs))
         self._servos = data.actuator_force[self._drive], data.ctrl[self._drive]  # views: they show what is now
@@ -303,31 +300,7 @@ class Hull:
         force, speed = self._servos
         return max(0.0, float(force.dot(speed)))
 
-    # -- legs --------------------------------------------------------------------------------------------------------
-
-    def hold_belly(self, height: float | None, *, weightless: bool = False) -> None:
-        """Hold the torso at ``height`` m, or let it sink (None); ``weightless``: in free fall it needs no support."""
-        limp = height is None
-        self._model.actuator_gainprm[self._legs] = 0.0 if limp else self._leg_gains[0]
-        self._model.actuator_biasprm[self._legs] = 0.0 if limp else self._leg_gains[1]
-        if height is not None:
-            self._ctrl[self._legs] = height + (0.0 if weightless else self._sag)
-
-    def put_belly(self, height: float) -> None:
-        """Have the torso at ``height`` m at once."""
-        self._data.qpos[self._belly] = height
-        self.look()
-        self.hold_belly(height)
-
-    def step_over(self, height: float) -> None:
-        """Lift the feet so that what is lower than ``height`` m passes under the chassis."""
-        section, geom = self.body.hull, self._solid[0]
-        half = max(0.01, (section.clearance + section.chassis_height - height) / 2)
-        self.clearance = section.clearance + section.chassis_height - 2 * half
-        model = self._model
-        model.geom_size[geom][1], model.geom_pos[geom][2] = half, self.clearance + half
-        model.geom_rbound[geom] = math.hypot(section.radius, half)
-        model.geom_aabb[geom] = [0, 0, 0, section.radius, section.radius, half]
+    # -- leaps ------------------------------------------------------------------------------------------------------
 
     def leap(self, x: float, y: float, turn: float, airtime: float) -> None:
         """Take off at this velocity (base_link, m/s, rad/s) and fly for ``airtime`` s if the ground is level."""

@@ -13,7 +13,8 @@ from typing import Any
 import mujoco
 
 from roboglot.simulation.bodies.body import Body
-from roboglot.simulation.bodies.hull import DRIVE_GAIN, LEG_GAIN, TORSO, wheel_places
+from roboglot.simulation.bodies.hull import DRIVE_GAIN, wheel_places
+from roboglot.simulation.bodies.hull_legs import LEG_GAIN, TORSO
 from roboglot.simulation.bodies.support import FOOT, GRAVITY, HANGS, MOVES, STANDS
 from roboglot.simulation.building.blueprint import (
     Kind,

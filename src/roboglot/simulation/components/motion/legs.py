@@ -17,12 +17,10 @@ from roboglot.model.components.motion.legs import LEGS, BodyPose, Choreography, 
 from roboglot.model.components.motion.motions import MOTIONS, Motion, MotionSpec
 from roboglot.model.errors import Collided, EmergencyStopped, InvalidGoal, Refused
 from roboglot.model.events import PostureChanged
-from roboglot.model.geometry import LEVEL, STILL, Orientation, Point
+from roboglot.model.geometry import STILL, Orientation
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.body import LegsSection
-from roboglot.simulation.bodies.feet import Feet
-from roboglot.simulation.bodies.footfalls import DOWN, walking
-from roboglot.simulation.bodies.hull import Hull, wheel_places
+from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.performing import (
     Body,
@@ -35,18 +33,13 @@ from roboglot.simulation.bodies.performing import (
     strayed,
 )
 from roboglot.simulation.bodies.posture_limits import STEP_SECONDS_MAX, added, check_lift, check_pose, check_steps, led
-from roboglot.simulation.bodies.readiness import check_fit, in_the_way
+from roboglot.simulation.bodies.readiness import check_fit
 from roboglot.simulation.bodies.schedule import Duty
-from roboglot.simulation.bodies.walking_body import (
-    check_posture,
-    followed,
-    given_up,
-    held_body,
-    no_floor_under,
-    swayed,
-    walking_effort,
-)
+from roboglot.simulation.bodies.steps import Steps
+from roboglot.simulation.bodies.torso import Torso
+from roboglot.simulation.bodies.walking_body import check_posture, held_body, swayed, walking_effort
 from roboglot.simulation.components.motion.base import SimulatedBase
+from roboglot.simulation.components.motion.motion_player import MotionPlayer
 
 LOOK = 0.02  # s between looks at whether a motion has ended
 TURN_RATE = 1.2  # rad/s at which the body straightens on its way between postures
@@ -60,23 +53,19 @@ class SimulatedLegs(Legs):
         self._section, self._hull, self._base, self._robot = section, hull, base, robot
         self._clock = robot.clock
         self.limits = section.limits
-        self._posture, self._straight = Posture.STANDING, Body(section.standing)
-        self._body = self._taken = self._straight
+        self._posture = Posture.STANDING
+        self._torso = torso = Torso(hull, Body(section.standing))
         self._stance = Stance(
-            self._straight, min(section.lying, section.lowest), max(section.standing, section.highest), tick
+            torso.straight, min(section.lying, section.lowest), max(section.standing, section.highest), tick
         )
-        self._track: Track | None = None
-        self._performance: Performance | None = None
         self._performing: Motion | None = None
-        self._gait: Gait | None = section.gait
-        self._lift = FootLift()
-        self._still = self._strides = 0.0
-        places = [wheel_places(hull.body)[index] for index in (1, 0, 3, 2)]  # in the order of Foot
+        self._still = 0.0  # s since it stopped walking
         self.duty = Duty(on=True)  # while the torso or the feet move
-        self._feet = Feet([Point(x, y) for x, y in places], section.reach, hull.pose) if section.gait else None
+        self._steps = Steps(section, hull)
+        self._player = MotionPlayer(hull, base, torso, self._steps, self._stance)
         self.choreography = Choreography()
         self.off = ""  # why the motors have no power; empty: they have
-        hull.put_belly(section.standing)
+        torso.put(section.standing)
         self.walk(section.gait)
 
     @property
@@ -97,24 +86,25 @@ class SimulatedLegs(Legs):
 
     @property
     def gait(self) -> Gait | None:
-        return self._gait
+        return self._steps.gait
 
     @property
     def foot_lift(self) -> FootLift:
-        return self._lift
+        return self._steps.lift
 
     @property
     def feet(self) -> Mapping[Foot, FootState]:
-        return self._feet.states(self._hull.pose) if self._feet else {}
+        feet = self._steps.feet
+        return feet.states(self._hull.pose) if feet else {}
 
     # -- postures ----------------------------------------------------------------------------------------------------
 
     def stand(self, *, source: str = "") -> Action:
         async def run(action: Action) -> None:
-            if self._posture is not Posture.STANDING or self._body != self._straight:
+            if self._posture is not Posture.STANDING or not self._torso.is_straight:
                 await self._move(action, Posture.STANDING, self._section.standing, self._section.stand_time)
 
-        there = self._posture is Posture.STANDING and self._body == self._straight and not self._track
+        there = self._posture is Posture.STANDING and self._torso.is_straight and not self._torso.track
         return self._start("stand up", run, there, Posture.STANDING, source)
 
     def lie_down(self, *, source: str = "") -> Action:
@@ -130,9 +120,9 @@ class SimulatedLegs(Legs):
         for resource in (BASE, LEGS):
             for action in self._robot.actions.running(resource):
                 action.cancel("emergency: the legs went limp")
-        self._performance = self._track = None
+        self._player.performance = self._torso.track = None
         self._base.cut()
-        self._hull.hold_belly(None)
+        self._torso.let_sink()
         self._become(Posture.LIMP)
 
     def _start(self, name: str, run: Callable[[Action], Awaitable[None]], there: bool, goal: object, by: str) -> Action:
@@ -145,21 +135,17 @@ class SimulatedLegs(Legs):
             raise Refused(self.off)
         await self._brake()
         goal = Body(height)
-        self._body = held_body(self._hull)
+        self._torso.body = held = held_body(self._hull)
         pace = (self._section.standing - self._section.lying) / duration
-        seconds = max(abs(goal.height - self._body.height) / pace, self._body.turn_to(goal) / TURN_RATE)
+        seconds = max(abs(goal.height - held.height) / pace, held.turn_to(goal) / TURN_RATE)
         self._become(Posture.CHANGING)
-        await self._follow(action, Track(self._body, goal, seconds))
+        await self._follow(action, Track(held, goal, seconds))
         self._become(wanted)
 
     async def _follow(self, action: Action, track: Track) -> None:
         """Wait until the body is there; for ever if something else moves it now."""
-        self._track = track
         self.duty.begin()
-        try:
-            await followed(track, action, self._clock, LOOK)
-        finally:
-            self._track = None if self._track is track else self._track
+        await self._torso.follow(track, action, self._clock, LOOK)
 
     async def _brake(self) -> None:
         """Return when the wheels stand still; who cancels meanwhile finds the robot standing as before."""
@@ -189,15 +175,15 @@ class SimulatedLegs(Legs):
         if not 0.0 <= duration <= STEP_SECONDS_MAX:
             raise InvalidGoal(f"a body pose takes at most {STEP_SECONDS_MAX:g} s")
         if relative:
-            body = added(self._body, body, self.limits)
+            body = added(self._torso.body, body, self.limits)
         check_pose(body, self.limits)
 
         async def run(action: Action) -> None:
             if self._posture is not Posture.STANDING:
                 raise Refused(f"the robot holds no pose while {self._posture}")
-            height = self._body.height if body.height is None else body.height
-            goal = Body(height, body.attitude, body.shift)
-            await self._follow(action, Track(self._body, goal, max(duration, self._body.turn_to(goal) / 4.0)))
+            held = self._torso.body
+            goal = Body(held.height if body.height is None else body.height, body.attitude, body.shift)
+            await self._follow(action, Track(held, goal, max(duration, held.turn_to(goal) / 4.0)))
 
         return self._robot.actions.start("hold the body", run, resources=[LEGS], goal=body, source=source)
 
@@ -206,18 +192,10 @@ class SimulatedLegs(Legs):
         check_lift(lift)
         gait = gait or self._section.gait
         self._still = 0.0
-        if (gait, lift) != (self._gait, self._lift) or gait is not None:
-            self._gait, self._lift = gait, lift
+        if (gait, lift) != (self._steps.gait, self._steps.lift) or gait is not None:
             self.duty.begin()
             self._base.walk(GAITS[gait].clamp if gait else None)
-            if self._feet:
-                self._feet.narrow(lift.inward)
-            self._step_over(None)
-
-    def _step_over(self, lowest: float | None) -> None:
-        """What is lower passes under the body; None: as it walks. A body on wheels has its own clearance."""
-        walking = min(self._lift.front, self._lift.rear) if self._gait else self._hull.body.hull.clearance
-        self._hull.step_over(walking if lowest is None or not self._gait else lowest)
+            self._steps.walk(gait, lift)
 
     # -- motions -----------------------------------------------------------------------------------------------------
 
@@ -226,7 +204,7 @@ class SimulatedLegs(Legs):
 
         async def run(action: Action) -> None:
             self._check_ready(spec.before)
-            await self._play(action, motion, lambda: motion_frames(spec, self._body, self._stance), spec)
+            await self._play(action, motion, lambda: motion_frames(spec, self._torso.body, self._stance), spec)
 
         return self._robot.actions.start(
             motion, run, resources=[LEGS, BASE], goal=motion, source=source, on_busy=on_busy
@@ -242,11 +220,11 @@ class SimulatedLegs(Legs):
     ) -> Action:
         check_steps(steps, footfalls, self.limits, self._base.limits.twist)
         self.choreography = Choreography(tuple(steps), tuple(footfalls))
-        falls = footfalls if self._feet else ()  # who rolls has no feet to lift
+        falls = footfalls if self._steps.feet else ()  # who rolls has no feet to lift
 
         async def run(action: Action) -> None:
             self._check_ready(frozenset({Posture.STANDING}))
-            await self._play(action, None, lambda: dance_frames(steps, self._body, self._stance, falls), None)
+            await self._play(action, None, lambda: dance_frames(steps, self._torso.body, self._stance, falls), None)
 
         return self._robot.actions.start(
             "dance", run, resources=[LEGS, BASE], goal=tuple(steps), source=source, on_busy=on_busy
@@ -261,93 +239,52 @@ class SimulatedLegs(Legs):
     ) -> None:
         """Brake, perform to the end, and see where one is. Given up, the body lands and straightens itself."""
         await self._brake()
-        self._body = held_body(self._hull)
+        self._torso.body = held_body(self._hull)
         self._become(Posture.CHANGING)
         begin = self._hull.pose
         performance, self._performing = Performance(make()), motion
-        self._performance = performance
+        self._player.performance = performance
         self.duty.begin()
         try:
-            await self._until_over(performance)
+            await self._player.until_over(performance, self._clock, LOOK)
         except asyncio.CancelledError:
             if action.status is ActionStatus.CANCELING:  # otherwise the loop is closing and its clock may stand still
-                performance.frames = given_up(performance, self._hull, self._body, self._straight, self._stance)
-                await self._until_over(performance)
+                self._player.give_up(performance)
+                await self._player.until_over(performance, self._clock, LOOK)
             raise
         finally:
             self._performing = None
-            if self._performance is performance:
-                self._performance = None
+            if self._player.performance is performance:
+                self._player.performance = None
                 self._base.carry(STILL)
                 straight = performance.hit or action.status is ActionStatus.CANCELING or spec is None
                 self._become(Posture.STANDING if straight or spec is None else spec.after)
         if performance.hit or (spec and strayed(self._hull.pose, begin.compose(spec.way))):
             raise Collided("something stood in the way")
 
-    async def _until_over(self, performance: Performance) -> None:
-        while not performance.over and self._performance is performance:
-            await self._clock.sleep(LOOK)
-
     # -- every tick --------------------------------------------------------------------------------------------------
 
     def control(self, seconds: float) -> None:
         """Before the physics: move the torso's set point on, the feet, and base_link while performing."""
-        if self._performance:
-            self._play_frame(self._performance)
-            self._step(seconds, self._performance.frame)
+        torso = self._torso
+        if performance := self._player.performance:
+            self._player.play(performance)
+            self._steps.step(self._base.velocity, seconds, performance.frame)
             self._hull.effort = self._section.perform_power
             return
-        if self._track:
-            self._body = self._track.advance(seconds)
+        if torso.track:
+            torso.body = torso.track.advance(seconds)
         if self._posture is Posture.STANDING:
             self._walk_on(seconds)
-        elif self._track:
-            self._take(self._body)
-        self._step(seconds)
-        if not (self._gait or self._track or self._hull.effort) and self._body is self._taken:
+        elif torso.track:
+            torso.take(torso.body)
+        self._steps.step(self._base.velocity, seconds, standing=self._posture is Posture.STANDING)
+        if not (self._steps.gait or torso.track or self._hull.effort) and torso.body is torso.taken:
             self.duty.end()
-
-    def _step(self, seconds: float, frame: Frame | None = None) -> None:
-        """The feet follow what the body does."""
-        if self._feet is None or self._gait is None:
-            return
-        if no_floor_under(self._hull, frame):
-            self._feet.hang(self._hull.pose)
-            return
-        velocity, swings = self._base.velocity, DOWN
-        if frame and frame.feet:
-            swings = frame.feet
-        elif velocity != STILL or (self._feet.restless and self._posture is Posture.STANDING):
-            if frame or velocity == STILL:  # otherwise the body swings with the steps and counts them
-                self._strides += GAITS[self._gait].steps * seconds
-            swings = walking(self._gait, self._strides, self._lift)
-        self._feet.step(self._hull.pose, velocity, swings, seconds)
-
-    def _play_frame(self, performance: Performance) -> None:
-        frame = performance.frame
-        if frame and not performance.hit and in_the_way(self._hull, frame.twist):
-            performance.hit = True
-            performance.frames = given_up(performance, self._hull, self._body, self._straight, self._stance)
-        performance.frame = frame = next(performance.frames, None)
-        if frame is None:
-            performance.over = True
-            self._base.carry(STILL)
-            return
-        held_back = frame.feet and self._feet and self._feet.holds_back(self._hull.pose, frame.twist, frame.feet)
-        self._base.carry(STILL if held_back else frame.twist)
-        if frame.lift != performance.lift:
-            performance.lift = frame.lift
-            self._step_over(frame.lift)
-        if frame.leap:
-            self._hull.leap(frame.twist.x, frame.twist.y, frame.twist.yaw, frame.leap)
-        elif frame.landed:
-            self._hull.stop()
-        self._body = frame.body
-        self._take(frame.body, weightless=frame.airborne)
 
     def _walk_on(self, seconds: float) -> None:
         """Swing the body with the gait; after a stand the default gait returns."""
-        velocity, gait, body = self._base.velocity, self._gait, self._body
+        velocity, gait, body = self._base.velocity, self._steps.gait, self._torso.body
         on_a_leash = gait is Gait.TROT_PASSIVE
         if on_a_leash and self._hull.leash and not (self._base.locks.held or self._robot.actions.running(BASE)):
             with suppress(Collided):  # it stands against what it is pulled into
@@ -359,18 +296,11 @@ class SimulatedLegs(Legs):
                 self.walk(None)
         elif gait is not None:
             spec, self._still = GAITS[gait], 0.0
-            self._strides += spec.steps * seconds
-            body = swayed(body, spec, self._strides, velocity, self._stance)
-            self._hull.effort = walking_effort(self._hull, spec, self._lift)
-        if body is not self._taken and body != self._taken:
-            self._take(body)
-
-    def _take(self, body: Body, *, weightless: bool = False) -> None:
-        self._taken = body
-        self._hull.hold_belly(body.height, weightless=weightless)
-        # The one object where the torso is level: the IMU asks for it in every tick.
-        self._hull.attitude = LEVEL if body.attitude == LEVEL else body.attitude
-        self._hull.shift = body.shift
+            self._steps.count += spec.steps * seconds
+            body = swayed(body, spec, self._steps.count, velocity, self._stance)
+            self._hull.effort = walking_effort(self._hull, spec, self._steps.lift)
+        if body is not self._torso.taken and body != self._torso.taken:
+            self._torso.take(body)
 
 
 def _fit(fit: Fitting) -> SimulatedLegs:

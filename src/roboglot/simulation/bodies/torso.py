@@ -1,0 +1,50 @@
+"""The torso of a body on legs: how it is to be held, on which way to there, and how the physics holds it now."""
+
+from __future__ import annotations
+
+from roboglot.model.actions import Action
+from roboglot.model.clock import Clock
+from roboglot.model.geometry import LEVEL
+from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.performing import Body, Track
+from roboglot.simulation.bodies.walking_body import followed
+
+
+class Torso:
+    """``body`` is how it is to be held before it sways; ``taken``, what the physics has. ``straight``: standing so."""
+
+    def __init__(self, hull: Hull, straight: Body) -> None:
+        assert hull.legs is not None, "legs belong to a body that has them"
+        self._hull, self._legs = hull, hull.legs
+        self.straight = self.body = self.taken = straight
+        self.track: Track | None = None
+
+    @property
+    def is_straight(self) -> bool:
+        """True if it is to be held straight."""
+        return self.body == self.straight
+
+    async def follow(self, track: Track, action: Action, clock: Clock, period: float) -> None:
+        """Wait until the body is there; for ever if something else moves it now."""
+        self.track = track
+        try:
+            await followed(track, action, clock, period)
+        finally:
+            self.track = None if self.track is track else self.track
+
+    def take(self, body: Body, *, weightless: bool = False) -> None:
+        """Hold it like this from now on."""
+        self.taken = body
+        self._legs.hold(body.height, weightless=weightless)
+        # The one object where the torso is level: the IMU asks for it in every tick.
+        self._hull.attitude = LEVEL if body.attitude == LEVEL else body.attitude
+        self._hull.shift = body.shift
+
+    def put(self, height: float) -> None:
+        """Have it at ``height`` m at once."""
+        self._legs.put(height)
+        self._hull.look()
+
+    def let_sink(self) -> None:
+        """Hold it no more."""
+        self._legs.hold(None)

@@ -1,0 +1,54 @@
+"""Plays motions and choreographies: their frames, one a tick, to the base, the torso and the feet."""
+
+from __future__ import annotations
+
+from roboglot.model.clock import Clock
+from roboglot.model.geometry import STILL
+from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.performing import Performance, Stance
+from roboglot.simulation.bodies.readiness import in_the_way
+from roboglot.simulation.bodies.steps import Steps
+from roboglot.simulation.bodies.torso import Torso
+from roboglot.simulation.bodies.walking_body import given_up
+from roboglot.simulation.components.motion.base import SimulatedBase
+
+
+class MotionPlayer:
+    """``performance`` is what is played now."""
+
+    def __init__(self, hull: Hull, base: SimulatedBase, torso: Torso, steps: Steps, stance: Stance) -> None:
+        self._hull, self._base, self._torso, self._steps, self._stance = hull, base, torso, steps, stance
+        self.performance: Performance | None = None
+
+    async def until_over(self, performance: Performance, clock: Clock, period: float) -> None:
+        """Wait until it is over, or another one is played; look every ``period`` s."""
+        while not performance.over and self.performance is performance:
+            await clock.sleep(period)
+
+    def give_up(self, performance: Performance) -> None:
+        """Have it land if need be, and straighten itself."""
+        torso = self._torso
+        performance.frames = given_up(performance, self._hull, torso.body, torso.straight, self._stance)
+
+    def play(self, performance: Performance) -> None:
+        """Move base_link, the torso and the feet by the next frame; a motion that meets something ends."""
+        frame = performance.frame
+        if frame and not performance.hit and in_the_way(self._hull, frame.twist):
+            performance.hit = True
+            self.give_up(performance)
+        performance.frame = frame = next(performance.frames, None)
+        if frame is None:
+            performance.over = True
+            self._base.carry(STILL)
+            return
+        held_back = self._steps.hold_back(frame)
+        self._base.carry(STILL if held_back else frame.twist)
+        if frame.lift != performance.lift:
+            performance.lift = frame.lift
+            self._steps.step_over(frame.lift)
+        if frame.leap:
+            self._hull.leap(frame.twist.x, frame.twist.y, frame.twist.yaw, frame.leap)
+        elif frame.landed:
+            self._hull.stop()
+        self._torso.body = frame.body
+        self._torso.take(frame.body, weightless=frame.airborne)
