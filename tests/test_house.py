@@ -22,7 +22,6 @@ WIDE = {  # classes with more, and why
     "Hands": "to be split",
     "PipeEnd": "to be split",
     "RobotServer": "to be split",
-    "SimulatedGimbal": "to be split",
     "Stage": "to be split",
 }
 GENERATED = ("_pb2.py", "_pb2_grpc.py")

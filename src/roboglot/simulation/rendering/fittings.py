@@ -20,7 +20,7 @@ from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.hull import Hull, rotation
 from roboglot.simulation.components.interaction.blaster import BlasterSection
 from roboglot.simulation.components.motion.arm import ArmSection
-from roboglot.simulation.components.motion.gimbal import GimbalSection
+from roboglot.simulation.components.motion.gimbal_axes import GimbalSection
 from roboglot.simulation.components.motion.gripper import GripperSection
 from roboglot.simulation.rendering.shapes import (
     Floats,

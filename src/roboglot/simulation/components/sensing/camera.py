@@ -23,7 +23,7 @@ from roboglot.model.feed import Feed, Viewer
 from roboglot.simulation.bodies.hull import Hull, rotation
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import NotNegative
-from roboglot.simulation.components.motion.gimbal import GimbalSection
+from roboglot.simulation.components.motion.gimbal_axes import GimbalSection
 from roboglot.simulation.rendering.studio import Studio
 from roboglot.simulation.rendering.views import Eye, Instant, Scenery
 

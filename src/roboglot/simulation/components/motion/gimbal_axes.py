@@ -1,0 +1,201 @@
+"""The two axes of a gimbal in time: held against the body's motion, turned to where they are aimed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+from msgspec import Meta, Struct
+
+from roboglot.model.components.motion.base import WheelSpeeds
+from roboglot.model.components.motion.driving import BASE
+from roboglot.model.components.motion.gimbal import FollowMode, Frame
+from roboglot.model.components.sensing.imu import Imu
+from roboglot.model.errors import Unreachable
+from roboglot.model.geometry import Twist, wrap_angle
+from roboglot.model.robot import Robot
+from roboglot.simulation.bodies.axis_motors import SETTLED, Axis
+from roboglot.simulation.bodies.hull import LEVEL, Hull
+from roboglot.simulation.bodies.quantities import Offset, Positive
+from roboglot.simulation.components.motion.base import SimulatedBase
+
+FOLLOWING = 6.0  # 1/s: turn rate of the gimbal back to the chassis' front, per rad that it is off
+STEERING = 4.0  # 1/s: the same for a chassis that follows the gimbal
+THERE = 0.002  # rad: near enough to a goal
+
+
+class GimbalSection(Struct, frozen=True, forbid_unknown_fields=True):
+    """Where its axes cross, how far up, down and to both sides it turns, speed and acceleration of both axes."""
+
+    forward: Offset
+    above_belly: Offset
+    up: Annotated[float, Meta(gt=0, lt=1.6)]
+    down: Annotated[float, Meta(gt=0, lt=1.6)]
+    sideways: Positive
+    speed: Positive
+    acceleration: Positive
+
+
+@dataclass(frozen=True, slots=True)
+class Aim:
+    """One axis: go to ``goal`` (rad) at up to ``speed`` (rad/s), or without a goal keep turning at ``speed``."""
+
+    goal: float | None
+    speed: float
+    frame: Frame = Frame.WORLD
+
+
+UNAIMED = (None, None)
+
+
+class GimbalAxes:
+    """Keeps the axes' angles relative to the body; what is not aimed stays where it points in the world.
+
+    ``lean``: the body's pitch where the gimbal looks, rad.
+    """
+
+    def __init__(self, section: GimbalSection, hull: Hull, base: SimulatedBase, robot: Robot) -> None:
+        self._hull, self._base, self._robot = hull, base, robot
+        self._top_speed = section.speed
+        self.pitch = Axis(-section.up, section.down, section.acceleration)
+        self.yaw = Axis(-section.sideways, section.sideways, section.acceleration)
+        self._aims: tuple[Aim | None, Aim | None] = UNAIMED  # of pitch and yaw
+        self.mode = FollowMode.CHASSIS_LEAD
+        self.suspended = False
+        self._resting = False
+        self._turned = hull.turned
+        self._since_start = 0.0  # how far the body really turned, to count whole turns
+        self.lean = 0.0
+
+    def set_mode(self, mode: FollowMode) -> None:
+        """Follow the body, have it follow, or neither."""
+        self.mode, self._resting = mode, False
+        self._base.steer = None
+
+    def suspend(self) -> None:
+        """Cut the motors: the axes stay where they are against the body."""
+        self.suspended = True
+        self.halt()
+        self.pitch.rate = self.yaw.rate = 0.0
+        self._base.steer = None
+
+    def resume(self) -> None:
+        """Switch the motors on again."""
+        self.suspended = self._resting = False
+
+    def aim(self, pitch: Aim | None, yaw: Aim | None) -> None:
+        """Have the axes turn there, or leave one alone (None)."""
+        self._aims, self._resting = (pitch, yaw), False
+
+    def halt(self) -> None:
+        """Have both stay where they point."""
+        self.aim(None, None)
+
+    def arrived(self) -> bool:
+        """True if every axis is where it is to be; raises Unreachable once one is at its end short of that."""
+        short = 0.0
+        for axis, goal in ((self.pitch, self._goal(0)), (self.yaw, self._goal(1))):
+            if goal is None or not (axis.rate or abs(axis.position - goal) > THERE):
+                continue
+            if reaches(axis, goal) or axis.position not in (axis.lowest, axis.highest):
+                return False
+            short = max(short, abs(axis.position - goal))
+        if short:
+            raise Unreachable(f"the gimbal is at the end of its travel, {math.degrees(short):.1f} degrees short")
+        return True
+
+    @property
+    def heading(self) -> float:
+        """The body's since power-on as the gyro has it, rad, not wrapped."""
+        if Imu not in self._robot:
+            return self._since_start
+        measured = self._robot[Imu].reading.orientation.yaw
+        return self._since_start + wrap_angle(measured - self._since_start)
+
+    def _goal(self, index: int) -> float | None:
+        """Where the axis is to be, as a joint's angle; in CHASSIS_LEAD only the chassis aims the yaw."""
+        aim = self._aims[index]
+        if aim is None or aim.goal is None or (index and self.mode is FollowMode.CHASSIS_LEAD):
+            return None
+        if aim.frame is Frame.BODY:
+            return aim.goal
+        return aim.goal - (self.heading if index else self.lean)
+
+    def control(self, seconds: float) -> None:
+        """Before the base's: hold against the body's last motion, follow or be followed, turn to where it is aimed."""
+        hull = self._hull
+        turn, self._turned = hull.turned - self._turned, hull.turned
+        if self._resting and not turn and hull.tilt is LEVEL:
+            return
+        self._since_start += turn
+        if hull.tilt is LEVEL and self._plain and not self.lean:
+            hull.gaze = self.pitch.position, self._follow_body(turn, seconds)
+            return
+        lean = 0.0 if hull.tilt is LEVEL else _lean(hull.tilt, self.yaw.position)
+        leaning, self.lean = lean - self.lean, lean
+        if self.suspended:
+            return
+        if turn or self._aims[1] is not None or self.yaw.position or self.yaw.rate:
+            self._advance(1, self.yaw, -turn, seconds)
+        if leaning or self._aims[0] is not None or self.pitch.rate:
+            self._advance(0, self.pitch, -leaning, seconds)
+        hull.gaze = self.pitch.position, self.yaw.position
+        if self.mode is FollowMode.GIMBAL_LEAD:
+            self._steer()
+        rested = self._aims == (None, None) and not self.pitch.rate and not self.yaw.rate
+        centred = self.mode is FollowMode.CHASSIS_LEAD and not self.yaw.position
+        self._resting = rested and (centred or self.mode is FollowMode.FREE)
+
+    @property
+    def _plain(self) -> bool:
+        """True if all it does is to follow the chassis."""
+        unaimed = self._aims == UNAIMED and not self.pitch.rate
+        return unaimed and self.mode is FollowMode.CHASSIS_LEAD and not self.suspended
+
+    def _follow_body(self, turn: float, seconds: float) -> float:
+        """Hold the yaw against a turn of the body while coming back to its front; return it."""
+        axis = self.yaw
+        axis.trail(-turn, FOLLOWING, self._top_speed, seconds)
+        self._resting = not axis.position and not axis.rate
+        return axis.position
+
+    def displaced(self) -> None:
+        """The robot was lifted and put elsewhere: the axes went with it."""
+        self._turned = self._hull.turned
+
+    def _advance(self, index: int, axis: Axis, held: float, seconds: float) -> None:
+        """Move one axis; ``held`` is how it turns to point where it did before the body moved."""
+        aim, led = self._aims[index], index == 1 and self.mode is FollowMode.CHASSIS_LEAD
+        if held and (aim is None or led or aim.goal is None or aim.frame is Frame.WORLD):
+            axis.shift(held)
+        if led:
+            self._follow(axis, seconds)
+        elif aim is not None and (goal := self._goal(index)) is not None:
+            axis.approach(goal, aim.speed, seconds)
+        elif aim is not None or axis.rate:
+            axis.run(aim.speed if aim is not None else 0.0, seconds)
+
+    def _follow(self, axis: Axis, seconds: float) -> None:
+        """Come back to the body's front, the faster the further off."""
+        axis.trail(0.0, FOLLOWING, self._top_speed, seconds)
+
+    def _steer(self) -> None:
+        """Have the base turn after the gimbal, unless something else than hands drives it."""
+        drivers = self._robot.actions.running(BASE)
+        if self._base.locks.held or not all(isinstance(driver.goal, Twist | WheelSpeeds) for driver in drivers):
+            self._base.steer = None
+            return
+        off, top = self.yaw.position, self._base.limits.twist.yaw
+        self._base.steer = 0.0 if abs(off) < SETTLED else max(-top, min(top, STEERING * off))
+
+
+def reaches(axis: Axis, goal: float) -> bool:
+    """True if the axis can turn to ``goal`` (rad)."""
+    return axis.lowest - 1e-9 <= goal <= axis.highest + 1e-9
+
+
+def _lean(tilt: tuple[float, float], yaw: float) -> float:
+    """The body's pitch in the direction ``yaw``."""
+    roll, pitch = tilt
+    return pitch * math.cos(yaw) - roll * math.sin(yaw)
