@@ -229,14 +229,14 @@ def default_data_folder(environment: Mapping[str, str]) -> Path:
 
 
 def load_config(
-    path: Path | None, overrides: Mapping[str, Any], doors: Mapping[str, type] = MappingProxyType({})
+    path: Path | None, overrides: Mapping[str, object], doors: Mapping[str, type] = MappingProxyType({})
 ) -> Config:
     """Read the file at ``path`` (or none) with ``overrides`` (those not None) on top. Raises ValueError naming the key.
 
     ``doors`` are the types of the doors' sections by name (``roboglot.protocols.sections()``).
     """
     try:
-        values: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8")) if path else {}
+        values: dict[str, object] = tomllib.loads(path.read_text(encoding="utf-8")) if path else {}
     except (OSError, tomllib.TOMLDecodeError) as error:
         raise ValueError(f"{path}: {error}") from None
     return config_of(values, overrides, doors, origin=str(path or "configuration"))
@@ -244,7 +244,7 @@ def load_config(
 
 def config_of(
     values: dict[str, Any],
-    overrides: Mapping[str, Any] = MappingProxyType({}),
+    overrides: Mapping[str, object] = MappingProxyType({}),
     doors: Mapping[str, type] = MappingProxyType({}),
     *,
     origin: str = "configuration",
@@ -332,7 +332,7 @@ def with_addresses(robots: tuple[RobotConfig, ...]) -> tuple[RobotConfig, ...]:
 
 
 def _refuse_unknown(
-    values: Mapping[str, Any], kind: type, prefix: str, doors: Mapping[str, type] = MappingProxyType({})
+    values: Mapping[str, object], kind: type, prefix: str, doors: Mapping[str, type] = MappingProxyType({})
 ) -> None:
     """Raise ValueError for a key that is not a setting: a misspelt one would be ignored in silence."""
     fields: dict[str, object] = {f.name: f.default_factory for f in dataclasses.fields(kind) if f.name != "doors"}

@@ -11,7 +11,6 @@ from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
 from types import ModuleType
-from typing import Any
 
 # The extra to install for a module; of a module that several extras bring, the one most people miss it for.
 EXTRA_OF = {
@@ -113,7 +112,7 @@ def installed() -> dict[str, bool]:
 class _Lazy(ModuleType):
     """Stands for a module until the first of its attributes is used; each attribute is looked up once."""
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name: str) -> object:
         if name.startswith("__"):  # what Python itself asks of modules
             raise AttributeError(name)
         try:

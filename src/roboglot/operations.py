@@ -16,7 +16,7 @@ from typing import Any, Generic, TypeVar
 import msgspec
 
 K = TypeVar("K", bound=Hashable)
-Handler = TypeVar("Handler", bound=Callable[..., Awaitable[Any]])
+Handler = TypeVar("Handler", bound=Callable[..., Awaitable[object]])
 
 
 class Right(StrEnum):
@@ -49,7 +49,7 @@ class Operation(Generic[K]):
     key: K
     handler: Callable[..., Awaitable[Any]]
     parameters: type[msgspec.Struct]
-    answer: Any
+    answer: object
     partial: str
     right: Right | None
     needs: frozenset[type]
@@ -68,7 +68,7 @@ class Operation(Generic[K]):
         """The first line of the handler's docstring."""
         return (self.handler.__doc__ or "").strip().partition("\n")[0]
 
-    def parse(self, values: Mapping[str, object]) -> dict[str, Any]:
+    def parse(self, values: Mapping[str, object]) -> dict[str, object]:
         """Convert and check wire values by name; unknown names are ignored. Raises BadParameters."""
         try:
             checked = msgspec.convert(dict(values), self.parameters, strict=False)

@@ -15,7 +15,7 @@ import threading
 import time
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from roboglot.config import RobotConfig
 from roboglot.fleet import Fleet, build_fleet
@@ -50,7 +50,7 @@ QUEUE_MAX = 16  # plays that wait for their turn
 LIMITS = Limits(cpu=20, wall=120.0)
 HITS_MAX = 20
 R = TypeVar("R")
-Notice = Callable[[dict[str, Any]], None]
+Notice = Callable[[dict[str, object]], None]
 
 
 class Rehearsals:
@@ -80,7 +80,7 @@ class Rehearsals:
         """
         here = asyncio.get_running_loop()
 
-        def tell(news: dict[str, Any]) -> None:
+        def tell(news: dict[str, object]) -> None:
             if notice is not None:
                 here.call_soon_threadsafe(notice, news)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Mapping
-from typing import Any
+from typing import TypeVar
 from urllib.error import HTTPError, URLError
 from urllib.parse import quote
 from urllib.request import Request, urlopen
@@ -13,6 +13,9 @@ import msgspec
 
 ANSWER_MAX = 16 << 20  # bytes
 SECONDS = 20.0  # for one answer
+
+
+T = TypeVar("T")
 
 
 class Refused(Exception):
@@ -26,13 +29,13 @@ class ConsoleClient:
         self._url = url.rstrip("/")
         self._headers = {"authorization": f"Bearer {token}"} if token else {}
 
-    async def get(self, *path: str) -> Any:
-        """Return the JSON below /api/. Raises Refused."""
-        return msgspec.json.decode(await self.fetch(*path))
+    async def get(self, kind: type[T], *path: str) -> T:
+        """Return the JSON below /api/. Raises Refused, also where it is no ``kind``."""
+        return _decoded(await self.fetch(*path), kind)
 
-    async def post(self, *path: str, values: Mapping[str, object]) -> Any:
-        """Have something done; the result. Raises Refused."""
-        return msgspec.json.decode(await self.fetch(*path, body=msgspec.json.encode(values)))
+    async def post(self, kind: type[T], *path: str, values: Mapping[str, object]) -> T:
+        """Have something done; the result. Raises Refused, also where it is no ``kind``."""
+        return _decoded(await self.fetch(*path, body=msgspec.json.encode(values)), kind)
 
     async def fetch(self, *path: str, body: bytes | None = None) -> bytes:
         """Return the bytes below /api/. Raises Refused."""
@@ -52,6 +55,13 @@ class ConsoleClient:
         if len(data) > ANSWER_MAX:
             raise Refused(f"the answer is longer than {ANSWER_MAX} bytes")
         return data
+
+
+def _decoded(data: bytes, kind: type[T]) -> T:
+    try:
+        return msgspec.json.decode(data, type=kind)
+    except msgspec.MsgspecError as error:
+        raise Refused(f"the console's answer is not what was asked for: {error}") from None
 
 
 def _reason(error: HTTPError) -> str:

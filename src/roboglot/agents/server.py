@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-import math
-from collections.abc import Awaitable
+from collections.abc import AsyncIterator, Awaitable, Mapping
 from importlib.metadata import version
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Literal, TypeVar
 
+import msgspec
 from mcp.server import MCPServer
 from mcp.server.mcpserver import Image
 from mcp.server.mcpserver.exceptions import ToolError
@@ -49,6 +49,30 @@ INSTRUCTIONS = """Robots of roboglot. Positions are metres in the robot's map (x
 angles radians counter-clockwise. Look first, rehearse, then act. Refusals say why."""
 
 
+class _Action(msgspec.Struct):
+    action: int
+
+
+class _Begun(msgspec.Struct):
+    """The answer to a verb that begins an action."""
+
+    result: _Action
+
+
+class _Faults(msgspec.Struct):
+    """The numbers of the faults that were injected."""
+
+    result: list[int]
+
+
+class _State(msgspec.Struct):
+    """What is read of a robot's state; no place of the pose is a number before it is known."""
+
+    pose: list[float | None]
+    actions: list[dict[str, object]]
+    history: list[dict[str, object]]
+
+
 def make_server(console: ConsoleClient) -> MCPServer:
     """Return the server with all tools over one console."""
     server = MCPServer("roboglot", version=version("roboglot"), instructions=INSTRUCTIONS)
@@ -84,14 +108,14 @@ class Tools:
     def __init__(self, console: ConsoleClient) -> None:
         self._console = console
 
-    async def robots(self) -> list[dict[str, Any]]:
+    async def robots(self) -> list[dict[str, object]]:
         """List the robots with pose [x m, y m, yaw rad] and velocity."""
-        found: list[dict[str, Any]] = await _asked(self._console.get("robots"))
+        found: list[dict[str, object]] = await _asked(self._console.get(list, "robots"))
         return found
 
-    async def where_am_i(self, robot: Robot = DEFAULT) -> dict[str, Any]:
+    async def where_am_i(self, robot: Robot = DEFAULT) -> dict[str, object]:
         """Where a robot is, what it does, its battery, faults, and who controls it."""
-        state = await _asked(self._console.get("robots", robot))
+        state: dict[str, object] = await _asked(self._console.get(dict, "robots", robot))
         keys = ("name", "pose", "velocity", "actions", "control", "faults", "battery", "place", "safety")
         return {key: state[key] for key in keys if key in state}
 
@@ -103,7 +127,7 @@ class Tools:
         """The robot's map from above, with the robot on it."""
         return Image(data=await _asked(self._console.fetch("robots", robot, "map.png")), format="png")
 
-    async def go_to(self, x: Meters, y: Meters, robot: Robot = DEFAULT, wait: Wait = 60.0) -> dict[str, Any]:
+    async def go_to(self, x: Meters, y: Meters, robot: Robot = DEFAULT, wait: Wait = 60.0) -> dict[str, object]:
         """Drive to a point of the map around obstacles; tells how it ended."""
         return await self._act(robot, "go_to", {"points": [[x, y]]}, wait)
 
@@ -114,21 +138,23 @@ class Tools:
         yaw: Speed = 0.0,
         seconds: Annotated[float, Field(gt=0, le=2)] = 1.0,
         robot: Robot = DEFAULT,
-    ) -> dict[str, Any]:
+    ) -> dict[str, object]:
         """Drive with a velocity (m/s ahead, m/s left, rad/s) for at most 2 s, then brake."""
         values = {"x": x, "y": y, "yaw": yaw, "seconds": seconds}
         return await self._act(robot, "drive", values, seconds + 5.0)
 
     async def stop(self, robot: Robot = DEFAULT) -> str:
         """Stop everything that moves the robot, no matter who began it."""
-        await _asked(self._console.post("robots", robot, "stop", values={}))
+        await _asked(self._console.post(dict, "robots", robot, "stop", values={}))
         return "it stands"
 
-    async def rehearse(self, plan: Plan, robot: Robot = DEFAULT) -> dict[str, Any]:
+    async def rehearse(self, plan: Plan, robot: Robot = DEFAULT) -> dict[str, object]:
         """Try a plan in a copy of the simulated world first: how each step ends, what the robot would hit, where it
         would go. The robot itself does not move. `safe` is true if all succeeds and nothing is touched."""
         steps = [step.model_dump() for step in plan]
-        found: dict[str, Any] = await _asked(self._console.post("robots", robot, "rehearse", values={"steps": steps}))
+        found: dict[str, object] = await _asked(
+            self._console.post(dict, "robots", robot, "rehearse", values={"steps": steps})
+        )
         return found
 
     async def run_program(
@@ -136,15 +162,16 @@ class Tools:
         source: Annotated[str, Field(min_length=1, max_length=65_536)],
         robot: Robot = DEFAULT,
         wait: Wait = 60.0,
-    ) -> dict[str, Any]:
+    ) -> dict[str, object]:
         """Run a block program (restricted Python, docs/programs/language.md); its state and the lines it printed."""
-        run = await _asked(self._console.post("robots", robot, "program", values={"source": source}))
+        run: dict[str, object] = await _asked(
+            self._console.post(dict, "robots", robot, "program", values={"source": source})
+        )
         async for _ in _beats(wait):
-            run = await _asked(self._console.get("robots", robot, "program"))
+            run = await _asked(self._console.get(dict, "robots", robot, "program"))
             if run["state"] not in ("run", "run_wait"):
                 break
-        found: dict[str, Any] = run
-        return found
+        return run
 
     async def inject_fault(
         self,
@@ -154,32 +181,30 @@ class Tools:
     ) -> list[int]:
         """Break something of the simulation on purpose (needs the right to administer); the faults' numbers."""
         values = {"kind": kind, "robot": robot, "duration": seconds}
-        answer = await _asked(self._console.post("world", "inject_fault", values=values))
-        numbers: list[int] = answer["result"]
-        return numbers
+        return (await _asked(self._console.post(_Faults, "world", "inject_fault", values=values))).result
 
     async def clear_faults(self) -> str:
         """Mend everything that was broken on purpose."""
-        await _asked(self._console.post("world", "clear_fault", values={}))
+        await _asked(self._console.post(dict, "world", "clear_fault", values={}))
         return "mended"
 
-    async def _act(self, robot: str, verb: str, values: dict[str, Any], wait: float) -> dict[str, Any]:
+    async def _act(self, robot: str, verb: str, values: Mapping[str, object], wait: float) -> dict[str, object]:
         """Start an action and wait for its end, at most so long."""
-        answer = await _asked(self._console.post("robots", robot, verb, values=values))
-        number = answer["result"]["action"]
-        seen: dict[str, Any] = {"id": number, "status": "ACCEPTED"}
+        begun = await _asked(self._console.post(_Begun, "robots", robot, verb, values=values))
+        number = begun.result.action
+        seen: dict[str, object] = {"id": number, "status": "ACCEPTED"}
         async for _ in _beats(wait):
-            state = await _asked(self._console.get("robots", robot))
-            listed = [*state["actions"], *state["history"]]
+            state = await _asked(self._console.get(_State, "robots", robot))
+            listed = [*state.actions, *state.history]
             seen = next((action for action in listed if action["id"] == number), seen)
             if seen["status"] in ("SUCCEEDED", "CANCELED", "ABORTED"):
                 break
-        pose = (await _asked(self._console.get("robots", robot)))["pose"]
+        pose = (await _asked(self._console.get(_State, "robots", robot))).pose
         known = {key: seen[key] for key in ("id", "status", "reason") if key in seen}
-        return known | {"pose": [round(value, 3) if math.isfinite(value) else None for value in pose]}
+        return known | {"pose": [None if value is None else round(value, 3) for value in pose]}
 
 
-async def _beats(seconds: float) -> Any:
+async def _beats(seconds: float) -> AsyncIterator[None]:
     """Return an iterator over looks, LOOK apart, for so many seconds; at least one."""
     loop = asyncio.get_running_loop()
     end = loop.time() + seconds

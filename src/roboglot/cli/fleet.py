@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import msgspec
 import typer
@@ -25,6 +25,7 @@ from roboglot.hosting.visible import visible
 if TYPE_CHECKING:
     from roboglot.shards.keeper import Keeper
     from roboglot.shards.plan import FleetPlan
+    from roboglot.shards.wishes import Answer, Row, Verb
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, no_args_is_help=True)
 PATIENCE = 120.0  # s for a wish; stopping and starting 100 shards takes its time
@@ -62,7 +63,7 @@ def up(
 
     set_up_logging(verbose=False)
     folder = _folder(data)
-    asked = {"worlds": worlds, "robots_each": robots_each, "template": template, "first": first_address}
+    asked = _Asked(worlds, robots_each, template, first_address)
     try:
         plan = _plan(folder, asked, replan=replan)
         if detached and on in ("", "local"):
@@ -204,21 +205,30 @@ def _folder(data: Path | None) -> Path:
     return (data or default_data_folder(os.environ) / "fleet").absolute()
 
 
-def _plan(folder: Path, asked: dict[str, Any], *, replan: bool) -> FleetPlan:
+class _Asked(NamedTuple):
+    """Options of a plan; none of them: the plan that is kept."""
+
+    worlds: int
+    robots_each: int
+    template: Path | None
+    first: str
+
+
+def _plan(folder: Path, asked: _Asked, *, replan: bool) -> FleetPlan:
     """Return the plan that is kept, or a new one. Raises ValueError if the kept one is for something else."""
     from roboglot.shards.plan import FIRST_ADDRESS, load, plan_fleet
 
     kept = None if replan else load(folder)
-    if kept is not None and not any(asked.values()):
+    if kept is not None and not any(asked):
         return kept
-    if not asked["worlds"]:
+    if not asked.worlds:
         raise ValueError(f"there is no fleet in {folder} yet: how many --worlds?")
     try:
-        template = tomllib.loads(asked["template"].read_text(encoding="utf-8")) if asked["template"] else {}
+        template = tomllib.loads(asked.template.read_text(encoding="utf-8")) if asked.template else {}
     except (OSError, tomllib.TOMLDecodeError) as error:
-        raise ValueError(f"{asked['template']}: {error}") from None
-    first = asked["first"] or FIRST_ADDRESS
-    plan = plan_fleet(asked["worlds"], asked["robots_each"], template, folder, first=first)
+        raise ValueError(f"{asked.template}: {error}") from None
+    first = asked.first or FIRST_ADDRESS
+    plan = plan_fleet(asked.worlds, asked.robots_each, template, folder, first=first)
     if kept is None:
         return plan
     if kept.request != plan.request:
@@ -281,7 +291,7 @@ async def _serve(keeper: Callable[[], Keeper], folder: Path) -> int:
     return 0
 
 
-def _ask(verb: Any, data: Path | None, **wish: str) -> Any:
+def _ask(verb: Verb, data: Path | None, **wish: str) -> Answer:
     """Return the fleet's answer; ends the program with a sentence if there is none, or if it refused."""
     from roboglot.hosting.local_socket import ask
     from roboglot.shards.wishes import SOCKET, Answer, Request
@@ -299,12 +309,12 @@ def _ask(verb: Any, data: Path | None, **wish: str) -> Any:
     return answer
 
 
-def _tell(answer: Any) -> None:
+def _tell(answer: Answer) -> None:
     for row in answer.shards:
         print(f"{row.name:6} {row.state:9} {', '.join(robot.name for robot in row.robots)} {_why(row)}".rstrip())
 
 
-def _why(row: Any) -> str:
+def _why(row: Row) -> str:
     if row.state == "ready":
         return row.console or ""
     return str(row.reason)

@@ -349,7 +349,7 @@ async def own_robot(body: str, world: str, speed: float) -> AsyncIterator[str]:
         robot = fleet.robots[robots[0].name]
         service = ProgramService(robot, engine, program_stores(database, robot.id))
         door = VisualDoor(service, "127.0.0.1", VisualConfig(port=0))
-        closing: list[Coroutine[Any, Any, None]] = [fleet.close(), engine.close()]
+        closing: list[Coroutine[object, None, None]] = [fleet.close(), engine.close()]
         try:
             await fleet.start(wait=False)  # without waiting for compilation; skills that need it follow
             await door.start()

@@ -50,7 +50,7 @@ class Stepper:
     async def _ask(self, operate: str, **fields: Any) -> dict[str, Any]:
         await self._debug.send(json.dumps({"target_id": self._task, "operate": operate} | fields))
         async for text in self._debug:
-            answer: dict[str, Any] = json.loads(text)
+            answer: dict[str, object] = json.loads(text)
             return answer
         raise LinkLost("the robot went away")
 

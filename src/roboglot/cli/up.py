@@ -16,7 +16,7 @@ import threading
 import webbrowser
 from collections.abc import AsyncIterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -95,7 +95,7 @@ def command(
     ] = False,
     config: Annotated[Path | None, typer.Option(help="A TOML file with any of these and more.")] = None,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Log every request.")] = False,
-    **doors: Any,
+    **doors: object,
 ) -> None:
     """Start the robots with all their doors; Ctrl-C stops them."""
     set_up_logging(verbose)
@@ -133,7 +133,7 @@ def command(
     sys.exit(uvloop.run(_serve(settings, open_console=open_console)))
 
 
-def access_section(*, on: bool, insecure: bool) -> dict[str, Any] | None:
+def access_section(*, on: bool, insecure: bool) -> dict[str, object] | None:
     """Return what the options say of [access]; --insecure beats a file that is on. Raises ValueError for both."""
     if on and insecure:
         raise ValueError("--access asks who comes and --insecure lets everyone in: give one of them")
@@ -161,9 +161,9 @@ def _with_door_options() -> inspect.Signature:
     return signature.replace(parameters=[*own, *added])
 
 
-def _sections(given: Mapping[str, Any]) -> dict[str, Any]:
+def _sections(given: Mapping[str, object]) -> dict[str, object]:
     """Return the doors' sections of the configuration as far as options were given."""
-    found: dict[str, Any] = {}
+    found: dict[str, object] = {}
     for door in DOORS:
         values = {
             option.setting: given[_parameter(option)] if option.value is None else option.value
@@ -174,7 +174,7 @@ def _sections(given: Mapping[str, Any]) -> dict[str, Any]:
     return found
 
 
-def _robots(texts: list[str], address: str | None) -> list[dict[str, Any]]:
+def _robots(texts: list[str], address: str | None) -> list[dict[str, object]]:
     """Return robot a first, with the options of the command line, then the others."""
     robots = {"a": RobotConfig()} | {r.name: r for r in map(parse_robot, texts)}
     rows = [dataclasses.asdict(robot) for robot in robots.values()]

@@ -25,13 +25,13 @@ STATUS = {CloudCode.MISSING: 400}  # of HTTP, where it is not the code itself
 
 Scope = Mapping[str, Any]
 Receive = Callable[[], Awaitable[Mapping[str, Any]]]
-Send = Callable[[Mapping[str, Any]], Awaitable[None]]
+Send = Callable[[Mapping[str, object]], Awaitable[None]]
 
 
 class Answer(Exception):
     """The end of a request."""
 
-    def __init__(self, code: CloudCode, message: str, items: list[dict[str, Any]] | None = None) -> None:
+    def __init__(self, code: CloudCode, message: str, items: list[dict[str, object]] | None = None) -> None:
         super().__init__(message)
         self.code = code
         self.items = items
@@ -48,7 +48,7 @@ class BackEnd:
         """One request."""
         if scope["type"] != "http":
             return
-        frame: dict[str, Any] = {}
+        frame: dict[str, object] = {}
         try:
             await self._serve(scope, receive, frame)
         except Answer as answer:
@@ -63,7 +63,7 @@ class BackEnd:
         await send({"type": "http.response.start", "status": status, "headers": headers})
         await send({"type": "http.response.body", "body": body})
 
-    async def _serve(self, scope: Scope, receive: Receive, frame: dict[str, Any]) -> None:
+    async def _serve(self, scope: Scope, receive: Receive, frame: dict[str, object]) -> None:
         """Always raises Answer; what was read of the frame is in ``frame``."""
         if why := self._browsers.refusal(of_rows(scope["headers"], scope["method"])):
             raise Answer(CloudCode.REFUSED, why)
@@ -90,7 +90,7 @@ class BackEnd:
             raise Answer(CloudCode.REFUSED, "no account has this token")
         return account
 
-    async def _program(self, account: str, robot: str, frame: dict[str, Any]) -> None:
+    async def _program(self, account: str, robot: str, frame: dict[str, object]) -> None:
         """What a robot posts: a frame of its front end, an inquiry of its own, or a feedback."""
         if "feedback" in frame:
             await self._store.record(account, robot, json.dumps(frame))
@@ -156,7 +156,7 @@ async def _json_of(receive: Receive) -> dict[str, object]:
     return frame
 
 
-def _text(frame: dict[str, Any], name: str) -> str:
+def _text(frame: dict[str, object], name: str) -> str:
     value = frame.get(name)
     if not isinstance(value, str) or not value:
         raise Answer(CloudCode.MISSING, f"{name} is missing")

@@ -11,7 +11,7 @@ from roboglot.console.settings import BODY_MAX
 
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
-Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
+Send = Callable[[MutableMapping[str, object]], Awaitable[None]]
 Rows = list[tuple[bytes, bytes]]
 
 SAFETY: Rows = [
@@ -43,7 +43,7 @@ async def read_json(receive: Receive) -> Mapping[str, object]:
         if not message.get("more_body"):
             break
     try:
-        return msgspec.json.decode(body, type=dict[str, Any]) if body else {}
+        return msgspec.json.decode(body, type=dict) if body else {}
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
         raise Problem(400, f"the body is no JSON object: {error}") from None
 

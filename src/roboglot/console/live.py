@@ -9,7 +9,6 @@ import asyncio
 import itertools
 import time
 from collections.abc import Awaitable, Callable, Mapping
-from typing import Any
 
 import msgspec
 
@@ -56,7 +55,7 @@ class Wish(msgspec.Struct, tag="do", tag_field="type"):
     id: int
     verb: str
     robot: str = ""
-    values: dict[str, Any] = {}
+    values: dict[str, object] = {}
 
 
 class Ping(msgspec.Struct, tag="ping", tag_field="type"):
@@ -84,11 +83,11 @@ class Page:
         self._watched: RobotView | None = None
         self._watch = Watch("")
         self._pads: dict[str, Pad] = {}
-        self._replies: asyncio.Queue[dict[str, Any]] = asyncio.Queue(WISHES_MAX * 4)
-        self._sent: dict[str, dict[str, Any]] = {}
+        self._replies: asyncio.Queue[dict[str, object]] = asyncio.Queue(WISHES_MAX * 4)
+        self._sent: dict[str, dict[str, object]] = {}
         self._frames: dict[str, bytes] = {}
-        self._truth: dict[str, Any] = {}
-        self._boxes: list[list[Any]] = []
+        self._truth: dict[str, object] = {}
+        self._boxes: list[list[object]] = []
         self._wire_at = 0
         self._wishes: set[asyncio.Task[None]] = set()
         self._allowance, self._counted_at = float(MESSAGES_PER_SECOND_MAX), time.monotonic()
@@ -119,7 +118,7 @@ class Page:
     async def _show(self, beat: int) -> None:
         visible = self._desk.visible
         motion = {name: view.motion for name, view in visible.items()}
-        moment: dict[str, Any] = {"type": "moment", "now": milliseconds(), "time": self._desk.world.clock.time()}
+        moment: dict[str, object] = {"type": "moment", "now": milliseconds(), "time": self._desk.world.clock.time()}
         moment["pace"] = self._desk.pace
         moment["poses"] = motion
         moment["recording"] = self._desk.recordings is not None and self._desk.recordings.on
@@ -163,7 +162,7 @@ class Page:
             self._wire_at = batch[-1].number
             await self._tell({"type": "wire", "robot": view.robot.id, "rows": rows(batch), "skipped": skipped})
 
-    async def _tell(self, message: Mapping[str, Any]) -> None:
+    async def _tell(self, message: Mapping[str, object]) -> None:
         await self._send(msgspec.json.encode(message).decode())
 
     # -- in ------------------------------------------------------------------------------------------------------------
@@ -241,7 +240,7 @@ class Page:
         task.add_done_callback(self._wishes.discard)
 
     async def _carry_out(self, wish: Wish) -> None:
-        answer: dict[str, Any] = {"type": "done", "id": wish.id}
+        answer: dict[str, object] = {"type": "done", "id": wish.id}
         try:
             if wish.robot:
                 answer["result"] = await self._desk.command(wish.robot, wish.verb, wish.values, self._client)
@@ -251,7 +250,7 @@ class Page:
             answer["error"] = str(error) or type(error).__name__
         self._reply(answer)
 
-    def _reply(self, message: dict[str, Any]) -> None:
+    def _reply(self, message: dict[str, object]) -> None:
         if self._replies.full():  # a page that does not read its answers
             self._replies.get_nowait()
         self._replies.put_nowait(message)

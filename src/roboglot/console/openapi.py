@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
 
 import msgspec
 
@@ -40,9 +39,9 @@ READS = {
 
 
 @lru_cache(1)
-def document(version: str) -> dict[str, Any]:
+def document(version: str) -> dict[str, object]:
     """Return the whole description."""
-    paths: dict[str, Any] = {path: {"get": _read(path, summary)} for path, summary in READS.items()}
+    paths: dict[str, object] = {path: {"get": _read(path, summary)} for path, summary in READS.items()}
     for operation in VERBS:
         paths[f"/api/robots/{{name}}/{operation.key}"] = {"post": _verb(operation, [NAME])}
     taking = {"operationId": TAKE, "summary": "Let only this client move the robot.", "parameters": [NAME]}
@@ -54,7 +53,7 @@ def document(version: str) -> dict[str, Any]:
     return {"openapi": "3.1.0", "info": {"title": "roboglot console", "version": version}, "paths": paths}
 
 
-def _read(path: str, summary: str) -> dict[str, Any]:
+def _read(path: str, summary: str) -> dict[str, object]:
     names = [part[1:-1] for part in path.split("/") if part.startswith("{")]
     return {"summary": summary, "parameters": [NAME | {"name": name} for name in names], "responses": _answers()}
 

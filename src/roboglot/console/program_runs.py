@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from roboglot.console.desk import CLIENT, Desk
 from roboglot.console.studio.programs import Programs
 from roboglot.model.admission import Right
@@ -15,7 +13,7 @@ SOURCE_MAX = 64 * 1024  # characters of a program
 LINES_MAX = 200  # newest ones of the log that an answer holds
 
 
-async def start(desk: Desk, name: str, source: str) -> dict[str, Any]:
+async def start(desk: Desk, name: str, source: str) -> dict[str, object]:
     """Save ``source`` and run it now; what ran before must have ended. Raises NotFound, Forbidden, ProgramError."""
     programs = _programs(desk, name, Right.PROGRAM)
     if not 0 < len(source) <= SOURCE_MAX:
@@ -26,7 +24,7 @@ async def start(desk: Desk, name: str, source: str) -> dict[str, Any]:
     return await program(desk, name)
 
 
-async def program(desk: Desk, name: str) -> dict[str, Any]:
+async def program(desk: Desk, name: str) -> dict[str, object]:
     """Return its state and the end of its log. Raises NotFound, Forbidden."""
     service = _programs(desk, name, Right.SEE).service
     tasks = await service.tasks([TASK])

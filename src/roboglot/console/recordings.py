@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
 
@@ -34,7 +34,7 @@ class Recordings:
         """Whether all that robots say, hear, see and do is being written to a file."""
         return self._recorder().status.on
 
-    def look(self) -> dict[str, Any]:
+    def look(self) -> dict[str, object]:
         """How it goes; files by their names, not by where they are."""
         status = self._recorder().status
         return {
@@ -46,7 +46,7 @@ class Recordings:
             "failure": status.failure,
         }
 
-    async def do(self, wish: RecordingWish) -> dict[str, Any]:
+    async def do(self, wish: RecordingWish) -> dict[str, object]:
         """Begin, mark or end it. Raises Refused."""
         recorder = self._recorder()
         match wish.do:

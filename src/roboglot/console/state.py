@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from roboglot.console import words
 from roboglot.model.components.energy.battery import Battery, DockContact
 from roboglot.model.components.energy.power import Power
@@ -52,7 +50,7 @@ PARTS = {  # by which a page decides what panels there are
 }
 
 
-def state_of(robot: Robot) -> dict[str, Any]:
+def state_of(robot: Robot) -> dict[str, object]:
     """Everything but what moves many times a second; each key is sent again when it changed."""
     return {
         "about": _about(robot),
@@ -107,7 +105,7 @@ def _faults(robot: Robot) -> list[dict[str, object]]:
     ]
 
 
-def _battery(robot: Robot) -> dict[str, Any] | None:
+def _battery(robot: Robot) -> dict[str, object] | None:
     if Battery not in robot:
         return None
     state = robot[Battery].state
@@ -123,7 +121,7 @@ def _battery(robot: Robot) -> dict[str, Any] | None:
     }
 
 
-def _place(robot: Robot) -> dict[str, Any]:
+def _place(robot: Robot) -> dict[str, object]:
     known = Localization in robot
     lost = robot[Localization].lost if known else None
     return {
@@ -145,9 +143,9 @@ def _safety(robot: Robot) -> dict[str, object]:
     }
 
 
-def _body(robot: Robot) -> dict[str, Any]:
+def _body(robot: Robot) -> dict[str, object]:
     """How the parts stand that only some bodies have."""
-    body: dict[str, Any] = {}
+    body: dict[str, object] = {}
     if Legs in robot:
         body["posture"] = str(robot[Legs].posture)
     if Gimbal in robot:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from typing import Any
 
 from roboglot.console import drawings, words
 from roboglot.console.camera import Sightings
@@ -101,7 +100,7 @@ class RobotView:
         rates = [words.number(v) for v in (speed.x, speed.y, speed.yaw)] if speed else [0.0, 0.0, 0.0]
         return [*words.pose(where), *rates]
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> dict[str, object]:
         """Everything that changes seldom, by key."""
         return state_of(self.robot) | {
             "drawings": drawings.drawings_of(self.robot),

@@ -6,7 +6,6 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from enum import Enum
-from typing import Any
 
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.motion.navigation import NavigationFeedback
@@ -31,7 +30,7 @@ def points(values: Sequence[Point]) -> list[list[float | None]]:
     return [[number(p.x), number(p.y)] for p in values]
 
 
-def action(value: Action, now: float) -> dict[str, Any]:
+def action(value: Action, now: float) -> dict[str, object]:
     """One action: what, for whom, how far, and why it ended."""
     status = "PAUSED" if value.paused else ActionStatus(value.status).name
     seconds = (value.ended_at if value.status.ended else now) - value.started_at
@@ -55,7 +54,7 @@ def feedback(value: object) -> object:
     return plain(value)
 
 
-def plain(value: object) -> Any:
+def plain(value: object) -> object:
     """Any value of the model as JSON; what is too long is cut."""
     match value:
         case None | bool() | int():

@@ -11,7 +11,6 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from roboglot.model.components.interaction.armor import PlatePlace
 from roboglot.model.components.sensing.touch import TouchKind
@@ -311,7 +310,7 @@ class Stage(ABC):
 
     @abstractmethod
     def inject_fault(
-        self, kind: str, robot: str | None = None, *, duration: float | None = None, **options: Any
+        self, kind: str, robot: str | None = None, *, duration: float | None = None, **options: object
     ) -> Sequence[ActiveFault]:
         """Let a fault begin: on one robot, on all that have the part (None), or in the building.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Protocol
 
 from roboglot.model.geometry import Point, Pose, Twist
 
@@ -54,7 +54,7 @@ class Played:
 
     printed: str = ""
     said: list[str] = field(default_factory=list)
-    calls: list[tuple[str, tuple[Any, ...]]] = field(default_factory=list)
+    calls: list[tuple[str, tuple[object, ...]]] = field(default_factory=list)
     blocks: list[str] = field(default_factory=list)
     colours: set[tuple[str, int, int, int]] = field(default_factory=set)
     path: list[Spot] = field(default_factory=list)

@@ -129,7 +129,7 @@ class Option:
     flag: str
     setting: str
     help: str
-    value: Any = None
+    value: object = None
 
 
 class Implementation(Protocol):
@@ -173,7 +173,7 @@ class DoorType:
     provides: bool = False
     asks: str = ""
 
-    def section(self, config: Config) -> Any:
+    def section(self, config: Config) -> object:
         """Return the door's own settings, the defaults where the configuration has no such section."""
         return config.doors.get(self.name) or self.config()
 

@@ -47,7 +47,7 @@ class Kind:
         return foxglove.schema(self.schema) if self.is_protobuf else messages.SCHEMAS[self.schema]
 
 
-def _plain(_at: int, value: Any) -> bytes:
+def _plain(_at: int, value: object) -> bytes:
     return messages.encode_plain(value)
 
 

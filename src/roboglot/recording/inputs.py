@@ -28,7 +28,7 @@ class Inputs:
         doors = [exchange for exchange in exchanges if not exchange.door.startswith(DRIVER)]
         self._asked, self._clock, self._where = pair(doors)[0], clock, where
         self._lines: dict[tuple[str, str, str], Line] = {}
-        self._tasks: set[asyncio.Task[Any]] = set()
+        self._tasks: set[asyncio.Task[object]] = set()
         self._heard: Counter[tuple[str, str, Direction]] = Counter()
         self.unheard: list[str] = []  # requests that did not come in, in words
 

@@ -127,7 +127,7 @@ def _answer(open_ones: list[Asked], number: int, reply: Exchange) -> None:
     del open_ones[:-64]
 
 
-def records(path: Path) -> Iterator[tuple[Any, Channel | None, Schema | None]]:
+def records(path: Path) -> Iterator[tuple[object, Channel | None, Schema | None]]:
     """Yield the records of the file, messages with their channel and schema; ends where the file is cut off.
 
     Raises BadRecording, OSError.

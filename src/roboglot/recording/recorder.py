@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 from roboglot.config import RecordConfig
 from roboglot.model.clock import Clock, LockstepClock
@@ -176,7 +175,7 @@ class Recorder:
         loop = asyncio.get_running_loop()
         before = loop.get_exception_handler()
 
-        def handle(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        def handle(loop: asyncio.AbstractEventLoop, context: dict[str, object]) -> None:
             if isinstance(context.get("exception"), Exception):
                 self._save_by_itself(folder, f"crash {type(context['exception']).__name__}")
             if before is None:

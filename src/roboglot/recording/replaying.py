@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import re
 from collections.abc import Sequence
-from typing import Any
 
 from roboglot.clients.errors import ClientError, LinkLost
 from roboglot.model.clock import Clock
@@ -100,7 +99,7 @@ class Replay:
 
     def _learn(self, recorded: bytes, live: bytes) -> None:
         """Remember what the robot calls now what it called otherwise then."""
-        then: dict[str, Any] = dict(leaves(tree(recorded)))
+        then: dict[str, object] = dict(leaves(tree(recorded)))
         for path, value in leaves(tree(live)):
             old = then.get(path)
             if path.lower().endswith("id") and old is not None and old != value and len(self._ids) < IDS_MAX:

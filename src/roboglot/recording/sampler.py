@@ -52,7 +52,7 @@ class Sampler:
         self._robot, self._put = robot, put
         self._stamps = Stamps(robot)
         self._topic = f"/{robot.id}"
-        self._before: dict[str, Any] = {}
+        self._before: dict[str, object] = {}
         self._scan_mount: Pose = ORIGIN
         self._shown = False
         self._leave = [
@@ -85,7 +85,7 @@ class Sampler:
         if number % MAP_BEATS == 0:
             self._note_map(at, wall)
 
-    def _send(self, topic: str, kind: str, value: Any, at: int, wall: int) -> None:
+    def _send(self, topic: str, kind: str, value: object, at: int, wall: int) -> None:
         self._put(Entry(f"{self._topic}/{topic}", kind, at, wall, value))
 
     # -- what comes by itself ------------------------------------------------------------------------------------------
@@ -169,7 +169,7 @@ class Sampler:
             self._send(topic, kind, value, at, wall)
 
 
-def _action(event: ActionChanged) -> dict[str, Any]:
+def _action(event: ActionChanged) -> dict[str, object]:
     """What is known of an action now; it changes later."""
     action: Any = event.action
     return {

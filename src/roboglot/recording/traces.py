@@ -8,7 +8,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby, zip_longest
 from pathlib import Path
-from typing import Any
 
 from roboglot.recording.entries import NANO
 from roboglot.recording.reader import Record, read_messages
@@ -69,7 +68,7 @@ def _stream(record: Record) -> tuple[str, str]:
 def _bytes(record: Record) -> bytes:
     if record.schema != "roboglot.Exchange":
         return record.data
-    value: dict[str, Any] = record.json()
+    value: dict[str, object] = record.json()
     for name in OTHER_ENDS:
         value.pop(name, None)
     return json.dumps(value, sort_keys=True).encode()

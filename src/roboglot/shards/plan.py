@@ -34,7 +34,7 @@ class ShardPlan(msgspec.Struct):
 class FleetPlan(msgspec.Struct):
     """All shards. ``request`` is what was asked for, to know it again at the next start."""
 
-    request: dict[str, Any]
+    request: dict[str, object]
     shards: list[ShardPlan]
 
     def home_of(self, robot: str) -> ShardPlan:
@@ -113,7 +113,7 @@ def load(folder: Path) -> FleetPlan | None:
         raise ValueError(f"{folder / PLAN} cannot be read: {error}") from None
 
 
-def _robots(count: int) -> list[dict[str, Any]]:
+def _robots(count: int) -> list[dict[str, object]]:
     if count <= len(NAMES):
         return [{"name": name, "body": "universal"} for name in NAMES[:count]]
     return [{"name": f"r{number}_", "body": "universal"} for number in range(1, count + 1)]
@@ -140,7 +140,7 @@ def _addresses(first: str, count: int) -> Iterator[str]:
     return (str(start + number) for number in range(count))
 
 
-def robots_of(shards: Sequence[ShardPlan]) -> Iterator[tuple[ShardPlan, dict[str, Any]]]:
+def robots_of(shards: Sequence[ShardPlan]) -> Iterator[tuple[ShardPlan, dict[str, object]]]:
     """Return every robot's settings with its shard."""
     for shard in shards:
         for robot in shard.settings["robots"]:

@@ -13,7 +13,7 @@ import socket
 import sqlite3
 import threading
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -46,7 +46,7 @@ def run(folder: str, link: socket.socket) -> int:
     set_up_logging(verbose=False)
     reporter = Reporter(link)
     try:
-        config = settings_of(msgspec.json.decode((Path(folder) / SETTINGS).read_bytes(), type=dict[str, Any]))
+        config = settings_of(msgspec.json.decode((Path(folder) / SETTINGS).read_bytes(), type=dict))
     except (ValueError, OSError) as error:
         reporter.send(Refusal(str(error), lasting=True))
         return 1

@@ -7,6 +7,7 @@ from typing import Literal
 import msgspec
 
 SOCKET = "fleet.sock"
+Verb = Literal["look", "stop", "restart", "reset", "move"]
 
 
 class Request(msgspec.Struct, forbid_unknown_fields=True):
@@ -15,7 +16,7 @@ class Request(msgspec.Struct, forbid_unknown_fields=True):
     ``robot`` is for ``move`` alone. An empty ``shard`` of ``stop`` and ``restart`` means all.
     """
 
-    do: Literal["look", "stop", "restart", "reset", "move"] = "look"
+    do: Verb = "look"
     shard: str = ""
     robot: str = ""
     to: str = ""

@@ -21,7 +21,7 @@ from roboglot.model.components.system.disk import Disk
 from roboglot.storage.transactions import AlreadyThere, Connection, DatabaseError, DiskFull
 
 T = TypeVar("T")
-Work = Callable[[Connection], Any]
+Work = Callable[[Connection], object]
 ROBOTS = "roboglot.storage.schema"  # tables of what robots remember
 
 
@@ -89,8 +89,8 @@ class Database:
                 if not waiting.done():
                     waiting.set_result(result) if error is None else waiting.set_exception(error)
 
-    def _transact_all(self, works: list[tuple[Database, Work]]) -> list[tuple[Any, Exception | None]]:
-        results: list[tuple[Any, Exception | None]] = []
+    def _transact_all(self, works: list[tuple[Database, Work]]) -> list[tuple[object, Exception | None]]:
+        results: list[tuple[object, Exception | None]] = []
 
         def all_of_them(connection: Connection) -> None:
             for database, work in works:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from roboglot.model.components.system.ledger import Ledger
 from roboglot.storage.transactions import Connection, Transactions
@@ -16,7 +15,7 @@ class StoredLedger(Ledger):
     def __init__(self, database: Transactions, robot: str) -> None:
         self._database, self._robot = database, robot
 
-    def all(self, kind: str) -> Sequence[tuple[str, Any]]:
+    def all(self, kind: str) -> Sequence[tuple[str, object]]:
         rows = self._database.run_now(
             lambda c: c.execute(
                 "SELECT id, document FROM ledger WHERE robot=? AND kind=? ORDER BY seq", (self._robot, kind)
@@ -24,7 +23,7 @@ class StoredLedger(Ledger):
         )
         return [(id, json.loads(document)) for id, document in rows]
 
-    async def write(self, kind: str, documents: Mapping[str, Any], *, forget: Sequence[str] = ()) -> None:
+    async def write(self, kind: str, documents: Mapping[str, object], *, forget: Sequence[str] = ()) -> None:
         rows = [(self._robot, kind, id, json.dumps(document)) for id, document in documents.items()]
 
         def work(connection: Connection) -> None:

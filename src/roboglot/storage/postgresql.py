@@ -47,7 +47,7 @@ class PostgreSQL:
         connections = 1 if robots else CONNECTIONS_MAX
         self._disk: Disk | None = None
         self._own = threading.local()
-        self._opened: list[psycopg.Connection[Any]] = []
+        self._opened: list[psycopg.Connection[object]] = []
         self._opening = threading.Lock()
         self._threads = ThreadPoolExecutor(
             max_workers=connections,
@@ -117,9 +117,9 @@ class PostgreSQL:
             raise
         return result
 
-    def _begin(self, begin: bytes) -> psycopg.Connection[Any]:
+    def _begin(self, begin: bytes) -> psycopg.Connection[object]:
         """Return this thread's connection with a transaction begun; reconnects if it died while idle."""
-        connection: psycopg.Connection[Any] | None = getattr(self._own, "connection", None)
+        connection: psycopg.Connection[object] | None = getattr(self._own, "connection", None)
         if connection is not None and not connection.closed:
             try:
                 connection.execute(begin)
@@ -142,7 +142,7 @@ class PostgreSQL:
                 connection.close()
                 raise DatabaseError(f"robot {robot} is served by another program from the same database")
 
-    def _connect(self) -> psycopg.Connection[Any]:
+    def _connect(self) -> psycopg.Connection[object]:
         limits = (
             f"-c statement_timeout={STATEMENT_MAX}s -c idle_in_transaction_session_timeout={IDLE_MAX}s"
             # The server notices within five seconds that a machine is gone, also one that it was just sending to, and
@@ -176,27 +176,27 @@ class _Rows:
     def rowcount(self) -> int:
         return self._cursor.rowcount
 
-    def fetchone(self) -> Any:
+    def fetchone(self) -> object:
         row = self._cursor.fetchone()
         return None if row is None else _restored(row)
 
-    def fetchall(self) -> list[Any]:
+    def fetchall(self) -> list[object]:
         return [_restored(row) for row in self._cursor.fetchall()]
 
-    def __iter__(self) -> Iterator[Any]:
+    def __iter__(self) -> Iterator[object]:
         return map(_restored, self._cursor)
 
 
 class _Statements:
     """A connection that takes ``?`` for parameters, and any character in a text, as SQLite does."""
 
-    def __init__(self, connection: psycopg.Connection[Any]) -> None:
+    def __init__(self, connection: psycopg.Connection[object]) -> None:
         self._connection = connection
 
-    def execute(self, query: str, parameters: Sequence[Any] = (), /) -> Rows:
+    def execute(self, query: str, parameters: Sequence[object] = (), /) -> Rows:
         return _Rows(self._connection.execute(_marked(query), _storable(parameters)))
 
-    def executemany(self, query: str, parameters: Iterable[Sequence[Any]], /) -> None:
+    def executemany(self, query: str, parameters: Iterable[Sequence[object]], /) -> None:
         with self._connection.cursor() as cursor:
             cursor.executemany(_marked(query), map(_storable, parameters))
 
@@ -206,7 +206,7 @@ def _marked(query: str) -> bytes:
     return query.replace("?", "%s").encode()
 
 
-def _storable(values: Sequence[Any]) -> Sequence[Any]:
+def _storable(values: Sequence[object]) -> Sequence[object]:
     """Write the character 0, which PostgreSQL's texts cannot hold, as ``ESCAPE`` and a digit."""
     return [
         value.replace(ESCAPE, f"{ESCAPE}1").replace("\0", f"{ESCAPE}0")
@@ -216,7 +216,7 @@ def _storable(values: Sequence[Any]) -> Sequence[Any]:
     ]
 
 
-def _restored(row: Sequence[Any]) -> tuple[Any, ...]:
+def _restored(row: Sequence[object]) -> tuple[object, ...]:
     return tuple(
         value.replace(f"{ESCAPE}0", "\0").replace(f"{ESCAPE}1", ESCAPE)
         if isinstance(value, str) and ESCAPE in value

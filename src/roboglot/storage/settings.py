@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from typing import Any
 
 from roboglot.model.components.system.settings import Settings
 from roboglot.storage.transactions import Connection, Transactions
@@ -21,15 +20,15 @@ class StoredSettings(Settings):
         )
         self._values = {key: json.loads(value) for key, value in rows}
 
-    def get(self, key: str, default: Any = None) -> Any:
+    def get(self, key: str, default: object = None) -> object:
         return self._values.get(key, default)
 
-    async def put(self, key: str, value: Any) -> None:
+    async def put(self, key: str, value: object) -> None:
         writing, kept = self.writing(key, value), json.loads(json.dumps(value))
         await self._database.run(writing)
         self._values[key] = kept
 
-    def writing(self, key: str, value: Any) -> Callable[[Connection], object]:
+    def writing(self, key: str, value: object) -> Callable[[Connection], object]:
         """Return the transaction that writes it."""
         row = (self._robot, key, json.dumps(value))
         return lambda connection: connection.execute(
@@ -38,6 +37,6 @@ class StoredSettings(Settings):
             row,
         )
 
-    def adopt(self, key: str, value: Any) -> None:
+    def adopt(self, key: str, value: object) -> None:
         """Take over a written value."""
         self._values[key] = json.loads(json.dumps(value))

@@ -42,10 +42,10 @@ class Rows(Protocol):
 class Connection(Protocol):
     """Running transaction."""
 
-    def execute(self, query: str, parameters: Sequence[Any] = (), /) -> Rows:
+    def execute(self, query: str, parameters: Sequence[object] = (), /) -> Rows:
         """Run a statement."""
 
-    def executemany(self, query: str, parameters: Iterable[Sequence[Any]], /) -> object:
+    def executemany(self, query: str, parameters: Iterable[Sequence[object]], /) -> object:
         """Run a statement for each set of parameters."""
 
 

@@ -20,7 +20,7 @@ class Loop:
     def run(self, function: Callable[..., Any], *arguments: Any, within: float = PATIENCE, **named: Any) -> Any:
         """Call it there, wait for what it awaits, and return its result. Raises what it raises, and TimeoutError."""
 
-        async def call() -> Any:
+        async def call() -> object:
             result = function(*arguments, **named)
             return await result if inspect.isawaitable(result) and not _is_kept(result) else result
 
@@ -42,7 +42,7 @@ class Blocking:
     def __init__(self, target: Any, loop: Loop) -> None:
         self._target, self._loop = target, loop
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name: str) -> object:
         value = getattr(self._target, name)
         if not callable(value) or isinstance(value, type):
             return self._wrapped(value)
@@ -75,14 +75,14 @@ class Blocking:
             except StopAsyncIteration:
                 return
 
-    def next(self, within: float = PATIENCE) -> Any:
+    def next(self, within: float = PATIENCE) -> object:
         """Return the next of what it yields. Raises TimeoutError, StopAsyncIteration."""
         return self._loop.run(self._target.__anext__, within=within)
 
-    def wait(self, within: float = PATIENCE) -> Any:
+    def wait(self, within: float = PATIENCE) -> object:
         """Wait for the end of an action or task; raises as ``await`` would, and TimeoutError."""
 
-        async def end() -> Any:
+        async def end() -> object:
             return await self._target
 
         return self._loop.run(end, within=within)

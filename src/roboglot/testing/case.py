@@ -6,7 +6,7 @@ import os
 import unittest
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from roboglot.testing.artifacts import FOLDER, folder_of, save
 from roboglot.testing.server import RobotServer
@@ -28,8 +28,8 @@ class RobotTestCase(unittest.TestCase):
     speed: ClassVar[float] = Wanted().speed
     lockstep: ClassVar[bool] = False
     recording: ClassVar[str] = ""
-    faults: ClassVar[tuple[str | tuple[str, Mapping[str, Any]], ...]] = ()
-    doors: ClassVar[Mapping[str, Any]] = {}
+    faults: ClassVar[tuple[str | tuple[str, Mapping[str, object]], ...]] = ()
+    doors: ClassVar[Mapping[str, object]] = {}
     server: RobotServer
 
     def run(self, result: unittest.TestResult | None = None) -> unittest.TestResult | None:
@@ -50,26 +50,26 @@ class RobotTestCase(unittest.TestCase):
             save(self.server, folder, self.id(), "failed: see the test's own output")
 
     @property
-    def rest(self) -> Any:
+    def rest(self) -> object:
         """A connected client of the REST API."""
         return self._client("rest")
 
     @property
-    def robomaster(self) -> Any:
+    def robomaster(self) -> object:
         """A connected client of the text protocol, in SDK mode."""
         return self._client("robomaster")
 
     @property
-    def cyberdog(self) -> Any:
+    def cyberdog(self) -> object:
         """A connected client of the dog's app protocol."""
         return self._client("cyberdog")
 
     @property
-    def program(self) -> Any:
+    def program(self) -> object:
         """A connected client of block programs."""
         return self._client("program")
 
-    def _client(self, name: str) -> Any:
+    def _client(self, name: str) -> object:
         found = self.__dict__.get(f"_{name}")
         if found is None:
             found = self.__dict__[f"_{name}"] = self.server.open(getattr(self.server, f"new_{name}")())

@@ -177,25 +177,25 @@ def reset(robot_server: RobotServer) -> Callable[[], None]:
 
 
 @pytest.fixture
-def rest(robot_server: RobotServer) -> Any:
+def rest(robot_server: RobotServer) -> object:
     """A client of the first robot's REST API (``SlamwareClient``) whose methods block."""
     return robot_server.open(robot_server.new_rest())
 
 
 @pytest.fixture
-def robomaster(robot_server: RobotServer) -> Any:
+def robomaster(robot_server: RobotServer) -> object:
     """A client of its text protocol (``RoboMasterClient``), in SDK mode, whose methods block."""
     return robot_server.open(robot_server.new_robomaster())
 
 
 @pytest.fixture
-def cyberdog(robot_server: RobotServer) -> Any:
+def cyberdog(robot_server: RobotServer) -> object:
     """A client of its app protocol (``CyberDogClient``), by TLS, whose methods block."""
     return robot_server.open(robot_server.new_cyberdog())
 
 
 @pytest.fixture
-def program(robot_server: RobotServer) -> Any:
+def program(robot_server: RobotServer) -> object:
     """A client of its block programs (``ProgramClient``) whose methods block."""
     return robot_server.open(robot_server.new_program())
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field
-from typing import Any
 
 from roboglot.clients.errors import LinkLost
 from roboglot.clients.visual import TextLink
@@ -53,7 +52,7 @@ class ProgramClient:
         blocks = await self._follow(task)
         return ProgramRun(blocks, await self._printed(task))
 
-    async def ask(self, operate: str, *targets: str, **fields: str) -> dict[str, Any]:
+    async def ask(self, operate: str, *targets: str, **fields: str) -> dict[str, object]:
         """Send one frame and return the answer's ``feedback`` or ``response``. Raises ProgramFailed, LinkLost."""
         id = f"test-{operate}"
         await self._of(self._frames).send(
@@ -61,7 +60,7 @@ class ProgramClient:
         )
         async for text in self._of(self._frames):
             frame = json.loads(text)
-            content: dict[str, Any] = frame.get("feedback") or frame["response"]
+            content: dict[str, object] = frame.get("feedback") or frame["response"]
             if content["id"] == id:
                 if content.get("state"):
                     raise ProgramFailed(f"{operate}: {content['describe']} ({content['state']})")

@@ -315,7 +315,7 @@ class RobotServer:
             export_client(self.data / FOLDER, folder)
         return Certificates.load(folder)
 
-    def open(self, client: Any) -> Any:
+    def open(self, client: object) -> object:
         """Connect an asyncio client where the robots run; its methods block. It is closed with the server."""
         return self._clients.enter_context(Blocking(client, self.loop))
 
@@ -326,10 +326,10 @@ class RobotServer:
 class _There:
     """An object whose methods are called where the robots run, and so are those of what they return."""
 
-    def __init__(self, target: Any, loop: Loop) -> None:
+    def __init__(self, target: object, loop: Loop) -> None:
         self._target, self._loop = target, loop
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name: str) -> object:
         value = self._loop.run(lambda: getattr(self._target, name))
         if not callable(value):
             return value

@@ -36,7 +36,7 @@ class Wanted:
     shared: bool = False
     recording: str = ""
     faults: tuple[WantedFault, ...] = ()
-    doors: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    doors: Mapping[str, object] = field(default_factory=dict, hash=False)
 
     def configs(self, first: str) -> tuple[RobotConfig, ...]:
         """Return the robots' configuration, the first one at that address."""
@@ -52,12 +52,12 @@ class Wanted:
 
 def wanted_by(markers: Iterable[pytest.Mark]) -> Wanted:
     """Read the markers of a test, the nearest first. Raises ValueError for what they do not know."""
-    values: dict[str, Any] = {}
+    values: dict[str, object] = {}
     faults: list[WantedFault] = []
     for mark in markers:
         match mark.name:
             case "world":
-                given: dict[str, Any] = dict(mark.kwargs)
+                given: dict[str, object] = dict(mark.kwargs)
                 if mark.args:
                     given["world"] = str(mark.args[0])
                 values = given | values

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from typing import Any, cast
+from typing import cast
 
 Spend = Callable[[int], float]
 PAUSE_MIN = 0.01  # s: shorter debts are left standing
@@ -110,7 +110,7 @@ class Valve:
         """Return the inner protocol."""
         return self._meter.inner
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name: str) -> object:
         return getattr(self._transport, name)
 
     def _open(self) -> None:

@@ -10,7 +10,6 @@ import asyncio
 import logging
 from collections.abc import Callable
 from contextvars import copy_context
-from typing import Any
 
 log = logging.getLogger(__name__)
 
@@ -211,7 +210,7 @@ class PipeEnd(asyncio.Transport):
             if not self._call(self._protocol.eof_received):  # type: ignore[attr-defined]
                 self.close()
 
-    def _call(self, method: Callable[..., Any], *values: object) -> object:
+    def _call(self, method: Callable[..., object], *values: object) -> object:
         """Call the protocol; its errors end the connection, as everywhere in asyncio, and no one else's work."""
         try:
             return self._context.copy().run(method, *values)

@@ -14,7 +14,7 @@ import ssl
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 from roboglot.transport.seldom import Seldom
 
@@ -285,5 +285,5 @@ class _Encrypted:
                 return self._end.tunnel
         return self._transport.get_extra_info(name, default)
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name: str) -> object:
         return getattr(self._transport, name)

@@ -13,7 +13,7 @@ import ssl
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol, cast
+from typing import NotRequired, Protocol, TypedDict, cast
 
 from roboglot.access.tunnel.busy_poll import BusyPoll
 from roboglot.access.tunnel.frames import Kind
@@ -27,6 +27,15 @@ GREETING_SECONDS_MAX = 10.0
 BESIDE_AGAIN = 1.0  # s until another second connection is tried
 BROADCAST = "127.255.255.255"
 ROBOT_IP = b"robot ip "
+
+
+class Welcome(TypedDict):
+    """What the gateway answers to a greeting: its ports, and the key of a second connection."""
+
+    tcp: list[int]
+    callbacks: list[int]
+    broadcasts: list[int]
+    beats: NotRequired[str]
 
 
 class NotTrusted(ConnectionError):
@@ -133,16 +142,16 @@ class Connector:
                 log.info("no second connection for beats: %s", error)
             await asyncio.sleep(BESIDE_AGAIN)
 
-    async def _greet(self, link: Link) -> dict[str, object]:
+    async def _greet(self, link: Link) -> Welcome:
         link.send(Kind.HELLO, 0, json.dumps({"robot": self._robot, "token": self._token}).encode())
         async with asyncio.timeout(GREETING_SECONDS_MAX):
             frame = await link.first()
         if frame.kind is not Kind.WELCOME:
             raise Refused(frame.payload.decode("utf-8", "replace"))
-        words: dict[str, Any] = json.loads(frame.payload)
+        words: Welcome = json.loads(frame.payload)
         return words
 
-    async def _carry(self, link: Link, words: dict[str, Any], ready: Callable[[list[int]], None]) -> None:
+    async def _carry(self, link: Link, words: Welcome, ready: Callable[[list[int]], None]) -> None:
         loop = asyncio.get_running_loop()
         broadcasts = {int(port) for port in words["broadcasts"]}
         callbacks = {int(port) for port in words["callbacks"]}

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Unpack
 
 from roboglot.autonomy.delivery.drive import Driver, Failed
 from roboglot.autonomy.delivery.handover import Ears, Handover, Signal
-from roboglot.autonomy.delivery.order_book import OrderBook
+from roboglot.autonomy.delivery.order_book import OrderBook, OrderChanges
 from roboglot.model.components.logistics.cargo import Cargo
 from roboglot.model.components.logistics.delivery import (
     Failure,
@@ -127,6 +128,6 @@ class Round:
         results = tuple(r for r in self._order.results if (r.box, r.stop) != (result.box, result.stop))
         await self._set(results=(*results, result))
 
-    async def _set(self, **changes: object) -> None:
-        self._order = replace(self._order, **changes)  # type: ignore[arg-type]
+    async def _set(self, **changes: Unpack[OrderChanges]) -> None:
+        self._order = replace(self._order, **changes)
         await self._book.change(self._order.id, **changes)

@@ -6,16 +6,19 @@ import logging
 import uuid
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TypedDict, Unpack
 
 import msgspec
 
 from roboglot.model.components.logistics.delivery import (
+    Failure,
     Order,
     OrderRequest,
     OrderStage,
     OrderStatus,
+    PickUp,
     Policy,
+    Untaken,
 )
 from roboglot.model.components.system.ledger import Ledger
 from roboglot.model.components.system.settings import Settings
@@ -25,6 +28,19 @@ from roboglot.model.robot import Robot
 log = logging.getLogger(__name__)
 KIND, POLICY, HOLD = "order", "delivery.policy", "delivery.hold"
 OPEN_MAX, ENDED_MAX = 100, 100  # orders
+
+
+class OrderChanges(TypedDict, total=False):
+    """What may change of an order."""
+
+    request: OrderRequest
+    status: OrderStatus
+    stage: OrderStage
+    stop: str
+    failure: Failure | None
+    results: tuple[PickUp, ...]
+    untaken: tuple[Untaken, ...]
+    began_at: float
 
 
 class OrderBook:
@@ -71,16 +87,16 @@ class OrderBook:
         await self._write(*orders)
         return orders
 
-    async def change(self, id: str, **changes: Any) -> Order:
+    async def change(self, id: str, **changes: Unpack[OrderChanges]) -> Order:
         """The changed order, when it is safe on disk."""
         order = replace(self._orders[id], changed_at=self._robot.clock.epoch(), **changes)
         await self._write(order)
         return order
 
-    async def end_all(self, status: OrderStatus, **changes: Any) -> None:
-        """End all that are open, in one transaction."""
+    async def end_all(self, **changes: Unpack[OrderChanges]) -> None:
+        """End all that are open, in one transaction; ``changes`` say with which status."""
         now = self._robot.clock.epoch()
-        await self._write(*(replace(order, status=status, changed_at=now, **changes) for order in self.open))
+        await self._write(*(replace(order, changed_at=now, **changes) for order in self.open))
 
     async def set_policy(self, policy: Policy) -> None:
         """Returns when it is safe on disk."""

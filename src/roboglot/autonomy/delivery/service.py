@@ -91,7 +91,7 @@ class QueueDelivery(Delivery):
 
     async def finish(self) -> None:
         async with self._courier.changing:
-            await self._book.end_all(OrderStatus.SUCCEEDED)
+            await self._book.end_all(status=OrderStatus.SUCCEEDED)
             self._courier.drop_current()
 
     @property

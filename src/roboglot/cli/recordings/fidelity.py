@@ -11,7 +11,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path
 from textwrap import wrap
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgspec
 import typer
@@ -140,7 +140,7 @@ def _facts(asked: Asked, answers: Sequence[tuple[bytes, str]]) -> list[tuple[boo
         found.append((status == asked.status, f"status {status}"))
     if asked.pattern:
         found.append((re.fullmatch(asked.pattern, text) is not None, f"`{text[:60]}`"))
-    values: dict[str, Any] = dict(leaves(tree(payload)))
+    values: dict[str, object] = dict(leaves(tree(payload)))
     for path, kind in asked.fields.items():
         inner = any(name.startswith((f"{path}.", f"{path}[")) for name in values)
         there = kind_of(values[path]) if path in values else kind if inner else "nothing"

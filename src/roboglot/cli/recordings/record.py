@@ -11,7 +11,7 @@ import signal
 import sys
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import msgspec
 import typer
@@ -28,7 +28,7 @@ EPILOG = "A URL instead of a command records a real robot: roboglot record slamw
 class _Commands(TyperGroup):
     """A URL in the place of a command means ``proxy``."""
 
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+    def parse_args(self, ctx: Context, args: list[str]) -> list[str]:
         """Put the command's name in front of a URL."""
         return super().parse_args(ctx, ["proxy", *args] if args and "://" in args[0] else args)
 
@@ -42,6 +42,8 @@ app = typer.Typer(
     epilog=EPILOG,
 )
 if TYPE_CHECKING:
+    from typer._click.core import Context
+
     from roboglot.recording.lines import Target
     from roboglot.recording.proxy.dog import DogRelay
     from roboglot.recording.proxy.relay import Book, Relay

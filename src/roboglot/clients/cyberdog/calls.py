@@ -81,7 +81,7 @@ class Calls:
     async def do(self, code: Code, params: object = None, *, within: float = TIMEOUT) -> None:
         """For answers that say nothing but whether it was done: ``success``, ``result`` or nothing at all."""
         text = await self.text(code, params, within=within)
-        check(code, decode(text, dict[str, Any], code) if text else {})
+        check(code, decode(text, dict, code) if text else {})
 
 
 def check(code: Code, answer: Mapping[str, Any], words: type[IntEnum] | None = None) -> None:

@@ -134,5 +134,5 @@ class CyberDogClient(
             log.warning("push %d is not what it should be: %s", code, error)
 
 
-def _feed() -> Feed[Any]:
+def _feed() -> Feed[object]:
     return Feed(lambda: None, lambda: None, queue_max=UNREAD_MAX)

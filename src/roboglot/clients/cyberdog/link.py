@@ -107,9 +107,9 @@ class Link:
         self.line: Line | None = None  # what is asked, answered and pushed is noted there
         self._host, self._port, self._certificates, self._pushed = host, port, certificates, pushed
         self._channel: Any = None
-        self._stub: Any = None
+        self._stub: object = None
         self._server: Any = None
-        self._stopping: asyncio.Future[Any] | None = None
+        self._stopping: asyncio.Future[object] | None = None
 
     @property
     def connected(self) -> bool:
@@ -183,7 +183,7 @@ class Link:
         finally:
             call.cancel()
 
-    async def fetch(self, code: int, text: str) -> AsyncGenerator[Any, None]:
+    async def fetch(self, code: int, text: str) -> AsyncGenerator[object, None]:
         """The chunks of a file. Raises LinkLost."""
         call = self._robot().getFile(pb.SendRequest(nameCode=code, params=text))
         line = self.line if self.line is not None and self.line.watched else None
@@ -216,7 +216,7 @@ class _App(GrpcAppServicer):  # type: ignore[misc]
     def __init__(self, link: Link) -> None:
         self._link = link
 
-    async def heartbeat(self, request: Any, _context: Any) -> Any:
+    async def heartbeat(self, request: object, _context: object) -> object:
         self._link.heartbeat = _heartbeat(request, self._link.clock.time())
         return pb.Result(result="ok")
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncGenerator, Callable, Generator
 from contextlib import aclosing
-from typing import Any
 
 import msgspec
 
@@ -51,7 +50,7 @@ class RunningTask:
         self._accepted: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._reading: asyncio.Task[None] | None = None
 
-    def __await__(self) -> Generator[Any, None, None]:
+    def __await__(self) -> Generator[object, None, None]:
         return self.succeeded().__await__()
 
     @property
@@ -59,7 +58,7 @@ class RunningTask:
         """True once the task has ended."""
         return self._reading is not None and self._reading.done()
 
-    async def begin(self, code: Code, params: dict[str, Any]) -> None:
+    async def begin(self, code: Code, params: dict[str, object]) -> None:
         """Start or join it. Raises CyberDogRefused if the robot does not accept, TimedOut, LinkLost."""
         self._reading = asyncio.get_running_loop().create_task(self._read(code, params), name=f"task {self.kind.name}")
         self._reading.add_done_callback(_noticed)
@@ -87,7 +86,7 @@ class RunningTask:
         if self._reading:
             self._reading.cancel()
 
-    async def _read(self, code: Code, params: dict[str, Any]) -> None:
+    async def _read(self, code: Code, params: dict[str, object]) -> None:
         try:
             await self._stream(self._calls.answers(code, params))
         except ClientError as error:

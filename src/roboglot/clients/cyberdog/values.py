@@ -223,8 +223,8 @@ class Frame(Value):
     """2001: a frame of visual programming as it came."""
 
     feedback: dict[str, Any] = {}
-    block: dict[str, Any] | None = None
-    response: dict[str, Any] | None = None
+    block: dict[str, object] | None = None
+    response: dict[str, object] | None = None
 
 
 PUSHED: dict[Code, type[Value]] = {

@@ -55,7 +55,7 @@ class _Plan:
     path: str
     in_path: frozenset[str]
     signature: inspect.Signature
-    decode: Callable[[Answer], Any]
+    decode: Callable[[Answer], object]
     transfer: bool
 
 
@@ -65,7 +65,7 @@ def call(key: str) -> Callable[[Callable[P, Awaitable[T]]], Callable[P, Coroutin
     Raises SlamwareRefused for any status but 2xx, LinkLost, TimedOut, BadAnswer.
     """
 
-    def make(stated: Callable[P, Awaitable[T]]) -> Callable[P, Coroutine[Any, Any, T]]:
+    def make(stated: Callable[P, Awaitable[T]]) -> Callable[P, Coroutine[object, None, T]]:
         plan: list[_Plan] = []
 
         @functools.wraps(stated)
@@ -85,7 +85,7 @@ def call(key: str) -> Callable[[Callable[P, Awaitable[T]]], Callable[P, Coroutin
     return make
 
 
-def _plan(key: str, stated: Callable[..., Awaitable[Any]]) -> _Plan:
+def _plan(key: str, stated: Callable[..., Awaitable[object]]) -> _Plan:
     method, _, path = key.partition(" ")
     signature = inspect.signature(stated, eval_str=True)
     answer, body = signature.return_annotation, signature.parameters.get("body")
@@ -158,7 +158,7 @@ def _decoder(key: str, kind: object) -> Callable[[Answer], object]:
     else:
         convert = msgspec.json.Decoder(kind, strict=False).decode
 
-    def decode(answer: Answer) -> Any:
+    def decode(answer: Answer) -> object:
         try:
             return convert(bytes(answer.body))
         except (msgspec.MsgspecError, BadMap, UnicodeDecodeError, RecursionError) as error:

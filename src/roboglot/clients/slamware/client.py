@@ -12,7 +12,6 @@ Speaks the vendor's units and frames, and knows nothing of drivers.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import msgspec
 
@@ -97,7 +96,7 @@ class SlamwareClient(
 
         ``options`` are the wire's of that name (MoveToOptions …). ``on_progress`` hears of it while it is waited for.
         """
-        fields: dict[str, Any] = without_none(msgspec.to_builtins(options)) if options is not None else {}
+        fields: dict[str, object] = without_none(msgspec.to_builtins(options)) if options is not None else {}
         begun = await self.create_action(ActionRequest(await self._full(name), fields))
         return RunningAction(self, self.clock, begun, on_progress)
 

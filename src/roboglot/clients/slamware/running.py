@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from roboglot.clients.errors import ClientError, LinkLost
 from roboglot.clients.slamware.calls import SlamwareRefused
@@ -42,7 +42,7 @@ class RunningAction:
         self.state = begun.state
         self._progress(begun)
 
-    def __await__(self) -> Generator[Any, None, None]:
+    def __await__(self) -> Generator[object, None, None]:
         return self.succeeded().__await__()
 
     async def succeeded(self) -> None:

@@ -11,7 +11,7 @@ import secrets
 import time
 from collections.abc import Awaitable, Callable, Collection
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import msgspec
 
@@ -143,7 +143,7 @@ class Classes:
 
     # -- the teacher ---------------------------------------------------------------------------------------------------
 
-    def look(self) -> dict[str, Any]:
+    def look(self) -> dict[str, object]:
         """The class as its teacher sees it; empty if none is open. Raises Forbidden."""
         self._check_teacher()
         lesson = self._lesson
@@ -163,7 +163,7 @@ class Classes:
         minutes = max(0, round((lesson.until - self._now()) / 60.0))
         return {"code": lesson.code, "name": lesson.name, "minutes": minutes, "pupils": pupils}
 
-    async def do(self, wish: Wish) -> dict[str, Any]:
+    async def do(self, wish: Wish) -> dict[str, object]:
         """Do what a teacher wants, and show the class. Raises Forbidden, NotFound, Refused."""
         with self._desk.noting(f"class {wish.do}"):
             return await self._do(wish)

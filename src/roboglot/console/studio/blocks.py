@@ -90,7 +90,7 @@ def _group(key: str) -> str:
 def _parameter(function: str, parameter: inspect.Parameter, labels: dict[str, Any]) -> dict[str, Any]:
     words = labels["parameters"][parameter.name]
     kind = _kind(str(parameter.annotation))
-    described: dict[str, Any] = {"name": parameter.name, "kind": kind, **words}
+    described: dict[str, object] = {"name": parameter.name, "kind": kind, **words}
     default = None if parameter.default is inspect.Parameter.empty else parameter.default
     if (choices := choices_of(function, parameter.name)) is not None:
         enum, members = choices

@@ -15,7 +15,7 @@ import time
 from collections import deque
 from collections.abc import Awaitable, Callable
 from functools import lru_cache
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgspec
 
@@ -105,9 +105,9 @@ class Session:
         self._programs: Programs | None = None
         self._shown = ""  # the program; empty: all
         self._leaving: list[Callable[[], None]] = []
-        self._waiting: deque[dict[str, Any]] = deque()
+        self._waiting: deque[dict[str, object]] = deque()
         self._due = asyncio.Event()
-        self._light: dict[str, Any] | None = None  # of the last begin of a block, while it waits
+        self._light: dict[str, object] | None = None  # of the last begin of a block, while it waits
         self._pending: set[asyncio.Task[None]] = set()
         self._trial = Trial(self.tell)
         self._seat = classroom.seat(self.tell)
@@ -131,7 +131,7 @@ class Session:
                 frame = message["type"] == "frame"
                 await self._send(_framed(message["text"]) if frame else msgspec.json.encode(message).decode())
 
-    def tell(self, message: dict[str, Any]) -> None:
+    def tell(self, message: dict[str, object]) -> None:
         """Send a message when its turn comes."""
         if message["type"] in ("variables", "grid", "map"):  # only the newest counts
             kind = [message.get(key) for key in ("type", "task", "name")]
@@ -289,7 +289,7 @@ class Session:
         self._seat.leave()
 
 
-def _plain(problem: Problem) -> dict[str, Any]:
+def _plain(problem: Problem) -> dict[str, object]:
     return {
         "line": problem.line,
         "column": problem.column,
@@ -300,7 +300,7 @@ def _plain(problem: Problem) -> dict[str, Any]:
 
 
 def _entry(task: str, entry: LogEntry) -> dict[str, object]:
-    found: dict[str, Any] = {"task": task, "stamp": entry.at, "level": entry.level, "text": entry.text}
+    found: dict[str, object] = {"task": task, "stamp": entry.at, "level": entry.level, "text": entry.text}
     if entry.level == "error":
         found |= explain(entry.text)
     return found

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgspec
 
@@ -22,7 +22,7 @@ from roboglot.wire.visual.requests import BODY_MAX
 
 SPEED = 10.0
 NAME_MAX = 100
-Tell = Callable[[dict[str, Any]], None]
+Tell = Callable[[dict[str, object]], None]
 
 
 class TrialWish(msgspec.Struct, tag="try", tag_field="type"):
@@ -82,7 +82,7 @@ class Trial:
         played: Played | None = None,
         problems: list[Problem] | None = None,
     ) -> None:
-        answer: dict[str, Any] = {"type": "tried", "id": wish.id, "lesson": wish.lesson}
+        answer: dict[str, object] = {"type": "tried", "id": wish.id, "lesson": wish.lesson}
         if played is not None:
             answer |= {"printed": played.printed, "error": played.error, "line": played.line, "seconds": played.seconds}
             answer |= {"late": played.late, "touched": _touched(played)}

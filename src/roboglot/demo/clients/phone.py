@@ -31,7 +31,7 @@ class Phone(service.GrpcAppServicer):  # type: ignore[misc]
         self._channel = grpc.aio.secure_channel(f"{address}:{port}", credentials, options=options)
         self._robot = service.GrpcAppStub(self._channel)
         self._server = grpc.aio.server()
-        self._pushed: dict[int, Any] = {}
+        self._pushed: dict[int, object] = {}
         self._arrived = asyncio.Condition()
         self._frames: asyncio.Queue[Any] = asyncio.Queue()
         self.port = 0
@@ -47,7 +47,7 @@ class Phone(service.GrpcAppServicer):  # type: ignore[misc]
         await self._channel.close()
         await self._server.stop(None)
 
-    async def heartbeat(self, _request: Any, _context: Any) -> Any:
+    async def heartbeat(self, _request: object, _context: object) -> object:
         """Receive the heartbeat of the robot, twice a second."""
         return pb.Result(result="ok")
 
@@ -60,7 +60,7 @@ class Phone(service.GrpcAppServicer):  # type: ignore[misc]
             self._frames.put_nowait(json.loads(request.params))
         yield pb.RecResponse(nameCode=request.nameCode, data="{}")
 
-    async def ask(self, code: int, parameters: object) -> list[Any]:
+    async def ask(self, code: int, parameters: object) -> list[object]:
         """Send a message down; all its answers."""
         request = pb.SendRequest(nameCode=code, params=json.dumps(parameters))
         async with asyncio.timeout(PATIENCE):

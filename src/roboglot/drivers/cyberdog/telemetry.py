@@ -78,7 +78,7 @@ class StatusPoll:
             }
 
 
-def temperatures_of(reply: Mapping[str, Any]) -> dict[str, float]:
+def temperatures_of(reply: Mapping[str, object]) -> dict[str, float]:
     """Return Celsius by motor name; missing ones are left out."""
     warm = {}
     for joint, name in JOINTS.items():

@@ -10,7 +10,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable
 from functools import partial
-from typing import Any, Protocol
+from typing import Protocol
 
 import msgspec
 
@@ -29,7 +29,7 @@ CALL_BYTES_RATE_MAX = 2 * 1024 * 1024
 SHORT = 256
 """Bytes of a frame whose cost is not measured: reading the clock twice would take as long."""
 NONE_REPLY = b'{"t":"value","value":null}'  # the answer to most calls
-Values = tuple[tuple[Any, ...], dict[str, Any]]
+Values = tuple[tuple[object, ...], dict[str, object]]
 
 
 class CallHost(Protocol):
@@ -93,7 +93,7 @@ class Calls:
         self.answered: Callable[[str, bytes], None] | None = None
         """Called with every answer that is sent and its call's name, to continue the program after a crash."""
 
-    def reply(self, id: int, value: Any = None) -> None:
+    def reply(self, id: int, value: object = None) -> None:
         """Answer a call with None, bool, int, float, str, Record, or lists and dicts of these.
 
         Raises TypeError or ValueError for values that cannot cross (the call still waits), LookupError if no such call

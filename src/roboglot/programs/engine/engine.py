@@ -91,7 +91,7 @@ class Engine:
         self._busy = 0
         self._closed = False
         self._reaping: set[asyncio.Task[None]] = set()
-        self._asked: set[asyncio.Task[Any]] = set()
+        self._asked: set[asyncio.Task[object]] = set()
         self._background: asyncio.Task[None] | None = None
         self._group = ProcessorGroup()
         self._share = Share()
@@ -294,7 +294,7 @@ class Engine:
         transport.write(frame(body))
         return worker
 
-    async def _in_time(self, work: Coroutine[Any, Any, T]) -> T:
+    async def _in_time(self, work: Coroutine[object, None, T]) -> T:
         """What ``work`` gives, or EngineSilent: who waits for a worker that is never born does not wait for ever."""
         task = asyncio.ensure_future(work)
         self._asked.add(task)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
 
 import msgspec
 
@@ -88,8 +87,8 @@ class Call(msgspec.Struct, frozen=True):  # one a call: a frozen dataclass takes
 
     id: int
     name: str
-    args: tuple[Any, ...]
-    kwargs: dict[str, Any]
+    args: tuple[object, ...]
+    kwargs: dict[str, object]
     line: int
     unit: str = ""
     interrupted: bool = False
@@ -109,8 +108,8 @@ class Replayed:
     """A call that was answered from the run's history; nothing is waiting."""
 
     name: str
-    args: tuple[Any, ...]
-    kwargs: dict[str, Any]
+    args: tuple[object, ...]
+    kwargs: dict[str, object]
     answer: bytes
 
 

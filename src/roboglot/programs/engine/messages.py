@@ -6,7 +6,7 @@ Every byte is hostile. Knows the shapes and the small limits; what follows from 
 from __future__ import annotations
 
 from collections.abc import Generator
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgspec
 
@@ -43,7 +43,7 @@ class CallMessage(msgspec.Struct, tag_field="t", tag="call", forbid_unknown_fiel
     args: msgspec.Raw
     kwargs: msgspec.Raw
 
-    def values(self) -> Generator[None, None, tuple[tuple[Any, ...], dict[str, Any]]]:
+    def values(self) -> Generator[None, None, tuple[tuple[object, ...], dict[str, object]]]:
         """The arguments, unpacked in steps. Raises ProtocolViolation, for too many values before any is made."""
         if self.size > SEPARATORS_MAX and separators(bytes(self.args)) + separators(bytes(self.kwargs)) > VALUES_MAX:
             raise ProtocolViolation("more values than a call may have")
@@ -94,8 +94,8 @@ class CheckedMessage(msgspec.Struct, tag_field="t", tag="checked", forbid_unknow
 
 Message = OutputMessage | CallMessage | VariablesMessage | FinishedMessage | FailedMessage | CheckedMessage
 _decoder: msgspec.json.Decoder[Message] = msgspec.json.Decoder(Message)
-_list = msgspec.json.Decoder(list[Any]).decode
-_dict = msgspec.json.Decoder(dict[str, Any]).decode
+_list = msgspec.json.Decoder(list).decode
+_dict = msgspec.json.Decoder(dict).decode
 
 
 def decode(body: bytes) -> Message:

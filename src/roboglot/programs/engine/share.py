@@ -10,7 +10,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Coroutine, Generator
 from types import coroutine
-from typing import Any, TypeVar
+from typing import TypeVar
 
 T = TypeVar("T")
 
@@ -138,9 +138,9 @@ class Meter:
 
 
 @coroutine
-def metered(work: Coroutine[Any, Any, T], charge: Callable[[float], None]) -> Generator[Any, Any, T]:
+def metered(work: Coroutine[object, None, T], charge: Callable[[float], None]) -> Generator[object, None, T]:
     """The result of ``work``, charging for what each of its steps takes of the thread."""
-    step: Callable[[], Any] = lambda: work.send(None)  # noqa: E731 - what comes next depends on how the last wait ended
+    step: Callable[[], object] = lambda: work.send(None)  # noqa: E731 - what comes next depends on how the last wait ended
     try:
         while True:
             began = time.thread_time()

@@ -69,7 +69,7 @@ def probe(whereabouts: Whereabouts) -> int:
     return 0
 
 
-def _plain(problem: Problem) -> list[Any]:
+def _plain(problem: Problem) -> list[object]:
     return [problem.line, problem.column, str(problem.kind), problem.english, problem.chinese]
 
 
@@ -116,7 +116,7 @@ def _globals(link: Link, request: dict[str, Any], call: Callable[..., Any]) -> d
     link.records = type(link.records)(prelude.records)
     modules = build_modules(call, request["seed"], prelude.utc_offset)
     own_builtins = build_builtins(link.write, modules)
-    scope: dict[str, Any] = {
+    scope: dict[str, object] = {
         "__name__": "__main__",
         "time": modules["time"],
         **build_roots(prelude, call),
@@ -128,7 +128,7 @@ def _globals(link: Link, request: dict[str, Any], call: Callable[..., Any]) -> d
     return {**scope, "print": own_builtins["print"]}
 
 
-def _report(error: BaseException) -> dict[str, Any]:
+def _report(error: BaseException) -> dict[str, object]:
     unit, line = _place(error)
     try:
         message = str(error)
@@ -137,7 +137,7 @@ def _report(error: BaseException) -> dict[str, Any]:
     return _failure(type(error).__name__, message, unit, line)
 
 
-def _failure(kind: str, message: str, unit: int, line: int) -> dict[str, Any]:
+def _failure(kind: str, message: str, unit: int, line: int) -> dict[str, object]:
     return {"t": "failed", "type": kind[:200], "message": message[:MESSAGE_MAX], "unit": unit, "line": line}
 
 

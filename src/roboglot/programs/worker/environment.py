@@ -26,9 +26,9 @@ class RobotError(Exception):
     """Something the robot refused or could not do; the host names finer types, all of them caught by this one."""
 
 
-def build_builtins(write: Callable[[str], None], modules: Mapping[str, ModuleType]) -> dict[str, Any]:
+def build_builtins(write: Callable[[str], None], modules: Mapping[str, ModuleType]) -> dict[str, object]:
     """The ``__builtins__`` of one run."""
-    own: dict[str, Any] = {
+    own: dict[str, object] = {
         "print": _printer(write),
         "getattr": _getattr,
         "hasattr": _hasattr,
@@ -44,7 +44,7 @@ def build_builtins(write: Callable[[str], None], modules: Mapping[str, ModuleTyp
     offered = {name: own[name] if name in own else getattr(builtins, name) for name in BUILTINS}
 
     def import_module(
-        name: str, globals: Any = None, locals: Any = None, fromlist: Sequence[str] = (), level: int = 0
+        name: str, globals: object = None, locals: object = None, fromlist: Sequence[str] = (), level: int = 0
     ) -> ModuleType:
         if name in _INTERNAL and name in sys.modules:
             return sys.modules[name]
@@ -64,7 +64,7 @@ def build_builtins(write: Callable[[str], None], modules: Mapping[str, ModuleTyp
 
 def _printer(write: Callable[[str], None]) -> Callable[..., None]:
     def print(
-        *values: Any, sep: str | None = " ", end: str | None = "\n", file: None = None, flush: bool = False
+        *values: object, sep: str | None = " ", end: str | None = "\n", file: None = None, flush: bool = False
     ) -> None:
         if file is not None:
             raise TypeError("print() has no files here")
@@ -112,7 +112,7 @@ def _delattr(value: object, name: str) -> None:
     delattr(value, _checked(name))
 
 
-def _type(value: Any, *more: Any) -> Any:
+def _type(value: object, *more: object) -> object:
     """The type of a value. Never a metaclass: with one, ``case`` patterns would read any attribute."""
     if more:
         raise TypeError("type() takes 1 argument in robot programs")

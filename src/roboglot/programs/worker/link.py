@@ -50,7 +50,7 @@ class Link:
 
     def receive(self) -> dict[str, Any]:
         """The next message of the host."""
-        message: dict[str, Any] = _scan(self._body().decode(), 0)[0]
+        message: dict[str, object] = _scan(self._body().decode(), 0)[0]
         return message
 
     def _body(self) -> bytes:
@@ -61,7 +61,7 @@ class Link:
             self._bodies = self._reader.feed(data)
         return self._bodies.pop(0)
 
-    def send(self, message: dict[str, Any]) -> None:
+    def send(self, message: dict[str, object]) -> None:
         """One message to the host; ValueError if it is too large. Lone surrogates become question marks."""
         self._send("".join(_pieces(message, 0)))
 
@@ -82,7 +82,7 @@ class Link:
         for start in range(0, len(text), TEXT_MAX):
             self.send({"t": "output", "text": text[start : start + TEXT_MAX]})
 
-    def call(self, name: str, /, *args: Any, **kwargs: Any) -> Any:
+    def call(self, name: str, /, *args: object, **kwargs: object) -> object:
         """Ask the host; returns its value or raises its error."""
         limit = sys.getrecursionlimit()
         sys.setrecursionlimit(limit + _HEADROOM)  # a program at its depth limit must not break off inside a call
@@ -97,7 +97,7 @@ class Link:
             raise _exception(reply["type"], reply["message"])
         return self.records.enrich(unpack(reply["value"], self.records.join))
 
-    def _ask(self, name: str, args: tuple[Any, ...], kwargs: dict[str, Any]) -> bytes:
+    def _ask(self, name: str, args: tuple[object, ...], kwargs: dict[str, object]) -> bytes:
         packed, named = self._json(args) if args else "", self._json_named(kwargs) if kwargs else ""
         if len(packed) + len(named) > SEPARATORS_MAX:
             packed, named = _sparse(packed), _sparse(named)

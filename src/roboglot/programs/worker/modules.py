@@ -65,7 +65,7 @@ def _time_members(call: HostCall, utc_offset: int) -> dict[str, object]:
     def monotonic() -> float:
         return float(call("time.monotonic"))
 
-    def at(convert: Callable[[float], Any]) -> Callable[..., Any]:
+    def at(convert: Callable[[float], object]) -> Callable[..., object]:
         return lambda seconds=None: convert(now() if seconds is None else seconds)
 
     def strftime(pattern: str, moment: Any = None, /) -> str:

@@ -29,7 +29,7 @@ class RecordType:
     come out of calls.
     """
 
-    fields: Mapping[str, Any] = field(default_factory=dict)
+    fields: Mapping[str, object] = field(default_factory=dict)
     aliases: Mapping[str, str] = field(default_factory=dict)
     constructible: bool = False
 
@@ -64,7 +64,7 @@ class Prelude:
         constructible = {name for name, kind in self.records.items() if kind.constructible}
         return Names(frozenset(constructible | set(self.enums) | functions), self.calls | self.attributes | members)
 
-    def to_wire(self) -> dict[str, Any]:
+    def to_wire(self) -> dict[str, object]:
         """As JSON, for the worker."""
         return {
             "calls": sorted(self.calls),

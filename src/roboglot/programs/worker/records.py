@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Mapping
-from typing import Any
 
 from roboglot.programs.worker.prelude import RecordType
 from roboglot.programs.worker.values import Record
 
 
-class Vector(list[Any]):
+class Vector(list[object]):
     """A list with the vendor's vector operations besides Python's own."""
 
     __slots__ = ()
@@ -30,11 +29,11 @@ class Vector(list[Any]):
         """The first item."""
         return self[0]
 
-    def back(self) -> Any:
+    def back(self) -> object:
         """The last item."""
         return self[-1]
 
-    def at(self, index: int) -> Any:
+    def at(self, index: int) -> object:
         """The item at an index; IndexError outside, also below zero."""
         if index < 0:
             raise IndexError("vector index out of range")
@@ -57,7 +56,7 @@ class Vector(list[Any]):
         return len(self)
 
 
-class Dictionary(dict[Any, Any]):
+class Dictionary(dict[object, object]):
     """A dictionary with the vendor's operations besides Python's own."""
 
     __slots__ = ()
@@ -106,13 +105,13 @@ class Records:
             known = self._classes[name] = self._build(name, self._types[name])
         return known
 
-    def join(self, name: str, fields: dict[str, Any]) -> Any:
+    def join(self, name: str, fields: dict[str, object]) -> object:
         """A record that came from the host; an undeclared type becomes a plain dictionary."""
         if name not in self._types:
             return self.enrich(fields)
         return self.class_of(name)(**fields)
 
-    def split(self, value: object) -> tuple[str, Mapping[str, Any]] | None:
+    def split(self, value: object) -> tuple[str, Mapping[str, object]] | None:
         """A record on its way to the host."""
         if not isinstance(value, ProgramRecord):
             return None
@@ -141,7 +140,7 @@ class Records:
             if fields:
                 raise TypeError(f"{name} has no field '{next(iter(fields))}'")
 
-        body: dict[str, Any] = {"__slots__": tuple(defaults), "__init__": initialise}
+        body: dict[str, object] = {"__slots__": tuple(defaults), "__init__": initialise}
         for alias, target in kind.aliases.items():
             body[alias] = property(_reader(target))
         return type(name, (ProgramRecord,), body)

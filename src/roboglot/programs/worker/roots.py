@@ -11,10 +11,10 @@ from typing import Any
 
 from roboglot.programs.worker.prelude import Prelude
 
-HostCall = Callable[..., Any]
+HostCall = Callable[..., object]
 
 
-def build_roots(prelude: Prelude, call: HostCall) -> dict[str, Any]:
+def build_roots(prelude: Prelude, call: HostCall) -> dict[str, object]:
     """The root objects by name; ``call(name, *args, **kwargs)`` asks the host."""
     tree: dict[str, Any] = {}
     for name in sorted(prelude.calls | prelude.attributes):
@@ -26,7 +26,7 @@ def build_roots(prelude: Prelude, call: HostCall) -> dict[str, Any]:
     return {name: _object(name, node, call) if isinstance(node, dict) else node for name, node in tree.items()}
 
 
-def build_enums(prelude: Prelude) -> dict[str, Any]:
+def build_enums(prelude: Prelude) -> dict[str, object]:
     """Objects whose attributes are the members' numbers."""
     return {name: _Namespace(name, dict(members), None) for name, members in prelude.enums.items()}
 
@@ -40,8 +40,8 @@ class _Attribute:
         self.name = name
 
 
-def _function(name: str, call: HostCall) -> Callable[..., Any]:
-    def function(*args: Any, **kwargs: Any) -> Any:
+def _function(name: str, call: HostCall) -> Callable[..., object]:
+    def function(*args: object, **kwargs: object) -> object:
         return call(name, *args, **kwargs)
 
     function.__name__ = function.__qualname__ = name.rpartition(".")[2]
@@ -61,7 +61,7 @@ class _Namespace:
 
     __slots__ = ("__call", "__dict__", "__members", "__name")
 
-    def __init__(self, name: str, members: dict[str, Any], call: HostCall | None) -> None:
+    def __init__(self, name: str, members: dict[str, object], call: HostCall | None) -> None:
         object.__setattr__(self, "_Namespace__name", name)
         object.__setattr__(self, "_Namespace__members", members)
         object.__setattr__(self, "_Namespace__call", call)

@@ -38,8 +38,8 @@ class Record:
     fields: Mapping[str, Any] = field(default_factory=dict)
 
 
-Split = Callable[[object], "tuple[str, Mapping[str, Any]] | None"]
-Join = Callable[[str, "dict[str, Any]"], Any]
+Split = Callable[[object], "tuple[str, Mapping[str, object]] | None"]
+Join = Callable[[str, "dict[str, object]"], object]
 
 
 def split_record(value: object) -> tuple[str, Mapping[str, object]] | None:
@@ -47,7 +47,7 @@ def split_record(value: object) -> tuple[str, Mapping[str, object]] | None:
     return (value.type, value.fields) if isinstance(value, Record) else None
 
 
-def pack(value: object, split: Split = split_record, depth: int = 0) -> Any:
+def pack(value: object, split: Split = split_record, depth: int = 0) -> object:
     """JSON-ready form.
 
     Raises TypeError for what can't cross (functions, complex numbers ...), ValueError for too deep or too large.
@@ -117,7 +117,7 @@ def drained(steps: Generator[None, None, T]) -> T:
         return result
 
 
-def unpacking(packed: object, join: Join = Record, depth: int = 0) -> Generator[None, None, Any]:
+def unpacking(packed: object, join: Join = Record, depth: int = 0) -> Generator[None, None, object]:
     """``unpack`` in steps, one for each container, so that other work can be done between them."""
     if depth > DEPTH_MAX:
         raise ValueError("nested too deeply")
@@ -142,14 +142,14 @@ def unpacking(packed: object, join: Join = Record, depth: int = 0) -> Generator[
     return (yield from _unpacking_fields(packed, join, depth))
 
 
-def _unpacking_fields(packed: dict[object, object], join: Join, depth: int) -> Generator[None, None, dict[str, Any]]:
+def _unpacking_fields(packed: dict[object, object], join: Join, depth: int) -> Generator[None, None, dict[str, object]]:
     fields = {}
     for key, item in packed.items():
         fields[str(key)] = item if type(item) in _PLAIN else (yield from unpacking(item, join, depth + 1))
     return fields
 
 
-def _unpacking_tagged(packed: dict[object, object], join: Join, depth: int) -> Generator[None, None, Any]:
+def _unpacking_tagged(packed: dict[object, object], join: Join, depth: int) -> Generator[None, None, object]:
     match packed:
         case {"$": "record", "t": str(name), "v": dict(fields)}:
             return join(name, (yield from _unpacking_fields(fields, join, depth)))
@@ -162,7 +162,7 @@ def _unpacking_tagged(packed: dict[object, object], join: Join, depth: int) -> G
     raise ValueError(f"not a tagged value: {packed['$']!r:.40}")
 
 
-def _unpacking_pairs(pairs: list[object], join: Join, depth: int) -> Generator[None, None, dict[Any, Any]]:
+def _unpacking_pairs(pairs: list[object], join: Join, depth: int) -> Generator[None, None, dict[object, object]]:
     result = {}
     for pair in pairs:
         match pair:

@@ -10,7 +10,6 @@ import sys
 import time
 from collections.abc import Callable, Mapping
 from types import BuiltinFunctionType, FrameType, FunctionType, ModuleType
-from typing import Any
 
 UNIT = "<unit "
 """How the file names of the program's code objects begin."""
@@ -41,18 +40,18 @@ class _Short(reprlib.Repr):
 class Variables:
     """Reports to ``send``; names that are in ``hide``'s scope are the host's own and are left out."""
 
-    def __init__(self, send: Callable[[dict[str, Any]], None]) -> None:
+    def __init__(self, send: Callable[[dict[str, object]], None]) -> None:
         self._send = send
         self._short = _Short()
         self._own: frozenset[str] = frozenset()
         self._said: dict[str, str] = {}
         self._due = 0.0
 
-    def hide(self, scope: Mapping[str, Any]) -> None:
+    def hide(self, scope: Mapping[str, object]) -> None:
         """Leave these names out."""
         self._own = frozenset(scope)
 
-    def before(self, call: Callable[..., Any]) -> Callable[..., Any]:
+    def before(self, call: Callable[..., object]) -> Callable[..., object]:
         """The same call, with a report before it if the last one is old."""
 
         def reporting(name: str, /, *args: object, **kwargs: object) -> object:
@@ -85,7 +84,7 @@ class Variables:
                 texts[name[:NAME_MAX]] = self._text(value)
         return texts
 
-    def _text(self, value: Any) -> str:
+    def _text(self, value: object) -> str:
         try:
             return self._short.repr(value)[:TEXT_MAX]
         except (ValueError, RecursionError):  # a number with too many digits

@@ -12,7 +12,6 @@ import mmap
 import sys
 from collections.abc import Callable
 from types import FrameType
-from typing import Any
 
 from roboglot.programs.language.places import WORD, Places, Step
 
@@ -30,7 +29,7 @@ class Whereabouts:
         self._marks: dict[int, object] = {}
         self._numbers: dict[object, int] = {}
         self._watched: Watched | None = None
-        self.cell: list[Any] = [None]
+        self.cell: list[object] = [None]
         nowhere = self._marked(0)
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(nowhere))  # the item's own, given up by the first store
         self._table[0] = id(nowhere)
@@ -89,7 +88,7 @@ class Watched:
     __slots__ = ("_cell", "_frame", "_halt", "_numbers", "_order", "_origin", "_stops")
 
     def __init__(
-        self, cell: list[Any], numbers: dict[object, int], stops: memoryview, halt: Callable[[], object]
+        self, cell: list[object], numbers: dict[object, int], stops: memoryview, halt: Callable[[], object]
     ) -> None:
         self._cell, self._numbers, self._stops, self._halt = cell, numbers, stops, halt
         self._order = 0

@@ -174,7 +174,7 @@ class Zygote:
     def _used(self) -> int:
         return int(os.pread(self._memory, 256, 0).split()[0]) * _PAGE
 
-    def _send(self, message: dict[str, Any], descriptors: list[int] | None = None) -> None:
+    def _send(self, message: dict[str, object], descriptors: list[int] | None = None) -> None:
         socket.send_fds(self._control, [json.dumps(message).encode()], descriptors or [])
 
 

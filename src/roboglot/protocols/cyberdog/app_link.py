@@ -65,7 +65,7 @@ class AppLink:
         credentials: Callable[[], grpc.ChannelCredentials] | None,
         route: AppRoute,
         *,
-        ticks: Callable[[str], Any],
+        ticks: Callable[[str], object],
         tap: Tap | None = None,
         on_host: Callable[[str], None] = lambda _: None,
     ) -> None:
@@ -257,7 +257,7 @@ def _after(error: grpc.aio.AioRpcError | grpc.aio.UsageError) -> Delivery:
     return Delivery.DONE if arrived else Delivery.FAILED
 
 
-def _request(code: int, text: str) -> Any:
+def _request(code: int, text: str) -> object:
     return pb.SendRequest(nameCode=code, params=text)
 
 

@@ -85,7 +85,7 @@ class CyberDogDoor:
         self._context: Context | None = None
         self._handshakes: Handshakes
         self._resting: asyncio.Task[None] | None = None
-        self._writing: set[asyncio.Task[Any]] = set()
+        self._writing: set[asyncio.Task[object]] = set()
         self._cleanup: list[Callable[[], None]] = []
 
     async def start(self) -> None:
@@ -309,15 +309,15 @@ def _as_client(store: CertificateStore) -> object:
     return grpc.ssl_channel_credentials(proof.callers, proof.key, proof.certificate)
 
 
-def _as_server(store: CertificateStore, handshakes: Handshakes) -> Any:
+def _as_server(store: CertificateStore, handshakes: Handshakes) -> object:
     """How it proves itself to who calls, and whom it lets in; looked up again at every connection."""
 
-    def configured(proof: Certificates) -> Any:
+    def configured(proof: Certificates) -> object:
         return grpc.ssl_server_certificate_configuration(((proof.key, proof.certificate),), proof.callers)
 
     used = store.newest()
 
-    def changed() -> Any:
+    def changed() -> object:
         nonlocal used
         handshakes.begun()
         before, used = used, store.newest()
@@ -326,7 +326,7 @@ def _as_server(store: CertificateStore, handshakes: Handshakes) -> Any:
     return grpc.dynamic_ssl_server_credentials(configured(used), changed, require_client_authentication=True)
 
 
-def _answer(code: int, value: object) -> Any:
+def _answer(code: int, value: object) -> object:
     """One message to the app."""
     text = write(value)
     if len(text) > CHARACTERS_MAX and len(text.encode()) > MESSAGE_MAX - FRAME:

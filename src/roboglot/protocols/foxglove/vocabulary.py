@@ -99,7 +99,7 @@ def pose(message: RosPose) -> Pose:
 class Parameter:
     """A value of the robot; ``write`` and ``right`` where clients may set it."""
 
-    read: Callable[[Robot], Any]
+    read: Callable[[Robot], object]
     needs: type | None = None
     kind: type = str
     write: Callable[[Robot, Any], None] | None = None
@@ -143,6 +143,6 @@ def parameters(robot: Robot, names: list[str] | None = None) -> list[dict[str, A
     for name in names or PARAMETERS:
         parameter = PARAMETERS.get(name)
         if parameter is not None and (parameter.needs is None or parameter.needs in robot):
-            value: dict[str, Any] = {"name": name, "value": parameter.read(robot)}
+            value: dict[str, object] = {"name": name, "value": parameter.read(robot)}
             found.append(value | ({"type": "float64"} if parameter.kind is float else {}))
     return found

@@ -65,7 +65,7 @@ def _only(shape: Shape, parameter: str, value: Value) -> dict[str, Any]:
     return fillers | {parameter: value}
 
 
-def _bare(kind: Any) -> Any:
+def _bare(kind: object) -> object:
     """``kind`` without its ``| None``."""
     if get_origin(kind) in (types.UnionType, typing.Union):
         return next(part for part in get_args(kind) if part is not type(None))
@@ -82,7 +82,7 @@ def _choices(kind: Any) -> tuple[Any, ...]:
     return (True, False) if kind is bool else ()
 
 
-def _limits(kind: Any) -> Meta | None:
+def _limits(kind: object) -> Meta | None:
     return next((extra for extra in getattr(kind, "__metadata__", ()) if isinstance(extra, Meta)), None)
 
 

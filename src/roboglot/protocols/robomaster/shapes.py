@@ -20,7 +20,7 @@ from roboglot.operations import BadParameters, Operation
 from roboglot.protocols.robomaster.ranges import OnRobots
 from roboglot.wire.robomaster.commands import Value, parameters_of
 
-Kinds = dict[str, Any]  # parameter name: annotation
+Kinds = dict[str, object]  # parameter name: annotation
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,7 @@ class Shape:
         """The words by parameter, not checked yet."""
         return parameters_of(words, tuple(self.kinds), self.bare)
 
-    def check(self, values: Mapping[str, Value]) -> dict[str, Any]:
+    def check(self, values: Mapping[str, Value]) -> dict[str, object]:
         """Converted and checked values of all parameters. Raises BadParameters naming the parameter."""
         if not self.kinds:
             return {}

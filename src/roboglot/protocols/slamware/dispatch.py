@@ -11,7 +11,7 @@ import logging
 from collections.abc import Awaitable, Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from time import perf_counter
-from typing import Any, get_args
+from typing import get_args
 from urllib.parse import parse_qsl
 
 import msgspec
@@ -73,7 +73,7 @@ QUERY_FIELDS_MAX = 32
 WHOLE_MAX = 2.0**53  # beyond it floats leave integers out
 LOGGED_MAX = 200  # characters of a path or a refusal in the log
 
-Send = Callable[[dict[str, Any]], Awaitable[None]]
+Send = Callable[[dict[str, object]], Awaitable[None]]
 Headers = list[tuple[bytes, bytes]]
 
 JSON = (b"content-type", b"application/json")

@@ -65,7 +65,7 @@ class _Schemas:
     """Makes schemas of types: all at once, so that the same type has the same name everywhere."""
 
     def __init__(self) -> None:
-        self._types: list[Any] = []
+        self._types: list[object] = []
         for operation in TABLE:
             self._types += [kind for kind in _members(operation.answer) if _is_json(kind)]
             self._types += [f.type for f in msgspec.structs.fields(operation.parameters) if f.type not in BODIES]
@@ -123,7 +123,7 @@ class _Schemas:
             done["content"] = {"application/json": {"schema": schema}}
         return {"200": done, "default": refused}
 
-    def of(self, kind: Any) -> Schema:
+    def of(self, kind: object) -> Schema:
         """The schema of a type that some operation has."""
         return dict(self._made[self._types.index(kind)])
 

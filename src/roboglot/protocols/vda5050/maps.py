@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.map_library import MapLibrary, StoredMap
 from roboglot.model.components.mapping.mapping import Mapping
@@ -78,7 +76,7 @@ class Maps:
         await self._robot[MapLibrary].remove(name)
         self._looked_at = float("-inf")
 
-    def listed(self) -> dict[str, Any]:
+    def listed(self) -> dict[str, object]:
         """Return the state's ``maps``; nothing for a robot that keeps none."""
         if MapLibrary not in self._robot:
             return {}

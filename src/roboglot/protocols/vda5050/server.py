@@ -56,7 +56,7 @@ class Vda5050Door:
         self._task: asyncio.Task[None] | None = None
         self._client: Any = None
         self._seldom = Seldom(log)
-        self._sent: Any = None  # the last state, coarsely, and when it was sent (robot time)
+        self._sent: object = None  # the last state, coarsely, and when it was sent (robot time)
         self._sent_at = 0.0
         self._rests = False  # hibernation was announced
 
@@ -257,7 +257,7 @@ class Vda5050Door:
         sheet = vocabulary.factsheet(self._robot, self._version, STATE_PERIOD, period)
         await self._send("factsheet", sheet, qos=0, retain=True)
 
-    def _message(self, name: str, values: Mapping[str, Any]) -> bytes:
+    def _message(self, name: str, values: Mapping[str, object]) -> bytes:
         """Return a message with its header."""
         number = self._headers.get(name, 0)
         self._headers[name] = number + 1
@@ -270,7 +270,7 @@ class Vda5050Door:
         }
         return msgspec.json.encode({**header, **values})
 
-    async def _send(self, name: str, values: Mapping[str, Any], qos: int = 0, retain: bool = False) -> None:
+    async def _send(self, name: str, values: Mapping[str, object], qos: int = 0, retain: bool = False) -> None:
         if self._client is None:
             return
         data = self._message(name, values)

@@ -34,7 +34,7 @@ def timestamp(epoch: float) -> str:
     return datetime.fromtimestamp(epoch, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
-def position(robot: Robot, version: Version, map_id: str) -> dict[str, Any]:
+def position(robot: Robot, version: Version, map_id: str) -> dict[str, object]:
     """Return where the robot is, under the version's name; nothing for a robot that cannot know."""
     if Localization not in robot:
         return {}
@@ -54,7 +54,7 @@ def position(robot: Robot, version: Version, map_id: str) -> dict[str, Any]:
     }
 
 
-def velocity(robot: Robot) -> dict[str, Any]:
+def velocity(robot: Robot) -> dict[str, object]:
     """Return how the robot moves, in its own axes."""
     if Odometry not in robot:
         return {}
@@ -92,7 +92,7 @@ def power(robot: Robot, version: Version) -> dict[str, object]:
     return {"batteryState": {"batteryCharge": charge, "charging": charging, **volts}}
 
 
-def safety(robot: Robot, version: Version) -> dict[str, Any]:
+def safety(robot: Robot, version: Version) -> dict[str, object]:
     """Return emergency stop and contact."""
     stopped = EmergencyStop in robot and robot[EmergencyStop].engaged
     name = "activeEmergencyStop" if version.new_words else "eStop"
@@ -100,7 +100,7 @@ def safety(robot: Robot, version: Version) -> dict[str, Any]:
     return {"safetyState": {name: "MANUAL" if stopped else "NONE", "fieldViolation": touched}}
 
 
-def loads(robot: Robot, known: Mapping[str, str]) -> dict[str, Any]:
+def loads(robot: Robot, known: Mapping[str, str]) -> dict[str, object]:
     """Return what the jack carries, with what fleet control said of it; nothing for a robot without a jack."""
     if Jack not in robot:
         return {}
@@ -186,7 +186,7 @@ def factsheet(robot: Robot, version: Version, state_period: float, visualization
     }
 
 
-def _limits(new: bool, state_period: float, visualization_period: float) -> dict[str, Any]:
+def _limits(new: bool, state_period: float, visualization_period: float) -> dict[str, object]:
     strings, arrays = ("maximumStringLengths", "maximumArrayLengths") if new else ("maxStringLens", "maxArrayLens")
     length, names = ("maximumMessageLength", "maximumIdLength") if new else ("msgLen", "idLen")
     interval = (

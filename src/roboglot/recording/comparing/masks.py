@@ -105,7 +105,7 @@ def _agree(how: How, one: Any, other: Any, tolerance: float, share: float) -> bo
     return bool(one == other)
 
 
-def is_volatile(value: Any) -> bool:
+def is_volatile(value: object) -> bool:
     """Return whether a value is one that no two sessions share: an id, a date, a Unix time."""
     if isinstance(value, bool):
         return False

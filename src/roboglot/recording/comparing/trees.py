@@ -14,7 +14,7 @@ _sequence = re.compile(r"\s*\bseq\s+\d+\s*(?=;|$)")
 _decode = msgspec.json.Decoder().decode
 
 
-def tree(payload: bytes) -> Any:
+def tree(payload: bytes) -> object:
     """Return the values of a payload."""
     body = payload.partition(b"\n\n")[2] or payload
     if body[:1] in (b"{", b"["):
@@ -47,7 +47,7 @@ def leaves(value: Any, path: str = "$") -> Iterator[tuple[str, Any]]:
             yield where, found
 
 
-def kind_of(value: Any) -> str:
+def kind_of(value: object) -> str:
     """The JSON type of a value."""
     if isinstance(value, bool):
         return "boolean"

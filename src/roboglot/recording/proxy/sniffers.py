@@ -146,8 +146,8 @@ class FrameSniffer(Sniffer):
         from wsproto import ConnectionType, WSConnection
 
         super().__init__(note)
-        self._client: Any = WSConnection(ConnectionType.SERVER)  # what the client sends, read as a server does
-        self._robot: Any = None
+        self._client: object = WSConnection(ConnectionType.SERVER)  # what the client sends, read as a server does
+        self._robot: object = None
         self._began: dict[str, tuple[str, float]] = {}
         self._partial = {True: "", False: ""}
         self._upgraded = {True: b"", False: b""}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from types import MethodType
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from roboglot.model.client_context import context_of
 from roboglot.simulation.bodies.part import Fitting, Part, ordered, parts
@@ -19,7 +19,7 @@ class SimulatedRobot:
     def __init__(self, fitting: Fitting) -> None:
         self._fitting = fitting
         self._context = context_of(fitting.robot.id)
-        fitted: list[tuple[Part[Any], Any]] = []
+        fitted: list[tuple[Part[object], object]] = []
         for part in parts():
             if part.section is not None and fitting.body.get(part.section) is None:
                 continue
@@ -62,7 +62,7 @@ class SimulatedRobot:
             detach()
 
 
-def _job(part: Part[Any], component: object, method: Callable[..., None] | None, *, periodic: bool = False) -> Job:
+def _job(part: Part[object], component: object, method: Callable[..., None] | None, *, periodic: bool = False) -> Job:
     assert method is not None
     duty = part.duty(component) if part.duty is not None else None
     if not periodic:

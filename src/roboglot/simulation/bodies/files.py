@@ -54,5 +54,5 @@ def _file_type() -> type[Struct]:
     plate: list[Any] = [("maker", str), ("model", str), ("hardware_version", str), ("hull", HullSection)]
     sections = [(part.name, part.section) for part in parts() if part.section is not None]
     plate += [(name, section) for name, section in sections if name == "base"]
-    optional: list[Any] = [(name, section | None, None) for name, section in sections if name != "base"]
+    optional: list[object] = [(name, section | None, None) for name, section in sections if name != "base"]
     return defstruct("BodyFile", plate + optional, frozen=True, forbid_unknown_fields=True)

@@ -6,7 +6,7 @@ The simulated components read and drive it; nothing outside the simulation sees 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,9 @@ from roboglot.simulation.bodies.hull_legs import HullLegs
 from roboglot.simulation.bodies.schedule import Duty
 from roboglot.simulation.bodies.support import GRAVITY, SETTLED, Nearness, Support
 from roboglot.simulation.building.terrain import Ground
+
+if TYPE_CHECKING:
+    from mujoco import MjData, MjModel
 
 DRIVE_GAIN = 150.0  # 1/s: how fast the body takes on the wheels' velocity: in one step of physics, or it swings
 LEVEL = (0.0, 0.0)
@@ -62,7 +65,9 @@ def rotation(tilt: tuple[float, float], yaw: float) -> Floats:
 class Hull:
     """Handles into MuJoCo's arrays for one robot."""
 
-    def __init__(self, model: Any, data: Any, name: str, body: Body, elevations: list[float], ground: Ground) -> None:
+    def __init__(
+        self, model: MjModel, data: MjData, name: str, body: Body, elevations: list[float], ground: Ground
+    ) -> None:
         self._model, self._data, self._elevations, self._ground = model, data, elevations, ground
         self.name, self.body = name, body
         self._q, self._v = int(model.joint(f"{name} x").qposadr[0]), int(model.joint(f"{name} x").dofadr[0])

@@ -98,7 +98,7 @@ def parts() -> tuple[Part[Any], ...]:
     return tuple(ordered(found.values(), lambda part: part.after))
 
 
-def ordered(among: Iterable[Part[Any]], before: Callable[[Part[Any]], tuple[str, ...]]) -> list[Part[Any]]:
+def ordered(among: Iterable[Part[object]], before: Callable[[Part[object]], tuple[str, ...]]) -> list[Part[object]]:
     """Sort parts so that each comes after those it names; otherwise as they come. Raises ValueError for a circle."""
     named = {part.name: part for part in among}
     rank = {name: index for index, name in enumerate(named)}
@@ -107,7 +107,7 @@ def ordered(among: Iterable[Part[Any]], before: Callable[[Part[Any]], tuple[str,
         sorter.prepare()
     except CycleError as error:
         raise ValueError(f"parts wait for each other: {', '.join(error.args[1])}") from None
-    result: list[Part[Any]] = []
+    result: list[Part[object]] = []
     ready: list[str] = []
     while sorter.is_active():
         ready = sorted([*ready, *sorter.get_ready()], key=rank.__getitem__)

@@ -7,9 +7,12 @@ of a step of the physics.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING
 
 from roboglot.simulation.bodies.schedule import Duty
+
+if TYPE_CHECKING:
+    from mujoco import MjModel
 
 GRAVITY = 9.81
 STANDS, FOOT, HANGS, MOVES = 1, 2, 4, 8  # bits of what meets what
@@ -68,7 +71,7 @@ class Nearness:
 class Support:
     """Switches one robot between contacts and the spring, without moving it, and between walls and none."""
 
-    def __init__(self, model: Any, name: str, mass: float, wheels: list[int]) -> None:
+    def __init__(self, model: MjModel, name: str, mass: float, wheels: list[int]) -> None:
         joint = model.joint(f"{name} z")
         self._model, self._mass, self._wheels = model, mass, wheels
         self._body, self._chassis = model.body(name).id, model.geom(f"{name} chassis").id

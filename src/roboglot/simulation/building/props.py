@@ -7,12 +7,15 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from typing import Any
+from typing import TYPE_CHECKING
 
 from roboglot.model.errors import NotFound
 from roboglot.simulation.building.blueprint import Solid
 from roboglot.simulation.building.cards import PrintedTag
 from roboglot.simulation.world.description import WorldDescription
+
+if TYPE_CHECKING:
+    from mujoco import MjData, MjModel
 
 OBSTACLES_MAX = 16
 PASSENGERS_MAX = 4
@@ -24,7 +27,7 @@ AWAY = (0.0, 0.0, -50.0)  # where what is not there waits
 class Props:
     """The movable boxes by key. ``solids`` has those that are there: floor and box, z from that floor's surface."""
 
-    def __init__(self, model: Any, data: Any, elevations: list[float]) -> None:
+    def __init__(self, model: MjModel, data: MjData, elevations: list[float]) -> None:
         self._model, self._data, self._elevations = model, data, elevations
         self.solids: dict[str, tuple[int, Solid]] = {}
         self.revisions: dict[int, int] = defaultdict(int)  # per floor, counts changes

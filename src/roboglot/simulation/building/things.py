@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +13,16 @@ from roboglot.simulation.bodies.support import GRAVITY
 from roboglot.simulation.world.description import Thing as ThingSection
 from roboglot.simulation.world.description import WorldDescription
 
+if TYPE_CHECKING:
+    from mujoco import MjData, MjModel
+
 Floats = NDArray[np.float64]
 
 
 class Thing:
     """One of them."""
 
-    def __init__(self, model: Any, data: Any, section: ThingSection, elevation: float) -> None:
+    def __init__(self, model: MjModel, data: MjData, section: ThingSection, elevation: float) -> None:
         self.name, self.diameter, self.height, self.mass = section.name, section.diameter, section.height, section.mass
         self.carried = False
         self._origin = np.array((*section.at, elevation))
@@ -68,7 +71,7 @@ class Thing:
 class Things:
     """All things of a world."""
 
-    def __init__(self, model: Any, data: Any, world: WorldDescription) -> None:
+    def __init__(self, model: MjModel, data: MjData, world: WorldDescription) -> None:
         self._by_name = {
             section.name: Thing(model, data, section, world.elevation(number))
             for number, floor in enumerate(world.floors)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -221,7 +221,7 @@ class Hands(Stage):
         return self._faults().active
 
     def inject_fault(
-        self, kind: str, robot: str | None = None, *, duration: float | None = None, **options: Any
+        self, kind: str, robot: str | None = None, *, duration: float | None = None, **options: object
     ) -> Sequence[ActiveFault]:
         return self._faults().inject(kind, robot, duration=duration, **options)
 

@@ -6,7 +6,6 @@ import copy
 import math
 from collections.abc import Callable, Container, Mapping
 from functools import lru_cache
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -29,7 +28,7 @@ LIGHT = 1.0  # kg; a thing that weighs less gives way before a bumper does
 _compiled = lru_cache(maxsize=8)(build)
 
 
-def _model_of(world: WorldDescription, bodies: Mapping[str, Body]) -> Any:
+def _model_of(world: WorldDescription, bodies: Mapping[str, Body]) -> mujoco.MjModel:
     """Return a model of its own, compiled once for all worlds that are the same: those that are reset or reopened."""
     what = replace(world, faults=()), tuple(bodies.items())
     try:
@@ -43,8 +42,8 @@ class Physics:
     """Raises BadFile if the world cannot be built."""
 
     def __init__(self, world: WorldDescription, bodies: Mapping[str, Body]) -> None:
-        self._model: Any = _model_of(world, bodies)
-        self._data: Any = mujoco.MjData(self._model)
+        self._model = _model_of(world, bodies)
+        self._data = mujoco.MjData(self._model)
         model = self._model
         self._elevations = [world.elevation(number) for number in range(len(world.floors))]
         self.ground = Ground(world)
@@ -208,7 +207,7 @@ class Physics:
 class _Standing:
     """Where the model keeps a person."""
 
-    def __init__(self, model: Any, name: str) -> None:
+    def __init__(self, model: mujoco.MjModel, name: str) -> None:
         body = model.body(name)
         geom = body.geomadr[0]
         self.id, self.mocap, self.bits = body.id, int(body.mocapid[0]), int(model.geom_conaffinity[geom])

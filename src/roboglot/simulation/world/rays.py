@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.kernels import loading
 from roboglot.simulation.bodies.hull import Hull
+
+if TYPE_CHECKING:
+    from mujoco import MjData, MjModel
 
 PASSED = 0  # a kind of shape that the kernel does not meet
 UNSEEN = 5  # MuJoCo's geom group for what rays pass through
@@ -21,7 +24,7 @@ COMPILED = (2, 3, 5, 6)  # MuJoCo's numbers of the shapes that the kernel knows:
 class Rays:
     """Casts them against everything but the robot that looks."""
 
-    def __init__(self, model: Any, data: Any) -> None:
+    def __init__(self, model: MjModel, data: MjData) -> None:
         import mujoco  # it takes a quarter of a second to load
 
         self._model, self._data, self._mujoco = model, data, mujoco

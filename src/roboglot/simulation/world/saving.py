@@ -114,7 +114,7 @@ def _lines(world: WorldDescription) -> Iterator[str]:
         yield from _entries(floor)
 
 
-def _entries(values: Mapping[str, Any]) -> Iterator[str]:
+def _entries(values: Mapping[str, object]) -> Iterator[str]:
     for key, value in values.items():
         if isinstance(value, list) and value and isinstance(value[0], dict):
             yield f"{key} = ["
@@ -142,7 +142,7 @@ def _plain(value: Any) -> Any:
     """Return structs as dictionaries of what differs from the defaults, by the names of the file."""
     if isinstance(value, Struct):
         config = value.__struct_config__
-        found: dict[str, Any] = {config.tag_field: config.tag} if config.tag_field else {}
+        found: dict[str, object] = {config.tag_field: config.tag} if config.tag_field else {}
         for field in msgspec.structs.fields(value):
             held = getattr(value, field.name)
             if held != _default(field):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import TypedDict, Unpack
 
 import mujoco
 
@@ -50,7 +50,7 @@ TILT_MAX = math.radians(70)
 TYRES = 0.4  # N m s/rad per kg: how fast tyres and suspension calm the body down
 
 
-def build(world: WorldDescription, robots: Sequence[tuple[str, Body]]) -> Any:
+def build(world: WorldDescription, robots: Sequence[tuple[str, Body]]) -> mujoco.MjModel:
     """The compiled model. Raises BadFile if there is too much in it."""
     spec = _empty_spec()
     root = spec.worldbody
@@ -62,8 +62,8 @@ def build(world: WorldDescription, robots: Sequence[tuple[str, Body]]) -> Any:
     if world.lift is not None:
         _add_car(spec, world.lift, world.elevation(world.lift.parked_at))
     for key in keys_of(world):
-        body = root.add_body(name=key, mocap=True, pos=AWAY)
-        _add_standing(body, mujoco.mjtGeom.mjGEOM_BOX, [0.1, 0.1, 0.1], STANDS | HANGS | MOVES, name=key)
+        box = root.add_body(name=key, mocap=True, pos=AWAY)
+        _add_standing(box, mujoco.mjtGeom.mjGEOM_BOX, [0.1, 0.1, 0.1], STANDS | HANGS | MOVES, name=key)
     for key in visitors():
         _add_person(root, key, Person(path=()))
     uneven = Ground(world).uneven
@@ -75,7 +75,7 @@ def build(world: WorldDescription, robots: Sequence[tuple[str, Body]]) -> Any:
     return model
 
 
-def _empty_spec() -> Any:
+def _empty_spec() -> mujoco.MjSpec:
     spec = mujoco.MjSpec()
     spec.option.timestep = TIMESTEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -86,7 +86,7 @@ def _empty_spec() -> Any:
     return spec
 
 
-def _add_floor(spec: Any, world: WorldDescription, number: int, floor: Floor, solids: int) -> int:
+def _add_floor(spec: mujoco.MjSpec, world: WorldDescription, number: int, floor: Floor, solids: int) -> int:
     """Add a storey with all that is on it; return the number of solids, ``solids`` before."""
     root, elevation = spec.worldbody, world.elevation(number)
     _add_slabs(root, floor, world.lift, elevation)
@@ -111,18 +111,28 @@ def visitors() -> list[str]:
     return [f"visitor {number}" for number in range(1, VISITORS_MAX + 1)]
 
 
-def _add_person(root: Any, key: str, person: Person) -> None:
+def _add_person(root: mujoco.MjsBody, key: str, person: Person) -> None:
     body = root.add_body(name=key, mocap=True, pos=AWAY)
     size = [person.radius, max(0.01, person.height / 2 - person.radius), 0]
     _add_standing(body, mujoco.mjtGeom.mjGEOM_CAPSULE, size, STANDS | HANGS | MOVES)
 
 
-def _add_standing(body: Any, kind: Any, size: list[float], bits: int, **more: object) -> None:
+class _Placed(TypedDict, total=False):
+    """Where a geom is in its body, and its name."""
+
+    name: str
+    pos: list[float]
+    quat: list[float]
+
+
+def _add_standing(
+    body: mujoco.MjsBody, kind: mujoco.mjtGeom, size: list[float], bits: int, **placed: Unpack[_Placed]
+) -> None:
     """A geom that robots bump into and rays hit."""
-    body.add_geom(type=kind, size=size, contype=0, conaffinity=bits, friction=[0.3, 0.005, 0.0001], **more)
+    body.add_geom(type=kind, size=size, contype=0, conaffinity=bits, friction=[0.3, 0.005, 0.0001], **placed)
 
 
-def _add_slabs(root: Any, floor: Floor, lift: Lift | None, elevation: float) -> None:
+def _add_slabs(root: mujoco.MjsBody, floor: Floor, lift: Lift | None, elevation: float) -> None:
     for slab in slabs_of(floor, lift):
         _add_slab(root, slab, elevation)
     if elevation == 0.0:  # what falls through the lowest floor falls into a pit
@@ -130,7 +140,7 @@ def _add_slabs(root: Any, floor: Floor, lift: Lift | None, elevation: float) -> 
             _add_slab(root, pit, -PIT)
 
 
-def _add_slab(root: Any, slab: Rectangle, elevation: float) -> None:
+def _add_slab(root: mujoco.MjsBody, slab: Rectangle, elevation: float) -> None:
     root.add_geom(
         type=mujoco.mjtGeom.mjGEOM_BOX,
         size=[slab.width / 2, slab.depth / 2, SLAB / 2],
@@ -140,7 +150,7 @@ def _add_slab(root: Any, slab: Rectangle, elevation: float) -> None:
     )
 
 
-def _add_solid(root: Any, solid: Solid, elevation: float, name: str, bits: int) -> None:
+def _add_solid(root: mujoco.MjsBody, solid: Solid, elevation: float, name: str, bits: int) -> None:
     width, depth, height = solid.size
     pos = [solid.pose.x, solid.pose.y, elevation + solid.base + height / 2]
     quat = [math.cos(solid.pose.yaw / 2), 0, 0, math.sin(solid.pose.yaw / 2)]
@@ -150,7 +160,7 @@ def _add_solid(root: Any, solid: Solid, elevation: float, name: str, bits: int) 
     _add_standing(root, kind, size, bits, pos=pos, quat=quat, name=name)
 
 
-def _add_car(spec: Any, lift: Lift, elevation: float) -> None:
+def _add_car(spec: mujoco.MjSpec, lift: Lift, elevation: float) -> None:
     """The lift car's floor on a slide joint; gravity compensated, so that it stands exactly where it is put."""
     yaw = math.radians(lift.facing)
     car = spec.worldbody.add_body(
@@ -171,7 +181,7 @@ def _add_car(spec: Any, lift: Lift, elevation: float) -> None:
     servo.set_to_position(kp=4e6, dampratio=1.0)
 
 
-def _add_terrain(spec: Any, terrain: Terrain, elevation: float, name: str) -> None:
+def _add_terrain(spec: mujoco.MjSpec, terrain: Terrain, elevation: float, name: str) -> None:
     """Convex pieces that carry wheels as floors do."""
     for index, corners in enumerate(pieces_of(terrain)):
         shape = [(x, y, z + elevation) for x, y, z in corners]
@@ -185,7 +195,7 @@ def _add_terrain(spec: Any, terrain: Terrain, elevation: float, name: str) -> No
         )
 
 
-def _add_thing(root: Any, thing: Thing, elevation: float) -> None:
+def _add_thing(root: mujoco.MjsBody, thing: Thing, elevation: float) -> None:
     """A can on a frictionless foot: it never falls over; damping stands for its friction on the floor."""
     never = mujoco.mjtSleepPolicy.mjSLEEP_NEVER  # it can be put elsewhere at any time
     body = root.add_body(name=f"thing {thing.name}", sleep=never)
@@ -203,7 +213,7 @@ def _add_thing(root: Any, thing: Thing, elevation: float) -> None:
     body.pos = [*thing.at, elevation]
 
 
-def _add_foot(body: Any, name: str, radius: float, at: tuple[float, float]) -> None:
+def _add_foot(body: mujoco.MjsBody, name: str, radius: float, at: tuple[float, float]) -> None:
     """A frictionless ball under a body. Its priority: contacts take its friction (none), not the larger of the two."""
     body.add_geom(
         name=name,
@@ -218,7 +228,7 @@ def _add_foot(body: Any, name: str, radius: float, at: tuple[float, float]) -> N
     )
 
 
-def _add_robot(spec: Any, name: str, body: Body, tilting: bool) -> None:
+def _add_robot(spec: mujoco.MjSpec, name: str, body: Body, tilting: bool) -> None:
     """Chassis on slides x, y, z and a hinge, carried by one frictionless caster; torso on a slide above it.
 
     Where the ground is uneven (``tilting``), hinges for pitch and roll too, carried by a foot where each wheel is.
@@ -272,7 +282,14 @@ def _add_robot(spec: Any, name: str, body: Body, tilting: bool) -> None:
 
 
 def _add_hull(
-    body: Any, name: str, radius: float, height: float, base: float, mass: float, bits: int, travel: float = 0.0
+    body: mujoco.MjsBody,
+    name: str,
+    radius: float,
+    height: float,
+    base: float,
+    mass: float,
+    bits: int,
+    travel: float = 0.0,
 ) -> None:
     """A cylinder that bumps into things; contacts count, without force, from ``travel`` m on before it touches."""
     body.add_geom(
@@ -289,7 +306,7 @@ def _add_hull(
     )
 
 
-def _add_waist(body: Any, name: str, radius: float, gap: float, top: float) -> None:
+def _add_waist(body: mujoco.MjsBody, name: str, radius: float, gap: float, top: float) -> None:
     """What rays hit between chassis and torso (wheels, legs, the lidar's own column): it bumps into nothing."""
     body.add_geom(
         name=name,
@@ -302,7 +319,7 @@ def _add_waist(body: Any, name: str, radius: float, gap: float, top: float) -> N
     )
 
 
-def _add_drive(spec: Any, name: str, body: Body) -> None:
+def _add_drive(spec: mujoco.MjSpec, name: str, body: Body) -> None:
     """Velocity servos along x, y and around z, as strong as the wheels' grip on the floor."""
     hull = body.hull
     grip = body.base.traction * hull.mass * GRAVITY

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
-from typing import Any
 
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.system.health import Health
@@ -22,7 +21,7 @@ class Checker:
     def __init__(self, server: RobotServer) -> None:
         self._server = server
         self.printed: list[str] = []
-        self._checks: Mapping[str, Callable[[Any], str]] = {name: getattr(self, f"_{name}") for name in CHECKS}
+        self._checks: Mapping[str, Callable[[object], str]] = {name: getattr(self, f"_{name}") for name in CHECKS}
 
     def wrong(self, check: Check) -> str:
         """Return what is wrong in plain words; empty: it is true."""

@@ -243,7 +243,7 @@ def find(paths: Sequence[Path]) -> Sequence[Found]:
     return [read(file) for file in files]
 
 
-def schema() -> dict[str, Any]:
+def schema() -> dict[str, object]:
     """Return the JSON schema (2020-12) of a scenario file."""
     made = msgspec.json.schema(Scenario)
     for name, verbs in (("Step", STEPS), ("Check", CHECKS)):

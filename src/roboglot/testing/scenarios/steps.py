@@ -35,7 +35,7 @@ class Steps:
 
     def __init__(self, server: RobotServer, checker: Checker, folder: Path) -> None:
         self._server, self._checker, self._folder = server, checker, folder
-        self._clients: dict[str, Any] = {}
+        self._clients: dict[str, object] = {}
         self._verbs: Mapping[str, Callable[[Step], None]] = {name: getattr(self, f"_{name}") for name in STEPS}
 
     def play(self, step: Step) -> None:
@@ -167,7 +167,7 @@ def _end_group(process: subprocess.Popen[str]) -> None:
         os.killpg(process.pid, signal.SIGKILL)
 
 
-def _has(have: Any, wanted: Any) -> bool:
+def _has(have: object, wanted: object) -> bool:
     """Whether an answer has all that is wanted, and maybe more."""
     if isinstance(wanted, dict):
         return isinstance(have, dict) and all(key in have and _has(have[key], value) for key, value in wanted.items())

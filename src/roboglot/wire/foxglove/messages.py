@@ -143,7 +143,7 @@ def _text(data: bytes, start: int, length: int, most: int) -> tuple[str, int]:
         raise Malformed("a text in a binary message is not UTF-8") from None
 
 
-def message(op: str, **values: Any) -> str:
+def message(op: str, **values: object) -> str:
     """Return a JSON message; what is None is left out."""
     return msgspec.json.encode({"op": op} | {key: item for key, item in values.items() if item is not None}).decode()
 

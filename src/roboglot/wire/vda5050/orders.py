@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from itertools import pairwise
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Literal, TypeVar
 
 import msgspec
 
@@ -30,7 +30,7 @@ class Parameter(msgspec.Struct, frozen=True):
     """One value for an action."""
 
     key: Id
-    value: Any
+    value: object
 
 
 class Action(msgspec.Struct, frozen=True, rename="camel"):
@@ -43,7 +43,7 @@ class Action(msgspec.Struct, frozen=True, rename="camel"):
     retriable: bool = False  # 3.0: it may be tried again after a failure
 
     @property
-    def values(self) -> dict[str, Any]:
+    def values(self) -> dict[str, object]:
         """The parameters by their names."""
         return {parameter.key: parameter.value for parameter in self.action_parameters}
 
@@ -106,8 +106,8 @@ class Edge(Part, frozen=True, rename="camel", kw_only=True):
     maximum_speed: NotNegative | None = None
     max_height: NotNegative | None = None
     maximum_height: NotNegative | None = None
-    orientation: Any = None
-    direction: Any = None
+    orientation: object = None
+    direction: object = None
     rotation_allowed: bool | None = None
     trajectory: object = None
     corridor: object = None

@@ -42,10 +42,10 @@ class CloudAnswer:
 
 
 def format_answer(
-    code: CloudCode, message: str, request: str, items: Sequence[Mapping[str, Any]] | None = None
+    code: CloudCode, message: str, request: str, items: Sequence[Mapping[str, object]] | None = None
 ) -> bytes:
     """The cloud's end; ``data`` is there only where something was asked for."""
-    fields: dict[str, Any] = {"code": str(code), "message": message, "request_id": request}
+    fields: dict[str, object] = {"code": str(code), "message": message, "request_id": request}
     if items is not None:
         fields["data"] = items
     return json.dumps(fields, ensure_ascii=False).encode("utf-8", "replace")

@@ -9,7 +9,7 @@ import json
 import re
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, NoReturn
+from typing import NoReturn
 
 from roboglot.conditions import BadCondition, parse_cycle, parse_interface, parse_moment
 from roboglot.wire.visual.codes import FeedbackState
@@ -66,7 +66,7 @@ class Request:
 class BadFrame(ValueError):
     """Error in a frame, with as much of it as the feedback needs (empty where it was unreadable)."""
 
-    def __init__(self, state: FeedbackState, message: str, fields: dict[str, Any]) -> None:
+    def __init__(self, state: FeedbackState, message: str, fields: dict[str, object]) -> None:
         super().__init__(message)
         self.state = state
         self.kind = _text_of(fields.get("type"))
@@ -120,7 +120,7 @@ class _Checker:
 
     __slots__ = ("_fields",)
 
-    def __init__(self, fields: dict[str, Any]) -> None:
+    def __init__(self, fields: dict[str, object]) -> None:
         self._fields = fields
 
     def refuse(self, state: FeedbackState, message: str) -> NoReturn:

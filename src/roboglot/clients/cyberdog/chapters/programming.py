@@ -18,7 +18,7 @@ FEEDBACK_MAX = 60.0  # s
 class Programs(Calls):
     """A frame and the feedback that carries its id."""
 
-    frames: Feed[Any]  # pushes of 2001
+    frames: Feed[object]  # pushes of 2001
     _numbers = itertools.count(1)
 
     async def send_frame(self, frame: Mapping[str, object]) -> None:
@@ -28,7 +28,7 @@ class Programs(Calls):
         except NoAnswer:
             return
 
-    async def operate(self, kind: str, operate: str, *targets: str, **fields: Any) -> Frame:
+    async def operate(self, kind: str, operate: str, *targets: str, **fields: object) -> Frame:
         """Send a frame and wait for its feedback. Raises CyberDogRefused with the feedback's state, TimedOut."""
         id = f"roboglot-{next(self._numbers)}"
         frame = {"type": kind, "id": id, "operate": operate, "target_id": list(targets), **fields}

@@ -6,7 +6,6 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
 
 from roboglot.model.components.component import Component
 from roboglot.model.components.motion.navigation import Tracks
@@ -181,7 +180,7 @@ class Policy:
     level_home: int = 10
     level_no_cloud: int = 20
     level_no_takeout: int = 30
-    words: Mapping[str, Any] = field(default_factory=dict)  # JSON of a door, kept beside what it stands for
+    words: Mapping[str, object] = field(default_factory=dict)  # JSON of a door, kept beside what it stands for
 
 
 class Delivery(Component):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 from roboglot.model.components.component import Component
 from roboglot.model.components.mapping.annotations import Annotations
@@ -25,7 +24,7 @@ class Replacement:
     """The new drawings, and settings and files that go with them (None: no such file)."""
 
     drawings: Drawings
-    settings: Mapping[str, Any] = field(default_factory=dict)
+    settings: Mapping[str, object] = field(default_factory=dict)
     files: Mapping[str, bytes | None] = field(default_factory=dict)
 
 

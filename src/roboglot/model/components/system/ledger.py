@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from roboglot.model.components.component import Component
 
@@ -13,9 +12,9 @@ class Ledger(Component):
     """JSON documents by kind ("order") and id. What was acknowledged survives a crash."""
 
     @abstractmethod
-    def all(self, kind: str) -> Sequence[tuple[str, Any]]:
+    def all(self, kind: str) -> Sequence[tuple[str, object]]:
         """Ids and documents of the kind, in the order in which their ids first came."""
 
     @abstractmethod
-    async def write(self, kind: str, documents: Mapping[str, Any], *, forget: Sequence[str] = ()) -> None:
+    async def write(self, kind: str, documents: Mapping[str, object], *, forget: Sequence[str] = ()) -> None:
         """Add or replace ``documents`` and drop the ids in ``forget``, all or nothing; returns when safe on disk."""

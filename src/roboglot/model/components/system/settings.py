@@ -20,10 +20,10 @@ class Settings(Component):
         """The value, or ``default`` if never set."""
 
     @abstractmethod
-    async def put(self, key: str, value: Any) -> None:
+    async def put(self, key: str, value: object) -> None:
         """Set it; returns when it is safe on disk."""
 
-    async def keep(self, key: str, value: Any) -> None:
+    async def keep(self, key: str, value: object) -> None:
         """Set what no client waits for: where that fails, the log says so."""
         try:
             await self.put(key, value)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from roboglot.model.components.motion.feet import (
     TROT,
@@ -158,7 +157,7 @@ def _list(record: Record, name: str, kind: str) -> list[Record]:
 
 
 def _number(record: Record, *path: str) -> float:
-    value: Any = record
+    value: object = record
     for name in path:
         value = value.fields.get(name) if isinstance(value, Record) else None
     if not isinstance(value, int | float) or not abs(value) < 1e9:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import msgspec
 
 from roboglot.model.errors import InvalidGoal, NotFound
@@ -21,7 +19,7 @@ class Value(msgspec.Struct):
     """A parameter and its value."""
 
     name: str
-    value: Any = None
+    value: object = None
 
 
 @TABLE.on("getParameters", right=Right.SEE)
@@ -76,7 +74,7 @@ def _set(robot: Robot, value: Value) -> None:
         raise InvalidGoal(f"{value.name} can only be read")
     robot.admission.check(DOOR, f"set {value.name}", parameter.right)
     try:
-        wanted: Any = msgspec.convert(value.value, parameter.kind)
+        wanted: object = msgspec.convert(value.value, parameter.kind)
     except msgspec.ValidationError:
         raise InvalidGoal(f"{value.name} is {'a number' if parameter.kind is float else 'true or false'}") from None
     parameter.write(robot, wanted)

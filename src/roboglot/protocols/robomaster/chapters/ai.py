@@ -82,7 +82,7 @@ class Ai:
                 for attribute in attributes:
                     self._context.send(profile.push("AI", attribute))
 
-    def _numbers(self, name: str, seen: Sequence[Any]) -> Numbers:
+    def _numbers(self, name: str, seen: Sequence[object]) -> Numbers:
         """How many, then the numbers of each."""
         targets = [target for target in (WORDED[name](self, each) for each in seen) if target is not None]
         kept = targets[:TARGETS_MAX]
@@ -128,7 +128,7 @@ def _box(box: Box) -> Numbers:
     return float(box.x), float(box.y), float(box.width), float(box.height)
 
 
-def _detector(vision: Vision, name: str) -> Detector[Any]:
+def _detector(vision: Vision, name: str) -> Detector[object]:
     detectors: dict[str, Detector[Any]] = {
         "person": vision.people,
         "gesture": vision.gestures,

@@ -78,7 +78,7 @@ class SimulatedNetwork(Network):
         tail = zlib.crc32(robot.id.encode()) & 0xFFFFFF
         self._mac = f"{section.maker}:{tail >> 16:02x}:{tail >> 8 & 255:02x}:{tail & 255:02x}"
         self._own_name = f"{section.name}-{tail:06X}"
-        self._unsaved: dict[str, Any] = {}  # for a robot without settings
+        self._unsaved: dict[str, object] = {}  # for a robot without settings
         self._signal = self.strongest = FLOOR_OF_NOISE
         self._ssid = ""  # of the network that it is in
         self._levels: tuple[tuple[float, float, int], dict[str, float]] | None = None  # place, and dBm of all networks
@@ -249,7 +249,7 @@ class SimulatedNetwork(Network):
         document = self._robot[Settings].get(KEY, {}) if Settings in self._robot else self._unsaved
         return document.get(name, default)
 
-    async def _keep(self, **changes: Any) -> None:
+    async def _keep(self, **changes: object) -> None:
         if Settings in self._robot:
             await self._robot[Settings].put(KEY, {**self._robot[Settings].get(KEY, {}), **changes})
         else:

@@ -55,9 +55,9 @@ class Camera(Calls):
         return await self._file(Code.SAVED_FILE, {"file_name": name}, on_progress)
 
     async def _camera(self, command: int) -> None:
-        check(Code.CAMERA, await self.ask(Code.CAMERA, dict[str, Any], {"command": command}), FileError)
+        check(Code.CAMERA, await self.ask(Code.CAMERA, dict, {"command": command}), FileError)
 
-    async def _file(self, code: Code, params: dict[str, Any], on_progress: Progress | None) -> CameraFile:
+    async def _file(self, code: Code, params: dict[str, object], on_progress: Progress | None) -> CameraFile:
         data, name, size = bytearray(), "", 0
         async with aclosing(self.link.fetch(code, msgspec.json.encode(params).decode())) as chunks:
             while (chunk := await self._next(chunks, code)) is not None:

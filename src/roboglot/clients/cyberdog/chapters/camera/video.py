@@ -49,7 +49,7 @@ class Picture:
 class Video(Calls):
     """Image transmission."""
 
-    signals: Feed[Any]  # what is pushed under 4001
+    signals: Feed[object]  # what is pushed under 4001
 
     async def signal(self, signal: Signal) -> None:
         """4001: one message of signalling; the robot's own come in ``signals``."""
@@ -78,7 +78,7 @@ class Video(Calls):
 
         offer_loopback()
         peer = RTCPeerConnection(RTCConfiguration(iceServers=[]))
-        tracks: asyncio.Queue[Any] = asyncio.Queue()
+        tracks: asyncio.Queue[object] = asyncio.Queue()
         peer.add_listener("track", tracks.put_nowait)
         peer.addTransceiver("video", direction="recvonly")
         try:

@@ -43,7 +43,9 @@ class Updates(Calls):
         """5006: s; below 0: not known."""
         return (await self.ask(Code.UPDATE_TIME, _Time)).time
 
-    async def update(self, operate: str, data: object = None, on_feedback: OnUpdate | None = None) -> Mapping[str, Any]:
+    async def update(
+        self, operate: str, data: object = None, on_feedback: OnUpdate | None = None
+    ) -> Mapping[str, object]:
         """5010: "inquire", "download", "upgrade" and what else the robot knows; ``data`` of the result.
 
         Raises CyberDogRefused when it is not accepted (2), and with the result's code when it failed.

@@ -20,11 +20,11 @@ class Status(Calls):
     async def information(self, *topics: str, uid: str = "") -> Mapping[str, Any]:
         """1001: what is asked for of TOPICS (all, if none is named), in the robot's own form."""
         asked = {f"is_{topic}": True for topic in topics or TOPICS}
-        return await self.ask(Code.DEVICE_INFO, dict[str, Any], {**asked, "uid": uid})
+        return await self.ask(Code.DEVICE_INFO, dict, {**asked, "uid": uid})
 
     async def status(self) -> Mapping[str, Any]:
         """10001: the states of the heartbeat."""
-        return await self.ask(Code.STATUS, dict[str, Any])
+        return await self.ask(Code.STATUS, dict)
 
     async def disconnect_app(self) -> None:
         """55001: the robot forgets this app until its next request."""

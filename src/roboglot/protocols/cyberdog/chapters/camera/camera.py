@@ -49,7 +49,7 @@ async def _saved(files: CameraFiles, name: str) -> Path:
     return files.path(name)
 
 
-async def _refused(error: FileError) -> AsyncGenerator[Any, None]:
+async def _refused(error: FileError) -> AsyncGenerator[object, None]:
     yield pb.FileChunk(error_code=error)
 
 

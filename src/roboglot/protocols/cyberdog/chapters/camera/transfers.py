@@ -6,7 +6,6 @@ import asyncio
 import logging
 from collections.abc import AsyncGenerator, Awaitable, Callable
 from pathlib import Path
-from typing import Any
 
 from roboglot.media.video import beside
 from roboglot.model.components.system.disk import LOW, Disk
@@ -50,7 +49,7 @@ class Transfers:
         app.on_found.append(self._found)
         app.on_lost.append(self._lost)
 
-    async def send(self, command: Callable[[], Awaitable[Path]]) -> AsyncGenerator[Any, None]:
+    async def send(self, command: Callable[[], Awaitable[Path]]) -> AsyncGenerator[object, None]:
         """The file that ``command`` yields, or one chunk that tells the error."""
         if self._under_way >= TRANSFERS_MAX:
             yield pb.FileChunk(error_code=FileError.TOO_MANY)

@@ -164,7 +164,7 @@ class Transmission:
     def _tell(self, signal: Signal) -> None:
         self._app.push(SIGNAL, fields_of(signal))
 
-    def _begin(self, work: Coroutine[Any, Any, None]) -> None:
+    def _begin(self, work: Coroutine[object, None, None]) -> None:
         task = asyncio.get_running_loop().create_task(work, name="image transmission")
         self._running.add(task)
         task.add_done_callback(self._done)

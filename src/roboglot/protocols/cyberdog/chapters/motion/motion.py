@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.geometry import STILL
 from roboglot.operations import Right
@@ -52,7 +50,7 @@ async def servo(
         executed = gaits.servo(motion_id, Wish(body=body_of(pos_des, rpy_des)))
     else:
         executed = Executed(MotionCode.UNSUPPORTED)
-    response: dict[str, Any] = {
+    response: dict[str, object] = {
         "motion_id": motion_id,
         "result": executed.code is MotionCode.DONE,
         "code": int(executed.code),
@@ -74,7 +72,7 @@ async def motion(
     step_height: list[float] = [],  # noqa: B006
     contact: Int32 = ALL_FEET,
     duration: Int32 = 0,
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """A motion that ends by itself; ``duration`` in ms (walks, poses). Answered when it has ended, within 20 s."""
     walks, poses = motion_id in WALKS or motion_id == Motion.USER_GAIT, motion_id in POSES
     wish = Wish(

@@ -6,7 +6,6 @@ import asyncio
 import logging
 from collections.abc import Coroutine
 from enum import IntEnum
-from typing import Any
 
 from roboglot.model.components.interaction.members import Members
 from roboglot.model.components.sensing.vision import Vision
@@ -67,7 +66,7 @@ class Faces:
             self._looking.cancel()
         self._looking, self.entering = None, ""
 
-    def _begin(self, work: Coroutine[Any, Any, None]) -> None:
+    def _begin(self, work: Coroutine[object, None, None]) -> None:
         self._looking = asyncio.get_running_loop().create_task(work, name="faces")
 
     async def _enter(self, name: str) -> None:

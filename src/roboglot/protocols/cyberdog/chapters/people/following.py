@@ -6,7 +6,6 @@ import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import msgspec
 
@@ -69,7 +68,7 @@ async def follow_thing(context: Context, task: Task, manner: Manner) -> TaskResu
 
 
 async def _pursue(
-    context: Context, task: Task, pursuit: Pursuit | ThingPursuit, follow: Callable[[Any], Action]
+    context: Context, task: Task, pursuit: Pursuit | ThingPursuit, follow: Callable[[object], Action]
 ) -> TaskResult:
     task.feedback(Feedback.ACTIVATING)
     task.feedback(Feedback.FOLLOW_STARTING)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
 
 import msgspec
 
@@ -38,7 +37,7 @@ class WireDevice(msgspec.Struct):
 
 
 @TABLE.on(Code.SCAN_BLUETOOTH, right=Right.EDIT, needs=(Bluetooth,))
-async def scan(call: Call, *, scan_seconds: float = 0.0) -> dict[str, Any]:
+async def scan(call: Call, *, scan_seconds: float = 0.0) -> dict[str, object]:
     """What is heard in ``scan_seconds`` and was not connected before; 0: what was connected once.
 
     While a device is connected nothing is scanned: the last scan's devices are returned.

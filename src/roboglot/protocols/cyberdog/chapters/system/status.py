@@ -60,7 +60,7 @@ def status_of(context: Context) -> Status:
     )
 
 
-def ticks(context: Context, address: str) -> Any:
+def ticks(context: Context, address: str) -> object:
     """One heartbeat; ``address`` is where the app finds the robot."""
     status = status_of(context)
     return pb.Ticks(
@@ -96,7 +96,7 @@ async def query_status(call: Call) -> dict[str, object]:
     }
 
 
-def _battery(context: Context) -> dict[str, Any]:
+def _battery(context: Context) -> dict[str, object]:
     if Battery not in context.robot:
         return {}
     state = context.robot[Battery].state
@@ -124,7 +124,7 @@ def _strength(robot: Robot) -> int:
     return wifi_strength(robot[Network].signal) if Network in robot and robot[Network].connected else 0
 
 
-def _versions(context: Context) -> dict[str, Any]:
+def _versions(context: Context) -> dict[str, object]:
     """The whole, and the single boards' as the firmware knows them ("board.module")."""
     robot = context.robot
     if Firmware not in robot:

@@ -9,7 +9,6 @@ import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from roboglot.model.components.system.disk import Disk
 from roboglot.model.components.system.firmware import (
@@ -150,7 +149,7 @@ class UpdateJobs:
         self._updates.restart()
         return {**done, "seconds": NOTICE}
 
-    async def remove(self, _: Goal) -> dict[str, Any]:
+    async def remove(self, _: Goal) -> dict[str, object]:
         """Throw away what was downloaded."""
         if self._robot[Firmware].progress.state is not FirmwareState.DOWNLOADED:
             raise Unable(STATE, "nothing is downloaded")
@@ -164,7 +163,7 @@ class UpdateJobs:
         self._updates.restart()
         return {"seconds": NOTICE}
 
-    async def reset(self, _: Goal) -> dict[str, Any]:
+    async def reset(self, _: Goal) -> dict[str, object]:
         """Give up what is under way, and throw away what was downloaded."""
         if self._robot[Firmware].progress.state in (FirmwareState.INSTALLED, FirmwareState.REBOOTING):
             raise Unable(BUSY, "what is installed is there to stay")
@@ -172,7 +171,7 @@ class UpdateJobs:
         await self._robot[Firmware].discard()
         return {}
 
-    async def disk(self, _: Goal) -> dict[str, Any]:
+    async def disk(self, _: Goal) -> dict[str, object]:
         """How much room there is, in bytes."""
         disk = self._robot[Disk]
         return {"size": disk.size, "free": disk.free}

@@ -12,7 +12,6 @@ import hashlib
 import logging
 from collections.abc import Callable, Coroutine, Iterable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import msgspec
 
@@ -207,7 +206,7 @@ class MapKeeper:
             return _parsed(data)
         return await asyncio.to_thread(_parsed, data)
 
-    async def _use(self, floor: FloorMap, pose: Pose | None, draw: Coroutine[Any, Any, None]) -> None:
+    async def _use(self, floor: FloorMap, pose: Pose | None, draw: Coroutine[object, None, None]) -> None:
         """The grid to memory, what is on it by ``draw``, and the robot to ``pose``, else to its dock."""
         self._loading = True
         try:

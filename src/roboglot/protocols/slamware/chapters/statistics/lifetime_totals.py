@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Any
 
 from roboglot.model.clock import Timer
 from roboglot.model.components.sensing.odometry import Odometry
@@ -21,7 +20,7 @@ class Totals:
         self._robot = robot
         self._before = (0.0, 0.0)
         self._timer: Timer | None = None
-        self._keeping: asyncio.Task[Any] | None = None
+        self._keeping: asyncio.Task[object] | None = None
 
     def start(self) -> None:
         """Remember what was before, and keep what comes."""
