@@ -87,6 +87,8 @@ class Hull:
         self.hand: float | None = None  # height in the world at which a hand holds the base_link, m
         self.standing = 1.0  # share of the wheels that touch the ground
         self.overturned = False
+        # Whether wheels pull along the floor, it was seen to stand still, something else than physics moved it.
+        self.pulls = self.rests = self.disturbed = False
         self._belly: int | None = None
         self.legs: HullLegs | None = None
         if body.legs:
@@ -126,6 +128,7 @@ class Hull:
     def place(self, pose: Pose, floor: int) -> None:
         """Put it there, standing still."""
         self.support.release()
+        self.disturbed = True
         height = self._elevations[floor]
         if self._tilts:
             wheels = [pose.compose(Pose(x, y)) for x, y in wheel_places(self.body)]
@@ -139,6 +142,7 @@ class Hull:
 
     def halt_at(self, pose: Pose) -> None:
         """Something stops it dead over the ground, here."""
+        self.disturbed = True
         turned = self.turned + wrap_angle(pose.yaw - self.turned)
         self._data.qpos[self._q], self._data.qpos[self._q + 1], self._data.qpos[self._q + 3] = pose.x, pose.y, turned
         self._data.qvel[self._v], self._data.qvel[self._v + 1], self._data.qvel[self._v + 3] = 0.0, 0.0, 0.0
@@ -229,6 +233,7 @@ class Hull:
         """Let the wheels pull at ``twist`` (base_link) for the next ``seconds``, if they stand on the ground."""
         if self.hand is not None or self.overturned or self._free:
             self._servos[1][:] = 0.0  # the hand holds it, or it lies there
+            self.pulls = False
             return
         vx, vy = twist.x, twist.y
         if self._tilts:  # the wheels measure along the slope, and hold against it
@@ -241,6 +246,7 @@ class Hull:
             c, s = math.cos(yaw), math.sin(yaw)
             vx, vy = c * vx - s * vy, s * vx + c * vy
         speeds[0], speeds[1], speeds[2] = vx, vy, twist.yaw
+        self.pulls = bool(vx or vy)
 
     def stand(self, wheels: float) -> None:
         """Take note that this share of the wheels touches the ground: as much force do they pass on."""
@@ -274,6 +280,7 @@ class Hull:
     def push(self, x: float, y: float, z: float) -> None:
         """Give it a blow (N s, base_link)."""
         self.support.release()
+        self.disturbed = True
         c, s = math.cos(self.turned), math.sin(self.turned)
         mass = self.mass
         self._data.qvel[self._v : self._v + 3] += ((c * x - s * y) / mass, (s * x + c * y) / mass, z / mass)

@@ -6,6 +6,7 @@ of a step of the physics.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -31,6 +32,8 @@ class Nearness:
         self._x = self._y = 0.0  # where it was looked last
         self._floor = -1
         self._free = 0.0  # m from there
+        self._next = -math.inf  # m from there to the nearest
+        self._radius = radius
         self._duties: list[Duty] = []
         self.near = True  # before it knows where things are, they may be anywhere
 
@@ -52,6 +55,12 @@ class Nearness:
             return -1.0
         return self._free - abs(x - self._x) - abs(y - self._y)
 
+    def gap(self, x: float, y: float, floor: int) -> float:
+        """Return the room (m) that a robot at that place has around it at least; less than nothing: that is unknown."""
+        if floor != self._floor or self._room is None:
+            return -math.inf
+        return self._next - self._radius - abs(x - self._x) - abs(y - self._y)
+
     def look(self, x: float, y: float, floor: int) -> bool:
         """Note that the robot is there now; True if that changed whether something may be near."""
         if floor == self._floor and abs(x - self._x) + abs(y - self._y) <= self._free:
@@ -59,7 +68,8 @@ class Nearness:
         if self._room is None:
             return False
         self._x, self._y, self._floor = x, y, floor
-        free = self._room(x, y, floor) - self._zone
+        self._next = self._room(x, y, floor)
+        free = self._next - self._zone
         before, self.near = self.near, free <= 0.0
         self._free = AGAIN if self.near else free
         if self.near and not before:

@@ -21,9 +21,11 @@ from roboglot.simulation.building.terrain import Ground
 from roboglot.simulation.building.things import Things
 from roboglot.simulation.people.people import keyed
 from roboglot.simulation.world.description import WorldDescription
+from roboglot.simulation.world.meetings import Meetings
 from roboglot.simulation.world.rays import Rays
 from roboglot.simulation.world.scene import TIMESTEP, VISITORS_MAX, build, visitors
 
+JUMP = 0.1  # m that no person walks in a tick
 LIGHT = 1.0  # kg; a thing that weighs less gives way before a bumper does
 _compiled = lru_cache(maxsize=8)(build)
 
@@ -74,6 +76,8 @@ class Physics:
             if thing.mass < LIGHT
         }
         self.things = Things(model, self._data, world)
+        calm = not (self.ground.uneven or any(floor.things for floor in world.floors))
+        self._meetings = Meetings(model, self._data, list(self.hulls.values()), self.props, possible=calm)
 
     def step(self, seconds: float, meanwhile: Callable[[float], None] | None = None) -> None:
         """Let ``seconds`` pass with the controls as they are, and note what touches whom.
@@ -84,6 +88,7 @@ class Physics:
         for hull in self.hulls.values():
             if hull.hand is not None:
                 hull.handle()
+        self._meetings.look(seconds)
         if meanwhile is None:
             mujoco.mj_step(self._model, self._data, nstep=steps)
         else:
@@ -113,6 +118,9 @@ class Physics:
         """Have a person stand at ``pose``."""
         person = self._people[body]
         self._places[person.mocap] = pose.x, pose.y, self._elevations[floor] + person.half
+        if not (abs(pose.x - person.x) < JUMP and abs(pose.y - person.y) < JUMP):
+            self._meetings.forget()
+        person.x, person.y = pose.x, pose.y
         if pose.yaw != person.facing:
             person.facing = pose.yaw
             self._attitudes[person.mocap] = math.cos(pose.yaw / 2), 0.0, 0.0, math.sin(pose.yaw / 2)
@@ -121,7 +129,7 @@ class Physics:
     def remove_person(self, body: str) -> None:
         """Take a person away; ``move_person`` brings them back."""
         person = self._people[body]
-        self._places[person.mocap] = AWAY
+        self._places[person.mocap], person.x = AWAY, math.nan
         self._model.body_conaffinity[person.id] = 0
 
     def spare_person(self, there: Container[str]) -> str:
@@ -178,7 +186,7 @@ class Physics:
         data = self._data
         # A caster's contact is frictionless: one constraint. Only a touching hull makes more constraints than contacts
         # (limp legs do too, which costs a useless look) or more contacts than there are feet, and looking is dear.
-        if data.nefc <= data.ncon <= feet and not before:
+        if (not data.nefc or data.nefc <= data.ncon <= feet) and not before:
             return
         geoms, near = data.contact.geom, data.contact.dist <= 0.0
         mine = self._hulls_of[geoms]
@@ -212,4 +220,4 @@ class _Standing:
         geom = body.geomadr[0]
         self.id, self.mocap, self.bits = body.id, int(body.mocapid[0]), int(model.geom_conaffinity[geom])
         self.half = float(model.geom_size[geom][:2].sum())  # m: of a capsule, radius and half its straight part
-        self.facing = math.nan
+        self.x = self.y = self.facing = math.nan

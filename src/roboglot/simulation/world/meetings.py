@@ -1,0 +1,108 @@
+"""Whether robots may touch anything in the next steps; while none can, the physics looks for no contacts.
+
+To look for them is half of a step of the physics, wherever everything is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.building.props import AWAY, Props
+
+ROOM = 0.05  # m that are kept free of doubt: more than contacts reach beyond the shapes
+PERSON_MAX = 3.0  # m/s
+STILL = 1e-6  # m/s
+HORIZON = 1.0  # s
+AGAIN, AGAIN_MAX = 0.1, 1.0  # s until it is looked again after something was near: the first time; at most
+WORTH = 0.06  # s: for less it does not pay to look
+NO_CONTACTS = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+
+
+class Meetings:
+    """Counts everything as round, and all floors as one."""
+
+    def __init__(self, model: Any, data: Any, hulls: Sequence[Hull], props: Props, *, possible: bool) -> None:
+        """``possible``: whether there may be moments without contacts at all in this world."""
+        self._model, self._data, self._hulls, self._props, self._possible = model, data, hulls, props, possible
+        bodies = np.flatnonzero(model.body_mocapid >= 0)
+        bodies = bodies[np.argsort(model.body_mocapid[bodies])]
+        self._geoms = model.body_geomadr[bodies]
+        self._round = model.geom_type[self._geoms] == mujoco.mjtGeom.mjGEOM_CAPSULE  # people; else boxes
+        self._radii = np.array([hull.body.hull.radius for hull in hulls])
+        self._tops = np.array([hull.body.base.speed for hull in hulls])
+        self._revision = -1
+        self._off = False  # whether it looks for none now
+        self._left = 0.0  # s until it has to be looked again
+        self._wait = AGAIN
+
+    def forget(self) -> None:
+        """Something was put elsewhere at once."""
+        self._switch(off=False)
+        self._left = 0.0
+
+    def look(self, seconds: float) -> None:
+        """Before a step of so many ``seconds``: have the physics look for contacts in it, or not."""
+        if not self._possible:
+            return
+        revision = sum(self._props.revisions.values())
+        if revision != self._revision or (self._off and not all(map(self._as_expected, self._hulls))):
+            self._revision = revision
+            self.forget()
+        self._left -= seconds
+        if self._left >= 0.0:
+            return
+        free = self._free() if self._is_calm() else 0.0
+        self._switch(off=bool(free >= WORTH))
+        self._wait = AGAIN if self._off else min(2.0 * self._wait, AGAIN_MAX)
+        self._left = free - seconds if self._off else self._wait
+
+    def _switch(self, *, off: bool) -> None:
+        if off is not self._off:
+            self._off = off
+            flags = int(self._model.opt.disableflags)
+            self._model.opt.disableflags = flags | NO_CONTACTS if off else flags & ~NO_CONTACTS
+
+    def _as_expected(self, hull: Hull) -> bool:
+        return hull.support.sprung and not (hull.disturbed or (hull.rests and hull.pulls))
+
+    def _is_calm(self) -> bool:
+        """Whether all robots stand on springs and nothing presses on anything; notes which of them rest."""
+        for hull in self._hulls:
+            vx, vy, _, _ = hull.motion
+            hull.rests = not hull.pulls and abs(vx) < STILL and abs(vy) < STILL
+            hull.disturbed = False
+        return not self._data.nefc and all(hull.support.sprung and not hull.touches for hull in self._hulls)
+
+    def _free(self) -> float:
+        """Seconds in which nothing can come to touch a robot, HORIZON at most."""
+        places, sizes = self._data.mocap_pos, self._model.geom_size[self._geoms]
+        there = places[:, 2] > AWAY[2] / 2
+        hulls = np.array([(hull.x, hull.y) for hull in self._hulls])
+        speeds = np.array([0.0 if hull.rests else math.hypot(*hull.motion[:2]) for hull in self._hulls])
+        speeds = np.where([hull.rests for hull in self._hulls], 0.0, np.maximum(speeds, self._tops))
+        radii = np.where(self._round, sizes[:, 0], np.hypot(sizes[:, 0], sizes[:, 1]))[there]
+        away = np.hypot(hulls[:, 0, None] - places[there, 0], hulls[:, 1, None] - places[there, 1])
+        gaps = away - radii - self._radii[:, None] - ROOM
+        closing = speeds[:, None] + np.where(self._round[there], PERSON_MAX, 0.0)
+        free = min(HORIZON, _soonest(gaps, closing))
+        for index, hull in enumerate(self._hulls):
+            if speeds[index] > 0.0:
+                free = min(free, (hull.walls.gap(hull.x, hull.y, hull.floor) - ROOM) / speeds[index])
+        if len(hulls) > 1:
+            first, second = np.triu_indices(len(hulls), 1)
+            away = np.hypot(*(hulls[first] - hulls[second]).T)
+            gaps = away - self._radii[first] - self._radii[second] - ROOM
+            free = min(free, _soonest(gaps, speeds[first] + speeds[second]))
+        return free
+
+
+def _soonest(gaps: Any, closing: Any) -> float:
+    """When the first of the gaps (m) that close at these speeds (m/s) may be closed; never where nothing moves."""
+    moving = closing > 0.0
+    return float(np.min(gaps[moving] / closing[moving], initial=math.inf))

@@ -1,0 +1,65 @@
+"""The physics looks for contacts only while some may come about: what happens is the same as if it always looked."""
+
+from __future__ import annotations
+
+import contextlib
+
+import pytest
+
+from roboglot.model.components.motion.base import Base
+from roboglot.model.errors import Collided
+from roboglot.model.geometry import Pose, Twist, Vector3
+from roboglot.simulation.world.meetings import Meetings
+
+from .conftest import Simulate, Simulation
+
+WAYS = (Twist(0.3), Twist(-0.2, 0.1, 0.5), Twist(), Twist(0.0, 0.4, -0.3), Twist(0.9), Twist(0.0, 0.0, 1.0))
+
+
+async def lived(simulation: Simulation) -> tuple[list[object], int, int]:
+    """Drive through the office, into walls, people and each other: all that was so, ticks without contacts, touches."""
+    world, clock, told, calm, touched = simulation.world, simulation.clock, list[object](), 0, 0
+    physics = world._physics
+    world.start()
+    await clock.advance(0.5)
+    for second in range(24):
+        for number, robot in enumerate(simulation.robots.values()):
+            with contextlib.suppress(Collided):
+                robot[Base].set_velocity(WAYS[(second + 2 * number) % len(WAYS)])
+        if second == 7:
+            world.hands.place("a", Pose(4.0, 2.0, 1.0))
+        if second == 9:
+            world.hands.add_obstacle(Pose(4.5, 2.4, 0.3), (0.4, 0.4, 0.5))
+        if second == 12:
+            there = world.truth.pose_of("b")
+            world.hands.add_person(Pose(there.x + 0.5, there.y + 0.3))
+        if second == 16:
+            world.hands.push("b", Vector3(20.0, 10.0))
+        for _ in range(50):
+            await clock.advance(0.02)
+            calm += bool(physics._model.opt.disableflags)
+            for hull in physics.hulls.values():
+                touched += bool(hull.touches)
+                told.append((hull.x, hull.y, hull.elevation, hull.turned, list(hull.touches)))
+    return told, calm, touched
+
+
+async def test_what_is_not_looked_for_does_not_happen(simulate: Simulate, monkeypatch: pytest.MonkeyPatch) -> None:
+    sparing, calm, touched = await lived(simulate("office", robots=("a", "b"), seed=3))
+    monkeypatch.setattr(Meetings, "look", lambda *_: None)
+    thorough, always, _ = await lived(simulate("office", robots=("a", "b"), seed=3))
+    assert sparing == thorough
+    assert calm > 50
+    assert touched > 20
+    assert not always
+
+
+async def test_alone_on_the_floor_no_contact_is_looked_for(simulate: Simulate) -> None:
+    simulation = simulate("empty")
+    options = simulation.world._physics._model.opt
+    simulation.world.start()
+    await simulation.clock.advance(2.0)
+    assert options.disableflags
+    simulation.world.hands.add_person(simulation.pose.compose(Pose(0.6)))
+    await simulation.clock.advance(0.02)
+    assert not options.disableflags
