@@ -61,7 +61,7 @@ class Walker:
         self.emotion = person.emotion
         self.walking = False
         self.displaced = False  # whether they were put elsewhere since the last tick
-        self._aloud: list[Say | Clap] = []
+        self.aloud: list[Say | Clap] = []  # what they began to say or clap since it was fetched last
         self._script = person.script or tuple(_strolling(person))
         self._number = 0
         self._told: deque[Step] | None = None  # None: they follow their script
@@ -106,9 +106,7 @@ class Walker:
 
     def fetch(self) -> Sequence[Say | Clap]:
         """What they began to say or clap since the last time."""
-        if not self._aloud:
-            return ()
-        aloud, self._aloud = self._aloud, []
+        aloud, self.aloud = self.aloud, []
         return aloud
 
     # -- orders --------------------------------------------------------------------------------------------
@@ -150,7 +148,8 @@ class Walker:
         before, self._elapsed = self.pose, self._elapsed + seconds
         if self._do(seconds, robots, free):
             self.doing = None
-        return moved or (self.pose is not before and self.pose != before)
+        after = self.pose
+        return moved or after.x != before.x or after.y != before.y or after.yaw != before.yaw
 
     def _begin(self) -> bool:
         """Take up the next step, if there is any."""
@@ -164,7 +163,7 @@ class Walker:
         self._elapsed = 0.0
         match self.doing:
             case Say() | Clap():
-                self._aloud.append(self.doing)
+                self.aloud.append(self.doing)
             case Feel(emotion=emotion):
                 self.emotion = emotion
         return self.doing is not None
@@ -172,10 +171,10 @@ class Walker:
     def _do(self, seconds: float, robots: Sequence[Placed], free: Free) -> bool:
         """True if the step is over."""
         match self.doing:
-            case Walk(to=to, speed=speed):
-                if self._lets_pass(Point(*to), robots, seconds, free):
+            case Walk(to=(x, y), speed=speed):
+                if self._lets_pass(x, y, robots, seconds, free):
                     return False
-                return self._step(*to, (speed or self.person.speed) * seconds)
+                return self._step(x, y, (speed or self.person.speed) * seconds)
             case Look(at=at):
                 return self._turn(self.pose.point.bearing_to(Point(*at)), TURN_RATE * seconds)
             case Wait(seconds=span) | Show(seconds=span):
@@ -189,13 +188,14 @@ class Walker:
             case _:
                 return True
 
-    def _lets_pass(self, to: Point, robots: Sequence[Placed], seconds: float, free: Free) -> bool:
+    def _lets_pass(self, x: float, y: float, robots: Sequence[Placed], seconds: float, free: Free) -> bool:
         """True if they wait for a robot that is close and in the way, or step aside for one that does not move."""
         if self._dodging is not None:
             self._dodge(self._dodging, robots, self.person.speed * seconds)
             return True
         pose = self.pose
-        heading = pose.point.bearing_to(to) if pose.point.distance_to(to) > 1e-9 else pose.yaw
+        dx, dy = x - pose.x, y - pose.y
+        heading = math.atan2(dy, dx) if math.hypot(dx, dy) > 1e-9 else pose.yaw
         c, s = math.cos(heading), math.sin(heading)
         for robot in robots:
             off_x, off_y = robot.x - pose.x, robot.y - pose.y

@@ -245,8 +245,9 @@ class World:
         for walker in self._walkers:
             if walker.walk(TICK, robots.get(walker.floor, ()), self._environment.surroundings.lines.leads):
                 self._physics.move_person(walker.body, walker.pose, walker.floor)
-            for step in walker.fetch():
-                self._sound(walker, step)
+            if walker.aloud:
+                for step in walker.fetch():
+                    self._sound(walker, step)
 
     def _sound(self, walker: Walker, step: Say | Clap) -> None:
         """Let a person be heard, unless there are too many sounds already."""

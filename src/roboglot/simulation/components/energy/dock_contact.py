@@ -33,6 +33,7 @@ class SimulatedDockContact(DockContact):
     ) -> None:
         self._section, self._hull, self._docks, self._events = section, hull, docks, events
         self._far = 0.0  # stamp up to which docks are out of reach
+        self._felt = 0.0, 0.0, 0.0, -1  # where it felt for one last: x, y, yaw, floor
         self._docked, _ = self._touches()
 
     @property
@@ -43,6 +44,11 @@ class SimulatedDockContact(DockContact):
         """Feel for a dock; while none is near, not in every tick."""
         if stamp < self._far:
             return
+        hull = self._hull
+        here = hull.x, hull.y, hull.turned, hull.floor
+        if here == self._felt:  # it stands
+            return
+        self._felt = here
         touches, away = self._touches()
         self._far = stamp + away / FASTEST
         if touches != self._docked:
