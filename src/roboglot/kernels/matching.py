@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from roboglot.kernels.arrays import FloatArray, Int16Array, SingleArray
+from roboglot.kernels.arrays import FloatArray, Int16Array, IntArray, SingleArray
 from roboglot.kernels.compiled import kernel
 from roboglot.kernels.linear import invert
 from roboglot.kernels.occupancy import is_surface
@@ -18,39 +18,55 @@ SIGMA = 0.02  # m, of a point against a surface
 SIGMA_LOOSE = 0.06  # m, where the surface has no clear direction
 ROBUST, ROBUST_START = 0.06, 0.24  # m, beyond which a point loses its influence: at the end, at the start
 INLIER = 0.08  # m
+CELLS = 25  # around a point, its own among them
 MOVED = 0.0002  # m, from which a point's surface is looked up again: no more than what ends the match
 CORRELATION = 0.1  # points are not independent: share of their information that is believed
 
 
-@kernel("UniTuple(float64, 5)(float32[:,:,::1], int16[:,::1], float64, float64, float64, float64, float64)")
-def surface_near(
-    surface: SingleArray, evidence: Int16Array, x: float, y: float, beam_x: float, beam_y: float, resolution: float
-) -> tuple[float, float, float, float, float]:
-    """The surface around (x, y) as seen along the beam: mean x and y, normal x and y (0, 0: unclear), weight."""
-    height, width = evidence.shape
-    col, row = int(np.floor(x / resolution)), int(np.floor(y / resolution))
-    total = mean_x = mean_y = xx = xy = yy = 0.0
-    for r in range(max(0, row - 2), min(height, row + 3)):
-        for c in range(max(0, col - 2), min(width, col + 3)):
+@kernel("int64(float32[:,:,::1], int16[:,::1], int64, int64, float64, float64[:,:,::1], int64)")
+def _surfaces(
+    surface: SingleArray, evidence: Int16Array, row: int, col: int, resolution: float, around: FloatArray, i: int
+) -> int:
+    """Fill ``around[i]`` with the surfaces in the cells around (row, col); returns how many there are.
+
+    Of each: mean x and y of its hits, the summed unit vector towards the sensors, the number of hits.
+    """
+    count = 0
+    for r in range(max(0, row - 2), min(evidence.shape[0], row + 3)):
+        for c in range(max(0, col - 2), min(evidence.shape[1], col + 3)):
             hits = surface[r, c, 0]
-            if hits <= 0.0 or not is_surface(evidence, r, c):
+            if hits <= 0.0 or not (evidence[r, c] > 0 or is_surface(evidence, r, c)):
                 continue
-            if surface[r, c, 3] * beam_x + surface[r, c, 4] * beam_y > 0.2 * hits:
-                continue
-            # Relative to (x, y), for precision.
             one = 1.0 / hits
-            dx = surface[r, c, 1] * one + c * resolution - x
-            dy = surface[r, c, 2] * one + r * resolution - y
-            near = 1.0 - (dx * dx + dy * dy) / (SPREAD * SPREAD)
-            if near <= 0.0:
-                continue
-            weight = min(hits, 10.0) * near * near
-            total += weight
-            mean_x += weight * dx
-            mean_y += weight * dy
-            xx += weight * dx * dx
-            xy += weight * dx * dy
-            yy += weight * dy * dy
+            around[i, count, 0] = surface[r, c, 1] * one + c * resolution
+            around[i, count, 1] = surface[r, c, 2] * one + r * resolution
+            around[i, count, 2], around[i, count, 3], around[i, count, 4] = surface[r, c, 3], surface[r, c, 4], hits
+            count += 1
+    return count
+
+
+@kernel("UniTuple(float64, 5)(float64[:,:,::1], int64, int64, float64, float64, float64, float64)")
+def _line(
+    around: FloatArray, i: int, count: int, x: float, y: float, beam_x: float, beam_y: float
+) -> tuple[float, float, float, float, float]:
+    """The surface around (x, y) as ``surface_near`` has it, from the ``count`` rows of ``around[i]``."""
+    total = mean_x = mean_y = xx = xy = yy = 0.0
+    for k in range(count):
+        hits = around[i, k, 4]
+        if around[i, k, 2] * beam_x + around[i, k, 3] * beam_y > 0.2 * hits:
+            continue
+        # Relative to (x, y), for precision.
+        dx, dy = around[i, k, 0] - x, around[i, k, 1] - y
+        near = 1.0 - (dx * dx + dy * dy) / (SPREAD * SPREAD)
+        if near <= 0.0:
+            continue
+        weight = min(hits, 10.0) * near * near
+        total += weight
+        mean_x += weight * dx
+        mean_y += weight * dy
+        xx += weight * dx * dx
+        xy += weight * dx * dy
+        yy += weight * dy * dy
     if total < 1e-3:
         return 0.0, 0.0, 0.0, 0.0, 0.0
     share = 1.0 / total
@@ -63,6 +79,16 @@ def surface_near(
     cosine = (xx - yy) / (2.0 * root)  # of twice the surface's direction
     along, aside = np.sqrt(max(0.0, (1.0 + cosine) / 2.0)), np.sqrt(max(0.0, (1.0 - cosine) / 2.0))
     return x + mean_x, y + mean_y, (aside if xy < 0.0 else -aside), along, total
+
+
+@kernel("UniTuple(float64, 5)(float32[:,:,::1], int16[:,::1], float64, float64, float64, float64, float64)")
+def surface_near(
+    surface: SingleArray, evidence: Int16Array, x: float, y: float, beam_x: float, beam_y: float, resolution: float
+) -> tuple[float, float, float, float, float]:
+    """The surface around (x, y) as seen along the beam: mean x and y, normal x and y (0, 0: unclear), weight."""
+    around = np.empty((1, CELLS, 5))
+    row, col = int(np.floor(y / resolution)), int(np.floor(x / resolution))
+    return _line(around, 0, _surfaces(surface, evidence, row, col, resolution, around, 0), x, y, beam_x, beam_y)
 
 
 @kernel()
@@ -89,12 +115,15 @@ def _linearise(
     resolution: float,
     reach: float,
     lines: FloatArray,
+    places: IntArray,
+    around: FloatArray,
     system: FloatArray,
 ) -> tuple[int, int]:
     """Fill the normal equations at ``pose``; returns how many points fit a surface, how many lie in known cells.
 
     ``reach`` (m): beyond it a point loses its influence. ``lines`` (n, 7): where each point was when its surface was
-    looked up, and what was found; it is looked up again when the point has moved.
+    looked up, and what was found; it is looked up again when the point has moved. ``places`` (n, 3): the cell then, and
+    how many surfaces ``around`` (n, CELLS, 5) it there are.
     """
     height, width = evidence.shape
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
@@ -113,7 +142,10 @@ def _linearise(
         if not abs(x - lines[i, 0]) + abs(y - lines[i, 1]) < MOVED:
             beam_x, beam_y = x - sensor_x, y - sensor_y
             away = np.sqrt(beam_x * beam_x + beam_y * beam_y) + 1e-9
-            found = surface_near(surface, evidence, x, y, beam_x / away, beam_y / away, resolution)
+            if places[i, 0] != row or places[i, 1] != col:
+                places[i, 0], places[i, 1] = row, col
+                places[i, 2] = _surfaces(surface, evidence, row, col, resolution, around, i)
+            found = _line(around, i, places[i, 2], x, y, beam_x / away, beam_y / away)
             lines[i, 0], lines[i, 1] = x, y
             lines[i, 2], lines[i, 3], lines[i, 4], lines[i, 5], lines[i, 6] = found
         mean_x, mean_y, nx, ny, weight = lines[i, 2], lines[i, 3], lines[i, 4], lines[i, 5], lines[i, 6]
@@ -155,16 +187,16 @@ def gaps(
 
     inf and 0: there is none near. The more hits made the surface, the greater is its weight.
     """
-    found = np.empty((points.shape[0], 2))
+    found, around = np.empty((points.shape[0], 2)), np.empty((1, CELLS, 5))
     cos, sin = np.cos(yaw), np.sin(yaw)
     for i in range(points.shape[0]):
         beam_x = cos * (points[i, 0] - sensor[0]) - sin * (points[i, 1] - sensor[1])
         beam_y = sin * (points[i, 0] - sensor[0]) + cos * (points[i, 1] - sensor[1])
         away = np.sqrt(beam_x * beam_x + beam_y * beam_y) + 1e-9
         px, py = x + cos * points[i, 0] - sin * points[i, 1], y + sin * points[i, 0] + cos * points[i, 1]
-        mean_x, mean_y, nx, ny, weight = surface_near(
-            surface, evidence, px, py, beam_x / away, beam_y / away, resolution
-        )
+        row, col = int(np.floor(py / resolution)), int(np.floor(px / resolution))
+        count = _surfaces(surface, evidence, row, col, resolution, around, 0)
+        mean_x, mean_y, nx, ny, weight = _line(around, 0, count, px, py, beam_x / away, beam_y / away)
         found[i, 1] = weight
         if weight == 0.0:
             found[i, 0] = np.inf
@@ -211,15 +243,16 @@ def match(
     """
     pose, step, right, system = np.empty(3), np.empty(3), np.empty(3), np.empty(9)
     information, normal, lines = np.empty((3, 3)), np.empty((3, 3)), np.empty((points.shape[0], 7))
+    places, around = np.empty((points.shape[0], 3), np.int64), np.empty((points.shape[0], CELLS, 5))
     for i in range(points.shape[0]):
-        lines[i, 0] = np.inf
+        lines[i, 0], places[i, 0] = np.inf, -1
     for i in range(3):
         pose[i] = start[i]
         for j in range(3):
             information[i, j] = covariance[i, j]
     invert(information)
     reach = ROBUST_START if iterations > 0 else ROBUST
-    fit, known = _linearise(surface, evidence, points, pose, sensor, resolution, reach, lines, system)
+    fit, known = _linearise(surface, evidence, points, pose, sensor, resolution, reach, lines, places, around, system)
     for _ in range(iterations):
         _covariance(information, system, normal)
         for i in range(3):
@@ -232,7 +265,9 @@ def match(
             pose[i] += step[i]
         settled = reach <= ROBUST
         reach = max(ROBUST, reach * 0.5)
-        fit, known = _linearise(surface, evidence, points, pose, sensor, resolution, reach, lines, system)
+        fit, known = _linearise(
+            surface, evidence, points, pose, sensor, resolution, reach, lines, places, around, system
+        )
         if settled and abs(step[0]) + abs(step[1]) < 2e-4 and abs(step[2]) < 1e-4:
             break
     strain = 0.0

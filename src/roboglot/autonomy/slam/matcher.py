@@ -30,6 +30,7 @@ SEARCH_POINTS_MAX = 180
 WIDE = (0.5, math.radians(20.0))  # m, rad that are searched around a place in doubt
 UNKNOWN_SCORE = 50  # of 255, for a point where nothing is known: better than in floor that was seen free
 EDGE_COST = 0.1  # of a perfect score: what a pose at the edge of the window must fit better than one in its middle
+LEAST = np.where(np.eye(3, dtype=bool), SURE, -np.inf)  # variances; covariances may be anything
 FREE = np.diag((0.1**2, 0.1**2, 0.05**2))  # variances that leave the match to the scan
 HEADINGS = 240  # tried when the robot may be anywhere
 PYRAMID_LEVELS = 7
@@ -121,7 +122,7 @@ def fit(
     found, narrowed, strain, fitting, known = match(
         grid.surface, grid.evidence, points, first, centre, covariance, sensor, RESOLUTION, iterations
     )
-    np.fill_diagonal(narrowed, np.maximum(np.diag(narrowed), SURE))
+    np.maximum(narrowed, LEAST, out=narrowed)
     x, y, yaw = found.tolist()
     return Match(Pose(x + corner.x, y + corner.y, wrap_angle(yaw)), narrowed, strain, fitting, known, len(points))
 

@@ -37,16 +37,6 @@ class ScanPoints:
         turned += (pose.x, pose.y)
         return turned
 
-    def near(self, reach: float) -> ScanPoints:
-        """The same with rays cut at ``reach`` m, where they hit nothing then."""
-        away = np.hypot(self.ends[:, 0], self.ends[:, 1])
-        far = away > reach
-        if not far.any():
-            return self
-        ends, hit = self.ends * np.minimum(1.0, reach / np.maximum(away, reach))[:, None], self.hit.copy()
-        hit[far] = 0
-        return ScanPoints(ends, hit, self.points, self.sensor)
-
     def nearby(self, most: int) -> NDArray[np.float64]:
         """At most so many of the points that a search or a judgement looks at, evenly chosen."""
         near = self.points[np.hypot(self.points[:, 0], self.points[:, 1]) < NEARBY]
@@ -87,7 +77,7 @@ class ScanReader:
             hit = (ranges >= scan.range_min) & (ranges <= scan.range_max)
             empty = ranges > scan.range_max
         sensor = scan.mount.point
-        if hit.sum() < ECHO_SHARE_MIN * len(ranges):
+        if np.count_nonzero(hit) < ECHO_SHARE_MIN * len(ranges):
             none = np.empty((0, 2))
             return ScanPoints(none, np.empty(0, np.uint8), none, sensor)
         ranges[empty] = min(scan.clear_range, scan.range_max)
@@ -102,7 +92,7 @@ class ScanReader:
             hit, empty = hit & ~mine, empty & ~mine
         points = ends[hit]
         kept = hit | empty
-        if not kept.all():
+        if np.count_nonzero(kept) < len(kept):
             ends, hit = ends[kept], hit[kept]
         return ScanPoints(ends, hit.astype(np.uint8), points, sensor)
 

@@ -160,8 +160,9 @@ class Slam:
 
     def _take(self, event: ScanTaken) -> None:
         belief, odometry, self._newest = self._belief, event.odometry, event
-        self._straighten(odometry, event.stamp)
-        if np.isnan(event.scan.ranges).mean() > 1.0 - ECHO_SHARE_MIN:
+        if self._loops.has_work:
+            self._straighten(odometry, event.stamp)
+        if np.count_nonzero(np.isnan(event.scan.ranges)) > (1.0 - ECHO_SHARE_MIN) * len(event.scan.ranges):
             belief.quality *= 1.0 - QUALITY_GAIN
             return  # a covered lidar sends scans that say nothing: as if it sent none
         if self.whereabouts.hear(event.stamp) and belief.map.scans and belief.localizing:
@@ -241,10 +242,9 @@ class Slam:
             return
         shoved = self._check_displaced(before, best, prior, stamp)
         if shoved is None and driven is None and _is_sure(best):
-            still = self.odometry.learns(self._way) and is_well_painted(belief.map, scan, best.pose)
             moved = moved if belief.lost is None else None
             correction = Correction(before, best, prior, self._step, moved, seconds)
-            self.odometry.learn(correction, self._way, still=still)
+            self.odometry.learn(correction, self._way, lambda: is_well_painted(belief.map, scan, best.pose))
         belief.covariance = prior if driven else best.covariance
         belief.move_to(best.pose, odometry)
         if shoved is not None:
@@ -314,8 +314,8 @@ class Slam:
         """Where to begin to match: found by a search when odometry may be wronger than a match can mend."""
         if self._belief.lost is not None and stamp - self._looked_at < LOST_PERIOD:
             return before
-        sigmas = np.sqrt(np.diag(self._belief.covariance))
-        reach, turn = SIGMAS * float(max(sigmas[:2])), SIGMAS * float(sigmas[2])
+        x, y, yaw = (math.sqrt(self._belief.covariance[k, k]) for k in range(3))
+        reach, turn = SIGMAS * max(x, y), SIGMAS * yaw
         if reach < CATCH and turn < CATCH_YAW:
             return before
         window = min(max(reach, CATCH), REACH_MAX), min(max(turn, CATCH_YAW), REACH_YAW_MAX)

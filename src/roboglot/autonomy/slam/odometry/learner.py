@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,7 +63,7 @@ class OdometryLearner:
         """Whether corrections say all of odometry (again) after ``driven`` m."""
         return driven >= self._learns_from
 
-    def learn(self, correction: Correction, driven: float, *, still: bool) -> None:
+    def learn(self, correction: Correction, driven: float, still: Callable[[], bool]) -> None:
         """What a correction at ``driven`` m says of odometry; only if all around is ``still``, how bad it is."""
         before, here, after, prior = (
             correction.before,
@@ -73,7 +73,8 @@ class OdometryLearner:
         )
         off = (here.x - before.x, here.y - before.y, wrap_angle(here.yaw - before.yaw))
         step = correction.step
-        self.noise.learn(off, prior, after, here.yaw - step.yaw + math.atan2(step.y, step.x), rising=still)
+        direction = here.yaw - step.yaw + math.atan2(step.y, step.x)
+        self.noise.learn(off, prior, after, direction, rising=lambda: self.learns(driven) and still())
         if correction.moved is None:
             return
         c, s = abs(math.cos(here.yaw)), abs(math.sin(here.yaw))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,12 +60,12 @@ class LearntNoise:
         posterior: NDArray[np.float64],
         direction: float,
         *,
-        rising: bool = True,
+        rising: Callable[[], bool] = lambda: True,
     ) -> None:
         """A match moved the pose by ``correction`` (m, m, rad) from ``prior`` to ``posterior`` (covariances).
 
         The robot drove in ``direction`` (rad, in map): errors across it come from turning, and say nothing of the way.
-        Only if ``rising`` may the way be trusted less than before.
+        Only if ``rising``, which is asked when it matters, may the way be trusted less than before.
         """
         c, s = math.cos(direction), math.sin(direction)
         before, (way, around) = self._before, self._described
@@ -73,7 +73,8 @@ class LearntNoise:
         factor = _learnt(
             self.way_factor, correction_along, _along(prior, c, s), _along(posterior, c, s), _along(before, c, s), way
         )
-        self.way_factor = factor if rising else min(factor, self.way_factor)
+        if factor <= self.way_factor or rising():
+            self.way_factor = factor
         self.yaw_factor = _learnt(
             self.yaw_factor, correction[2], float(prior[2, 2]), float(posterior[2, 2]), float(before[2, 2]), around
         )
