@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboglot.kernels.depth import FLOOR, LOW, NEAR, STEEP, sort_out
+from roboglot.kernels.depth import FLOOR, LOW, NEAR, STEEP, remember_low, sort_out
 
-HEIGHT = 0.6
+HEIGHT, INNER = 0.6, 0.2
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(2, 12), st.integers(2, 12), st.booleans())
@@ -26,6 +26,33 @@ def test_each_place_is_sorted_by_its_lower_neighbour(seed: int, rows: int, colum
     away, up = np.hypot(places[..., 0], places[..., 1]), places[..., 2]
     rise, farther = up[:-1] - up[1:], away[:-1] - away[1:]
     stands = (rise > STEEP * np.maximum(farther, 0.0)) & (up[:-1] > LOW) & (up[:-1] < HEIGHT) & (away[:-1] < NEAR)
-    obstacles, floor = sort_out(rays, ways, eye, HEIGHT)
-    assert obstacles == pytest.approx(places[:-1][stands][:, :2])
+    obstacles, floor = sort_out(rays, ways, eye, HEIGHT, INNER)
+    assert obstacles == pytest.approx(places[:-1][stands & (away[:-1] > INNER)][:, :2])
     assert floor == pytest.approx(places[(np.abs(up) < FLOOR) & (away < NEAR)][:, :2])
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(-3.0, 3.0))
+def test_only_what_nothing_explains_is_remembered(seed: int, yaw: float) -> None:
+    random = np.random.default_rng(seed)
+    evidence = np.where(random.random((40, 50)) < 0.02, 100, -100).astype(np.int16)
+    seen, corner, pose = np.full((40, 50), 1.0, np.float32), np.array((-1.0, -0.7)), np.array((0.2, 0.1, yaw))
+    floor, obstacles = random.uniform(-1.5, 1.5, (30, 2)), random.uniform(-1.5, 1.5, (40, 2))
+    echoes, turn = (
+        random.uniform(-1.0, 1.0, (6, 2)),
+        np.array(((np.cos(yaw), np.sin(yaw)), (-np.sin(yaw), np.cos(yaw)))),
+    )
+    expected, new = seen.copy(), []
+    for x, y in floor @ turn + pose[:2]:
+        column, row = np.floor((x - corner[0]) / 0.05).astype(int), np.floor((y - corner[1]) / 0.05).astype(int)
+        if 0 <= row < 40 and 0 <= column < 50:
+            expected[row, column] = 0.0
+    for x, y in obstacles @ turn + pose[:2]:
+        column, row = np.floor((x - corner[0]) / 0.05).astype(int), np.floor((y - corner[1]) / 0.05).astype(int)
+        inside = 1 <= row < 39 and 1 <= column < 49
+        alone = inside and not (evidence[row - 1 : row + 2, column - 1 : column + 2] > 0).any()
+        if alone and np.hypot(*(echoes - (x, y)).T).min() > 0.1:
+            expected[row, column] = 7.0
+            new.append((x, y))
+    found = remember_low(evidence, seen, floor, obstacles, echoes, pose, corner, 7.0, 0.1, 0.05)
+    assert found == pytest.approx(np.array(new).reshape(-1, 2))
+    assert (seen == expected).all()

@@ -34,13 +34,15 @@ def test_every_shape_is_met_as_by_mujoco(seed: int, reach: float) -> None:
     model = spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    origin, ways = random.uniform(-3, 3, 3), directions(random)
-    found, expected = np.empty(RAYS, np.int32), np.empty(RAYS)
+    origins, ways = random.uniform(-3, 3, (2, 3)), np.concatenate((directions(random), directions(random)))
+    found, expected = np.empty((2, RAYS), np.int32), np.empty((2, RAYS))
     groups = np.ones(6, np.uint8)
-    mujoco.mj_multiRay(model, data, origin, ways.ravel(), groups, True, -1, found, expected, None, RAYS, 1e6)
+    for number, there in enumerate(np.split(ways, 2)):
+        told = origins[number], there.ravel(), groups, True, -1, found[number], expected[number], None, RAYS, 1e6
+        mujoco.mj_multiRay(model, data, *told)
     expected[(found < 0) | (expected > reach)] = np.inf
     solids = data.geom_xpos, data.geom_xmat, model.geom_size, model.geom_rbound
-    assert cast(model.geom_type, *solids, origin, ways, reach) == pytest.approx(expected, abs=1e-9)
+    assert cast(model.geom_type, *solids, origins, ways, reach) == pytest.approx(expected.ravel(), abs=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -53,7 +55,7 @@ async def test_sensors_see_the_same_with_the_kernel(name: str, is_compiled: bool
     world.start()
     await clock.advance(0.1)  # or the physics does not know yet where things are
     hull, rays, ways = world._population.hull("a"), world._physics.rays, directions(np.random.default_rng(1))
-    origin = hull.x, hull.y, hull.elevation + 0.2
+    origin = np.array(((hull.x, hull.y, hull.elevation + 0.2),))
     before = rays.cast(origin, ways, 4.0, hull)
     rays.load_kernel()
     assert (rays._kernel is not None) is is_compiled

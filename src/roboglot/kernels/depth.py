@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 
-from roboglot.kernels.arrays import FloatArray
+from roboglot.kernels.arrays import FloatArray, Int16Array, SingleArray
 from roboglot.kernels.compiled import kernel
+from roboglot.kernels.obstacles import beside_occupied
 
 LOW, FLOOR = 0.10, 0.04  # m above the floor: what is lower is stepped over; is floor, for sure
 STEEP = 0.7  # rise per way from which a surface is a wall
 NEAR = 2.5  # m from base_link within which depth is precise enough
 
 
-@kernel("Tuple((float64[:,::1], float64[:,::1]))(float64[:,:,::1], float64[:,::1], float64[::1], float64)")
-def sort_out(rays: FloatArray, ways: FloatArray, eye: FloatArray, height: float) -> tuple[FloatArray, FloatArray]:
+@kernel("Tuple((float64[:,::1], float64[:,::1]))(float64[:,:,::1], float64[:,::1], float64[::1], float64, float64)")
+def sort_out(
+    rays: FloatArray, ways: FloatArray, eye: FloatArray, height: float, inner: float
+) -> tuple[FloatArray, FloatArray]:
     """What stands, and where there is floor: x and y in base_link (n, 2; m), row by row.
 
     ``rays`` (rows from above, columns, 3) go out from ``eye`` (3), both in base_link; ``ways`` (rows, columns) is how
-    many of its lengths each goes, not finite where nothing was seen. What is above ``height`` (m) is passed below.
+    many of its lengths each goes, not finite where nothing was seen. What is above ``height`` (m) is passed below; what
+    stands within ``inner`` (m) is left out.
     """
     rows, columns = ways.shape
     away, up = np.empty((rows, columns)), np.empty((rows, columns))
@@ -35,8 +39,57 @@ def sort_out(rays: FloatArray, ways: FloatArray, eye: FloatArray, height: float)
         for column in range(columns):
             here, below = up[row, column], up[row + 1, column]  # each against what is seen right below
             farther = max(away[row, column] - away[row + 1, column], 0.0)
-            if here - below > STEEP * farther and LOW < here < height and away[row, column] < NEAR:
+            if here - below > STEEP * farther and LOW < here < height and inner < away[row, column] < NEAR:
                 obstacles[standing, 0] = rays[row, column, 0] * ways[row, column] + eye[0]
                 obstacles[standing, 1] = rays[row, column, 1] * ways[row, column] + eye[1]
                 standing += 1
     return obstacles[:standing].copy(), floor[:lying].copy()
+
+
+@kernel(
+    "float64[:,::1](int16[:,::1], float32[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[::1],"
+    " float64[::1], float64, float64, float64)",
+)
+def remember_low(
+    evidence: Int16Array,
+    seen: SingleArray,
+    floor: FloatArray,
+    obstacles: FloatArray,
+    echoes: FloatArray,
+    pose: FloatArray,
+    corner: FloatArray,
+    now: float,
+    explained: float,
+    resolution: float,
+) -> FloatArray:
+    """Note the time ``now`` (> 0) in cells with ``obstacles`` that neither map nor ``echoes`` explain, 0 in ``floor``.
+
+    Returns those obstacles in map (n, 2). ``floor`` and ``obstacles`` (n, 2) are in base_link at ``pose`` (x, y, yaw),
+    ``echoes`` (n, 2) and ``corner`` (of the grid) in map. Beside an occupied cell, within ``explained`` m of an echo
+    and off the grid nothing is new.
+    """
+    (height, width), count = seen.shape, 0
+    cos, sin, near = np.cos(pose[2]), np.sin(pose[2]), explained * explained
+    found = np.empty((len(obstacles), 2))
+    for i in range(len(floor)):
+        x = cos * floor[i, 0] - sin * floor[i, 1] + pose[0] - corner[0]
+        y = sin * floor[i, 0] + cos * floor[i, 1] + pose[1] - corner[1]
+        row, col = int(np.floor(y / resolution)), int(np.floor(x / resolution))
+        if 0 <= row < height and 0 <= col < width:
+            seen[row, col] = 0.0
+    for i in range(len(obstacles)):
+        x = cos * obstacles[i, 0] - sin * obstacles[i, 1] + pose[0]
+        y = sin * obstacles[i, 0] + cos * obstacles[i, 1] + pose[1]
+        row, col = int(np.floor((y - corner[1]) / resolution)), int(np.floor((x - corner[0]) / resolution))
+        if not (1 <= row < height - 1 and 1 <= col < width - 1) or beside_occupied(evidence, row, col):
+            continue
+        is_new = True
+        for k in range(len(echoes)):
+            if (x - echoes[k, 0]) ** 2 + (y - echoes[k, 1]) ** 2 <= near:
+                is_new = False
+                break
+        if is_new:
+            found[count, 0], found[count, 1] = x, y
+            seen[row, col] = now
+            count += 1
+    return found[:count].copy()

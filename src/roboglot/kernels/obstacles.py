@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from roboglot.kernels.arrays import ByteArray, FloatArray, Int16Array, IntArray, SingleArray
+from roboglot.kernels.arrays import ByteArray, FloatArray, Int16Array, Int32Array, IntArray, SingleArray
 from roboglot.kernels.compiled import kernel
 from roboglot.kernels.distance import distances
 
+CELL_SQUARE = 0.5001  # squared, how far a corner of a cell is from its middle, in cells, and a little more
+FEW = 200  # cells up to which asking each ray for them costs less than following it
+
 
 @kernel("boolean(int16[:,::1], int64, int64)")
-def _beside_occupied(evidence: Int16Array, row: int, col: int) -> bool:
+def beside_occupied(evidence: Int16Array, row: int, col: int) -> bool:
     """Whether the cell or one of its eight neighbours is occupied."""
     for r in range(max(0, row - 1), min(evidence.shape[0], row + 2)):
         for c in range(max(0, col - 1), min(evidence.shape[1], col + 2)):
@@ -19,37 +22,127 @@ def _beside_occupied(evidence: Int16Array, row: int, col: int) -> bool:
     return False
 
 
+@kernel("int64(float64, float64, float64, int32[:,::1], int64, float64[:,::1])")
+def _noted_near(row: float, col: float, reach: float, noted: Int32Array, count: int, near: FloatArray) -> int:
+    """How many of the ``noted`` cells may be met within ``reach`` of (row, col), all in cells.
+
+    ``near`` gets where their middles are from there.
+    """
+    found = 0
+    for k in range(count):
+        up, along = noted[k, 0] + 0.5 - row, noted[k, 1] + 0.5 - col
+        if abs(up) <= reach + 1.0 and abs(along) <= reach + 1.0:
+            near[found, 0], near[found, 1] = up, along
+            found += 1
+    return found
+
+
+@kernel("boolean(float64, float64, float64[:,::1], int64)")
+def _meets(up: float, along: float, near: FloatArray, count: int) -> bool:
+    """Whether a ray in this direction may pass through one of the cells with their middles ``near``."""
+    square = up * up + along * along
+    for k in range(count):
+        aside = along * near[k, 0] - up * near[k, 1]
+        if aside * aside <= CELL_SQUARE * square and up * near[k, 0] + along * near[k, 1] >= -np.sqrt(square):
+            return True
+    return False
+
+
 @kernel(
-    "void(int16[:,::1], float32[:,::1], float64[:,::1], uint8[::1], float64, float64, float64, float64)",
+    "Tuple((int64, float64[:,::1]))(int16[:,::1], float32[:,::1], float64[:,::1], uint8[::1], float64, float64,"
+    " int32[:,::1], int64)",
 )
-def remember(
+def _note(
     evidence: Int16Array,
     seen: SingleArray,
     ends: FloatArray,
     hit: ByteArray,
-    x: float,
-    y: float,
     now: float,
     resolution: float,
-) -> None:
+    noted: Int32Array,
+    count: int,
+) -> tuple[int, FloatArray]:
+    """The second half of ``remember``: what is hit."""
+    (height, width), met, echoes = seen.shape, 0, np.empty(ends.shape)
+    for i in range(ends.shape[0]):
+        if hit[i] == 0:
+            continue
+        echoes[met, 0], echoes[met, 1] = ends[i, 0], ends[i, 1]
+        met += 1
+        col, row = int(np.floor(ends[i, 0] / resolution)), int(np.floor(ends[i, 1] / resolution))
+        if not (0 <= row < height and 0 <= col < width) or beside_occupied(evidence, row, col):
+            continue
+        if seen[row, col] == 0.0 and count >= 0:
+            if count < noted.shape[0]:
+                noted[count, 0], noted[count, 1] = row, col
+                count += 1
+            else:
+                count = -1
+        seen[row, col] = now
+    return count, echoes[:met].copy()
+
+
+@kernel("void(float64[:,::1], uint8[::1], float64[::1], float64, float64[:,::1], uint8[::1])")
+def _place(rays: FloatArray, hit: ByteArray, pose: FloatArray, reach: float, ends: FloatArray, near: ByteArray) -> None:
+    """Fill ``ends`` with where ``rays`` (n, 2; base_link) end, seen from the frame of ``pose``, cut at ``reach`` m.
+
+    ``near`` gets 1 for what was ``hit`` within that.
+    """
+    cos, sin = np.cos(pose[2]), np.sin(pose[2])
+    for i in range(rays.shape[0]):
+        x, y = rays[i, 0], rays[i, 1]
+        away, near[i] = np.sqrt(x * x + y * y), hit[i]
+        if away > reach:
+            x, y, near[i] = x * (reach / away), y * (reach / away), 0
+        ends[i, 0], ends[i, 1] = cos * x - sin * y + pose[0], sin * x + cos * y + pose[1]
+
+
+@kernel(
+    "Tuple((int64, float64[:,::1]))(int16[:,::1], float32[:,::1], float64[:,::1], uint8[::1], float64[::1], float64,"
+    " float64, float64, int32[:,::1], int64)",
+)
+def remember(
+    evidence: Int16Array,
+    seen: SingleArray,
+    rays: FloatArray,
+    hit: ByteArray,
+    pose: FloatArray,
+    reach: float,
+    now: float,
+    resolution: float,
+    noted: Int32Array,
+    count: int,
+) -> tuple[int, FloatArray]:
     """Note the time ``now`` (> 0) in cells with a hit that the map does not explain; 0 in those that rays pass.
 
-    ``ends`` (n, 2) and (x, y) are metres from the grid's corner.
+    ``rays`` (n, 2; base_link, m) are looked at up to ``reach`` m; ``pose`` (x, y, yaw) is base_link's, from the grid's
+    corner. The first ``count`` rows of ``noted`` are the cells (row, column) that are not 0: only rays that come near
+    them are followed. Returns how many there are now, or -1 when they are more than ``noted`` holds; and the hits
+    within reach (n, 2; m from the grid's corner).
     """
     height, width = seen.shape
-    for i in range(ends.shape[0]):
+    x, y = pose[0], pose[1]
+    ends, hits = np.empty((rays.shape[0], 2)), np.empty(rays.shape[0], np.uint8)
+    _place(rays, hit, pose, reach, ends, hits)
+    near, listed = np.empty((max(count, 0), 2)), max(count, 0)
+    few = _noted_near(y / resolution, x / resolution, reach / resolution, noted, listed, near)
+    for i in range(ends.shape[0] if few or count < 0 else 0):
         dx, dy = ends[i, 0] - x, ends[i, 1] - y
-        count = int(np.sqrt(dx * dx + dy * dy) / resolution)  # the last cell before the end is left alone
-        step_x, step_y = dx / (count + 1.0) / resolution, dy / (count + 1.0) / resolution  # in cells
-        for k in range(count):
+        if count >= 0 and few < FEW and not _meets(dy, dx, near, few):
+            continue
+        steps = int(np.sqrt(dx * dx + dy * dy) / resolution)  # the last cell before the end is left alone
+        step_x, step_y = dx / (steps + 1.0) / resolution, dy / (steps + 1.0) / resolution  # in cells
+        for k in range(steps):
             col = int(np.floor(x / resolution + k * step_x))
             row = int(np.floor(y / resolution + k * step_y))
             if 0 <= row < height and 0 <= col < width:
                 seen[row, col] = 0.0
-    for i in range(ends.shape[0]):
-        col, row = int(np.floor(ends[i, 0] / resolution)), int(np.floor(ends[i, 1] / resolution))
-        if hit[i] and 0 <= row < height and 0 <= col < width and not _beside_occupied(evidence, row, col):
-            seen[row, col] = now
+    left = 0
+    for k in range(listed):
+        if seen[noted[k, 0], noted[k, 1]] > 0.0:
+            noted[left, 0], noted[left, 1] = noted[k, 0], noted[k, 1]
+            left += 1
+    return _note(evidence, seen, ends, hits, now, resolution, noted, left if count >= 0 else -1)
 
 
 @kernel(
@@ -191,3 +284,29 @@ def reopen(
                         nearest = min(nearest, (r - row) ** 2 + (c - col) ** 2)
             if nearest >= reach * reach:
                 cost[row, col] = value * (1.0 + (reach + 3.0 - np.sqrt(nearest)) ** 2)
+
+
+@kernel("float64(float64[:,::1], float64, int64)")
+def corridor(points: FloatArray, half: float, stretches: int) -> float:
+    """How wide it is between what stands to the left and to the right, where that is widest; inf: one side is open.
+
+    Of ``points`` (n, 2; base_link, m) those count that lie less than ``half`` m ahead or behind, in so many stretches.
+    """
+    left, right = np.full(stretches, np.inf), np.full(stretches, np.inf)
+    count = 0
+    for i in range(points.shape[0]):
+        x, y = points[i, 0], points[i, 1]
+        if abs(x) >= half:
+            continue
+        count += 1
+        stretch = min(stretches - 1, int((x + half) * (stretches / (2.0 * half))))
+        if y > 0.0:
+            left[stretch] = min(left[stretch], y)
+        else:
+            right[stretch] = min(right[stretch], -y)
+    if count < 2 * stretches:
+        return np.inf
+    widest = 0.0
+    for stretch in range(stretches):
+        widest = max(widest, left[stretch] + right[stretch])
+    return widest

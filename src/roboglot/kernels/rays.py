@@ -134,10 +134,10 @@ def _reached(
 
 
 @kernel(
-    "float64[::1](int32[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[::1],"
-    " float64[::1], float64[:,::1], float64)"
+    "void(int32[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[::1],"
+    " float64[::1], float64[:,::1], float64, float64[::1])"
 )
-def cast(
+def _cast_from(
     kinds: NDArray[np.int32],
     places: FloatArray,
     turns: FloatArray,
@@ -146,14 +146,11 @@ def cast(
     origin: FloatArray,
     directions: FloatArray,
     reach: float,
-) -> FloatArray:
-    """Distances (m) from ``origin`` along ``directions`` (k, 3; of length 1); inf where nothing is within ``reach``.
-
-    Solids by row: kind, middle (3), rotation into the world (9, row by row), half extents (3) and the radius of the
-    sphere around it, all as in MuJoCo's model. Rays pass through other kinds than the four.
-    """
+    found: FloatArray,
+) -> None:
+    """Fill ``found``: see ``cast``, of one origin."""
     chosen, nearest = np.empty(len(kinds), np.int64), np.empty(len(kinds))
-    count, found = _reached(kinds, places, bounds, origin, reach, chosen, nearest), np.empty(len(directions))
+    count = _reached(kinds, places, bounds, origin, reach, chosen, nearest)
     local = np.empty((count, 3))  # the origin, seen from each solid
     for place in range(count):
         i = chosen[place]
@@ -172,4 +169,30 @@ def cast(
             x, y, z = local[place, 0], local[place, 1], local[place, 2]
             best = min(best, _along(kinds[i], x, y, z, dx, dy, dz, sizes[i, 0], sizes[i, 1], sizes[i, 2]))
         found[k] = best if best <= reach else np.inf
+
+
+@kernel(
+    "float64[::1](int32[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[::1],"
+    " float64[:,::1], float64[:,::1], float64)"
+)
+def cast(
+    kinds: NDArray[np.int32],
+    places: FloatArray,
+    turns: FloatArray,
+    sizes: FloatArray,
+    bounds: FloatArray,
+    origins: FloatArray,
+    directions: FloatArray,
+    reach: float,
+) -> FloatArray:
+    """Distances (m) along ``directions`` (k, 3; of length 1); inf where nothing is within ``reach``.
+
+    Each of the ``origins`` (m, 3) is where as many of the directions begin, in their order. Solids by row: kind, middle
+    (3), rotation into the world (9, row by row), half extents (3) and the radius of the sphere around it, all as in
+    MuJoCo's model. Rays pass through other kinds than the four.
+    """
+    found, each = np.empty(len(directions)), len(directions) // len(origins)
+    for k in range(len(origins)):
+        part = slice(k * each, (k + 1) * each)
+        _cast_from(kinds, places, turns, sizes, bounds, origins[k], directions[part], reach, found[part])
     return found

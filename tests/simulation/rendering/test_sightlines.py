@@ -32,7 +32,7 @@ async def test_as_many_rays_as_you_like(name, size):
         places = np.column_stack((random.uniform(0.0, size, (40, 2)), random.uniform(0.05, 2.0, 40)))
         ways = places - eye
         lengths = np.linalg.norm(ways, axis=1)
-        away = rays.cast(tuple(eye), ways / lengths[:, None], 50.0, hull)
+        away = rays.cast(eye[None], ways / lengths[:, None], 50.0, hull)
         free = away >= lengths - 0.02
         mine = lines.now(0).clear(eye, places, (hull,))
         if not mine.any():

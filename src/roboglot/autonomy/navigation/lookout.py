@@ -82,7 +82,8 @@ class Lookout:
             path = self._path(follower, pose)
             tight = planner.free_way(path, points, pose, tuning.slow_margin)
         follower.slow_at = follower.along + tight
-        follower.stop_at = follower.along + planner.free_way(path, points, pose, tuning.touch_margin)
+        stop = planner.free_way(path, points, pose, tuning.touch_margin) if math.isfinite(tight) else tight
+        follower.stop_at = follower.along + stop
         blocked = math.isfinite(follower.stop_at)
         if blocked and not self.blocked:
             self.blocked_at = self._clock.time()

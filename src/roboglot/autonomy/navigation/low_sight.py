@@ -5,10 +5,8 @@ Floors and ramps are no obstacles: only what rises more steeply than a wheel cou
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,8 +36,9 @@ class LowSight:
     def __init__(self, robot: Robot) -> None:
         from roboglot.kernels.depth import sort_out  # it takes Numba
 
-        self._robot, self._height = robot, robot.description.height
-        self._sort_out: Callable[[Points, Points, Points, float], tuple[Points, Points]] = sort_out
+        self._robot, self._height, self._radius = robot, robot.description.height, robot.description.radius
+        self._last: tuple[DepthImage, tuple[Points, Points]] | None = None  # and what it showed
+        self._sort_out: Callable[[Points, Points, Points, float, float], tuple[Points, Points]] = sort_out
 
     def look(self) -> LowView:
         """All sensors together; nothing for a robot without any."""
@@ -52,32 +51,20 @@ class LowSight:
         if not views:
             return LowView(NONE, NONE)
         obstacles = np.concatenate([standing for standing, _ in views])
-        if Gripper in robot and robot[Gripper].status is not GripperStatus.OPEN:
+        if len(obstacles) and Gripper in robot and robot[Gripper].status is not GripperStatus.OPEN:
             held = (obstacles[:, 0] > 0.0) & (obstacles[:, 0] < GRASP) & (np.abs(obstacles[:, 1]) < GRASP_SIDE)
             obstacles = obstacles[~held]
-        outside = np.hypot(obstacles[:, 0], obstacles[:, 1]) > robot.description.radius
-        return LowView(obstacles[outside], np.concatenate([floor for _, floor in views]))
+        return LowView(obstacles, np.concatenate([floor for _, floor in views]))
 
     def _in_image(self, image: DepthImage) -> tuple[Points, Points]:
-        """What stands and what is floor in the picture of a depth camera."""
-        rays = _rays(image.depths.shape, image.width, image.height, image.attitude.pitch)
-        mount = np.array((image.mount.x, image.mount.y, image.mount.z))
-        return self._sort_out(rays, image.depths.astype(np.float64), mount, self._height)
+        """What stands and what is floor in the picture of a depth camera, which may be slower than who looks."""
+        if self._last is None or self._last[0] is not image:
+            mount, depths = np.array((image.mount.x, image.mount.y, image.mount.z)), image.depths.astype(np.float64)
+            self._last = image, self._sort_out(image.rays, depths, mount, self._height, self._radius)
+        return self._last[1]
 
     def _in_zones(self, reading: ZoneDistances) -> tuple[Points, Points]:
         """The same in the zones of a time-of-flight sensor."""
         rays = reading.rays.astype(np.float64).reshape(*reading.distances.shape, 3)
         eye = np.array((reading.eye.x, reading.eye.y, reading.eye.z))
-        return self._sort_out(rays, reading.distances.astype(np.float64), eye, self._height)
-
-
-@lru_cache(maxsize=64)
-def _rays(shape: tuple[int, int], width: float, height: float, pitch: float) -> Points:
-    """Every pixel's way through base_link for 1 m along the optical axis."""
-    rows, columns = shape
-    across = np.tan(np.linspace(width / 2, -width / 2, columns))
-    down = np.tan(np.linspace(height / 2, -height / 2, rows))
-    left, up = np.meshgrid(across, down)
-    c, s = math.cos(pitch), math.sin(pitch)
-    rays: Points = np.stack((c + s * up, left, c * up - s), axis=-1)
-    return rays
+        return self._sort_out(rays, reading.distances.astype(np.float64), eye, self._height, self._radius)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +16,9 @@ class NarrowWatch:
     """Examines every scan and reports each corridor once. A doorway is no corridor: it has no length."""
 
     def __init__(self, radius: float) -> None:
+        from roboglot.kernels.obstacles import corridor  # it takes Numba
+
+        self._corridor: Callable[[NDArray[np.float64], float, int], float] = corridor
         self._width = 2 * (radius + ROOM)
         self._wide = WIDE_AFTER
 
@@ -27,13 +32,5 @@ class NarrowWatch:
         return width if before >= WIDE_AFTER else None
 
     def _between(self, points: NDArray[np.float64]) -> float | None:
-        beside = points[np.abs(points[:, 0]) < HALF_LENGTH]
-        if len(beside) < 2 * STRETCHES:
-            return None
-        stretch = ((beside[:, 0] + HALF_LENGTH) * (STRETCHES / (2 * HALF_LENGTH))).astype(np.intp)
-        left, right = np.full(STRETCHES, np.inf), np.full(STRETCHES, np.inf)
-        up = beside[:, 1] > 0.0
-        np.minimum.at(left, stretch[up], beside[up, 1])
-        np.minimum.at(right, stretch[~up], -beside[~up, 1])
-        width = float((left + right).max())
+        width = self._corridor(points, HALF_LENGTH, STRETCHES)
         return width if width <= self._width else None

@@ -14,12 +14,13 @@ from roboglot.autonomy.navigation.low_memory import LowMemory
 from roboglot.autonomy.navigation.low_sight import LowView
 from roboglot.autonomy.navigation.route import Route
 from roboglot.autonomy.navigation.rules import Frame, Layers, layers
+from roboglot.autonomy.navigation.scan_memory import Cells, ScanMemory
 from roboglot.autonomy.navigation.terms import Terms
 from roboglot.autonomy.slam.belief import Belief
-from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid, is_too_large
+from roboglot.autonomy.slam.evidence import RESOLUTION, is_too_large
 from roboglot.autonomy.slam.scan_points import ScanPoints
 from roboglot.kernels.distance import distances
-from roboglot.kernels.obstacles import free_way, inflated_cost, nearest_open, remember, reopen, without_things
+from roboglot.kernels.obstacles import free_way, inflated_cost, nearest_open, reopen, without_things
 from roboglot.kernels.search import shortest_path, ways_from
 from roboglot.kernels.smoothing import corners, line_cost
 from roboglot.model.components.mapping.annotations import Annotations
@@ -33,7 +34,6 @@ NEAR_COST = 8.0
 UNKNOWN_COST = 3.0
 SLACK = 1.02  # a straight line may cost this much more than the cells it replaces
 ESCAPE_MAX = 0.8  # m to the nearest open cell for a robot that stands too close to something
-OBSTACLE_RANGE = 5.0  # m within which obstacles are remembered
 OBSTACLE_SECONDS = 10.0  # how long one is remembered that is out of sight
 GONE_NEAR = 0.1  # m around where a leg stood that is taken away: what the map shows there counts no more
 SLOW = 0.35  # m/s past obstacles
@@ -75,11 +75,15 @@ class Task:
         self._check_near()
         cost = self.cost(rules)
         legs: list[NDArray[np.float64]] = []
-        start = self.start
+        start, driven = self.start, dict[tuple[Point, Point], NDArray[np.float64]]()  # who patrols comes by again
         for number, goal in enumerate(self.goals, start=1):
-            leg = self._leg(cost, start, goal, f"goal {number} at ({goal.x:.2f}, {goal.y:.2f})")
-            if not legs:
-                self._open_way_out(cost, leg)
+            leg = driven.get((start, goal))
+            if leg is None:
+                leg = self._leg(cost, start, goal, f"goal {number} at ({goal.x:.2f}, {goal.y:.2f})")
+                if legs:
+                    driven[start, goal] = leg
+                else:
+                    self._open_way_out(cost, leg)
             legs.append(leg if not legs else leg[1:])
             start = goal
         route = Route(legs, self.goals, self.tolerance)
@@ -241,11 +245,8 @@ class Planner:
 
     def __init__(self, belief: Belief, radius: float, load: Load) -> None:
         self._belief, self._hull, self._load = belief, radius, load
-        self._grid: EvidenceGrid | None = None
-        self._first = (0, 0)
-        self._seen: NDArray[np.float32] = np.zeros((0, 0), np.float32)
-        self._low = LowMemory()
-        self._trodden: NDArray[np.uint8] = np.zeros((0, 0), np.uint8)  # where the robot's middle has been
+        self._scans, self._low = ScanMemory(), LowMemory()
+        self._trodden = Cells(np.uint8)  # where the robot's middle has been
         self._trodden_radius = 0.0  # m that it had around it, at least
         self._last: Pose | None = None
         self._doubted: NDArray[np.int16] = np.zeros((0, 0), np.int16)
@@ -258,21 +259,13 @@ class Planner:
 
     def observe(self, scan: ScanPoints, pose: Pose, now: float) -> NDArray[np.float64]:
         """Remember what stands around; returns the near echoes in map (n, 2)."""
-        self._fit()
-        corner = self._belief.map.corner
-        near = scan.near(OBSTACLE_RANGE)
-        ends = scan.in_frame(pose, near.ends)
-        points = ends[near.hit > 0]
-        x, y = pose.x - corner.x, pose.y - corner.y
-        ends -= (corner.x, corner.y)
         grid = self._belief.map
         gone = self._load.gone_from(grid)
         shown = grid.evidence
         if now < self._doubted_until and self._doubted.shape == shown.shape:
             shown = self._doubted
         evidence = _without(shown, grid.corner, gone) if len(gone) else shown
-        remember(evidence, self._seen, ends, near.hit, x, y, max(now, 1e-3), RESOLUTION)
-        return points
+        return self._scans.observe(grid, evidence, scan, pose, now)
 
     def observe_low(self, view: LowView, echoes: NDArray[np.float64], pose: Pose, now: float) -> NDArray[np.float64]:
         """Remember what stands beside the lidar's plane and is not among ``echoes`` (map); returns it in map (n, 2)."""
@@ -289,16 +282,17 @@ class Planner:
 
         The map may say otherwise: it has walls as thick as whole cells.
         """
-        self._fit()
         last, self._last = self._last, pose
         if not (self._belief.localizing and self._belief.quality >= TRODDEN_QUALITY):
             return
+        grid = self._belief.map
+        trodden = self._trodden.of(grid)
         if self.radius > self._trodden_radius:  # it carries more than what got through there
-            self._trodden[:] = 0
+            trodden[:] = 0
         self._trodden_radius = self.radius
         if last is None or last.distance_to(pose) > TREAD_MAX:
             last = pose
-        _mark_line(self._trodden, self._belief.map.corner, last.point, pose.point)
+        _mark_line(trodden, grid.corner, last.point, pose.point)
 
     def free_way(self, path: NDArray[np.float64], points: NDArray[np.float64], pose: Pose, margin: float) -> float:
         """Metres along ``path`` that the hull can go before one of ``points`` is within ``margin`` m; inf: all."""
@@ -311,7 +305,6 @@ class Planner:
         terms: Terms,
     ) -> Task:
         """What is to be solved, on copies of the map and of what was seen."""
-        self._fit()
         evidence, seen, trodden, corner = self._window(start, *goals)
         if not (terms.obstacles and terms.things):
             evidence = without_things(evidence, THING_CELLS)
@@ -344,27 +337,14 @@ class Planner:
         left, right = min(0, min(columns) - ROOM), max(width, max(columns) + ROOM)
         if is_too_large(bottom - top, right - left):
             raise Unreachable("the goal lies too far from all that is known")
-        standing = np.maximum(self._seen, self._low.seen(grid))
+        standing, driven = np.maximum(self._scans.seen(grid), self._low.seen(grid)), self._trodden.of(grid)
         if (top, bottom, left, right) == (0, height, 0, width):
-            return known, standing, self._trodden.copy(), grid.corner
+            return known, standing, driven.copy(), grid.corner
         evidence = np.zeros((bottom - top, right - left), np.int16)
         seen, trodden = np.zeros(evidence.shape, np.float32), np.zeros(evidence.shape, np.uint8)
         inner = (slice(-top, height - top), slice(-left, width - left))
-        evidence[inner], seen[inner], trodden[inner] = known, standing, self._trodden
+        evidence[inner], seen[inner], trodden[inner] = known, standing, driven
         return evidence, seen, trodden, Point(grid.corner.x + left * RESOLUTION, grid.corner.y + top * RESOLUTION)
-
-    def _fit(self) -> None:
-        """Give the memory the map's shape, keeping what it holds while it is the same map."""
-        grid = self._belief.map
-        first = (grid.first_row, grid.first_column)
-        if grid is self._grid and first == self._first and grid.evidence.shape == self._seen.shape:
-            return
-        seen, trodden = np.zeros(grid.evidence.shape, np.float32), np.zeros(grid.evidence.shape, np.uint8)
-        if grid is self._grid:
-            down, along = self._first[0] - first[0], self._first[1] - first[1]
-            old = (slice(down, down + self._seen.shape[0]), slice(along, along + self._seen.shape[1]))
-            seen[old], trodden[old] = self._seen, self._trodden
-        self._grid, self._first, self._seen, self._trodden = grid, first, seen, trodden
 
 
 def _without(evidence: NDArray[np.int16], corner: Point, gone: NDArray[np.float64]) -> NDArray[np.int16]:
@@ -387,8 +367,9 @@ def _mark_line(trodden: NDArray[np.uint8], corner: Point, start: Point, end: Poi
             row = math.floor((place.y - corner.y) / RESOLUTION - 0.5)
             trodden[max(0, row) : max(0, row + 2), max(0, column) : max(0, column + 2)] = 1
         return
-    x = np.linspace(start.x - corner.x, end.x - corner.x, count) / RESOLUTION
-    y = np.linspace(start.y - corner.y, end.y - corner.y, count) / RESOLUTION
-    columns, rows = np.floor(x - 0.5).astype(int).tolist(), np.floor(y - 0.5).astype(int).tolist()
-    for column, row in zip(columns, rows, strict=True):
+    x, y = start.x - corner.x, start.y - corner.y
+    along, up = (end.x - start.x) / (count - 1), (end.y - start.y) / (count - 1)
+    for number in range(count):
+        column = math.floor((x + number * along) / RESOLUTION - 0.5)
+        row = math.floor((y + number * up) / RESOLUTION - 0.5)
         trodden[max(0, row) : max(0, row + 2), max(0, column) : max(0, column + 2)] = 1

@@ -43,21 +43,26 @@ class Rays:
             self._kernel = cast
 
     def cast(
-        self, origin: tuple[float, float, float], directions: NDArray[np.float64], reach: float, viewer: Hull
+        self, origins: NDArray[np.float64], directions: NDArray[np.float64], reach: float, viewer: Hull
     ) -> NDArray[np.float64]:
-        """Distances (m) along ``directions`` (n x 3, of length 1); inf where nothing is nearer than ``reach``."""
+        """Distances (m) along ``directions`` (n x 3, of length 1); inf where nothing is nearer than ``reach``.
+
+        From each of the ``origins`` (m x 3) go as many of them, in their order.
+        """
         if self._kernel is None:
-            return self._cast_slowly(origin, directions, reach, viewer)
+            bundles = np.split(directions, len(origins))
+            parts = zip(origins, bundles, strict=True)
+            return np.concatenate([self._cast_slowly(origin, ways, reach, viewer) for origin, ways in parts])
         kinds = self._kinds.get(viewer)
         if kinds is None:
             kinds = self._kinds[viewer] = self._model.geom_type.copy()
             kinds[viewer.shape] = PASSED
         model, data = self._model, self._data
         solids = data.geom_xpos, data.geom_xmat, model.geom_size, model.geom_rbound
-        return self._kernel(kinds, *solids, np.array(origin), directions, reach)
+        return self._kernel(kinds, *solids, origins, directions, reach)
 
     def _cast_slowly(
-        self, origin: tuple[float, float, float], directions: NDArray[np.float64], reach: float, viewer: Hull
+        self, origin: NDArray[np.float64], directions: NDArray[np.float64], reach: float, viewer: Hull
     ) -> NDArray[np.float64]:
         """The same by MuJoCo, which knows every shape."""
         count = len(directions)
@@ -65,7 +70,7 @@ class Rays:
         ways = np.ascontiguousarray(directions).ravel()
         with self._looking_through(viewer):
             self._mujoco.mj_multiRay(
-                self._model, self._data, np.array(origin), ways, SEEN, True, -1, found, distances, None, count, reach
+                self._model, self._data, origin, ways, SEEN, True, -1, found, distances, None, count, reach
             )
         distances[(found < 0) | (distances > reach)] = np.inf
         return distances

@@ -73,21 +73,17 @@ class SimulatedDepthCamera(DepthCamera):
         section, hull = self._section, self._hull
         turn = rotation(hull.tilt, hull.turned)
         place = turn @ (section.forward, 0.0, section.above_ground)
-        origin = (hull.pose.x + place[0], hull.pose.y + place[1], hull.elevation + place[2])
+        origin = place + np.array(((hull.x, hull.y, hull.elevation),))
         ways = self._rays.cast(origin, self._directions @ turn.T, section.range_max * 2.0, hull)
         depths = ways * self._optical[:, 0]
         depths += self._random.standard_normal(len(depths)) * section.noise * np.where(ways < np.inf, depths, 0.0) ** 2
         seen = (depths >= section.range_min) & (depths <= section.range_max)
         depths[~seen] = np.inf
-        ways = depths[seen] / self._optical[seen, 0]
-        points = self._directions[seen] * ways[:, None] + (section.forward, 0.0, section.above_ground)
         image = depths.reshape(section.rows, section.columns).astype(np.float32)
-        cloud = points.astype(np.float32)
         image.setflags(write=False)
-        cloud.setflags(write=False)
         mount = Vector3(section.forward, 0.0, section.above_ground)
         attitude = Orientation(pitch=section.pitch)
-        return DepthImage(stamp, image, cloud, mount, attitude, section.width, section.height)
+        return DepthImage(stamp, image, mount, attitude, section.width, section.height)
 
 
 def _bundle(section: DepthCameraSection) -> Floats:

@@ -87,7 +87,7 @@ class SimulatedRangeSensors(RangeSensors):
         at = (edge * math.cos(facing), edge * math.sin(facing), hull.belly + section.above_belly)
         seen = hull.to_world(np.vstack((at, self._fans[name])))
         x, y, z = (hull.position + seen[0]).tolist()
-        found = self._rays.cast((x, y, z), seen[1:], section.range_max, hull)
+        found = self._rays.cast(np.array(((x, y, z),)), seen[1:], section.range_max, hull)
         distance = float(found.min()) * (1.0 + section.noise * float(self._random.standard_normal()))
         distance = max(section.range_min, distance) if distance <= section.range_max else math.inf
         mount = Pose(at[0], at[1], facing)

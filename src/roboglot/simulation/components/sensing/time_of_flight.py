@@ -56,39 +56,37 @@ class SimulatedTimeOfFlight(TimeOfFlight):
         self._section, self._hull, self._rays, self._clock, self._random = section, hull, rays, clock, random
         self.names = tuple(eye.name for eye in section.sensors)
         self.rate = section.rate
-        self._eyes = {eye.name: eye for eye in section.sensors}
         bundle = _bundle(section.field_of_view)
-        self._bundles = {eye.name: bundle @ rotation((0.0, eye.pitch), eye.yaw).T for eye in section.sensors}
+        self._bundles = np.concatenate([bundle @ rotation((0.0, eye.pitch), eye.yaw).T for eye in section.sensors])
+        self._mounts = np.array([(eye.forward, eye.left, eye.above_belly) for eye in section.sensors])
         self._readings: dict[str, ZoneDistances] = {}
+        self._measured_at = -math.inf
 
     def reading(self, name: str) -> ZoneDistances:
-        if name not in self._eyes:
+        if name not in self.names:
             raise NotFound(f"there is no time-of-flight sensor {name!r}")
         now = self._clock.time()
-        last = self._readings.get(name)
-        if last is None or now - last.stamp >= 1.0 / self.rate - 1e-6:
-            self._readings[name] = last = self._measure(self._eyes[name], now)
-        return last
+        if now - self._measured_at >= 1.0 / self.rate - 1e-6:
+            self._measured_at = now
+            self._measure(now)
+        return self._readings[name]
 
-    def _measure(self, eye: Eye, stamp: float) -> ZoneDistances:
+    def _measure(self, stamp: float) -> None:
+        """Take readings of all sensors at once."""
         section, hull = self._section, self._hull
-        place = hull.held(np.array(((eye.forward, eye.left, eye.above_belly),)))
-        place += (hull.shift.x, hull.shift.y, hull.belly)
-        x, y, z = (hull.to_world(place)[0] + (hull.pose.x, hull.pose.y, hull.elevation)).tolist()
-        ahead = hull.held(self._bundles[eye.name])
-        directions = hull.to_world(ahead)
-        distances = self._rays.cast((x, y, z), directions, section.range_max * 1.5, hull)
-        distances = distances + self._random.standard_normal(len(distances)) * section.noise
+        turn = rotation(hull.tilt, hull.turned).T
+        eyes = hull.held(self._mounts) + np.array((hull.shift.x, hull.shift.y, hull.belly))
+        ahead, origins = hull.held(self._bundles), eyes @ turn + np.array((hull.x, hull.y, hull.elevation))
+        distances = self._rays.cast(origins, ahead @ turn, section.range_max * 1.5, hull)
+        distances += self._random.standard_normal(len(distances)) * section.noise
         distances[distances > section.range_max] = np.inf
         distances[distances < section.range_min] = -np.inf
-        grid = distances.reshape(ZONES, ZONES).astype(np.float32)
-        grid.setflags(write=False)
-        seen = np.isfinite(distances)
-        points = (place + ahead[seen] * distances[seen, None]).astype(np.float32)
-        eye_at = Vector3(*place[0].tolist())
-        return ZoneDistances(
-            stamp, grid, section.range_min, section.range_max, points, ahead.astype(np.float32), eye_at
-        )
+        grids, rays = distances.reshape(-1, ZONES, ZONES).astype(np.float32), ahead.astype(np.float32)
+        grids.setflags(write=False)
+        low, high, each = section.range_min, section.range_max, ZONES * ZONES
+        for number, (name, eye) in enumerate(zip(self.names, eyes.tolist(), strict=True)):
+            ways = rays[number * each : (number + 1) * each]
+            self._readings[name] = ZoneDistances(stamp, grids[number], low, high, ways, Vector3(*eye))
 
 
 def _bundle(field_of_view: float) -> Floats:

@@ -1,0 +1,72 @@
+"""Remembers, cell by cell, what the lidar saw that the map does not have. Needs the kernels."""
+
+from __future__ import annotations
+
+from typing import Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
+from roboglot.autonomy.slam.scan_points import ScanPoints
+from roboglot.kernels.obstacles import remember
+from roboglot.model.geometry import Pose
+
+OBSTACLE_RANGE = 5.0  # m within which obstacles are remembered
+NOTED_MAX = 4000  # cells that are listed: when there are more, all rays are followed
+
+Kind = TypeVar("Kind", bound=np.generic)
+
+
+class Cells(Generic[Kind]):
+    """A number for each cell of a map, 0 at first; grows with the map, and begins anew with another one."""
+
+    def __init__(self, kind: type[Kind]) -> None:
+        self._kind = kind
+        self._grid: EvidenceGrid | None = None
+        self._first = (0, 0)
+        self._cells: NDArray[Kind] = np.zeros((0, 0), kind)
+
+    def of(self, grid: EvidenceGrid) -> NDArray[Kind]:
+        """The numbers, to be written to until the map grows or is another one: then the array is another one, too."""
+        first, shape, kept = (grid.first_row, grid.first_column), grid.evidence.shape, self._cells
+        if grid is self._grid and first == self._first and shape == kept.shape:
+            return kept
+        cells = np.zeros(shape, self._kind)
+        if grid is self._grid:
+            down, along = self._first[0] - first[0], self._first[1] - first[1]
+            cells[down : down + kept.shape[0], along : along + kept.shape[1]] = kept
+        self._grid, self._first, self._cells = grid, first, cells
+        return cells
+
+
+class ScanMemory:
+    """Of one map at a time."""
+
+    def __init__(self) -> None:
+        self._seen = Cells(np.float32)
+        self._listed: NDArray[np.float32] | None = None  # of which these are the cells that are not 0, if so few
+        self._noted, self._count = np.empty((NOTED_MAX, 2), np.int32), 0
+
+    def seen(self, grid: EvidenceGrid) -> NDArray[np.float32]:
+        """When something was seen last in each of the map's cells (s); 0: never, or rays have passed since."""
+        return self._seen.of(grid)
+
+    def observe(
+        self, grid: EvidenceGrid, shown: NDArray[np.int16], scan: ScanPoints, pose: Pose, now: float
+    ) -> NDArray[np.float64]:
+        """Remember what ``scan`` has that is not ``shown`` on the map; returns its near echoes in map (n, 2)."""
+        corner, seen = grid.corner, self._seen.of(grid)
+        if seen is not self._listed:
+            self._list(seen)
+        at, stamp = np.array((pose.x - corner.x, pose.y - corner.y, pose.yaw)), max(now, 1e-3)
+        self._count, echoes = remember(
+            shown, seen, scan.ends, scan.hit, at, OBSTACLE_RANGE, stamp, RESOLUTION, self._noted, self._count
+        )
+        placed: NDArray[np.float64] = echoes + np.array((corner.x, corner.y))
+        return placed
+
+    def _list(self, seen: NDArray[np.float32]) -> None:
+        cells = np.argwhere(seen)
+        self._listed, self._count = seen, len(cells) if len(cells) <= NOTED_MAX else -1
+        self._noted[: max(0, self._count)] = cells[: max(0, self._count)]
