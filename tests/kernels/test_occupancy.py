@@ -197,9 +197,9 @@ def test_rays_beside_noted_cells_need_not_be_followed(seed: int, most: int) -> N
         pose = np.array((*random.uniform(1.0, 3.0, 2), random.uniform(-3.0, 3.0)))
         angles, ways = np.linspace(-3.1, 3.1, 40), random.uniform(0.1, 2.5, 40)
         rays, hit = (ways * (np.cos(angles), np.sin(angles))).T.copy(), (random.random(40) < 0.3).astype(np.uint8)
-        told = evidence, sparing, rays, hit, pose, 2.0, float(now), RESOLUTION
-        count, echoes = remember(*told, noted, count)
-        remember(evidence, thorough, *told[2:], noted, -1)
+        scan = evidence, sparing, rays, hit, pose, 2.0, float(now), RESOLUTION
+        count, echoes = remember(*scan, noted, count)
+        remember(evidence, thorough, *scan[2:], noted, -1)
         turn = pose[2] + angles[(hit > 0) & (ways <= 2.0)]
         there = ways[(hit > 0) & (ways <= 2.0)] * (np.cos(turn), np.sin(turn))
         assert echoes == pytest.approx(there.T + pose[:2])

@@ -18,7 +18,7 @@ WAYS = (Twist(0.3), Twist(-0.2, 0.1, 0.5), Twist(), Twist(0.0, 0.4, -0.3), Twist
 
 async def lived(simulation: Simulation) -> tuple[list[object], int, int]:
     """Drive through the office, into walls, people and each other: all that was so, ticks without contacts, touches."""
-    world, clock, told, calm, touched = simulation.world, simulation.clock, list[object](), 0, 0
+    world, clock, lives, calm, touched = simulation.world, simulation.clock, list[object](), 0, 0
     physics = world._physics
     world.start()
     await clock.advance(0.5)
@@ -40,8 +40,8 @@ async def lived(simulation: Simulation) -> tuple[list[object], int, int]:
             calm += bool(physics._model.opt.disableflags)
             for hull in physics.hulls.values():
                 touched += bool(hull.touches)
-                told.append((hull.x, hull.y, hull.elevation, hull.turned, list(hull.touches)))
-    return told, calm, touched
+                lives.append((hull.x, hull.y, hull.elevation, hull.turned, list(hull.touches)))
+    return lives, calm, touched
 
 
 async def test_what_is_not_looked_for_does_not_happen(simulate: Simulate, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -54,7 +54,7 @@ async def test_what_is_not_looked_for_does_not_happen(simulate: Simulate, monkey
     assert not always
 
 
-async def test_alone_on_the_floor_no_contact_is_looked_for(simulate: Simulate) -> None:
+async def test_alone_no_contact_is_looked_for(simulate: Simulate) -> None:
     simulation = simulate("empty")
     options = simulation.world._physics._model.opt
     simulation.world.start()

@@ -38,8 +38,8 @@ def test_every_shape_is_met_as_by_mujoco(seed: int, reach: float) -> None:
     found, expected = np.empty((2, RAYS), np.int32), np.empty((2, RAYS))
     groups = np.ones(6, np.uint8)
     for number, there in enumerate(np.split(ways, 2)):
-        told = origins[number], there.ravel(), groups, True, -1, found[number], expected[number], None, RAYS, 1e6
-        mujoco.mj_multiRay(model, data, *told)
+        asked = origins[number], there.ravel(), groups, True, -1, found[number], expected[number], None, RAYS, 1e6
+        mujoco.mj_multiRay(model, data, *asked)
     expected[(found < 0) | (expected > reach)] = np.inf
     solids = data.geom_xpos, data.geom_xmat, model.geom_size, model.geom_rbound
     assert cast(model.geom_type, *solids, origins, ways, reach) == pytest.approx(expected.ravel(), abs=1e-9)

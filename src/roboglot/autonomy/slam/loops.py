@@ -142,11 +142,6 @@ class LoopCloser:
         return self._frames[self._last].pose.compose(local)
 
     @property
-    def has_work(self) -> bool:
-        """Whether ``advance`` has something to do."""
-        return self._work is not None
-
-    @property
     def straightening(self) -> bool:
         """Whether a closed loop's work is not done yet."""
         return self._work is not None and self._belief.map is self._map

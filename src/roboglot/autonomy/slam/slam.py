@@ -160,8 +160,7 @@ class Slam:
 
     def _take(self, event: ScanTaken) -> None:
         belief, odometry, self._newest = self._belief, event.odometry, event
-        if self._loops.has_work:
-            self._straighten(odometry, event.stamp)
+        self._straighten(odometry, event.stamp)
         if np.count_nonzero(np.isnan(event.scan.ranges)) > (1.0 - ECHO_SHARE_MIN) * len(event.scan.ranges):
             belief.quality *= 1.0 - QUALITY_GAIN
             return  # a covered lidar sends scans that say nothing: as if it sent none

@@ -63,7 +63,10 @@ def rotation(tilt: tuple[float, float], yaw: float) -> Floats:
 
 
 class Hull:
-    """Handles into MuJoCo's arrays for one robot."""
+    """Handles into MuJoCo's arrays for one robot.
+
+    ``pulls``: wheels pull along the floor; ``rests``: it was seen to stand; ``disturbed``: not only physics moved it.
+    """
 
     def __init__(
         self, model: MjModel, data: MjData, name: str, body: Body, elevations: list[float], ground: Ground
@@ -86,9 +89,7 @@ class Hull:
         self.leash: tuple[float, float] | None = None  # N in the world, the pull of a hand
         self.hand: float | None = None  # height in the world at which a hand holds the base_link, m
         self.standing = 1.0  # share of the wheels that touch the ground
-        self.overturned = False
-        # Whether wheels pull along the floor, it was seen to stand still, something else than physics moved it.
-        self.pulls = self.rests = self.disturbed = False
+        self.overturned = self.pulls = self.rests = self.disturbed = False
         self._belly: int | None = None
         self.legs: HullLegs | None = None
         if body.legs:

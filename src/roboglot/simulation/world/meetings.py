@@ -11,6 +11,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.building.props import AWAY, Props
@@ -102,7 +103,7 @@ class Meetings:
         return free
 
 
-def _soonest(gaps: Any, closing: Any) -> float:
+def _soonest(gaps: NDArray[np.float64], closing: NDArray[np.float64]) -> float:
     """When the first of the gaps (m) that close at these speeds (m/s) may be closed; never where nothing moves."""
     moving = closing > 0.0
     return float(np.min(gaps[moving] / closing[moving], initial=math.inf))
