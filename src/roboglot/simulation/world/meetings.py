@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -28,7 +27,9 @@ NO_CONTACTS = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
 class Meetings:
     """Counts everything as round, and all floors as one."""
 
-    def __init__(self, model: Any, data: Any, hulls: Sequence[Hull], props: Props, *, possible: bool) -> None:
+    def __init__(
+        self, model: mujoco.MjModel, data: mujoco.MjData, hulls: Sequence[Hull], props: Props, *, possible: bool
+    ) -> None:
         """``possible``: whether there may be moments without contacts at all in this world."""
         self._model, self._data, self._hulls, self._props, self._possible = model, data, hulls, props, possible
         bodies = np.flatnonzero(model.body_mocapid >= 0)
