@@ -132,7 +132,7 @@ class OperationTable(Generic[K]):
 def _parameters_of(name: str, signature: inspect.Signature) -> type[msgspec.Struct]:
     """A struct with a handler's parameters after the first."""
     _, *parameters = signature.parameters.values()
-    fields: list[Any] = []
+    fields: list[tuple[str, object] | tuple[str, object, object]] = []
     for parameter in parameters:
         if parameter.annotation is parameter.empty:
             raise TypeError(f"{name}: parameter {parameter.name} has no type")

@@ -55,7 +55,7 @@ def feedback(value: object) -> object:
 
 
 def plain(value: object) -> object:
-    """Any value of the model as JSON; what is too long is cut."""
+    """A value of the model as JSON; what is too long is cut."""
     match value:
         case None | bool() | int():
             return value

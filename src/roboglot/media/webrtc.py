@@ -11,7 +11,7 @@ import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 from aiortc import (
     MediaStreamTrack,
@@ -25,6 +25,7 @@ from aiortc.exceptions import InvalidAccessError, InvalidStateError, OperationEr
 from aiortc.mediastreams import MediaStreamError
 from aiortc.sdp import candidate_from_sdp
 from av.packet import Packet
+from av.stream import Stream
 
 from roboglot.media.audio import AudioStream
 from roboglot.media.h264 import VideoPacket
@@ -70,7 +71,7 @@ class _PacketTrack(MediaStreamTrack, Generic[P]):
         self._viewer: Viewer[P] | None = None
         self._last = -1
 
-    async def recv(self) -> Packet[Any]:
+    async def recv(self) -> Packet[Stream]:
         """The next packet. Raises MediaStreamError when there are no more."""
         try:
             if self._viewer is None:
@@ -86,7 +87,7 @@ class _PacketTrack(MediaStreamTrack, Generic[P]):
         packet.time_base = self.base
         return packet
 
-    def _packet(self, media: P) -> Packet[Any]:
+    def _packet(self, media: P) -> Packet[Stream]:
         return Packet(media.data)
 
     def _due(self, now: int) -> int:
@@ -115,7 +116,7 @@ class _PictureTrack(_PacketTrack[VideoPacket]):
         self._stream = stream
         self._keyframe_at = float("-inf")
 
-    def _packet(self, media: VideoPacket) -> Packet[Any]:
+    def _packet(self, media: VideoPacket) -> Packet[Stream]:
         packet = super()._packet(media)
         packet.is_keyframe = media.keyframe
         return packet

@@ -166,7 +166,7 @@ class DoorType:
     title: str
     config: type
     contracts: tuple[Contract, ...]
-    table: Callable[[], OperationTable[Any]]
+    table: Callable[[], OperationTable[str] | OperationTable[int]]
     ports: tuple[PortSetting, ...]
     open: Callable[[Any, Site], Door]
     options: tuple[Option, ...] = ()

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import inspect
-from collections.abc import Callable, Iterator
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from concurrent.futures import TimeoutError as Late
+from contextlib import AbstractAsyncContextManager, AbstractContextManager
+from types import TracebackType
 from typing import Any
 
 PATIENCE = 60.0  # real s until a call of a test fails
@@ -17,7 +19,9 @@ class Loop:
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self.loop = loop
 
-    def run(self, function: Callable[..., Any], *arguments: Any, within: float = PATIENCE, **named: Any) -> Any:
+    def run(
+        self, function: Callable[..., object], *arguments: object, within: float = PATIENCE, **named: object
+    ) -> Any:
         """Call it there, wait for what it awaits, and return its result. Raises what it raises, and TimeoutError."""
 
         async def call() -> object:
@@ -39,16 +43,16 @@ class Loop:
 class Blocking:
     """An asyncio object whose methods block. What they return can be waited for (``wait``) and iterated over, too."""
 
-    def __init__(self, target: Any, loop: Loop) -> None:
+    def __init__(self, target: object, loop: Loop) -> None:
         self._target, self._loop = target, loop
 
-    def __getattr__(self, name: str) -> object:
+    def __getattr__(self, name: str) -> Any:
         value = getattr(self._target, name)
         if not callable(value) or isinstance(value, type):
             return self._wrapped(value)
 
-        def call(*arguments: Any, **named: Any) -> Any:
-            return self._wrapped(self._loop.run(value, *arguments, **named))
+        def call(*arguments: object, within: float = PATIENCE, **named: object) -> object:
+            return self._wrapped(self._loop.run(value, *arguments, within=within, **named))
 
         return call
 
@@ -75,17 +79,14 @@ class Blocking:
             except StopAsyncIteration:
                 return
 
-    def next(self, within: float = PATIENCE) -> object:
+    def next(self, within: float = PATIENCE) -> Any:
         """Return the next of what it yields. Raises TimeoutError, StopAsyncIteration."""
-        return self._loop.run(self._target.__anext__, within=within)
+        return self._loop.run(_next, self._target, within=within)
 
-    def wait(self, within: float = PATIENCE) -> object:
+    def wait(self, within: float = PATIENCE) -> Any:
         """Wait for the end of an action or task; raises as ``await`` would, and TimeoutError."""
 
-        async def end() -> object:
-            return await self._target
-
-        return self._loop.run(end, within=within)
+        return self._loop.run(_end, self._target, within=within)
 
     def _wrapped(self, value: object) -> object:
         return Blocking(value, self._loop) if _is_kept(value) else value
@@ -104,15 +105,28 @@ def _is_kept(value: object) -> bool:
     )
 
 
-async def _enter(target: Any) -> None:
-    if hasattr(target, "__aenter__"):
+async def _next(target: AsyncIterator[object]) -> object:
+    return await anext(target)
+
+
+async def _end(target: Awaitable[object]) -> object:
+    return await target
+
+
+async def _enter(target: AbstractAsyncContextManager[object] | AbstractContextManager[object]) -> None:
+    if isinstance(target, AbstractAsyncContextManager):
         await target.__aenter__()
     else:
         target.__enter__()
 
 
-async def _exit(target: Any, *failure: object) -> None:
-    if hasattr(target, "__aexit__"):
-        await target.__aexit__(*failure)
+async def _exit(
+    target: AbstractAsyncContextManager[object] | AbstractContextManager[object],
+    kind: type[BaseException] | None,
+    error: BaseException | None,
+    trace: TracebackType | None,
+) -> None:
+    if isinstance(target, AbstractAsyncContextManager):
+        await target.__aexit__(kind, error, trace)
     else:
-        target.__exit__(*failure)
+        target.__exit__(kind, error, trace)

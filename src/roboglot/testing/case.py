@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from roboglot.testing.artifacts import FOLDER, folder_of, save
+from roboglot.testing.blocking import Blocking
 from roboglot.testing.server import RobotServer
 from roboglot.testing.wanted import Wanted, WantedFault, wanted_of
 
@@ -50,27 +51,27 @@ class RobotTestCase(unittest.TestCase):
             save(self.server, folder, self.id(), "failed: see the test's own output")
 
     @property
-    def rest(self) -> object:
+    def rest(self) -> Blocking:
         """A connected client of the REST API."""
         return self._client("rest")
 
     @property
-    def robomaster(self) -> object:
+    def robomaster(self) -> Blocking:
         """A connected client of the text protocol, in SDK mode."""
         return self._client("robomaster")
 
     @property
-    def cyberdog(self) -> object:
+    def cyberdog(self) -> Blocking:
         """A connected client of the dog's app protocol."""
         return self._client("cyberdog")
 
     @property
-    def program(self) -> object:
+    def program(self) -> Blocking:
         """A connected client of block programs."""
         return self._client("program")
 
-    def _client(self, name: str) -> object:
-        found = self.__dict__.get(f"_{name}")
+    def _client(self, name: str) -> Blocking:
+        found: Blocking | None = self.__dict__.get(f"_{name}")
         if found is None:
             found = self.__dict__[f"_{name}"] = self.server.open(getattr(self.server, f"new_{name}")())
         return found

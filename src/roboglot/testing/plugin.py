@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import AsyncIterator, Callable, Generator, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from roboglot.model.robot import Robot
     from roboglot.simulation.world.world import World
     from roboglot.testing import Forward
+    from roboglot.testing.blocking import Blocking
     from roboglot.testing.server import RobotServer
     from roboglot.testing.wanted import Wanted
 
@@ -37,8 +38,8 @@ MARKERS = (
     "recording(file): the robots of robot_server answer as in that recording",
 )
 OPTION = "--roboglot-failures"
-_SERVER = pytest.StashKey[Any]()
-_SHARED = pytest.StashKey[dict[Any, Any]]()
+_SERVER = pytest.StashKey["RobotServer"]()
+_SHARED = pytest.StashKey[dict["Wanted", "RobotServer"]]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -59,9 +60,9 @@ def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
 
     It would rewrite every module of a package that brings a plugin: 800 here, seconds at each start, for nothing.
     """
-    hook: Any = getattr(early_config.pluginmanager, "rewrite_hook", None)
+    hook = getattr(early_config.pluginmanager, "rewrite_hook", None)
     marked = getattr(hook, "_must_rewrite", None)  # there is no public way; without it, it only takes longer
-    if isinstance(marked, set):
+    if hook is not None and isinstance(marked, set):
         marked.discard("roboglot")
         hook.mark_rewrite("roboglot.testing")
 
@@ -177,25 +178,25 @@ def reset(robot_server: RobotServer) -> Callable[[], None]:
 
 
 @pytest.fixture
-def rest(robot_server: RobotServer) -> object:
+def rest(robot_server: RobotServer) -> Blocking:
     """A client of the first robot's REST API (``SlamwareClient``) whose methods block."""
     return robot_server.open(robot_server.new_rest())
 
 
 @pytest.fixture
-def robomaster(robot_server: RobotServer) -> object:
+def robomaster(robot_server: RobotServer) -> Blocking:
     """A client of its text protocol (``RoboMasterClient``), in SDK mode, whose methods block."""
     return robot_server.open(robot_server.new_robomaster())
 
 
 @pytest.fixture
-def cyberdog(robot_server: RobotServer) -> object:
+def cyberdog(robot_server: RobotServer) -> Blocking:
     """A client of its app protocol (``CyberDogClient``), by TLS, whose methods block."""
     return robot_server.open(robot_server.new_cyberdog())
 
 
 @pytest.fixture
-def program(robot_server: RobotServer) -> object:
+def program(robot_server: RobotServer) -> Blocking:
     """A client of its block programs (``ProgramClient``) whose methods block."""
     return robot_server.open(robot_server.new_program())
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from roboglot.clients.cyberdog import Certificates, CyberDogClient
     from roboglot.clients.robomaster.client import RoboMasterClient
     from roboglot.clients.slamware import SlamwareClient
+    from roboglot.config import RobotConfig
     from roboglot.model.geometry import Pose
     from roboglot.model.robot import Robot
     from roboglot.model.tap import Exchange
@@ -105,7 +106,7 @@ class RobotServer:
             if self._given_data is None:
                 shutil.rmtree(self.data, ignore_errors=True)
 
-    async def _start(self, configs: tuple[Any, ...]) -> None:
+    async def _start(self, configs: tuple[RobotConfig, ...]) -> None:
         from roboglot.config import ConsoleConfig, RecordConfig, config_of
         from roboglot.protocols import sections
         from roboglot.runtime import Runtime
@@ -170,9 +171,15 @@ class RobotServer:
             raise RuntimeError("the robot is not up")
         return self._loop
 
-    def call(self, function: Callable[..., T | Coroutine[Any, Any, T]], *arguments: Any, **named: Any) -> T:
+    def call(
+        self,
+        function: Callable[..., T | Coroutine[object, None, T]],
+        *arguments: object,
+        within: float = PATIENCE,
+        **named: object,
+    ) -> T:
         """Call a function, or run a coroutine function, where the robots run; returns its result."""
-        result: T = self.loop.run(function, *arguments, **named)
+        result: T = self.loop.run(function, *arguments, within=within, **named)
         return result
 
     @property
@@ -196,12 +203,12 @@ class RobotServer:
         return next(iter(self.runtime.fleet.robots.values()))
 
     @property
-    def truth(self) -> Any:
+    def truth(self) -> _There:
         """What really is the case (``roboglot.simulation.world.truth``)."""
         return _There(self.runtime.fleet.world.truth, self.loop)
 
     @property
-    def stage(self) -> Any:
+    def stage(self) -> _There:
         """Hands in the world: place, push, add_obstacle, inject_fault, person (``roboglot.model.stage``)."""
         return _There(self.runtime.fleet.world.hands, self.loop)
 
@@ -315,7 +322,7 @@ class RobotServer:
             export_client(self.data / FOLDER, folder)
         return Certificates.load(folder)
 
-    def open(self, client: object) -> object:
+    def open(self, client: object) -> Blocking:
         """Connect an asyncio client where the robots run; its methods block. It is closed with the server."""
         return self._clients.enter_context(Blocking(client, self.loop))
 
@@ -329,13 +336,13 @@ class _There:
     def __init__(self, target: object, loop: Loop) -> None:
         self._target, self._loop = target, loop
 
-    def __getattr__(self, name: str) -> object:
+    def __getattr__(self, name: str) -> Any:
         value = self._loop.run(lambda: getattr(self._target, name))
         if not callable(value):
             return value
 
-        def call(*arguments: Any, **named: Any) -> Any:
-            result = self._loop.run(value, *arguments, **named)
+        def call(*arguments: object, within: float = PATIENCE, **named: object) -> object:
+            result = self._loop.run(value, *arguments, within=within, **named)
             return _There(result, self._loop) if hasattr(result, "walk_to") else result
 
         return call

@@ -35,7 +35,7 @@ def askable(door: str) -> list[str]:
     return found
 
 
-def _reading(door: str) -> Iterator[tuple[str, Operation[object]]]:
+def _reading(door: str) -> Iterator[tuple[str, Operation[str] | Operation[int]]]:
     (kind,) = (kind for kind in DOORS if kind.name == door)
     table = kind.table()
     if door == "visual":  # its table has what programs may call; here it is about frames

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from roboglot.operations import OperationTable
 from roboglot.protocols.cyberdog.config import CyberDogConfig
@@ -23,7 +22,7 @@ def _implementation() -> Implementation:
     return table
 
 
-def _table() -> OperationTable[Any]:
+def _table() -> OperationTable[int]:
     from roboglot.protocols.cyberdog import server, table  # noqa: F401
 
     return table.TABLE

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from roboglot.operations import OperationTable
 from roboglot.protocols.door import Contract, Door, DoorType, Implementation, PortSetting, Site
 from roboglot.protocols.foxglove.config import FoxgloveConfig
@@ -28,7 +26,7 @@ def _messages() -> Implementation:
     return Messages()
 
 
-def _table() -> OperationTable[Any]:
+def _table() -> OperationTable[str]:
     from roboglot.protocols.foxglove import dispatch, table  # noqa: F401 - the chapters fill the table
 
     return table.TABLE

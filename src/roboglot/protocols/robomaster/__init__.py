@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from roboglot.operations import OperationTable
 from roboglot.protocols.door import Contract, Door, DoorType, Implementation, Option, PortKind, PortSetting, Site
 from roboglot.protocols.robomaster.config import RoboMasterConfig
@@ -24,7 +22,7 @@ def _implementation() -> Implementation:
     return table
 
 
-def _table() -> OperationTable[Any]:
+def _table() -> OperationTable[str]:
     from roboglot.protocols.robomaster import dispatch, table  # noqa: F401 - dispatch's chapters fill the table
 
     return table.TABLE

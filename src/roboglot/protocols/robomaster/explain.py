@@ -59,7 +59,7 @@ def completed(name: str, shape: Shape, values: Mapping[str, Value]) -> str:
     return f"did you mean `{_spelt(name, words)}`?"
 
 
-def _only(shape: Shape, parameter: str, value: Value) -> dict[str, Any]:
+def _only(shape: Shape, parameter: str, value: Value) -> dict[str, Value | None]:
     """This value with something valid for whatever else is required."""
     fillers = {name: _nearest(_bare(shape.kinds[name]), "") for name in shape.required}
     return fillers | {parameter: value}

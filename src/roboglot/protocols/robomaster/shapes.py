@@ -36,7 +36,7 @@ class Shape:
         """The words by parameter, not checked yet."""
         return parameters_of(words, tuple(self.kinds), self.bare)
 
-    def check(self, values: Mapping[str, Value]) -> dict[str, object]:
+    def check(self, values: Mapping[str, Value | None]) -> dict[str, object]:
         """Converted and checked values of all parameters. Raises BadParameters naming the parameter."""
         if not self.kinds:
             return {}
@@ -52,7 +52,7 @@ def shape_of(operation: Operation[str], as_robots: bool) -> Shape:
     """The shape of ``operation`` in the manual's ranges, or in robots'."""
     _, *parameters = inspect.signature(operation.handler, eval_str=True).parameters.values()
     kinds: Kinds = {p.name: _as_robots(p.annotation) if as_robots else p.annotation for p in parameters}
-    fields: list[Any] = [
+    fields: list[tuple[str, object] | tuple[str, object, object]] = [
         (p.name, kinds[p.name]) if p.default is p.empty else (p.name, kinds[p.name], p.default) for p in parameters
     ]
     return Shape(

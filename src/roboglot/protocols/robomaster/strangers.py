@@ -1,6 +1,6 @@
 """Recognises connections that speak another protocol: what a browser, TLS or SSH sends first is never run as commands.
 
-Any page in a browser can have this machine's ports sent an HTTP request whose body holds commands.
+A page in a browser, any page, can have this machine's ports sent an HTTP request whose body holds commands.
 """
 
 from __future__ import annotations

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from roboglot.operations import OperationTable
 from roboglot.protocols.door import Contract, Door, DoorType, Implementation, PortSetting, Site
 from roboglot.protocols.slamware.config import SlamwareConfig
@@ -22,7 +20,7 @@ def _implementation() -> Implementation:
     return table
 
 
-def _table() -> OperationTable[Any]:
+def _table() -> OperationTable[str]:
     from roboglot.protocols.slamware import dispatch, table  # noqa: F401 - the chapters fill the table
 
     return table.TABLE

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from roboglot.operations import OperationTable
 from roboglot.protocols.door import Contract, Door, DoorType, Implementation, Option, PortKind, PortSetting, Site
 from roboglot.protocols.vda5050.config import Vda5050Config
@@ -29,7 +27,7 @@ def _messages() -> Implementation:
     return Messages()
 
 
-def _table() -> OperationTable[Any]:
+def _table() -> OperationTable[str]:
     from roboglot.protocols.vda5050 import dispatch, table  # noqa: F401 - the former fills the latter
 
     return table.TABLE

@@ -5,8 +5,6 @@ The CyberDog door carries its frames (codes 2002 and 2001), and so does a WebSoc
 
 from __future__ import annotations
 
-from typing import Any
-
 from roboglot.config import zone_of
 from roboglot.operations import OperationTable
 from roboglot.protocols.door import Contract, Door, DoorType, Implementation, Option, PortSetting, Site
@@ -39,7 +37,7 @@ def _frames() -> Implementation:
     return table
 
 
-def _table() -> OperationTable[Any]:
+def _table() -> OperationTable[str]:
     from roboglot.programs.functions import prelude, table  # noqa: F401 - the prelude fills the table
 
     return table.ABILITIES

@@ -51,8 +51,10 @@ def split_realism(name: str) -> tuple[str, str]:
 @cache
 def _file_type() -> type[Struct]:
     """Return the type of a whole file: the name plate, the hull, and a section for each part that has one."""
-    plate: list[Any] = [("maker", str), ("model", str), ("hardware_version", str), ("hull", HullSection)]
+    plate: list[tuple[str, object]] = [("maker", str), ("model", str), ("hardware_version", str), ("hull", HullSection)]
     sections = [(part.name, part.section) for part in parts() if part.section is not None]
     plate += [(name, section) for name, section in sections if name == "base"]
-    optional: list[object] = [(name, section | None, None) for name, section in sections if name != "base"]
-    return defstruct("BodyFile", plate + optional, frozen=True, forbid_unknown_fields=True)
+    optional: list[tuple[str, object, None]] = [
+        (name, section | None, None) for name, section in sections if name != "base"
+    ]
+    return defstruct("BodyFile", [*plate, *optional], frozen=True, forbid_unknown_fields=True)

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING
 
 from roboglot.simulation.bodies.body import Body
 from roboglot.simulation.bodies.support import GRAVITY
+
+if TYPE_CHECKING:
+    from mujoco import MjData, MjModel
 
 LEG_GAIN = 8000.0  # N/m, of the servo that holds the torso
 TORSO = 0.4  # of the mass; the rest is the chassis
@@ -15,7 +18,7 @@ TORSO = 0.4  # of the mass; the rest is the chassis
 class HullLegs:
     """``torso`` and ``sinking``: where MuJoCo keeps the height of the torso's underside, and its rate."""
 
-    def __init__(self, model: Any, data: Any, name: str, body: Body) -> None:
+    def __init__(self, model: MjModel, data: MjData, name: str, body: Body) -> None:
         self._model, self._section = model, body.hull
         self._positions, self._ctrl = data.qpos, data.ctrl  # views: they show what is now
         torso, self._servo = model.joint(f"{name} torso"), model.actuator(f"{name} torso").id

@@ -7,7 +7,6 @@ from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from operator import length_hint
-from typing import Any
 
 CYCLE_MAX = 100  # ticks after which the order of calls repeats itself at the latest
 Entry = tuple[int, Callable[..., None], float]  # rank, what is called, s since its last call
@@ -151,7 +150,7 @@ class _Periodic:
         self._call, self._every, self._left = call, every, first
         self._since = 0.0
 
-    def __call__(self, *times: Any) -> None:
+    def __call__(self, *times: float) -> None:
         *stamp, seconds = times
         self._since += seconds
         self._left -= 1

@@ -11,11 +11,11 @@ import signal
 import subprocess
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 from roboglot.clients.errors import ClientError
 from roboglot.model.errors import RobotError
 from roboglot.model.geometry import Pose
+from roboglot.testing.blocking import Blocking
 from roboglot.testing.programs import ProgramFailed
 from roboglot.testing.scenarios.checks import Checker
 from roboglot.testing.scenarios.files import STEPS, BadScenario, Step, fault_of, verb_of
@@ -35,7 +35,7 @@ class Steps:
 
     def __init__(self, server: RobotServer, checker: Checker, folder: Path) -> None:
         self._server, self._checker, self._folder = server, checker, folder
-        self._clients: dict[str, object] = {}
+        self._clients: dict[str, Blocking] = {}
         self._verbs: Mapping[str, Callable[[Step], None]] = {name: getattr(self, f"_{name}") for name in STEPS}
 
     def play(self, step: Step) -> None:
@@ -152,7 +152,7 @@ class Steps:
             self._server.forward(0.1)
             wrong = self._checker.wrong(step.until)
 
-    def _client(self, kind: str, robot: str) -> Any:
+    def _client(self, kind: str, robot: str) -> Blocking:
         if (found := self._clients.get(kind + robot)) is None:
             if robot and robot not in self._server.addresses:
                 raise BadScenario(f"there is no robot {robot!r}")
