@@ -28,6 +28,9 @@ class mjtIntegrator(int):
 class mjtEnableBit(int):
     mjENBL_SLEEP: mjtEnableBit
 
+class mjtDisableBit(int):
+    mjDSBL_CONTACT: mjtDisableBit
+
 class mjtSleepPolicy(int):
     mjSLEEP_NEVER: mjtSleepPolicy
 
@@ -36,6 +39,7 @@ class MjOption:
     integrator: int
     gravity: ArrayLike
     iterations: int
+    disableflags: int
     enableflags: int
 
 class MjsCompiler:
@@ -121,6 +125,8 @@ class MjModel:
     body_bvhadr: _Ints
     body_conaffinity: _Ints
     body_contype: _Ints
+    body_geomadr: _Ints
+    body_mocapid: _Ints
     body_rootid: _Ints
     body_subtreemass: _Floats
     bvh_aabb: _Floats
