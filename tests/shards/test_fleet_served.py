@@ -185,6 +185,7 @@ def test_logs_and_top_tell_of_a_shard(fleet: Fleet) -> None:
     assert fleet.call("logs", "w1").returncode == 0
     table = fleet.call("top", "--once").stdout
     assert "2 shards, 4 robots" in table
+    assert any(float(row.split()[4]) > 0 for row in table.splitlines() if row.startswith("w"))  # cores
 
 
 def test_killed_parents_leave_no_orphan_and_no_lock(fleet: Fleet) -> None:

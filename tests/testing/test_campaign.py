@@ -131,6 +131,21 @@ def test_another_program_is_another_scenario(tmp_path: Path) -> None:
     assert before.fingerprint != after.fingerprint
 
 
+def test_a_trial_played_again_leaves_one_row(tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    for outcome in (Outcome.CRASHED, Outcome.CRASHED, Outcome.PASSED):
+        table = Table(path)
+        assert not table.done(trial(1))
+        table.add(trial(1), Result(outcome))
+        table.add(trial(2), Result(Outcome.CRASHED))
+        table.close()
+        assert [row["outcome"] for row in csv.DictReader(path.read_text().splitlines())] == [outcome, "crashed"]
+    assert [file.name for file in tmp_path.iterdir()] == ["table.csv"]
+    table = Table(path)
+    assert table.done(trial(1))
+    table.close()
+
+
 def test_other_tables_and_other_scenarios_are_left_alone(tmp_path: Path) -> None:
     path = tmp_path / "table.csv"
     path.write_text("a,b\n1,2")  # whose last line has no end

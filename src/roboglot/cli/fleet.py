@@ -91,15 +91,14 @@ def show(data: Data = None, as_json: Annotated[bool, typer.Option("--json", help
 def top(
     data: Data = None,
     once: Annotated[bool, typer.Option("--once", help="One table, then end.")] = False,
-    period: Annotated[float, typer.Option(min=0.5, help="Seconds between two tables.")] = 2.0,
+    period: Annotated[float, typer.Option(min=0.5, help="Seconds between tables; cores are counted over it.")] = 2.0,
 ) -> None:
     """Show what each shard needs of the machine, and whether it keeps up with robot time."""
-    before: dict[str, tuple[float, float]] = {}
+    before = {row.name: (row.cpu, time.monotonic()) for row in _ask("look", data).shards}
     while True:
+        time.sleep(period)
         answer, now = _ask("look", data), time.monotonic()
-        lines = [
-            f"{'shard':6} {'state':9} {'pid':>8} {'robots':>6} {'core':>6} {'MB':>6} {'x real':>7} {'restarts':>8}"
-        ]
+        lines = [HEAD]
         for row in answer.shards:
             cpu, at = before.get(row.name, (row.cpu, now))
             core = (row.cpu - cpu) / (now - at) if now > at else 0.0
@@ -114,7 +113,6 @@ def top(
         print("\n".join(lines) if once or not sys.stdout.isatty() else "\x1b[H\x1b[2J" + "\n".join(lines), flush=True)
         if once:
             return
-        time.sleep(period)
 
 
 @app.command()

@@ -47,10 +47,12 @@ class Table:
             self._file.close()
             raise OtherCampaign(f"another campaign writes {path}") from None
         try:
-            self._found = {(row.scenario, row.seed): row for row in self._read()}
+            rows = self._read()
         except OtherCampaign:
             self._file.close()
             raise
+        self._found = {(row.scenario, row.seed): row for row in rows}
+        self._written = len(rows)
         if not self._file.tell():
             self._write(HEAD)
 
@@ -76,6 +78,7 @@ class Table:
             trial.fingerprint,
         )
         self._write(row)
+        self._written += 1
         self._found[row.scenario, row.seed] = row
         return row
 
@@ -85,13 +88,25 @@ class Table:
         return list(self._found.values())
 
     def close(self) -> None:
-        """Let others have the file."""
-        self._file.close()
+        """Leave one row of each trial, and let others have the file."""
+        try:
+            if self._written > len(self._found):
+                self._leave_the_last()
+        finally:
+            self._file.close()
+
+    def _leave_the_last(self) -> None:
+        """Put a file without the rows of trials that were played again into the place of this one."""
+        fresh = self.path.with_name(f"{self.path.name}.new")
+        with fresh.open("wb") as file:
+            for values in (HEAD, *self._found.values()):
+                file.write(_line(values))
+            file.flush()
+            os.fsync(file.fileno())
+        fresh.replace(self.path)
 
     def _write(self, values: Sequence[object]) -> None:
-        line = io.StringIO()
-        csv.writer(line, lineterminator="\n").writerow(values)
-        self._file.write(line.getvalue().encode())
+        self._file.write(_line(values))
         self._file.flush()
         os.fsync(self._file.fileno())
 
@@ -109,6 +124,12 @@ class Table:
         self._file.truncate(whole)
         self._file.seek(whole)
         return rows
+
+
+def _line(values: Sequence[object]) -> bytes:
+    line = io.StringIO()
+    csv.writer(line, lineterminator="\n").writerow(values)
+    return line.getvalue().encode()
 
 
 def _row(line: Sequence[str]) -> Row:
