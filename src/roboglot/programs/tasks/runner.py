@@ -120,8 +120,7 @@ class Runner:
             offset = int(here.total_seconds()) if here else 0
             seed = crc32(f"{task.id} {clock.time()}".encode()) if clock.repeats else None
             header = header_of(task.body, modules, offset, watched=stops is not None, seed=seed)
-            await journal.open(header)
-            living = await self._living(task, header, journal, stops=stops)
+            living = await self._begin(task, header, journal, stops)
         except (SandboxUnavailable, EngineError, ValueError, LookupError, ProgramError) as error:
             note = LogEntry(self._robot.clock.epoch(), "error", str(error))
             state = TaskState.RUN_WAIT if task.mode == "cycle" else TaskState.SHUTDOWN
@@ -133,6 +132,22 @@ class Runner:
         living.time.begin()
         clock.release(journal)
         self._supervisors.add(self._supervise(living), f"task {task.id}")
+
+    async def _begin(self, task: StoredProgram, header: Header, journal: Journal, stops: Stops | None) -> TaskRun:
+        """Fork while the disk writes; what the program says waits for both."""
+        opening = asyncio.ensure_future(journal.open(header))
+        try:
+            living = await self._living(task, header, journal, stops=stops)
+        except BaseException:
+            await asyncio.gather(opening, return_exceptions=True)
+            raise
+        try:
+            await opening
+        except BaseException:
+            del self.runs[task.id]
+            await living.kill()
+            raise
+        return living
 
     async def revive(self, task: StoredProgram, header: str) -> None:
         """Bring a task back that ran or was suspended when the server was killed: suspended, where it was."""

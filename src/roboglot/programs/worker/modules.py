@@ -22,8 +22,8 @@ def build_modules(call: HostCall, seed: int, utc_offset: int) -> dict[str, Modul
     """The modules of one run; ``call(name, *arguments)`` asks the host."""
     return {
         "time": _module("time", _time_members(call, utc_offset)),
-        "math": _module("math", _public(math)),
-        "numbers": _module("numbers", {name: getattr(numbers, name) for name in numbers.__all__}),
+        "math": _module("math", _MATH),
+        "numbers": _module("numbers", _NUMBERS),
         "random": _module("random", _random_members(seed)),
     }
 
@@ -38,6 +38,12 @@ def _public(module: object) -> dict[str, object]:
     return {name: getattr(module, name) for name in dir(module) if not name.startswith("_")}
 
 
+# Found once, in the process that programs are forked from.
+_MATH = _public(math)
+_NUMBERS = {name: getattr(numbers, name) for name in numbers.__all__}
+_RANDOM = tuple(_public(random.Random()))
+
+
 def _random_members(seed: int) -> dict[str, object]:
     generator = random.Random(seed)
 
@@ -45,7 +51,7 @@ def _random_members(seed: int) -> dict[str, object]:
         """Without a number, the next state still follows from the run's own seed: a run can be repeated."""
         generator.seed(generator.getrandbits(64) if a is None else a)
 
-    members = _public(generator)
+    members = {name: getattr(generator, name) for name in _RANDOM}
     return {**members, "seed": reseed, "Random": random.Random}
 
 

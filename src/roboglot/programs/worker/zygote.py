@@ -217,6 +217,7 @@ def main(descriptor: int, *, filter_required: bool) -> None:
     except (OSError, AttributeError, ctypes.ArgumentError) as error:
         control.send(json.dumps({"event": "unavailable", "message": str(error)}).encode())
         return
+    child.rehearse()
     gc.collect()
     gc.freeze()
     try:

@@ -27,6 +27,7 @@ export async function loadTable() {
   python.addReservedWords(["cyberdog", "choreographer", "dancer", "time", "true", "false", ...Object.keys(table.enums), ...Object.keys(table.records), ...table.builtins].join(","));
   defineValues();
   defineLanguage();
+  defineChange();
   for (const f of table.functions) for (const value of formsOf(f)) defineFunction(f, value);
   return table;
 }
@@ -84,6 +85,15 @@ export function defineModule({ condition, describe }) {
     };
     return type;
   });
+}
+
+/** As a pupil would write it; a variable that is changed begins at 0. */
+function defineChange() {
+  python.forBlock.math_change = (block) => {
+    const name = python.getVariableName(block.getFieldValue("VAR")), { definitions_: definitions } = /** @type {any} */ (python);
+    definitions.variables = definitions.variables?.replace(new RegExp(`^${name} = None$`, "m"), `${name} = 0`);
+    return `${name} += ${python.valueToCode(block, "DELTA", Order.NONE) || "0"}\n`;
+  };
 }
 
 /** The Python of a parameter that nothing is put into. @param {any} p */

@@ -104,7 +104,7 @@ function Teacher() {
     <div class="buttons"><${Button} kind="danger" icon="stop" label=${t("stop.all")} onClick=${() => wish({ do: "stop_all" })} /><${Button} label=${t("studio.class.export")} onClick=${exported} /><${Button} label=${t("studio.class.leave")} onClick=${leave} /><${Button} label=${t("studio.class.end")} onClick=${() => { if (confirm(t("studio.class.end.sure"))) wish({ do: "close" }); }} /></div>
     ${pupils.length ? html`<ul class="rows pupils">${pupils.map((p) => html`<li key=${p.name} class=${p.error ? "bad" : ""}>${maps.value[p.name] ? html`<img class="map" alt=${t("studio.class.map", { name: p.name })} src=${`data:image/png;base64,${maps.value[p.name]}`} />` : html`<span class="map"></span>`}<span class="grow"><b>${p.name}${p.here ? "" : ` (${t("studio.class.away")})`}</b>
         <small>${p.world ? `${p.world} · ` : ""}${p.robot} · ${t(`studio.phase.${p.phase}`)}${p.lit ? ` · ${p.lit}` : ""}</small><small>${p.program}${p.error ? ` · ${p.error}` : ""}</small></span>
-        <span>${p.stars} ★${p.handed ? ` · ${t("studio.class.handed")}` : ""}</span><${Button} label=${t("studio.class.look")} onClick=${() => look(p.name)} /></li>`)}</ul>` : html`<p class="muted">${t("studio.class.empty")}</p>`}`;
+        <span>${p.stars} ★${p.handed ? ` · ${t("studio.class.handed")}` : ""}</span><${Button} compact icon="eye" label=${t("studio.class.look.at", { name: p.name })} onClick=${() => look(p.name)} /></li>`)}</ul>` : html`<p class="muted">${t("studio.class.empty")}</p>`}`;
 }
 
 export function Group() {

@@ -1,13 +1,14 @@
 // Windows over the page: the library, versions and files; the schedule of a program in plain words.
 import { signal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
-import { Button, html, say, t } from "../base.js";
+import { Button, html, notice, say, t } from "../base.js";
 import * as editor from "./editor.js";
-import { frame } from "./link.js";
+import { frame, listen } from "./link.js";
 import { openModule, removeModule } from "./modules.js";
 import { changed, download, fresh, list, listed, openStored, program, python, remove, saveFrame, show, upload, versions } from "./program.js";
 import { catchUp, operate } from "./runner.js";
 
+const SOON = 150; // ms after news of a program until the list is asked for
 export const shown = signal("");
 const close = () => { shown.value = ""; };
 
@@ -16,7 +17,8 @@ function Dialog({ title, children }) {
   const place = useRef(/** @type {any} */ (null));
   useEffect(() => { place.current?.showModal(); }, []);
   return html`<dialog ref=${place} class="window" aria-label=${title} onClose=${close} onKeyDown=${(e) => e.stopPropagation()}>
-    <div class="bar8"><h2 class="grow">${title}</h2><${Button} label=${t("studio.close")} onClick=${close} /></div>${children}</dialog>`;
+    <div class="bar8"><h2 class="grow">${title}</h2><${Button} label=${t("studio.close")} onClick=${close} /></div>${children}
+    <div class=${`notice ${notice.value.bad ? "bad" : ""}`} role="status" aria-live="polite">${notice.value.text}</div></dialog>`; // the page below says nothing meanwhile
 }
 
 async function opening(id) { try { await openStored(id); await catchUp(); close(); } catch (error) { say(error.message, true); } }
@@ -32,7 +34,13 @@ function Row({ item }) {
 }
 
 export function Library() {
-  useEffect(() => { list().catch((error) => say(error.message, true)); }, []);
+  useEffect(() => {
+    let due = 0;
+    const look = () => list().catch((error) => say(error.message, true));
+    const leave = listen(({ type, frame: told }) => { if (type === "frame" && told.feedback?.type === "task" && !told.block) { clearTimeout(due); due = window.setTimeout(look, SOON); } });
+    look();
+    return () => { clearTimeout(due); leave(); };
+  }, []);
   const old = versions();
   return html`<${Dialog} title=${t("studio.programs")}>
     <div class="buttons"><${Button} icon="plus" label=${t("studio.new.blocks")} onClick=${() => { fresh("blocks"); close(); }} /><${Button} icon="plus" label=${t("studio.new.text")} onClick=${() => { fresh("text"); close(); }} />
@@ -69,7 +77,7 @@ export function plainly(how, text) {
   }
   const later = /^now\s*\+\s*(\d+)\s*(minutes|hours|days|weeks|months|years)$/.exec(when);
   if (when === "now") return t("studio.when.now");
-  if (later) return t("studio.when.later", { n: later[1], unit: t(`studio.unit.${later[2]}`) });
+  if (later) return t("studio.when.later", { n: later[1], unit: t(`studio.unit.${later[2]}`) }).replace(/\b(1 \w+)s\b/, "$1");
   return t("studio.when.at", { at: when });
 }
 
@@ -91,7 +99,7 @@ export function Schedule() {
   return html`<${Dialog} title=${t("studio.schedule")}>
     <div class="buttons"><${Button} on=${mode.value === "single"} label=${t("studio.once")} onClick=${() => { mode.value = "single"; condition.value = "now"; }} />
       <${Button} on=${mode.value === "cycle"} label=${t("studio.again")} onClick=${() => { mode.value = "cycle"; condition.value = "*/5 * * * *"; }} /></div>
-    <ul class="rows">${ready.map((text) => html`<li><${Button} on=${condition.value === text} label=${plainly(mode.value, text)} onClick=${() => { condition.value = text; }} /></li>`)}</ul>
+    <div class="buttons chips" role="group" aria-label=${t("studio.schedule")}>${ready.map((text) => html`<${Button} on=${condition.value === text} label=${plainly(mode.value, text)} onClick=${() => { condition.value = text; }} />`)}</div>
     <label class="field"><span>${t("studio.condition")}</span><input value=${condition.value} maxlength="100" onInput=${(e) => { condition.value = e.target.value; }} /></label>
     <p role="status"><b>${plainly(mode.value, condition.value)}</b></p>
     <div class="buttons"><${Button} kind="main" label=${t("studio.plan")} onClick=${() => { if (python().trim()) plan(true); else say(t("studio.empty")); }} /></div><//>`;

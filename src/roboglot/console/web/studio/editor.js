@@ -14,16 +14,17 @@ export const breaks = signal(/** @type {string[]} */ ([]));
 export const changes = signal(0); // counts what a person changed
 export const modules = signal(/** @type {any[]} */ ([]));
 export const BREAK = "breakpoint";
+Blockly.Scrollbar.scrollbarThickness = 14;
 /** @type {any} */
 export let workspace = null;
 let allowed = /** @type {Set<string> | null} */ (null);
-let lit = "", place = /** @type {HTMLElement | null} */ (null), quiet = false;
+let lit = "", place = /** @type {HTMLElement | null} */ (null), quiet = false, unarranged = false; // blocks came while nothing is shown
 
 /** Make the workspace in `element`; again after a change of language or looks, with the same blocks. @param {HTMLElement} element */
 export function mount(element) {
   place = element;
   remake();
-  new ResizeObserver(() => workspace && Blockly.svgResize(workspace)).observe(element);
+  new ResizeObserver(() => { if (!workspace || !element.clientWidth) return; Blockly.svgResize(workspace); if (unarranged) arrange(); }).observe(element); // hidden, it keeps its view
 }
 
 export function remake() {
@@ -99,7 +100,8 @@ export function load(state, fresh = true) {
 
 /** Show the middle of what fits, the beginning of what does not. */
 function arrange() {
-  if (!workspace.getAllBlocks(false).length) return;
+  unarranged = !place?.clientWidth;
+  if (unarranged || !workspace.getAllBlocks(false).length) return;
   const { viewWidth, viewHeight } = workspace.getMetrics(), box = workspace.getBlocksBoundingBox(), { scale } = workspace;
   if ((box.right - box.left) * scale < viewWidth && (box.bottom - box.top) * scale < viewHeight) workspace.scrollCenter();
   else workspace.scroll(24 - box.left * scale, 24 - box.top * scale);

@@ -12,7 +12,7 @@ import { connect, online, open, opened, unopened } from "./link.js";
 import { Inside } from "./modules.js";
 import { Missions, allowHere, loadMissions } from "./missions.js";
 import { Output, Python, RobotPanel, TextEditor, Values } from "./panels.js";
-import { body, changed, handOver, list, program, rename, restore, stored } from "./program.js";
+import { body, changed, handOver, list, listed, program, rename, restore, stored } from "./program.js";
 import * as runner from "./runner.js";
 
 const TABS = { python: Python, output: Output, values: Values, robot: RobotPanel, missions: Missions, group: Group };
@@ -65,7 +65,7 @@ function Bar() {
 function Banner() {
   if (online.value === "lost" || status.value === "lost") return html`<div class="banner bad" role="alert">${t("link.gone")}</div>`;
   if (unopened.value) return html`<div class="banner warn" role="status">${t("studio.unopened", { why: unopened.value })}</div>`;
-  if (runner.others.value.length) return html`<div class="banner warn" role="status">${t("studio.others")}${runner.others.value.map((id) => html`<${Button} label=${t("studio.stop")} onClick=${() => runner.operate("shutdown", id)} />`)}</div>`;
+  if (runner.others.value.length) return html`<div class="banner warn" role="status">${t("studio.others")}${runner.others.value.map((id) => html`<${Button} label=${`${t("studio.stop")}: ${listed.value.find((one) => one.id === id)?.describe || id}`} onClick=${() => runner.operate("shutdown", id)} />`)}</div>`;
   return null;
 }
 
@@ -78,6 +78,7 @@ function Blocks() {
 
 function Side() {
   const Shown = TABS[tab.value] ?? Python;
+  useEffect(() => { document.getElementById(`tab-${tab.value}`)?.scrollIntoView({ block: "nearest", inline: "nearest" }); }, [tab.value]);
   const move = (event) => {
     const names = Object.keys(TABS), by = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
     if (!by) return;

@@ -54,14 +54,15 @@ async function runNow(step) {
   began = performance.now();
   printed.value = []; readings.value = []; variables.value = {}; failure.value = null; bubbles.clear();
   try {
-    const saved = await isStored() ? null : await saveFrame();
+    const [known, early] = await Promise.all([isStored(), debug(stops(step)).catch(() => null)]);
+    const saved = known ? null : await saveFrame();
     if (saved?.feedback.state) {
       phase.value = "idle";
       await check();
       say(t("studio.wrong", { why: problems.value.length ? words(problems.value[0]) : saved.feedback.describe }), true);
       return undefined;
     }
-    const held = await debug(stops(step));
+    const held = known && early ? early : await debug(stops(step)); // of a program that was not there nothing is known
     if (held.error) throw new Error(held.error);
     const { feedback } = await frame({ type: "task", operate: "run", target_id: [program.value.id], mode: "single", condition: "now" });
     if (feedback.state) throw new Error(feedback.describe);
