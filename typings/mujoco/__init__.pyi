@@ -39,8 +39,8 @@ class MjOption:
     integrator: int
     gravity: ArrayLike
     iterations: int
-    disableflags: int
     enableflags: int
+    disableflags: int
 
 class MjsCompiler:
     degree: bool
