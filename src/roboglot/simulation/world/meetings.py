@@ -57,7 +57,7 @@ class Meetings:
             self._revision = revision
             self.forget()
         self._left -= seconds
-        if self._left >= 0.0:
+        if self._left >= 0.0 or not self._hulls:  # real and recorded robots are in no world
             return
         free = self._free() if self._is_calm() else 0.0
         self._switch(off=bool(free >= WORTH))
