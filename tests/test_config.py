@@ -113,6 +113,8 @@ def test_robots_on_the_command_line() -> None:
         with pytest.raises(ValueError, match="name is letters"):
             parse_robot(f"{name}=universal")
     assert parse_robot("b=universal@127.0.0.9") == RobotConfig("b", "universal", "127.0.0.9")
+    assert parse_robot("b=recording:/x/y.mcap#c@127.0.0.9") == RobotConfig("b", "recording:/x/y.mcap#c", "127.0.0.9")
+    assert parse_robot("b=recording:y.mcap").recording == "y.mcap"
     for bad in ("b", "=universal", "b="):
         with pytest.raises(ValueError, match="name=body"):
             parse_robot(bad)

@@ -20,6 +20,7 @@ from zoneinfo import ZoneInfo
 
 import msgspec
 
+RECORDING = "recording:"  # with which the body of a robot begins that answers as it was recorded
 ROBOTS_MAX = 100
 Limit = Annotated[int, msgspec.Meta(ge=1, le=2**40)]
 Port = Annotated[int, msgspec.Meta(ge=0, le=65535)]  # 0: any that is free
@@ -56,7 +57,7 @@ class RobotConfig:
     @property
     def recording(self) -> str:
         """The file of a robot that answers as it was recorded, "recording:FILE"; empty for any other."""
-        return self.body.removeprefix("recording:") if self.body.startswith("recording:") else ""
+        return self.body.removeprefix(RECORDING) if self.body.startswith(RECORDING) else ""
 
     @property
     def is_simulated(self) -> bool:
@@ -286,11 +287,12 @@ def zone_of(name: str) -> tzinfo:
 
 
 def parse_robot(text: str) -> RobotConfig:
-    """``name=body``, ``name=body@address``, ``name=body:x,y,yaw,floor@address``; the body may be a real robot's URL."""
+    """``name=body``, ``name=body@address``, ``name=body:x,y,yaw,floor@address``; the body may be a real robot's URL, or
+    ``recording:FILE``."""
     name, equals, rest = text.partition("=")
     body, _, address = rest.partition("@")
     start = None
-    if "://" not in body:
+    if "://" not in body and not body.startswith(RECORDING):
         body, colon, where = body.partition(":")
         start = _start(text, where) if colon else None
     if not (name and equals and body):
