@@ -5,7 +5,7 @@ A whole file has an index; one that was cut off is read once, from the front.
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -83,7 +83,8 @@ class Reel:
         Messages of the same time come together. Raises BadRecording, OSError.
         """
         waiting: list[Shot] = []
-        for number, chunk in enumerate(self._chunks, 1):
+        start = bisect_left(self._ends, since)
+        for number, chunk in enumerate(self._chunks[start:], start + 1):
             if chunk.last >= since:
                 waiting += (shot for shot in self._read(chunk) if shot.at >= since)
                 waiting.sort(key=_time)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 import json
 import struct
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,6 +19,7 @@ from roboglot.config import RecordConfig, load_config
 from roboglot.model.clock import LockstepClock
 from roboglot.protocols import DOORS, sections
 from roboglot.recording.reader import Recording, read_messages, read_recording, records
+from roboglot.recording.reel import Reel, Shot
 from roboglot.runtime import Runtime
 from tests.protocols.foxglove.conftest import ADDRESS, WORKER, Opened, Scene, Viewer
 
@@ -193,6 +195,31 @@ async def test_a_jump_shows_how_things_stood_then(playing: Scene, film: Path) ->
     await viewer.until(lambda: viewer.data.get(late))
     assert viewer.data[late] == [recorded(film, "/truth/a/pose", lambda at: at < there)[-1]]
     assert (await ask(viewer, PAUSED, seek=2**63)).time == recording.last
+
+
+async def test_many_jumps_at_once_are_one_read(playing: Scene, film: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    recording = await filmed(film)
+    viewer = await playing.connect()
+    pose = await viewer.subscribe("/a/pose")
+    await ask(viewer, PAUSED, seek=recording.first + NANO)
+    await viewer.settled()
+    look, free, looks = Reel.last, threading.Event(), list[int]()
+
+    def slowly(reel: Reel, at: int, topics: Collection[int]) -> list[Shot]:
+        looks.append(at)
+        assert free.wait(60)
+        return look(reel, at, topics)
+
+    monkeypatch.setattr(Reel, "last", slowly)
+    for number in range(2, 18):
+        assert (await ask(viewer, PAUSED, seek=recording.first + number * NANO)).sought
+    viewer.data.clear()
+    free.set()
+    await viewer.until(lambda: viewer.data.get(pose))
+    await viewer.settled()
+    assert len(looks) <= 2  # the one that was under way, and the last
+    assert looks[-1] == recording.first + 17 * NANO - 1
+    assert [at for at, _ in viewer.data[pose]] == [recorded(film, "/a/pose", lambda at: at <= looks[-1])[-1][0]]
 
 
 async def test_all_clients_see_same_and_last_rewinds(playing: Scene, film: Path) -> None:

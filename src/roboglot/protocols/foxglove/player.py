@@ -1,14 +1,15 @@
 """Plays a recorded robot's file to all clients of the door: its topics as recorded, with pause, speed and seek.
 
 It begins when the first client comes, so that viewers without playback controls see it too, and rewinds when the last
-one has left. Threads read; a chunk's messages wait in memory for their time.
+one has left. A thread reads, one at a time: of many jumps at once only the last is looked up. A chunk's messages wait
+in memory for their time.
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Coroutine, Iterator, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -50,6 +51,7 @@ class Player:
         self._beating: asyncio.Task[None] | None = None
         self._playing: asyncio.Task[None] | None = None
         self._showing: asyncio.Task[None] | None = None
+        self._reading: asyncio.Future[Sequence[Shot]] | None = None
         self._broken = ""  # why the file cannot be read any more
         self._rewind()
 
@@ -164,8 +166,16 @@ class Player:
 
     async def _read(self, batches: Iterator[Sequence[Shot]]) -> Sequence[Shot]:
         """Return the next messages; none: it is over."""
+        return await self._beside(partial(next, batches, ()))
+
+    async def _beside(self, read: Callable[[], Sequence[Shot]]) -> Sequence[Shot]:
+        """Read in a thread when the one before has ended: it goes on although no one waits for it any more."""
         with self._clock.holding():
-            return await beside(partial(next, batches, ()))
+            while self._reading is not None and not self._reading.done():
+                await asyncio.wait([self._reading])
+            reading = self._reading = asyncio.ensure_future(beside(read))
+            reading.add_done_callback(lambda ended: ended.cancelled() or ended.exception())
+            return await asyncio.shield(reading)
 
     async def _beat(self) -> None:
         number = 0
@@ -209,8 +219,7 @@ class Player:
     async def _last(self, at: int, places: set[int]) -> Sequence[Shot]:
         if not places:
             return ()
-        with self._clock.holding():
-            return await beside(partial(self._reel.last, at, places))
+        return await self._beside(partial(self._reel.last, at, places))
 
 
 async def open_source(robot: Robot) -> Player:
