@@ -123,6 +123,18 @@ async def test_last_minutes_are_written_when_a_fault_comes(tmp_path: Path) -> No
     assert 2.0 <= recording.seconds <= 5.0
     events = [message.json()["event"] for message in read_messages(path, "/a/events")]
     assert "FaultRaised" in events
+    assert {"/a/body", "/a/map", "/a/control", "/truth/state"} <= set(recording.topics)  # told before the last minutes
+
+
+async def test_a_second_recording_knows_how_things_stand(tmp_path: Path) -> None:
+    started = Runtime(config(tmp_path / "data", RecordConfig(ring=True)))
+    await started.start()
+    await advance(started, 8.0)
+    started.recorder.start(str(tmp_path / "late.mcap"))
+    await advance(started, 6.0)
+    await started.close()
+    topics = set(read_recording(tmp_path / "late.mcap").topics)
+    assert {"/a/body", "/a/battery", "/a/map", "/a/faults", "/a/control", "/truth/state"} <= topics
 
 
 async def test_last_minutes_are_written_after_an_uncaught_error(tmp_path: Path) -> None:

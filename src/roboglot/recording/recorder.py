@@ -217,12 +217,20 @@ class Recorder:
 
     def _look_at_robots(self) -> None:
         if self._samplers:
+            self._look_again()
             return
         self._samplers = [Sampler(robot, self._put, video=self._config.video) for robot in self._robots.values()]
         self._truth = TruthSampler(self._stage, self._put) if self._stage and self._config.truth else None
         self._handler = _LogHandler(self)
         logging.getLogger("roboglot").addHandler(self._handler)
         self._sampling = asyncio.get_running_loop().create_task(self._sample(), name="recorder")
+
+    def _look_again(self) -> None:
+        """Tell a recording that begins beside another one how things stand."""
+        for sampler in self._samplers:
+            sampler.again()
+        if self._truth is not None:
+            self._truth.again()
 
     def _look_away_if_idle(self) -> None:
         if self._thread is None and self._ring_thread is None:

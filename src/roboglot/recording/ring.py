@@ -1,4 +1,7 @@
-"""The last minutes, kept in memory, compressed second by second; written to a file when something went wrong."""
+"""The last minutes, kept in memory, compressed second by second; written to a file when something went wrong.
+
+What is told only when it changes (the map, faults) is kept when its block is forgotten: the file begins with it.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +18,8 @@ from roboglot.recording.redaction import Redaction
 
 BYTES_MAX = 64 << 20  # of compressed entries; what is older goes first
 BLOCK_SECONDS = 1.0
+STANDING = frozenset({"state", "battery", "grid", "scene"})  # kinds of which the last one holds until the next
+STANDING_MAX = 1000  # topics
 
 
 class Ring:
@@ -23,6 +28,7 @@ class Ring:
     def __init__(self, origin: Origin, redaction: Redaction, seconds: float = 300.0) -> None:
         self._origin, self._redaction, self._seconds = origin, redaction, seconds
         self._blocks: deque[tuple[int, bytes]] = deque()
+        self._standing: dict[str, bytes] = {}  # by topic: the last one before the first block
         self._bytes = 0
         self._open: list[Entry] = []
         self._lock = threading.Lock()
@@ -46,6 +52,7 @@ class Ring:
         """Forget all."""
         with self._lock:
             self._blocks.clear()
+            self._standing.clear()
             self._open.clear()
             self._bytes = 0
 
@@ -53,12 +60,14 @@ class Ring:
         """Write what is kept into a new file; returns how many entries. Raises OSError."""
         with self._lock:
             blocks, rest = [data for _, data in self._blocks], list(self._open)
+            standing = list(self._standing.values())
         first = rest[0].at if rest else 0
         if blocks:
             first = self._unpack(blocks[0])[0].at
         part, count = PartWriter(path, self._origin, self._redaction, first), 0
         try:
-            for entries in (*map(self._unpack, blocks), rest):
+            before = [entry._replace(at=first) for data in standing for entry in self._unpack(data)]
+            for entries in (before, *map(self._unpack, blocks), rest):
                 for entry in entries:
                     part.write(entry)
                     count += 1
@@ -68,13 +77,24 @@ class Ring:
         return count
 
     def _close_block(self) -> None:
-        data = zstandard.compress(pickle.dumps(self._open, pickle.HIGHEST_PROTOCOL))
+        data = self._pack(self._open)
         self._blocks.append((self._open[-1].at, data))
         self._bytes += len(data)
         newest = self._open[-1].at
         self._open = []
         while self._blocks and (self._bytes > BYTES_MAX or self._blocks[0][0] < newest - self._seconds * NANO):
-            self._bytes -= len(self._blocks.popleft()[1])
+            self._forget(self._blocks.popleft()[1])
+
+    def _forget(self, block: bytes) -> None:
+        self._bytes -= len(block)
+        last = {entry.topic: entry for entry in self._unpack(block) if entry.kind in STANDING}
+        for topic, entry in last.items():
+            if topic in self._standing or len(self._standing) < STANDING_MAX:
+                self._standing[topic] = self._pack([entry])
+
+    @staticmethod
+    def _pack(entries: list[Entry]) -> bytes:
+        return zstandard.compress(pickle.dumps(entries, pickle.HIGHEST_PROTOCOL))
 
     @staticmethod
     def _unpack(data: bytes) -> list[Entry]:

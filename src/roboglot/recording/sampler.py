@@ -24,6 +24,7 @@ from roboglot.recording.entries import Entry
 from roboglot.recording.messages import plain
 
 POSE_PERIOD = 0.1  # s
+CAMERA_PERIOD = 1.0  # s between two looks for a camera
 STATE_BEATS = 10  # poses to one look at what changes seldom
 MAP_BEATS = 50
 Put = Callable[[Entry], object]
@@ -76,6 +77,11 @@ class Sampler:
             self._filming.cancel()
             self._filming = None
 
+    def again(self) -> None:
+        """Tell once more what is told only when it changes: another recording begins."""
+        self._before.clear()
+        self._shown = False
+
     def beat(self, number: int) -> None:
         """Look at what moves; now and then at the rest."""
         at, wall = self._stamps.now()
@@ -110,8 +116,8 @@ class Sampler:
     async def _film(self) -> None:
         from roboglot.media.video import VideoStream  # its libraries are an extra
 
-        if VideoStream not in self._robot:
-            return
+        while VideoStream not in self._robot:  # a real robot's comes with its link
+            await self._robot.clock.sleep(CAMERA_PERIOD)
         frame = f"{self._robot.id}/camera"
         with self._robot[VideoStream].subscribe() as packets:
             async for packet in packets:

@@ -21,6 +21,10 @@ class TruthSampler:
         self._stage, self._put = stage, put
         self._before: object = None
 
+    def again(self) -> None:
+        """Tell once more what is told only when it changes."""
+        self._before = None
+
     def beat(self, number: int, at: int) -> None:
         """Look once."""
         wall = time.time_ns()
