@@ -51,7 +51,7 @@ def run(program: str) -> None:
     ca, certificate, key = (
         Path("phone", f"{name}.pem").read_bytes() for name in ("ca-cert", "client-cert", "client-key")
     )
-    app, server = App(), grpc.server(ThreadPoolExecutor(4))
+    app, server = App(), grpc.server(ThreadPoolExecutor(1))  # one thread: what comes at once stays in order
     service.add_GrpcAppServicer_to_server(app, server)
     server.add_secure_port("127.0.0.1:8981", grpc.ssl_server_credentials([(key, certificate)], ca, True))
     server.start()

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from roboglot.config import AccessConfig, Config, ConsoleConfig, RobotConfig
+from roboglot.config import AccessConfig, Config, ConsoleConfig, RecordConfig, RobotConfig
 from roboglot.model.clock import LockstepClock
 from roboglot.model.events import BumperPressed
 from roboglot.model.geometry import Pose
@@ -80,7 +80,8 @@ class Terminal:
     async def forward(self, seconds: float) -> None:
         assert isinstance(self.runtime.clock, LockstepClock)
         await self.runtime.clock.advance(seconds)
-        self.track.append(self.moved)
+        if self.runtime.config.robots[0].is_simulated:
+            self.track.append(self.moved)
 
     async def stand(self) -> None:
         """Wait until the robot does nothing any more."""
@@ -163,7 +164,12 @@ def commands(block: str) -> list[str]:
 
 @asynccontextmanager
 async def terminal(
-    folder: Path, address: str, body: str = "universal", access: AccessConfig | None = None
+    folder: Path,
+    address: str,
+    body: str = "universal",
+    access: AccessConfig | None = None,
+    world: str = "office",
+    record: str = "",
 ) -> AsyncIterator[Terminal]:
     """``roboglot up`` in lockstep, in this process, with the doors' own ports, and someone beside it."""
     (folder / "tools").mkdir()
@@ -182,11 +188,14 @@ async def terminal(
         doors={"cyberdog": dog},
         console=console,
         access=access or AccessConfig(),
+        world=world,
+        record=RecordConfig(to=record),
     )
     runtime = Runtime(config)
     try:
         await runtime.start()
-        opened = Terminal(runtime, address, folder, runtime.fleet.world.truth.pose_of("a"), dog.app_port)
+        start = runtime.fleet.world.truth.pose_of("a") if robots[0].is_simulated else Pose()
+        opened = Terminal(runtime, address, folder, start, dog.app_port)
         leave = opened.robot.events.listen(BumperPressed, opened.bumps.append)
         yield opened
         leave()

@@ -46,6 +46,10 @@ class StandIn(ABC):
         """
 
     @abstractmethod
+    def first_push(self, door: str, operation: str) -> bytes | None:
+        """Return the first push of this kind, for what must be known before it comes; None: there is none."""
+
+    @abstractmethod
     def join(self, door: str, send: Callable[[str, bytes], None], reads: Collection[str] = ()) -> Callable[[], None]:
         """Have pushes of ``door`` go to ``send`` (operation, payload) from now on; returns what ends it.
 

@@ -7,15 +7,19 @@ import json
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, urlsplit
 
 from roboglot.clients.errors import ClientError, LinkLost
 from roboglot.model.clock import Clock
 from roboglot.wire.robomaster.replies import Reply
 
+if TYPE_CHECKING:
+    from websockets.asyncio.client import ClientConnection
+
 PATIENCE = 60.0  # s for an answer
 LINE_MAX = 1 << 20
+FRAMES, LOG = "/programs", "/log"  # paths of a WebSocket
 PORTS = {"slamware": 1448, "robomaster": 40923, "cyberdog": 50052, "visual": 50053}
 REFUSALS = tuple(str(reply) for reply in Reply if reply is not Reply.OK)
 Answers = list[tuple[bytes, str]]
@@ -141,42 +145,70 @@ class DogLine(Line):
 
 
 class FrameLine(Line):
-    """Block programs over their WebSocket: answers carry the id of their request, all else is a push."""
+    """Block programs over their WebSocket: answers carry the id of their request, all else is a push.
+
+    An operation that is a path (``/log``) has a socket of its own.
+    """
 
     async def open(self) -> None:
-        from websockets.asyncio.client import connect
-        from websockets.exceptions import WebSocketException
-
-        try:
-            address = f"ws://{self.host}:{self.port}/programs"
-            self._socket = await self.clock.wait_for(connect(address, max_size=LINE_MAX), PATIENCE)
-        except (OSError, TimeoutError, WebSocketException) as error:
-            raise LinkLost(f"{address} cannot be reached: {error}") from None
+        self._sockets: dict[str, ClientConnection] = {}
+        self._draining: list[asyncio.Task[None]] | None = None
+        await self._socket(FRAMES)
 
     async def ask(self, operation: str, payload: bytes, answers: int) -> Answers:
-        from websockets.exceptions import ConnectionClosed
-
-        await self._socket.send(payload.decode("utf-8", "replace"))
+        path = operation if operation.startswith("/") else FRAMES
+        socket = await self._socket(path)
+        await socket.send(payload.decode("utf-8", "replace"))
         wanted, found = _frame_id(payload), Answers()
         while len(found) < answers:
-            try:
-                message: Any = await self.clock.wait_for(self._socket.recv(), PATIENCE)
-            except (TimeoutError, ConnectionClosed) as error:
-                raise LinkLost(f"no answer to {operation}: {error}") from None
-            frame = message.encode() if isinstance(message, str) else bytes(message)
-            if _frame_id(frame) == wanted:
+            frame = await self._next(socket, operation)
+            if path != FRAMES or _frame_id(frame) == wanted:
                 found.append((frame, status_of("visual", frame)))
+                if b'"entries"' in frame and path == LOG:  # the last one of that log
+                    break
             else:
                 self.pushed("robot block" if b'"block"' in frame else "robot feedback", frame)
         return found
 
+    async def _socket(self, path: str) -> ClientConnection:
+        from websockets.asyncio.client import connect
+        from websockets.exceptions import WebSocketException
+
+        if path not in self._sockets:
+            try:
+                address = f"ws://{self.host}:{self.port}{path}"
+                socket = await self.clock.wait_for(connect(address, max_size=LINE_MAX), PATIENCE)
+            except (OSError, TimeoutError, WebSocketException) as error:
+                raise LinkLost(f"{address} cannot be reached: {error}") from None
+            self._sockets[path] = socket
+            if self._draining is not None:
+                self._draining.append(asyncio.ensure_future(_drain(socket)))
+        return self._sockets[path]
+
+    async def _next(self, socket: ClientConnection, operation: str) -> bytes:
+        from websockets.exceptions import ConnectionClosed
+
+        try:
+            message = await self.clock.wait_for(socket.recv(), PATIENCE)
+        except (TimeoutError, ConnectionClosed) as error:
+            raise LinkLost(f"no answer to {operation}: {error}") from None
+        return message.encode() if isinstance(message, str) else bytes(message)
+
     async def drain(self) -> None:
         """Read what comes, and forget it, until the robot hangs up."""
-        async for _ in self._socket:
-            pass
+        self._draining = []
+        await _drain(self._sockets[FRAMES])
 
     async def close(self) -> None:
-        await self._socket.close()
+        for task in self._draining or ():
+            task.cancel()
+        for socket in self._sockets.values():
+            await socket.close()
+
+
+async def _drain(socket: ClientConnection) -> None:
+    async for _ in socket:
+        pass
 
 
 def _frame_id(frame: bytes) -> object:

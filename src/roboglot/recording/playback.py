@@ -95,8 +95,8 @@ class Playback(StandIn):
         for index, (number, reply) in enumerate(asked.numbered, 1):
             due = began + max(0.0, reply.stamp - asked.request.stamp)
             await kept.timeline.turn(due, number, in_order=in_order)
-            text = rewritten(reply.payload, recorded.fresh, live.fresh)
-            yield StandInReply(self._now(text, reply.stamp), reply.status, index == len(asked.numbered))
+            payload = self._as_now(reply, recorded.fresh, live.fresh)
+            yield StandInReply(payload, reply.status, index == len(asked.numbered))
 
     def join(self, door: str, send: Callable[[str, bytes], None], reads: Collection[str] = ()) -> Callable[[], None]:
         """See ``StandIn``."""
@@ -104,6 +104,11 @@ class Playback(StandIn):
         listeners = self._doors[door].listeners
         listeners.append(send)
         return lambda: listeners.remove(send) if send in listeners else None
+
+    def first_push(self, door: str, operation: str) -> bytes | None:
+        """See ``StandIn``."""
+        pushes = self._doors[door].pushes if door in self._doors else []
+        return next((push.payload for _, push in pushes if push.operation == operation), None)
 
     def close(self) -> None:
         """Push no more."""
@@ -153,6 +158,8 @@ class Playback(StandIn):
         if request.door == "robomaster":
             return not request.payload.rstrip(b" ;").endswith(b"?")
         if request.door == "visual":
+            if request.operation.startswith("/"):  # a path beside that of the frames
+                return request.operation == "/debug"
             return not _inquiry.search(request.payload)
         return request.operation not in door.reads
 
@@ -191,13 +198,18 @@ class Playback(StandIn):
                 door.timeline.push(due, number, partial(self._push, door, push))
 
     def _push(self, door: _Door, push: Exchange) -> None:
-        payload = rewritten(push.payload, tuple(door.ids), tuple(door.ids.values()))
+        payload = self._as_now(push, tuple(door.ids), tuple(door.ids.values()))
         for send in tuple(door.listeners):
-            send(push.operation, self._now(payload, push.stamp))
+            send(push.operation, payload)
 
-    def _now(self, payload: bytes, stamp: float) -> bytes:
-        """Move the Unix times of the recording to today."""
-        then = self._epoch + stamp
+    def _as_now(self, recorded: Exchange, old: tuple[bytes, ...], new: tuple[bytes, ...]) -> bytes:
+        """Return what was said with the ids of now, and its Unix times moved to today; files as they are."""
+        try:
+            recorded.payload.decode()
+        except UnicodeDecodeError:
+            return recorded.payload
+        payload = rewritten(recorded.payload, old, new)
+        then = self._epoch + recorded.stamp
         shift = self._clock.epoch() - then
 
         def move(match: re.Match[bytes]) -> bytes:

@@ -118,11 +118,14 @@ def _answer(open_ones: list[Asked], number: int, reply: Exchange) -> None:
         return
     began = reply.stamp - reply.seconds
     exact = [asked for asked in open_ones if abs(asked.request.stamp - began) <= 1e-6]
-    # A dog's answers on the way do not say when they were asked for: they belong to the newest request.
-    best = min(exact, key=lambda asked: (len(asked.numbered) > 0, asked.number)) if exact else open_ones[-1]
+    # A dog answers one request more than once, at its door and to its driver; of two at once the newer one is meant.
+    often = reply.door.removeprefix(DRIVER) == "cyberdog"
+    if often or not exact:  # what older versions recorded does not say when it was asked for
+        best = (exact or open_ones)[-1]
+    else:
+        best = min(exact, key=lambda asked: (len(asked.numbered) > 0, asked.number))
     best.numbered.append((number, reply))
-    # A dog answers one request more than once, at its door and to its driver.
-    if len(open_ones) > 1 and best.request.door.removeprefix(DRIVER) != "cyberdog":
+    if len(open_ones) > 1 and not often:
         open_ones.remove(best)
     del open_ones[:-64]
 

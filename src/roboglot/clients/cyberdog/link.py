@@ -19,6 +19,7 @@ from roboglot.clients.errors import LinkLost, TimedOut
 from roboglot.model.clock import Clock
 from roboglot.model.tap import LOST, Line
 from roboglot.wire.cyberdog.channel import APP_PORT, LOST_AFTER, ROBOT_NAME, ROBOT_PORT, client_options
+from roboglot.wire.cyberdog.chapters.system import HEARTBEAT, Beats
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import (
     GrpcAppServicer,
@@ -214,10 +215,14 @@ class _App(GrpcAppServicer):  # type: ignore[misc]
     """The service of the app, which the robot calls."""
 
     def __init__(self, link: Link) -> None:
-        self._link = link
+        self._link, self._beats = link, Beats()
 
     async def heartbeat(self, request: object, _context: object) -> object:
         self._link.heartbeat = _heartbeat(request, self._link.clock.time())
+        if self._link.line is None or not self._link.line.watched:
+            self._beats.forget()
+        elif news := self._beats.news(request):
+            self._link.line.push(HEARTBEAT, news)
         return pb.Result(result="ok")
 
     async def sendMsg(self, request: Any, _context: Any) -> Any:  # noqa: N802 - the service's name

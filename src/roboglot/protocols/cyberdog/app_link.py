@@ -31,6 +31,7 @@ from roboglot.wire.cyberdog.channel import (
     PUSH_MAX,
     client_options,
 )
+from roboglot.wire.cyberdog.chapters.system import HEARTBEAT, Beats
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import GrpcAppStub
 from roboglot.wire.cyberdog.text import write
@@ -86,6 +87,7 @@ class AppLink:
         self._news = asyncio.Event()  # the address changed, or a client called: worth dialling at once
         self._stub: Any = None
         self._outboxes: dict[int, Outbox] = {}
+        self._beats = Beats()
         self._task: asyncio.Task[None] | None = None
         self._asking: list[asyncio.Future[bool]] = []  # who waits for the next heartbeat
 
@@ -180,7 +182,7 @@ class AppLink:
         while self._target == target:
             began, asked = self._clock.time(), len(self._asking)
             try:
-                await self._clock.wait_for(self._stub.heartbeat(self._ticks(own)), HEARTBEAT_DEADLINE)
+                await self._clock.wait_for(self._stub.heartbeat(self._noted(self._ticks(own))), HEARTBEAT_DEADLINE)
             except (grpc.aio.AioRpcError, TimeoutError) as error:
                 log.debug("no heartbeat to %s: %s", target, _in_short(error))
                 if self._clock.time() - last >= LOST_AFTER:
@@ -194,6 +196,14 @@ class AppLink:
                 del self._asking[:asked]
             await self._clock.sleep_until(max(began + HEARTBEAT_PERIOD, self._clock.time()))
         return heard
+
+    def _noted(self, ticks: pb.Ticks) -> pb.Ticks:
+        """Tell those who follow what an app that is there hears."""
+        if self._tap is None or not self._tap.watched or not self.connected:
+            self._beats.forget()
+        elif news := self._beats.news(ticks):
+            self._tap.push("cyberdog", self._target, HEARTBEAT, news)
+        return ticks
 
     def _answer(self, asking: list[asyncio.Future[bool]], alive: bool) -> None:
         for answer in asking:

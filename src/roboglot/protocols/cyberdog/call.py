@@ -26,6 +26,7 @@ class Call:
     context: Context
     reply: Callable[[object], Awaitable[None]]
     why: str = ""  # it was refused, in plain words
+    began: float | None = None  # when those who follow heard of it, robot time
 
     def refused(self, answer: Answer, why: str) -> Answer:
         """Return ``answer``, which says no; ``why`` is for the log and who watches the exchange."""

@@ -20,6 +20,7 @@ from roboglot.protocols.cyberdog.chapters.system.bracelet import Bracelet
 from roboglot.protocols.cyberdog.chapters.system.update_jobs import UpdateJobs
 from roboglot.protocols.cyberdog.chapters.system.updates import Updates
 from roboglot.protocols.cyberdog.frame_queue import FrameQueue
+from roboglot.protocols.cyberdog.played import PlayedPushes
 from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.wire.visual.relay import FrameRelay
 
@@ -44,6 +45,7 @@ class Context:
     address: str  # where clients reach the robot
     relay: FrameRelay | None = None
     frames: FrameQueue | None = None  # programs' frames on their way to the app
+    played: PlayedPushes | None = None  # what a recorded robot pushes
     stored_map: str = ""
     map_deleted: bool = False  # the map in use was deleted: it stands in for none that is stored
     profile: Profile = Profile.SPEC

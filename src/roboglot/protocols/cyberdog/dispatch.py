@@ -33,6 +33,7 @@ from roboglot.wire.cyberdog.text import NotJson, fitting, misfits, read_params, 
 
 log = logging.getLogger(__name__)
 DOOR = "cyberdog"
+SILENT = "silent"  # the status of a request that gets no answer at all
 _NAMES = {int(row.key): row.name for row in contract("cyberdog")}
 KNOWN = (_NAMES.keys() | UNPUBLISHED) - TEXT_ONLY
 
@@ -49,7 +50,7 @@ async def answer(call: Call) -> object | None:
         last = await _outcome(call)
     else:
         key = str(int(call.code))
-        began = tap.request(DOOR, key, call.text)
+        began = call.began = tap.request(DOOR, key, call.text)
         try:
             last = await _outcome(call)
         except NotJson as bad:
@@ -57,7 +58,7 @@ async def answer(call: Call) -> object | None:
             tap.reply(DOOR, key, write(answered), _status(answered), str(bad), began)
             raise
         if last is not None or call.why:
-            text, status = ("", "silent") if last is None else (write(last), _status(last))
+            text, status = ("", SILENT) if last is None else (write(last), _status(last))
             tap.reply(DOOR, key, text, status, call.why, began)
     if delay := lateness(call.context.robot):
         await call.context.robot.clock.sleep(delay)
@@ -83,6 +84,9 @@ async def _ask_stand_in(call: Call, stand_in: StandIn) -> object | None:
         call.context.robot.admission.check(DOOR, str(int(call.code)), operation.right if operation else Right.ADMIN)
     reads = operation is not None and operation.right is Right.SEE
     async for reply in stand_in.answer(DOOR, str(int(call.code)), call.text.encode(), reads=reads):
+        if reply.status == SILENT:
+            call.why = "the recorded robot said nothing, either"
+            return None
         text = reply.payload.decode("utf-8", "replace")
         if reply.last:
             return text

@@ -46,6 +46,7 @@ from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.dispatch import answer, error
 from roboglot.protocols.cyberdog.handshakes import Handshakes
+from roboglot.protocols.cyberdog.played import PlayedPushes
 from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.protocols.cyberdog.reflection import add_reflection
 from roboglot.protocols.cyberdog.table import TABLE
@@ -153,7 +154,8 @@ class CyberDogDoor:
             listen(LocalizationRecovered, lambda _: tasks.find_place()),
         ]
         if robot.stand_in is not None:
-            self._cleanup.append(robot.stand_in.join(self.name, self._play, _reads()))
+            played = context.played = PlayedPushes(robot.stand_in, app, robot.clock, self.name)
+            self._cleanup += [played.close, robot.stand_in.join(self.name, played.put, _reads())]
         if self._relay:
             context.frames = queue_to(app, robot.clock)
             self._cleanup += [context.frames.close, self._relay.attach(context.frames)]
@@ -184,14 +186,6 @@ class CyberDogDoor:
             relay=self._relay,
             profile=Profile(self._config.profile),
         )
-
-    def _play(self, operation: str, message: bytes) -> None:
-        """Send the app what a stand-in pushes."""
-        if self._context and self._context.app.connected:
-            sending = self._context.app.send(int(operation), message.decode("utf-8", "replace"))
-            task = asyncio.get_running_loop().create_task(sending, name="play a push")
-            self._writing.add(task)
-            task.add_done_callback(self._writing.discard)
 
     def _keep_app(self, host: str) -> None:
         """Find the app again after a restart: an update reports its result then without being asked."""
@@ -245,11 +239,12 @@ class _Service(GrpcAppServicer):  # type: ignore[misc]
 
         async def reply(value: object) -> None:
             if tap.watched:
-                tap.reply("cyberdog", str(int(code)), write(value), "ok")
+                tap.reply("cyberdog", str(int(code)), write(value), "ok", began=call.began)
             await rpc.write(_answer(code, value))
 
+        call = Call(code, request.params, self._context, reply)
         try:
-            last = await answer(Call(code, request.params, self._context, reply))
+            last = await answer(call)
         except NotJson as bad:
             log.info("%d: %s", code, bad)
             last, code = error(InBandError.BAD_PARAMETERS), 0
@@ -261,16 +256,15 @@ class _Service(GrpcAppServicer):  # type: ignore[misc]
         peer, tap = rpc.peer(), self._context.robot.tap
         self._handshakes.asked(peer)
         await self._enter(rpc, peer)
-        if tap.watched:
-            tap.request("cyberdog", str(int(request.nameCode)), request.params)
+        began = tap.request("cyberdog", str(int(request.nameCode)), request.params) if tap.watched else None
         try:
             fields = read_params(request.params)
         except NotJson:
             fields = {}
-        async with contextlib.aclosing(get_file(self._context, request.nameCode, fields)) as chunks:
+        async with contextlib.aclosing(get_file(self._context, request.nameCode, fields, request.params)) as chunks:
             async for chunk in chunks:
                 if tap.watched:
-                    tap.reply("cyberdog", str(int(request.nameCode)), chunk.SerializeToString(), "ok")
+                    tap.reply("cyberdog", str(int(request.nameCode)), chunk.SerializeToString(), "ok", began=began)
                 await rpc.write(chunk)
                 await self._count(peer, len(chunk.buffer))
 

@@ -6,14 +6,9 @@ Knows the program service and one robot; carriers of the frames are none of its 
 from __future__ import annotations
 
 import asyncio
-import dataclasses
-import json
 import logging
 from collections.abc import Callable, Sequence
 
-from roboglot.model.admission import Right
-from roboglot.programs.stores import LogEntry
-from roboglot.programs.tasks import debugging
 from roboglot.programs.tasks.reports import TaskReport
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols.browsers import Browsers
@@ -24,11 +19,12 @@ from roboglot.protocols.visual.dispatch import Dispatch
 from roboglot.protocols.visual.errors import state_of_report
 from roboglot.protocols.visual.front_ends import FrontEnds, Plain
 from roboglot.protocols.visual.mirror import CloudMirror
+from roboglot.protocols.visual.side_paths import LOG, SidePaths
 from roboglot.protocols.websocket import WebSocketServer
 from roboglot.transport.tls import Tls
 from roboglot.wire.visual.relay import FrontEnd
 from roboglot.wire.visual.replies import feedback
-from roboglot.wire.visual.requests import ID_MAX, Kind
+from roboglot.wire.visual.requests import Kind
 
 log = logging.getLogger(__name__)
 
@@ -49,6 +45,7 @@ class VisualDoor:
         self._service = service
         self._cloud = cloud
         self._socket: WebSocketServer | None = None
+        self._side_paths = SidePaths(service)
         config = config or VisualConfig()
         if address and config.websocket:
             browsers = Browsers("[visual]", config.origins, config.hosts)
@@ -67,6 +64,7 @@ class VisualDoor:
         if self._cloud is not None:
             self._cloud.start()
         self._service.start()
+        self._side_paths.start()
         leave = self._service.robot.admission.on_lost(self._end_programs_of)
         self._listening = [
             leave,
@@ -87,6 +85,7 @@ class VisualDoor:
             await self._cloud.close()
         for leave in self._listening:
             leave()
+        self._side_paths.close()
         self._front_ends.clear()
 
     @property
@@ -110,7 +109,10 @@ class VisualDoor:
         await self._dispatch.receive(text)
 
     def _play(self, operation: str, message: bytes) -> None:
-        """Send all front ends what a stand-in pushes."""
+        """Send all front ends, or readers of the log, what a stand-in pushes."""
+        if operation == LOG:
+            self._side_paths.print(message.decode("utf-8", "replace"))
+            return
         if self._service.robot.tap.watched:
             self._service.robot.tap.push(self.name, "front ends", operation, message)
         self._front_ends.publish(message.decode("utf-8", "replace"))
@@ -121,49 +123,10 @@ class VisualDoor:
         def follow_frames(send: Send, room: Room) -> Callable[[], None]:
             return self._front_ends.add(Plain(send, room))
 
-        def follow_nothing(_send: Send, _room: Room) -> Callable[[], None]:
-            return lambda: None
-
         return {
             "/programs": texts(follow_frames, lambda text, _: self._dispatch.receive(text)),
-            "/log": texts(self._follow_log, self._send_log),
-            "/where": texts(follow_nothing, self._send_position),
-            "/runs": texts(follow_nothing, self._send_runs),
-            "/debug": texts(follow_nothing, self._debug, Right.PROGRAM),
+            **self._side_paths.channels(),
         }
-
-    def _follow_log(self, send: Send, room: Room) -> Callable[[], None]:
-        """Send every line that a program writes; programs wait for a reader that is slower than they print."""
-        leave = self._service.log_entries.join(lambda task, entry: send(log_line(task, entry)))
-        leave_pace = self._service.log_pace.join(room)
-
-        def leave_both() -> None:
-            leave()
-            leave_pace()
-
-        return leave_both
-
-    async def _send_log(self, text: str, send: Send) -> None:
-        """Answer on ``/log``: the stored log of the task it names, then the number of lines."""
-        task = text[:ID_MAX]
-        entries = await self._service.log(task)
-        for entry in entries:
-            send(log_line(task, entry))
-        send(json.dumps({"target_id": task, "entries": len(entries)}, ensure_ascii=False))
-
-    async def _send_position(self, text: str, send: Send) -> None:
-        """Answer on ``/where``: the current position of the task it names."""
-        task = text[:ID_MAX]
-        where = dataclasses.asdict(await self._service.whereabouts(task))
-        send(json.dumps({"target_id": task} | where, ensure_ascii=False))
-
-    async def _send_runs(self, _text: str, send: Send) -> None:
-        """Answer any text on ``/runs``: the resources of each running task."""
-        send(json.dumps({"runs": [dataclasses.asdict(figures) for figures in self._service.running()]}))
-
-    async def _debug(self, text: str, send: Send) -> None:
-        """Answer on ``/debug``; see ``debugging``."""
-        send(await debugging.answer(self._service, text))
 
     def _end_programs_of(self, who: str) -> None:
         """They lost a right: what they run might count on it."""
@@ -191,9 +154,3 @@ class VisualDoor:
             task = asyncio.create_task(self._cloud.send(text), name="record for the cloud")
             self._recording.add(task)
             task.add_done_callback(self._recording.discard)
-
-
-def log_line(task: str, entry: LogEntry) -> str:
-    """Return one entry of a task's log as ``/log`` sends it."""
-    fields = {"target_id": task, "at": entry.at, "level": entry.level, "text": entry.text}
-    return json.dumps(fields, ensure_ascii=False)

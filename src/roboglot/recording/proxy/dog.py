@@ -14,12 +14,14 @@ from pathlib import Path
 from urllib.parse import unquote
 
 import grpc
+from google.protobuf.message import DecodeError, Message  # type: ignore[import-untyped]
 
 from roboglot.clients.cyberdog.link import Certificates
 from roboglot.model.tap import Direction
 from roboglot.recording.lines import Target, status_of
 from roboglot.recording.proxy.relay import Book
 from roboglot.wire.cyberdog.channel import APP_NAME, APP_PORT, ROBOT_NAME, client_options, server_options
+from roboglot.wire.cyberdog.chapters.system import HEARTBEAT, Beats
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 
 log = logging.getLogger(__name__)
@@ -52,6 +54,7 @@ class DogRelay:
         self._robot: grpc.aio.Channel | None = None
         self._apps: dict[str, grpc.aio.Channel] = {}
         self._app_host = ""
+        self._beats = Beats()
 
     async def open(self) -> None:
         """Listen at both ends. Raises OSError."""
@@ -118,7 +121,8 @@ class DogRelay:
         self._app_host = _host(context.peer()) or self._app_host
         code, began = self._note_request(context.peer(), request)
         async for message in self._called_through(self._robot, "sendMsg", request, context):
-            answer = pb.RecResponse.FromString(message).data.encode()
+            read = _read(pb.RecResponse, message)
+            answer = message if read is None else read.data.encode()
             self._book.note(_name(context.peer()), Direction.REPLY, code, answer, status_of("cyberdog", answer), began)
             yield message
 
@@ -131,9 +135,8 @@ class DogRelay:
 
     async def _push(self, request: bytes, context: grpc.aio.ServicerContext) -> AsyncIterator[bytes]:
         """The robot tells the app something."""
-        said = pb.SendRequest.FromString(request)
-        where = f"{self._app_host}:{self._called}"
-        self._book.note(where, Direction.PUSH, str(said.nameCode), said.params.encode(), "", None)
+        code, text = _said(request)
+        self._book.note(f"{self._app_host}:{self._called}", Direction.PUSH, code, text, "", None)
         async for message in self._called_through(self._app(), "sendMsg", request, context):
             yield message
 
@@ -144,6 +147,9 @@ class DogRelay:
             await context.abort(grpc.StatusCode.UNAVAILABLE, "no app has come yet")
             raise AssertionError("abort raises")
         try:
+            ticks = _read(pb.Ticks, request)
+            if ticks is not None and (news := self._beats.news(ticks)):
+                self._book.note(f"{self._app_host}:{self._called}", Direction.PUSH, HEARTBEAT, news.encode(), "", None)
             answer: bytes = await app.unary_unary(f"/{SERVICE}/heartbeat")(request, timeout=context.time_remaining())
         except grpc.aio.AioRpcError as error:
             await context.abort(error.code(), error.details() or "")
@@ -166,9 +172,23 @@ class DogRelay:
             call.cancel()
 
     def _note_request(self, peer: str, request: bytes) -> tuple[str, float]:
-        said = pb.SendRequest.FromString(request)
-        code = str(said.nameCode)
-        return code, self._book.note(_name(peer), Direction.REQUEST, code, said.params.encode(), "", None)
+        code, text = _said(request)
+        return code, self._book.note(_name(peer), Direction.REQUEST, code, text, "", None)
+
+
+def _read(kind: type[Message], data: bytes) -> Message | None:
+    """Return what the bytes mean; None where they are not understood: they pass all the same."""
+    try:
+        return kind.FromString(data)
+    except DecodeError as error:
+        log.warning("not understood: %s", error)
+        return None
+
+
+def _said(request: bytes) -> tuple[str, bytes]:
+    """Return the code of a message, and its text; "" and all of it where it is not understood."""
+    said = _read(pb.SendRequest, request)
+    return ("", request) if said is None else (str(said.nameCode), said.params.encode())
 
 
 def _certificates(target: Target) -> Certificates | None:

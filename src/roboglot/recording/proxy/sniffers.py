@@ -12,7 +12,7 @@ from typing import Any
 import httptools
 
 from roboglot.model.tap import PAYLOAD_MAX, Direction
-from roboglot.recording.lines import status_of
+from roboglot.recording.lines import FRAMES, LOG, status_of
 from roboglot.wire.contracts import contract
 from roboglot.wire.robomaster.commands import Malformed, parse
 from roboglot.wire.robomaster.lines import LineSplitter
@@ -20,6 +20,7 @@ from roboglot.wire.visual.requests import BadFrame, Kind, parse_request
 
 BEYOND = {"version", "version ?"}  # commands that robots know and the manual does not list
 WAITING_MAX = 1000  # requests without an answer
+PATH_MAX = 128  # bytes of a request's first line
 Note = Callable[[Direction, str, bytes, str, float | None], float]
 
 
@@ -140,7 +141,10 @@ def _fits(segments: tuple[str, ...], parts: list[str]) -> bool:
 
 
 class FrameSniffer(Sniffer):
-    """Block programs over a WebSocket: answers carry the id of their request, all else is a push."""
+    """Block programs over a WebSocket: answers carry the id of their request, all else is a push.
+
+    On other paths than that of the frames (``/log``) the path is the operation.
+    """
 
     def __init__(self, note: Note) -> None:
         from wsproto import ConnectionType, WSConnection
@@ -151,6 +155,8 @@ class FrameSniffer(Sniffer):
         self._began: dict[str, tuple[str, float]] = {}
         self._partial = {True: "", False: ""}
         self._upgraded = {True: b"", False: b""}
+        self._path = FRAMES
+        self._path_asked = 0.0  # when
 
     def from_client(self, data: bytes) -> None:
         self._feed(data, client=True)
@@ -172,6 +178,8 @@ class FrameSniffer(Sniffer):
             data = rest
             if client:
                 self._client = connection
+                target = head[:PATH_MAX].partition(b" ")[2].partition(b" ")[0]
+                self._path = target.partition(b"?")[0].decode("ascii", "replace")
             else:
                 self._robot = connection
         connection.receive_data(data)
@@ -183,6 +191,9 @@ class FrameSniffer(Sniffer):
                     (self._frame_asked if client else self._frame_came)(text)
 
     def _frame_asked(self, text: str) -> None:
+        if self._path != FRAMES:
+            self._path_asked = self._note(Direction.REQUEST, self._path, text.encode(), "", None)
+            return
         try:
             request = parse_request(text)
             mode = request.operate if request.kind in (Kind.TASK, Kind.MODULE) else request.mode
@@ -194,6 +205,12 @@ class FrameSniffer(Sniffer):
             self._began[id] = key, now
 
     def _frame_came(self, text: str) -> None:
+        if self._path != FRAMES:
+            if self._path == LOG and '"entries"' not in text:
+                self._note(Direction.PUSH, LOG, text.encode(), "", None)
+            else:
+                self._note(Direction.REPLY, self._path, text.encode(), "ok", self._path_asked)
+            return
         frame = json.loads(text)
         inner = frame.get("feedback") or frame.get("response") or {}
         asked = self._began.get(inner.get("id", ""))

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import AsyncGenerator, Mapping
 from pathlib import Path
 from typing import Any
 
+from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
+
 from roboglot.media.recorder import Recorder
 from roboglot.model.admission import Forbidden
 from roboglot.model.components.sensing.camera import Camera
-from roboglot.model.errors import RobotError
+from roboglot.model.errors import NotFound, RobotError
+from roboglot.model.stand_in import StandIn
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.chapters.camera.camera_files import CameraFiles
@@ -20,19 +24,19 @@ from roboglot.wire.cyberdog.codes import Code, FileError
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.text import Int32
 
+log = logging.getLogger(__name__)
 files.add(Code.SAVED_FILE)
 
 
-def get_file(context: Context, code: int, fields: Mapping[str, object]) -> AsyncGenerator[Any, None]:
-    """The chunks that answer a ``getFile``."""
+def get_file(context: Context, code: int, fields: Mapping[str, object], params: str = "") -> AsyncGenerator[Any, None]:
+    """The chunks that answer a ``getFile``; ``params`` is the text of which ``fields`` were read."""
+    if (stand_in := context.robot.stand_in) is not None:
+        return _played(context, stand_in, code, params)
     if Camera not in context.robot or Recorder not in context.robot:
         return _refused(FileError.CAMERA_SILENT if code in (Code.CAMERA, Code.SAVED_FILE) else FileError.WRONG_CODE)
-    camera_files, admission = context.files, context.robot.admission
-    if admission.asks:
-        try:
-            admission.check("cyberdog", str(int(code)), Right.SEE if code == Code.SAVED_FILE else Right.DRIVE)
-        except Forbidden:
-            return _refused(FileError.CAMERA_SILENT)
+    if not _may_fetch(context, code):
+        return _refused(FileError.CAMERA_SILENT)
+    camera_files = context.files
     match code, fields.get("command"):
         case Code.SAVED_FILE, _:
             return context.transfers.send(lambda: _saved(camera_files, str(fields.get("file_name", ""))))
@@ -43,6 +47,28 @@ def get_file(context: Context, code: int, fields: Mapping[str, object]) -> Async
         case Code.CAMERA, _:
             return _refused(FileError.ARGUMENTS)
     return _refused(FileError.WRONG_CODE)
+
+
+def _may_fetch(context: Context, code: int) -> bool:
+    if (admission := context.robot.admission).asks:
+        try:
+            admission.check("cyberdog", str(int(code)), Right.SEE if code == Code.SAVED_FILE else Right.DRIVE)
+        except Forbidden:
+            return False
+    return True
+
+
+async def _played(context: Context, stand_in: StandIn, code: int, params: str) -> AsyncGenerator[Any, None]:
+    """The chunks of a file that was fetched when the robot was recorded."""
+    if not _may_fetch(context, code):
+        yield pb.FileChunk(error_code=FileError.CAMERA_SILENT)
+        return
+    try:
+        async for reply in stand_in.answer("cyberdog", str(int(code)), params.encode(), reads=code == Code.SAVED_FILE):
+            yield pb.FileChunk.FromString(reply.payload)
+    except (NotFound, DecodeError) as error:
+        log.info("no file: %s", error)
+        yield pb.FileChunk(error_code=FileError.NOT_THERE)
 
 
 async def _saved(files: CameraFiles, name: str) -> Path:

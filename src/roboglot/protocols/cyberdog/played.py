@@ -1,0 +1,78 @@
+"""Pushes of a recorded dog on their way to the app: in their order within a code, kept for a while until it is there.
+
+Its heartbeats say what they said then.
+
+A live dog sends several at once; in a recording their order is known, so each waits until the one before has arrived.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from dataclasses import dataclass, field
+
+from roboglot.model.clock import Clock
+from roboglot.model.stand_in import StandIn
+from roboglot.protocols.cyberdog.app_link import AppLink
+from roboglot.protocols.cyberdog.frame_queue import KEPT_SECONDS
+from roboglot.wire.cyberdog.chapters.system import HEARTBEAT, ticks_of
+from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
+
+WAITING_MAX = 4096  # of one code; then the oldest go
+CODES_MAX = 256
+
+
+@dataclass(slots=True)
+class _Line:
+    waiting: deque[tuple[float, str]] = field(default_factory=lambda: deque(maxlen=WAITING_MAX))
+    sending: asyncio.Task[None] | None = None
+
+
+class PlayedPushes:
+    """Those for one app. ``door`` is the name under which they were recorded."""
+
+    def __init__(self, stand_in: StandIn, app: AppLink, clock: Clock, door: str) -> None:
+        self._app, self._clock = app, clock
+        self._beat = stand_in.first_push(door, HEARTBEAT)
+        self._lines: dict[int, _Line] = {}
+        app.on_found.append(self._go_on)
+
+    def ticks(self, address: str) -> pb.Ticks | None:
+        """Return the heartbeat as it was at this moment; None: none was recorded."""
+        return None if self._beat is None else ticks_of(self._beat.decode("utf-8", "replace"), address)
+
+    def put(self, operation: str, message: bytes) -> None:
+        """Send it when it is its turn; never waits."""
+        if operation == HEARTBEAT:
+            self._beat = message
+            return
+        if not operation.isdigit():
+            return
+        code, text = int(operation), message.decode("utf-8", "replace")
+        if code not in self._lines and len(self._lines) >= CODES_MAX:
+            return
+        self._lines.setdefault(code, _Line()).waiting.append((self._clock.time(), text))
+        self._go_on()
+
+    def close(self) -> None:
+        """Send nothing more."""
+        for line in self._lines.values():
+            line.waiting.clear()
+            if line.sending is not None:
+                line.sending.cancel()
+
+    def _go_on(self) -> None:
+        if not self._app.connected:
+            return
+        for code, line in self._lines.items():
+            if line.waiting and line.sending is None:
+                line.sending = asyncio.get_running_loop().create_task(self._send(code, line), name=f"play {code}")
+
+    async def _send(self, code: int, line: _Line) -> None:
+        try:
+            while line.waiting and self._app.connected:
+                since, text = line.waiting.popleft()
+                if self._clock.time() - since <= KEPT_SECONDS:
+                    await self._app.send(code, text)
+        finally:
+            line.sending = None
