@@ -73,5 +73,5 @@ class RobotTestCase(unittest.TestCase):
     def _client(self, name: str) -> Blocking:
         found: Blocking | None = self.__dict__.get(f"_{name}")
         if found is None:
-            found = self.__dict__[f"_{name}"] = self.server.open(getattr(self.server, f"new_{name}")())
+            found = self.__dict__[f"_{name}"] = self.server.clients.open(getattr(self.server.clients, f"new_{name}")())
         return found

@@ -180,25 +180,25 @@ def reset(robot_server: RobotServer) -> Callable[[], None]:
 @pytest.fixture
 def rest(robot_server: RobotServer) -> Blocking:
     """A client of the first robot's REST API (``SlamwareClient``) whose methods block."""
-    return robot_server.open(robot_server.new_rest())
+    return robot_server.clients.open(robot_server.clients.new_rest())
 
 
 @pytest.fixture
 def robomaster(robot_server: RobotServer) -> Blocking:
     """A client of its text protocol (``RoboMasterClient``), in SDK mode, whose methods block."""
-    return robot_server.open(robot_server.new_robomaster())
+    return robot_server.clients.open(robot_server.clients.new_robomaster())
 
 
 @pytest.fixture
 def cyberdog(robot_server: RobotServer) -> Blocking:
     """A client of its app protocol (``CyberDogClient``), by TLS, whose methods block."""
-    return robot_server.open(robot_server.new_cyberdog())
+    return robot_server.clients.open(robot_server.clients.new_cyberdog())
 
 
 @pytest.fixture
 def program(robot_server: RobotServer) -> Blocking:
     """A client of its block programs (``ProgramClient``) whose methods block."""
-    return robot_server.open(robot_server.new_program())
+    return robot_server.clients.open(robot_server.clients.new_program())
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

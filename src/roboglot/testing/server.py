@@ -15,25 +15,21 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from roboglot.model.clock import LockstepClock
 from roboglot.testing.addresses import free_addresses, free_port, give_back
-from roboglot.testing.blocking import PATIENCE, Blocking, Loop
+from roboglot.testing.blocking import PATIENCE, Loop
+from roboglot.testing.clients import Clients
 from roboglot.testing.wanted import Wanted
+from roboglot.testing.ways import LOOK_AGAIN, Ways, pass_time
 
 if TYPE_CHECKING:
-    from roboglot.clients.cyberdog import Certificates, CyberDogClient
-    from roboglot.clients.robomaster.client import RoboMasterClient
-    from roboglot.clients.slamware import SlamwareClient
     from roboglot.config import RobotConfig
     from roboglot.model.geometry import Pose
     from roboglot.model.robot import Robot
     from roboglot.model.tap import Exchange
     from roboglot.runtime import Runtime
-    from roboglot.testing.programs import ProgramClient
 
 T = TypeVar("T")
 KEPT_EXCHANGES = 2000
-LOOK_AGAIN = 0.05  # s of robot time between two looks at a condition
 START_SECONDS_MAX = 240.0  # kernels may have to be compiled
 
 
@@ -47,6 +43,8 @@ class RobotServer:
     ``address`` is the first robot's. Its methods may be called from any thread but its own; they block.
     """
 
+    clients: Clients  # from ``start`` on
+
     def __init__(self, wanted: Wanted | None = None, *, data: Path | None = None) -> None:
         self.wanted = wanted or Wanted()
         self._given_data = data
@@ -54,14 +52,11 @@ class RobotServer:
         self.addresses: dict[str, str] = {}
         self.app_port = 0
         self.exchanges: deque[Exchange] = deque(maxlen=KEPT_EXCHANGES)
-        self.tracks: dict[str, list[tuple[float, float]]] = {}
         self._runtime: Runtime | None = None
         self._loop: Loop | None = None
         self._thread: threading.Thread | None = None
-        self._origins: dict[str, Pose] = {}  # where each really stood at first
-        self._starts: dict[str, Pose] = {}  # and where it believed to stand
-        self._tracking: asyncio.Task[None] | None = None
-        self._clients = contextlib.ExitStack()
+        self._ways = Ways()
+        self.tracks = self._ways.tracks
 
     # -- life ----------------------------------------------------------------------------------------------------------
 
@@ -80,6 +75,7 @@ class RobotServer:
         self.app_port = free_port()
         loop = _new_loop(lockstep=self.wanted.lockstep)
         self._loop = Loop(loop)
+        self.clients = Clients(self.addresses, self.data, self.app_port, self._loop)
         self._thread = threading.Thread(target=_serve, args=(loop,), name="roboglot", daemon=True)
         self._thread.start()
         try:
@@ -91,9 +87,9 @@ class RobotServer:
 
     def close(self) -> None:
         """Close its clients, stop it, and throw its data away."""
-        self._clients.close()
         if self._loop is None or self._thread is None:
             return
+        self.clients.close()
         try:
             if self._runtime is not None:
                 self._loop.run(self._runtime.close)
@@ -125,35 +121,12 @@ class RobotServer:
         for name, robot in self._runtime.fleet.robots.items():
             robot.tap.listen(self.exchanges.append)
             self.tracks[name] = []
-        self._origins = {placed.name: placed.pose for placed in self._runtime.fleet.world.hands.robots}
+        self._ways.begin(self._runtime.fleet, self._runtime.clock)
         await self._runtime.start()
-        self._tracking = asyncio.ensure_future(self._track())
+        self._ways.follow()
         if not wanted.recording:
-            await self._wait_for_places()
+            await self._ways.wait_for_places()
         self._break_things()
-
-    async def _wait_for_places(self) -> None:
-        from roboglot.model.components.mapping.localization import Localization
-        from roboglot.model.components.mapping.mapping import Mapping
-
-        for name, robot in self.runtime.fleet.robots.items():
-            if Localization in robot and Mapping in robot:
-                while not robot[Mapping].grid.width:
-                    await self._pass(LOOK_AGAIN)
-                self._starts[name] = robot[Localization].pose
-
-    async def _track(self) -> None:
-        """Remember where the robots really were, for the picture."""
-        while True:
-            self._note_places()
-            await self.runtime.clock.sleep(0.2)
-
-    def _note_places(self) -> None:
-        for placed in self.runtime.fleet.world.hands.robots:
-            track = self.tracks.setdefault(placed.name, [])
-            here = (round(placed.pose.x, 3), round(placed.pose.y, 3))
-            if not track or track[-1] != here:
-                track.append(here)
 
     # -- what is there -------------------------------------------------------------------------------------------------
 
@@ -220,7 +193,7 @@ class RobotServer:
     def moved(self, robot: str = "") -> Pose:
         """Return where it really is as seen from where it started: x ahead, y to the left."""
         name = robot or next(iter(self.addresses))
-        return self.pose(name).relative_to(self._origins[name])
+        return self.pose(name).relative_to(self._ways.origins[name])
 
     @property
     def time(self) -> float:
@@ -231,7 +204,7 @@ class RobotServer:
 
     def forward(self, seconds: float) -> None:
         """Let so much robot time pass: as fast as it can in lockstep, else at the clock's speed."""
-        self.loop.run(self._pass, seconds, within=PATIENCE + seconds / self.wanted.speed)
+        self.loop.run(pass_time, self.runtime.clock, seconds, within=PATIENCE + seconds / self.wanted.speed)
 
     def wait_until(self, condition: Callable[[], object], *, within: float, what: str = "") -> None:
         """Wait until ``condition()`` holds, looked at where the robots run. Raises NotInTime after robot seconds."""
@@ -241,23 +214,16 @@ class RobotServer:
                 raise NotInTime(f"{what or 'the condition'} does not hold after {within:g} s")
             self.forward(LOOK_AGAIN)
 
-    async def _pass(self, seconds: float) -> None:
-        clock = self.runtime.clock
-        await (clock.advance(seconds) if isinstance(clock, LockstepClock) else clock.sleep(seconds))
-
     # -- between tests -------------------------------------------------------------------------------------------------
 
     def reset(self) -> None:
         """Put all back: actions end, robots stand charged where they started and know it; no faults, no boxes."""
-        self._clients.close()
+        self.clients.close()
         self.loop.run(self._reset)
         self.exchanges.clear()
-        for track in self.tracks.values():
-            track.clear()
+        self._ways.clear()
 
     async def _reset(self) -> None:
-        from roboglot.model.components.mapping.localization import Localization
-
         fleet = self.runtime.fleet
         stage = fleet.world.hands
         for robot in fleet.robots.values():
@@ -267,11 +233,7 @@ class RobotServer:
             stage.remove_obstacle(box.number)
         for person in stage.people:
             stage.person(person.name).resume()
-        for name, robot in fleet.robots.items():
-            if name in self._origins:
-                stage.reset(name)
-            if name in self._starts:
-                robot[Localization].set_pose(self._starts[name])
+        self._ways.put_back()
 
     def prepare(self, wanted: Wanted) -> None:
         """Begin another test on this server: reset it, then break what that test wants broken."""
@@ -283,51 +245,6 @@ class RobotServer:
         stage = self.runtime.fleet.world.hands
         for fault in self.wanted.faults:
             stage.inject_fault(fault.kind, fault.robot, **dict(fault.options))
-
-    # -- clients -------------------------------------------------------------------------------------------------------
-
-    def new_rest(self, robot: str = "") -> SlamwareClient:
-        """Return an asyncio client of the REST API, not connected."""
-        from roboglot.clients.slamware import SlamwareClient
-
-        return SlamwareClient(self._address_of(robot))
-
-    def new_robomaster(self, robot: str = "") -> RoboMasterClient:
-        """Return an asyncio client of the text protocol; it connects from the robot's own address."""
-        from roboglot.clients.robomaster.client import RoboMasterClient
-
-        address = self._address_of(robot)
-        return RoboMasterClient(address, local=address)
-
-    def new_cyberdog(self, robot: str = "") -> CyberDogClient:
-        """Return an asyncio client of the dog's app protocol, with certificates."""
-        from roboglot.clients.cyberdog import CyberDogClient
-
-        return CyberDogClient(self._address_of(robot), self.certificates(), app_port=self.app_port)
-
-    def new_program(self, robot: str = "") -> ProgramClient:
-        """Return an asyncio client that runs block programs."""
-        from roboglot.testing.programs import ProgramClient
-
-        return ProgramClient(self._address_of(robot))
-
-    def certificates(self) -> Certificates:
-        """Return what an app of the dog needs to connect; the files are in ``data/app``."""
-        from roboglot.clients.cyberdog import Certificates
-        from roboglot.protocols.cyberdog.certificates import export_client
-        from roboglot.protocols.cyberdog.server import FOLDER
-
-        folder = self.data / "app"
-        if not folder.exists():
-            export_client(self.data / FOLDER, folder)
-        return Certificates.load(folder)
-
-    def open(self, client: object) -> Blocking:
-        """Connect an asyncio client where the robots run; its methods block. It is closed with the server."""
-        return self._clients.enter_context(Blocking(client, self.loop))
-
-    def _address_of(self, robot: str) -> str:
-        return self.addresses[robot] if robot else self.address
 
 
 class _There:

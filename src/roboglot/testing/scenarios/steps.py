@@ -58,7 +58,7 @@ class Steps:
             "ROBOGLOT_APP_PORT": str(server.app_port),
         }
         with contextlib.suppress(ImportError, OSError):
-            server.certificates()
+            server.clients.certificates()
             found["ROBOGLOT_CERTIFICATES"] = str(server.data / "app")
         return found
 
@@ -156,8 +156,8 @@ class Steps:
         if (found := self._clients.get(kind + robot)) is None:
             if robot and robot not in self._server.addresses:
                 raise BadScenario(f"there is no robot {robot!r}")
-            made = getattr(self._server, f"new_{kind}")(robot)
-            found = self._clients[kind + robot] = self._server.open(made)
+            made = getattr(self._server.clients, f"new_{kind}")(robot)
+            found = self._clients[kind + robot] = self._server.clients.open(made)
         return found
 
 

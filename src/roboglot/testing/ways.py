@@ -1,0 +1,79 @@
+"""Where the robots of a test began, and the ways that they really went."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING
+
+from roboglot.model.clock import Clock, LockstepClock
+
+if TYPE_CHECKING:
+    from roboglot.fleet import Fleet
+    from roboglot.model.geometry import Pose
+
+LOOK_AGAIN = 0.05  # s of robot time between two looks at a condition
+TRACK_PERIOD = 0.2  # s of robot time between two points of a track
+
+
+async def pass_time(clock: Clock, seconds: float) -> None:
+    """Let so much robot time pass: as fast as it can in lockstep, else at the clock's speed."""
+    await (clock.advance(seconds) if isinstance(clock, LockstepClock) else clock.sleep(seconds))
+
+
+class Ways:
+    """``origins``: where each robot really stood at first; ``tracks``: points of its way (m, world), for the picture.
+
+    All but these are for the thread in which the robots run.
+    """
+
+    def __init__(self) -> None:
+        self.origins: dict[str, Pose] = {}
+        self.tracks: dict[str, list[tuple[float, float]]] = {}
+        self._starts: dict[str, Pose] = {}  # where each believed to stand at first
+        self._fleet: Fleet
+        self._clock: Clock
+        self._tracking: asyncio.Task[None] | None = None
+
+    def begin(self, fleet: Fleet, clock: Clock) -> None:
+        """Remember where the robots of ``fleet`` stand before it starts."""
+        self._fleet, self._clock = fleet, clock
+        self.origins = {placed.name: placed.pose for placed in fleet.world.hands.robots}
+
+    async def wait_for_places(self) -> None:
+        """Wait until each robot that makes maps has one, and remember where it believes to stand."""
+        from roboglot.model.components.mapping.localization import Localization
+        from roboglot.model.components.mapping.mapping import Mapping
+
+        for name, robot in self._fleet.robots.items():
+            if Localization in robot and Mapping in robot:
+                while not robot[Mapping].grid.width:
+                    await pass_time(self._clock, LOOK_AGAIN)
+                self._starts[name] = robot[Localization].pose
+
+    def follow(self) -> None:
+        """Begin to keep tracks."""
+        self._tracking = asyncio.ensure_future(self._track())
+
+    def put_back(self) -> None:
+        """Have the robots stand where they began, charged as then, and know it."""
+        from roboglot.model.components.mapping.localization import Localization
+
+        for name, robot in self._fleet.robots.items():
+            if name in self.origins:
+                self._fleet.world.hands.reset(name)
+            if name in self._starts:
+                robot[Localization].set_pose(self._starts[name])
+
+    def clear(self) -> None:
+        """Forget the tracks."""
+        for track in self.tracks.values():
+            track.clear()
+
+    async def _track(self) -> None:
+        while True:
+            for placed in self._fleet.world.hands.robots:
+                track = self.tracks.setdefault(placed.name, [])
+                here = (round(placed.pose.x, 3), round(placed.pose.y, 3))
+                if not track or track[-1] != here:
+                    track.append(here)
+            await self._clock.sleep(TRACK_PERIOD)
