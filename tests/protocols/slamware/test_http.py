@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from roboglot.model.robot import Robot
 from roboglot.operations import OperationTable
-from roboglot.protocols.slamware import dispatch
+from roboglot.protocols.slamware import parameters
 from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.errors import reason_phrase
 from roboglot.protocols.slamware.http_connection import with_reason
@@ -172,7 +172,7 @@ async def test_empty_answers_are_empty_and_say_so(bare_client: httpx.AsyncClient
 
 
 async def test_bodies_are_bounded(bare_door: SlamwareDoor, bare_client: httpx.AsyncClient) -> None:
-    reply = await bare_client.post(POIS, content=b"x" * (dispatch.BODY_MAX + 1))
+    reply = await bare_client.post(POIS, content=b"x" * (parameters.BODY_MAX + 1))
     assert reply.status_code == 413
 
     async def chunks():  # type: ignore[no-untyped-def]

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable, Iterable, Iterator
-from contextlib import contextmanager, nullcontext
+from collections.abc import Awaitable, Callable, Iterable
+from contextlib import nullcontext
 from time import perf_counter
 from typing import get_args
-from urllib.parse import parse_qsl
 
 import msgspec
 
@@ -23,7 +22,7 @@ from roboglot.model.lateness import late
 from roboglot.model.stand_in import StandIn
 from roboglot.operations import BadParameters, Operation, Right
 from roboglot.protocols.browsers import Browsers, of_rows
-from roboglot.protocols.slamware.bodies import ClientGone, Receive, Scope, chunks, read_body
+from roboglot.protocols.slamware.bodies import ClientGone, Receive, Scope
 
 # Every chapter registers its operations.
 from roboglot.protocols.slamware.chapters import industry  # noqa: F401
@@ -35,7 +34,7 @@ from roboglot.protocols.slamware.chapters.delivery import (  # noqa: F401
     tasks,
 )
 from roboglot.protocols.slamware.chapters.firmware import firmware  # noqa: F401
-from roboglot.protocols.slamware.chapters.firmware.uploads import PACKAGE_MAX, Upload
+from roboglot.protocols.slamware.chapters.firmware.uploads import Upload
 from roboglot.protocols.slamware.chapters.motion import actions, strategies  # noqa: F401
 from roboglot.protocols.slamware.chapters.multi_floor import (  # noqa: F401
     elevators,
@@ -61,16 +60,12 @@ from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import HttpError, bad_request, from_robot, reason_phrase
 from roboglot.protocols.slamware.http_connection import REASON
 from roboglot.protocols.slamware.pages import Pages
-from roboglot.protocols.slamware.routes import BEYOND, SHORTHANDS, Match, Routes
+from roboglot.protocols.slamware.parameters import Parameters
+from roboglot.protocols.slamware.routes import BEYOND, Match, Routes
 from roboglot.protocols.slamware.table import NO_CONTENT, TABLE, Text
 from roboglot.wire.contracts import Row, contract
 
 log = logging.getLogger(__name__)
-BODY_MAX = 1 << 20  # bytes of a JSON body
-UPLOAD_MAX = 64 << 20  # bytes of a binary body
-UPLOADS_MAX = 4  # at a time
-QUERY_FIELDS_MAX = 32
-WHOLE_MAX = 2.0**53  # beyond it floats leave integers out
 LOGGED_MAX = 200  # characters of a path or a refusal in the log
 
 Send = Callable[[dict[str, object]], Awaitable[None]]
@@ -100,7 +95,7 @@ class Application:
         self._routes = Routes((*contract("slamware"), *BEYOND))
         self._pages = Pages()
         self._encode = msgspec.json.Encoder().encode
-        self._uploads = 0
+        self._parameters = Parameters(context)
         self.closing = False
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -205,7 +200,7 @@ class Application:
         if stand_in is not None or operation is None:
             assert stand_in is not None
             return await self._ask_stand_in(stand_in, row, scope, receive)
-        values = await self._values(operation, match, scope, receive)
+        values = await self._parameters.read(operation, match, scope, receive)
         if self._tap.watched:
             self._note_request(scope)
         answer = await self._call(operation, row, values)
@@ -244,8 +239,7 @@ class Application:
         self, stand_in: StandIn, row: Row, scope: Scope, receive: Receive
     ) -> tuple[int, Headers, bytes]:
         """Have another answer in the robot's place. Raises HttpError 501 for what it cannot answer."""
-        with self._uploading():
-            scope["body"] = await read_body(scope, receive, UPLOAD_MAX)
+        scope["body"] = await self._parameters.whole(scope, receive)
         if self._tap.watched:
             self._note_request(scope)
         reads = scope["method"] in ("GET", "HEAD")
@@ -258,35 +252,6 @@ class Application:
             raise HttpError(501, str(unknown), row.key) from None
         raise HttpError(501, f"the recording ends before {row.name} was answered", row.key)
 
-    async def _values(
-        self, operation: Operation[str], match: Match, scope: Scope, receive: Receive
-    ) -> dict[str, object]:
-        """The handler's parameters by name: path over query, and the body."""
-        try:
-            text = scope["query_string"].decode("latin-1")
-            query = parse_qsl(text, max_num_fields=QUERY_FIELDS_MAX) if text else ()
-        except ValueError as error:
-            raise bad_request(operation.key, str(error)) from None
-        values: dict[str, object] = {**dict(query), **match.values}
-        values.pop("body", None)
-        kind = operation.parameters.__annotations__.get("body")
-        if kind is bytes:
-            values["body"] = scope["body"] = await self._upload(scope, receive)
-        elif kind is Upload:
-            values["body"] = await self._stored(scope, receive)
-        elif "body" in operation.names:
-            body = scope["body"] = await read_body(scope, receive, BODY_MAX)
-            if (action := SHORTHANDS.get(scope["path"])) is not None:
-                body = b'{"action_name":"%s","options":%s}' % (self._prefixed(action), body or b"{}")
-            if not body and not operation.requires("body"):
-                return values
-            try:
-                values["body"] = msgspec.convert(whole_numbers(msgspec.json.decode(body)), kind)
-            except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
-                why = str(error).replace("`$", "`$.body", 1) if body else "a JSON body is needed"
-                raise bad_request(operation.key, why) from None
-        return values
-
     def _note_request(self, scope: Scope) -> None:
         scope["began"] = self._tap.request("slamware", scope["operation"], _wire_form(scope))
 
@@ -295,37 +260,6 @@ class Application:
             scope.setdefault("operation", "")
             self._note_request(scope)
         self._tap.reply("slamware", scope["operation"], body, str(status), why, scope["began"])
-
-    def _prefixed(self, action: str) -> bytes:
-        return (self._context.actions.prefix + action).encode()
-
-    @contextmanager
-    def _uploading(self) -> Iterator[None]:
-        """Count one more binary body. Raises HttpError 503 while too many others come in."""
-        if self._uploads >= UPLOADS_MAX:
-            raise HttpError(503, "Service Unavailable", f"{UPLOADS_MAX} uploads are under way")
-        self._uploads += 1
-        try:
-            yield
-        finally:
-            self._uploads -= 1
-
-    async def _upload(self, scope: Scope, receive: Receive) -> bytes:
-        """A binary body that is used as a whole."""
-        with self._uploading():
-            return await read_body(scope, receive, UPLOAD_MAX)
-
-    async def _stored(self, scope: Scope, receive: Receive) -> Upload:
-        """A binary body that goes to the disk as it comes."""
-        with self._uploading():
-            upload = Upload()
-            try:
-                async for chunk in chunks(scope, receive, PACKAGE_MAX):
-                    upload.write(chunk)
-            except BaseException:
-                upload.close()
-                raise
-            return upload
 
     def _render(self, answer: object, scope: Scope) -> tuple[Headers, bytes]:
         match answer:
@@ -365,18 +299,6 @@ def not_allowed(methods: Iterable[str]) -> HttpError:
     """405, which says what is."""
     words = allowed(methods)
     return HttpError(405, "Method Not Allowed", words, ((b"allow", words.encode()),))
-
-
-def whole_numbers(value: object) -> object:
-    """``value`` of JSON with 2.0 as 2: JSON has one kind of number, and the schemas call both an integer."""
-    match value:
-        case float() if value.is_integer() and abs(value) < WHOLE_MAX:
-            return int(value)
-        case dict():
-            return {key: whole_numbers(entry) for key, entry in value.items()}
-        case list():
-            return [whole_numbers(entry) for entry in value]
-    return value
 
 
 def _only_plain(scope: Scope) -> bool:

@@ -1,0 +1,100 @@
+"""The parameters of a request, as its handler wants them: from path, query and body, all bounded."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from urllib.parse import parse_qsl
+
+import msgspec
+
+from roboglot.operations import Operation
+from roboglot.protocols.slamware.bodies import Receive, Scope, chunks, read_body
+from roboglot.protocols.slamware.chapters.firmware.uploads import PACKAGE_MAX, Upload
+from roboglot.protocols.slamware.context import Context
+from roboglot.protocols.slamware.errors import HttpError, bad_request
+from roboglot.protocols.slamware.routes import SHORTHANDS, Match
+
+BODY_MAX = 1 << 20  # bytes of a JSON body
+UPLOAD_MAX = 64 << 20  # bytes of a binary body
+UPLOADS_MAX = 4  # at a time
+QUERY_FIELDS_MAX = 32
+WHOLE_MAX = 2.0**53  # beyond it floats leave integers out
+
+
+class Parameters:
+    """Of one robot's requests; counts the uploads that are under way."""
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+        self._uploads = 0
+
+    async def read(self, operation: Operation[str], match: Match, scope: Scope, receive: Receive) -> dict[str, object]:
+        """Return a handler's parameters by name: path over query, and the body. Raises HttpError."""
+        try:
+            text = scope["query_string"].decode("latin-1")
+            query = parse_qsl(text, max_num_fields=QUERY_FIELDS_MAX) if text else ()
+        except ValueError as error:
+            raise bad_request(operation.key, str(error)) from None
+        values: dict[str, object] = {**dict(query), **match.values}
+        values.pop("body", None)
+        kind = operation.parameters.__annotations__.get("body")
+        if kind is bytes:
+            values["body"] = scope["body"] = await self.whole(scope, receive)
+        elif kind is Upload:
+            values["body"] = await self._stored(scope, receive)
+        elif "body" in operation.names:
+            body = scope["body"] = await read_body(scope, receive, BODY_MAX)
+            if (action := SHORTHANDS.get(scope["path"])) is not None:
+                body = b'{"action_name":"%s","options":%s}' % (self._prefixed(action), body or b"{}")
+            if not body and not operation.requires("body"):
+                return values
+            try:
+                values["body"] = msgspec.convert(whole_numbers(msgspec.json.decode(body)), kind)
+            except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
+                why = str(error).replace("`$", "`$.body", 1) if body else "a JSON body is needed"
+                raise bad_request(operation.key, why) from None
+        return values
+
+    async def whole(self, scope: Scope, receive: Receive) -> bytes:
+        """Return a binary body that is used as a whole. Raises HttpError."""
+        with self._uploading():
+            return await read_body(scope, receive, UPLOAD_MAX)
+
+    def _prefixed(self, action: str) -> bytes:
+        return (self._context.actions.prefix + action).encode()
+
+    @contextmanager
+    def _uploading(self) -> Iterator[None]:
+        """Count one more binary body. Raises HttpError 503 while too many others come in."""
+        if self._uploads >= UPLOADS_MAX:
+            raise HttpError(503, "Service Unavailable", f"{UPLOADS_MAX} uploads are under way")
+        self._uploads += 1
+        try:
+            yield
+        finally:
+            self._uploads -= 1
+
+    async def _stored(self, scope: Scope, receive: Receive) -> Upload:
+        """A binary body that goes to the disk as it comes."""
+        with self._uploading():
+            upload = Upload()
+            try:
+                async for chunk in chunks(scope, receive, PACKAGE_MAX):
+                    upload.write(chunk)
+            except BaseException:
+                upload.close()
+                raise
+            return upload
+
+
+def whole_numbers(value: object) -> object:
+    """``value`` of JSON with 2.0 as 2: JSON has one kind of number, and the schemas call both an integer."""
+    match value:
+        case float() if value.is_integer() and abs(value) < WHOLE_MAX:
+            return int(value)
+        case dict():
+            return {key: whole_numbers(entry) for key, entry in value.items()}
+        case list():
+            return [whole_numbers(entry) for entry in value]
+    return value
