@@ -67,7 +67,7 @@ class Guarded:
     def forget_tries(self) -> None:
         """Let every address try again."""
         assert self.runtime.guard is not None
-        self.runtime.guard._tries = Limiter(1e-9, LOGINS, lambda: 0.0)
+        self.runtime.guard._proofs._tries = Limiter(1e-9, LOGINS, lambda: 0.0)
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="session")

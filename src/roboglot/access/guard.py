@@ -19,13 +19,13 @@ from weakref import WeakValueDictionary
 
 from roboglot.access import audit
 from roboglot.access.book import LOCAL, Book, Rights
-from roboglot.access.callers import basic_of, host_of, port_of
+from roboglot.access.callers import host_of, port_of
+from roboglot.access.proofs import Proofs
 from roboglot.access.rights import NOTHING
-from roboglot.access.secrets import password_fits, token_hash
 from roboglot.access.store import AccessStore, Grant, Kind, Snapshot, open_store
 from roboglot.access.trail import Entry, Trail, open_trail
 from roboglot.config import AccessConfig, is_loopback
-from roboglot.model.admission import NO_PROOF, Admission, Forbidden, LockedOut, Proof, ProofKind, Right, Unknown
+from roboglot.model.admission import NO_PROOF, Admission, Forbidden, Proof, ProofKind, Right, Unknown
 from roboglot.model.client_context import connection, identity
 from roboglot.model.components.system.lease import Lease
 from roboglot.model.errors import RobotError
@@ -39,13 +39,8 @@ log = logging.getLogger(__name__)
 seldom = Seldom(log)
 
 LOOK_PERIOD = 0.25  # s between two looks at the list and at the clock
-PROOFS_MAX = 4096  # clients whose proof needs no further look
-CHECKS_MAX = 16  # passwords that wait to be checked; each takes 50 ms of a thread
-TRIES_SECONDS = 60.0
-TRIES_OF_ONE_NAME = 10  # times as many as of one address: others' guesses must not lock a person out at once
 HANDSHAKES = 20  # TLS handshakes a second of one address, and twice as many at once
 HANDSHAKES_TOGETHER = 200  # of all
-HTTP = ProofKind.HTTP  # looking a member up in its class takes longer than all else here
 ALLOWED_MAX = 4096  # pairs of an identity and an operation that need no further look
 BURST_SECONDS = 2.0  # of bytes that may come at once
 
@@ -88,15 +83,10 @@ class Guard:
         self.tunnels: dict[str, Tunnelled] = {}  # by the loopback address that stands for each
         self._list = self._store.snapshot()
         self._book = Book(self._list.identities)
-        self._proofs: dict[str, str] = {}  # by the header that shows who it is
-        self._tries = Limiter(config.logins / TRIES_SECONDS, config.logins, time.monotonic)
-        often = TRIES_OF_ONE_NAME * config.logins
-        self._tries_of_name = Limiter(often / TRIES_SECONDS, often, time.monotonic)
+        self._proofs = Proofs(self._book, config.logins)
         self.bytes = Limiter(config.bytes, config.bytes * BURST_SECONDS, time.monotonic)
         self._handshakes = Limiter(HANDSHAKES, 2 * HANDSHAKES, time.monotonic)
         self._handshakes_together = Limiter(HANDSHAKES_TOGETHER, HANDSHAKES_TOGETHER, time.monotonic)
-        self._checking = asyncio.Semaphore(1)
-        self._waiting = 0
         self._ended = threading.Event()
         self._thread: threading.Thread | None = None
         self._next_end = self._book.next_end(now())
@@ -133,25 +123,20 @@ class Guard:
         older, self._book = self._book, Book(newer.identities)
         self._next_end = self._book.next_end(self.now())
         replaced = self._book.replaced(older)
-        self._proofs = {proof: who for proof, who in self._proofs.items() if who not in replaced}
+        self._proofs.renew(self._book, replaced)
         for admission in self._admissions:
             admission.renew(self._book, replaced)
 
     def known(self, address: str, proof: Proof) -> str | None:
         """See ``Admission.known``."""
         if proof is not NO_PROOF:
-            return self._proofs.get(proof.value) if proof.kind is HTTP else self._certified(proof)
+            return self._proofs.known(proof)
         host = host_of(address)
         if (tunnelled := self.tunnels.get(host)) is not None and port_of(address) in tunnelled.calls:
             return tunnelled.who
         if self._book.has(host, Kind.ADDRESS):
             return host
         return LOCAL if self.config.local and is_loopback(host) else None
-
-    def _certified(self, proof: Proof) -> str | None:
-        """Whose certificate it is; TLS has verified it."""
-        certificate = proof.kind is ProofKind.CERTIFICATE
-        return proof.value if certificate and self._book.has(proof.value, Kind.APP) else None
 
     def may(self, who: str, robot: str, right: Right) -> bool:
         """Whether ``who`` has the right on the robot."""
@@ -161,24 +146,13 @@ class Guard:
         """See ``Admission.admit``."""
         if (who := self.known(address, proof)) is not None:
             return who
-        if proof.kind is ProofKind.NONE:
-            raise Unknown("say who you are: a name and password, a token, or have your address allowed")
-        found = self._by_token(proof)
-        if found is None and proof.kind is HTTP:
-            found = await self._by_password(proof, host_of(address))
-        if found is None:
-            raise Unknown("this password, token or certificate lets nobody in")
-        if proof.kind is HTTP:
-            if len(self._proofs) >= PROOFS_MAX:
-                self._proofs.pop(next(iter(self._proofs)))
-            self._proofs[proof.value] = found
-        return found
+        return await self._proofs.find(proof, host_of(address))
 
     async def invite(self, name: str, grant: Grant) -> Proof:
         """See ``Admission.invite``."""
         token = await asyncio.to_thread(self._store.add_guest, name, [grant], self.now())
         self._adopt(await asyncio.to_thread(self._store.snapshot))
-        return Proof(HTTP, f"Bearer {token}")
+        return Proof(ProofKind.HTTP, f"Bearer {token}")
 
     async def shut_out(self, name: str) -> None:
         """See ``Admission.shut_out``."""
@@ -189,43 +163,6 @@ class Guard:
     def may_shake_hands(self, host: str) -> bool:
         """See ``Admission.may_shake_hands``."""
         return self._handshakes.take(host) and self._handshakes_together.take("")
-
-    def _by_token(self, proof: Proof) -> str | None:
-        """Who shows this certificate or token. No one guesses one, so it counts anyone else who was wrong before."""
-        if proof.kind is not HTTP:
-            return self._certified(proof)
-        scheme, _, rest = proof.value.partition(" ")
-        if scheme.lower() == "bearer":
-            return self._book.by_token(token_hash(rest.strip()))
-        name, secret = basic_of(proof.value)
-        return name if secret and self._book.by_token(token_hash(secret)) == name else None
-
-    async def _by_password(self, proof: Proof, host: str) -> str | None:
-        """Who has this password; what is wrong counts against the host and the name. Raises LockedOut."""
-        name, password = basic_of(proof.value)
-        if not self._tries.take(host):
-            raise LockedOut("too many wrong passwords and tokens from your address: wait a minute")
-        if not name:
-            return None
-        if not self._tries_of_name.take(name):
-            raise LockedOut(f"too many wrong passwords for {name}: wait a minute")
-        if not await self._password_fits(name, password):
-            return None
-        self._tries.give_back(host)
-        self._tries_of_name.give_back(name)
-        return name
-
-    async def _password_fits(self, name: str, password: str) -> bool:
-        if self._waiting >= CHECKS_MAX:
-            raise Unknown("many passwords are being checked: try again")
-        self._waiting += 1
-        try:
-            async with self._checking:
-                kept = self._book.password_of(name)
-                fits = await asyncio.to_thread(password_fits, password, kept)
-                return fits and kept == self._book.password_of(name)  # it may have been replaced meanwhile
-        finally:
-            self._waiting -= 1
 
     def _follow(self, loop: asyncio.AbstractEventLoop) -> None:
         """In a thread: looks cost nothing to the robots, and lockstep waits for none of them."""

@@ -1,0 +1,98 @@
+"""Whose password, token or certificate a client shows. What is wrong counts against its host, and the name it gives."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+
+from roboglot.access.book import Book
+from roboglot.access.callers import basic_of
+from roboglot.access.secrets import password_fits, token_hash
+from roboglot.access.store import Kind
+from roboglot.model.admission import LockedOut, Proof, ProofKind, Unknown
+from roboglot.transport.limiter import Limiter
+
+PROOFS_MAX = 4096  # clients whose proof needs no further look
+CHECKS_MAX = 16  # passwords that wait to be checked; each takes 50 ms of a thread
+TRIES_SECONDS = 60.0
+TRIES_OF_ONE_NAME = 10  # times as many as of one address: others' guesses must not lock a person out at once
+HTTP = ProofKind.HTTP  # looking a member up in its class takes longer than all else here
+
+
+class Proofs:
+    """``logins``: wrong ones of one address in a minute."""
+
+    def __init__(self, book: Book, logins: int) -> None:
+        self._book = book
+        self._owners: dict[str, str] = {}  # by the header that shows who it is
+        self._tries = Limiter(logins / TRIES_SECONDS, logins, time.monotonic)
+        often = TRIES_OF_ONE_NAME * logins
+        self._tries_of_name = Limiter(often / TRIES_SECONDS, often, time.monotonic)
+        self._checking = asyncio.Semaphore(1)
+        self._waiting = 0
+
+    def renew(self, book: Book, replaced: set[str]) -> None:
+        """The people are those of ``book`` from now on; what ``replaced`` showed before counts no more."""
+        self._book = book
+        self._owners = {proof: who for proof, who in self._owners.items() if who not in replaced}
+
+    def known(self, proof: Proof) -> str | None:
+        """Return whose it is, if that needs no work."""
+        return self._owners.get(proof.value) if proof.kind is HTTP else self._certified(proof)
+
+    async def find(self, proof: Proof, host: str) -> str:
+        """Return who shows ``proof`` from ``host``. Raises Unknown, and LockedOut after too many that were wrong."""
+        if proof.kind is ProofKind.NONE:
+            raise Unknown("say who you are: a name and password, a token, or have your address allowed")
+        found = self._by_token(proof)
+        if found is None and proof.kind is HTTP:
+            found = await self._by_password(proof, host)
+        if found is None:
+            raise Unknown("this password, token or certificate lets nobody in")
+        if proof.kind is HTTP:
+            if len(self._owners) >= PROOFS_MAX:
+                self._owners.pop(next(iter(self._owners)))
+            self._owners[proof.value] = found
+        return found
+
+    def _certified(self, proof: Proof) -> str | None:
+        """Whose certificate it is; TLS has verified it."""
+        certificate = proof.kind is ProofKind.CERTIFICATE
+        return proof.value if certificate and self._book.has(proof.value, Kind.APP) else None
+
+    def _by_token(self, proof: Proof) -> str | None:
+        """Who shows this certificate or token. No one guesses one, so it counts anyone else who was wrong before."""
+        if proof.kind is not HTTP:
+            return self._certified(proof)
+        scheme, _, rest = proof.value.partition(" ")
+        if scheme.lower() == "bearer":
+            return self._book.by_token(token_hash(rest.strip()))
+        name, secret = basic_of(proof.value)
+        return name if secret and self._book.by_token(token_hash(secret)) == name else None
+
+    async def _by_password(self, proof: Proof, host: str) -> str | None:
+        """Who has this password; what is wrong counts against the host and the name. Raises LockedOut."""
+        name, password = basic_of(proof.value)
+        if not self._tries.take(host):
+            raise LockedOut("too many wrong passwords and tokens from your address: wait a minute")
+        if not name:
+            return None
+        if not self._tries_of_name.take(name):
+            raise LockedOut(f"too many wrong passwords for {name}: wait a minute")
+        if not await self._password_fits(name, password):
+            return None
+        self._tries.give_back(host)
+        self._tries_of_name.give_back(name)
+        return name
+
+    async def _password_fits(self, name: str, password: str) -> bool:
+        if self._waiting >= CHECKS_MAX:
+            raise Unknown("many passwords are being checked: try again")
+        self._waiting += 1
+        try:
+            async with self._checking:
+                kept = self._book.password_of(name)
+                fits = await asyncio.to_thread(password_fits, password, kept)
+                return fits and kept == self._book.password_of(name)  # it may have been replaced meanwhile
+        finally:
+            self._waiting -= 1
