@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from msgspec import convert, to_builtins
 
@@ -13,6 +12,9 @@ from roboglot.model.robot import Robot
 
 INSTALLED, PENDING, AUTOMATIC = "firmware.installed", "firmware.pending", "firmware.automatic"
 DOWNLOADED = "firmware.downloaded"
+
+Versions = tuple[str, Mapping[str, str]]
+"""Of the whole, and of its modules by name."""
 
 
 class FirmwareRecord:
@@ -25,21 +27,20 @@ class FirmwareRecord:
         self._robot, self._factory = robot, (version, modules)
         self._kept: dict[str, object] = {}  # for a robot without settings
         self._awake = False  # whether it knows what an earlier life left
-        self._booted: Any = None  # what that life had installed, without a reboot since: it runs by now
+        self._booted: Versions | None = None  # what that life had installed, without a reboot since: it runs by now
 
     def wake(self) -> FirmwarePackage | None:
         """Take up what an earlier life left, once; return what it had downloaded."""
         if self._awake or Settings not in self._robot:
             return None
-        self._awake, self._booted = True, self._read(PENDING)
+        self._awake, self._booted = True, self._versions(PENDING)
         left = self._read(DOWNLOADED)
         return convert(left, FirmwarePackage) if left else None
 
     @property
-    def installed(self) -> tuple[str, Mapping[str, str]]:
+    def installed(self) -> Versions:
         """Versions of the whole and of its modules, as they run now."""
-        kept: Any = self._booted or self._read(INSTALLED) or self._factory
-        return kept[0], kept[1]
+        return self._booted or self._versions(INSTALLED) or self._factory
 
     @property
     def automatic(self) -> bool:
@@ -64,6 +65,10 @@ class FirmwareRecord:
             await self._write(INSTALLED, pending)
             await self._write(PENDING, None)
             self._booted = None
+
+    def _versions(self, key: str) -> Versions | None:
+        kept = self._read(key)
+        return convert(kept, tuple[str, dict[str, str]]) if kept else None
 
     def _read(self, key: str) -> object:
         return self._robot[Settings].get(key) if Settings in self._robot else self._kept.get(key)
