@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TypedDict, Unpack
+from typing import NamedTuple, TypedDict, Unpack
 
 import mujoco
 
@@ -208,8 +208,8 @@ def _add_thing(root: mujoco.MjsBody, thing: Thing, elevation: float) -> None:
             ref=0.0,
         )
     _add_foot(body, f"thing {thing.name} foot", thing.diameter / 4, (0.0, 0.0))
-    height = thing.height - 0.002
-    _add_hull(body, f"thing {thing.name}", thing.diameter / 2, height, 0.002, thing.mass, STANDS | HANGS | MOVES)
+    shape = Cylinder(thing.diameter / 2, thing.height - 0.002, 0.002)
+    _add_hull(body, f"thing {thing.name}", shape, thing.mass, STANDS | HANGS | MOVES)
     body.pos = [*thing.at, elevation]
 
 
@@ -229,14 +229,21 @@ def _add_foot(body: mujoco.MjsBody, name: str, radius: float, at: tuple[float, f
 
 
 def _add_robot(spec: mujoco.MjSpec, name: str, body: Body, tilting: bool) -> None:
-    """Chassis on slides x, y, z and a hinge, carried by one frictionless caster; torso on a slide above it.
+    """A chassis that drives, and a torso on a slide above it."""
+    chassis = spec.worldbody.add_body(name=name)
+    _add_chassis(chassis, name, body, tilting)
+    _add_torso(spec, chassis, name, body)
+    _add_drive(spec, name, body)
+
+
+def _add_chassis(chassis: mujoco.MjsBody, name: str, body: Body, tilting: bool) -> None:
+    """On slides x, y, z and a hinge, carried by one frictionless caster.
 
     Where the ground is uneven (``tilting``), hinges for pitch and roll too, carried by a foot where each wheel is.
     """
-    hull, slide = body.hull, mujoco.mjtJoint.mjJNT_SLIDE
-    chassis = spec.worldbody.add_body(name=name)
+    hull = body.hull
     for axis, direction in (("x", [1, 0, 0]), ("y", [0, 1, 0]), ("z", [0, 0, 1])):
-        chassis.add_joint(name=f"{name} {axis}", type=slide, axis=direction)
+        chassis.add_joint(name=f"{name} {axis}", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=direction)
     chassis.add_joint(name=f"{name} yaw", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1])
     if tilting:
         for axis, direction in (("pitch", [0, 1, 0]), ("roll", [1, 0, 0])):
@@ -252,17 +259,19 @@ def _add_robot(spec: mujoco.MjSpec, name: str, body: Body, tilting: bool) -> Non
             _add_foot(chassis, f"{name} wheel {index}", body.base.wheel_radius, place)
     else:
         _add_foot(chassis, f"{name} wheel 0", CASTER, (0.0, 0.0))
-    travel = BUMPER_TRAVEL if body.get(BumperSection) else 0.0
-    heavy, light = hull.mass * (1 - TORSO), hull.mass * TORSO
-    _add_hull(
-        chassis, f"{name} chassis", hull.radius, hull.chassis_height, hull.clearance, heavy, STANDS | MOVES, travel
-    )
+    shape = Cylinder(hull.radius, hull.chassis_height, hull.clearance)
+    _add_hull(chassis, f"{name} chassis", shape, hull.mass * (1 - TORSO), STANDS | MOVES, _bumper_travel(body))
+
+
+def _add_torso(spec: mujoco.MjSpec, chassis: mujoco.MjsBody, name: str, body: Body) -> None:
+    """Above the chassis; legs move it up and down by a servo."""
+    hull = body.hull
     belly = body.legs.standing if body.legs else hull.height - hull.torso_height
     torso = chassis.add_body(name=f"{name} torso")
     if body.legs:
         torso.add_joint(
             name=f"{name} torso",
-            type=slide,
+            type=mujoco.mjtJoint.mjJNT_SLIDE,
             axis=[0, 0, 1],
             limited=True,
             range=[
@@ -274,29 +283,32 @@ def _add_robot(spec: mujoco.MjSpec, name: str, body: Body, tilting: bool) -> Non
         legs = spec.add_actuator(name=f"{name} torso", trntype=mujoco.mjtTrn.mjTRN_JOINT, target=f"{name} torso")
         legs.set_to_position(kp=LEG_GAIN, dampratio=1.0)
     below = 0.0 if body.legs else belly
-    _add_hull(torso, f"{name} torso", hull.radius, hull.torso_height, below, light, HANGS, travel)
+    shape = Cylinder(hull.radius, hull.torso_height, below)
+    _add_hull(torso, f"{name} torso", shape, hull.mass * TORSO, HANGS, _bumper_travel(body))
     gap = (max(belly, body.legs.highest) if body.legs else belly) - hull.clearance - hull.chassis_height
     if gap > 0.0:
         _add_waist(torso, f"{name} waist", hull.radius, gap, below)
-    _add_drive(spec, name, body)
 
 
-def _add_hull(
-    body: mujoco.MjsBody,
-    name: str,
-    radius: float,
-    height: float,
-    base: float,
-    mass: float,
-    bits: int,
-    travel: float = 0.0,
-) -> None:
+def _bumper_travel(body: Body) -> float:
+    return BUMPER_TRAVEL if body.get(BumperSection) else 0.0
+
+
+class Cylinder(NamedTuple):
+    """An upright one; ``base`` is the height of its underside (m)."""
+
+    radius: float
+    height: float
+    base: float
+
+
+def _add_hull(body: mujoco.MjsBody, name: str, shape: Cylinder, mass: float, bits: int, travel: float = 0.0) -> None:
     """A cylinder that bumps into things; contacts count, without force, from ``travel`` m on before it touches."""
     body.add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-        size=[radius, height / 2, 0],
-        pos=[0, 0, base + height / 2],
+        size=[shape.radius, shape.height / 2, 0],
+        pos=[0, 0, shape.base + shape.height / 2],
         contype=bits,
         conaffinity=bits,
         friction=[0.2, 0.005, 0.0001],
