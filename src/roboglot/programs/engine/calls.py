@@ -92,6 +92,9 @@ class Calls:
         self._waiting: Call | Halted | None = None
         self.answered: Callable[[str, bytes], None] | None = None
         """Called with every answer that is sent and its call's name, to continue the program after a crash."""
+        self.keeps_last = False
+        """Keep the last answer of ``history`` back until ``go_on``: the program waits where its earlier life ended."""
+        self._kept = b""
 
     def reply(self, id: int, value: object = None) -> None:
         """Answer a call with None, bool, int, float, str, Record, or lists and dicts of these.
@@ -104,6 +107,12 @@ class Calls:
     def fail(self, id: int, type: str, message: str) -> None:
         """Answer a call with an error: a built-in exception's name, or another, which becomes a kind of RobotError."""
         self._answer(id, msgspec.json.encode({"t": "raise", "type": type, "message": message}))
+
+    def go_on(self) -> None:
+        """Send the answer that was kept back; do nothing without one."""
+        kept, self._kept = self._kept, b""
+        if kept and not self._host.over:
+            self._host.write(kept)
 
     def take(self, call: CallMessage, size: int) -> None:
         """Take a call of ``size`` bytes. Raises ProtocolViolation."""
@@ -171,7 +180,10 @@ class Calls:
         else:
             self._waiting = None
             self._host.put(Replayed(call.name, args, kwargs, known.body))
-            self._host.write(frame(known.body))
+            if self.keeps_last and not self._history:
+                self._kept = frame(known.body)
+            else:
+                self._host.write(frame(known.body))
         return False
 
     def _put(self, event: Call | Halted) -> None:

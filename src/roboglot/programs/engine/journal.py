@@ -107,6 +107,10 @@ class Journal:
         if self._writing is None or self._writing.done():
             self._writing = asyncio.create_task(self._flush(), name=f"journal {self._id}")
 
+    async def written(self) -> None:
+        """Return when a crash would find all answers here."""
+        await self._flush()
+
     async def close(self) -> None:
         """Delete the journal of a finished run."""
         self.kept = False

@@ -69,6 +69,10 @@ class RunLog:
         self._entries.append(entry)
         self._logged(entry)
 
+    def newest(self) -> list[LogEntry]:
+        """Return what was written since the last ``take``."""
+        return list(self._entries)
+
     def take(self) -> list[LogEntry]:
         """Return what was written since the last time."""
         entries = list(self._entries)

@@ -21,7 +21,7 @@ from roboglot.programs.language import Problem
 from roboglot.programs.language.places import Step
 from roboglot.programs.library.inspection import Inspector, refuse_wrong
 from roboglot.programs.library.library import ModuleLibrary
-from roboglot.programs.stores import ListedProgram, LogEntry, StoredProgram, Stores
+from roboglot.programs.stores import LOG_MAX, ListedProgram, LogEntry, StoredProgram, Stores
 from roboglot.programs.tasks.owners import act_for_owner
 from roboglot.programs.tasks.recovery import settle
 from roboglot.programs.tasks.reports import (
@@ -114,11 +114,12 @@ class ProgramService:
         return [task for task in await self._store.all(ids) if task.id != DEBUG]
 
     async def log(self, id: str) -> list[LogEntry]:
-        """Return the log of a task, oldest entry first."""
+        """Return the log of a task up to this moment, oldest entry first."""
         async with self._lock:  # a run that has just ended may still be written down
             if (run := self._runs.get(id)) is not None:
                 await self._store.append_log(id, run.log.take())
-            return await self._store.log(id)
+            entries = await self._store.log(id)
+            return (entries + run.log.newest())[-LOG_MAX:] if run else entries
 
     async def whereabouts(self, id: str) -> Whereabouts:
         """Return the current position of a task; line 0 and "" if it does not run."""

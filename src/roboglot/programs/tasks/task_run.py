@@ -98,7 +98,9 @@ class TaskRun:
         self.state = TaskState.RUN_WAIT
         self._run = run
         self.log = RunLog(robot.clock, run, listeners.log_pace, lambda entry: listeners.logged(task.id, entry))
-        self.host = RunHost(task.id, self.log, listeners.report, listeners.at_breakpoint)
+        self.host = RunHost(task.id, self.log, listeners.report, self._ask_to_halt)
+        self._at_breakpoint = listeners.at_breakpoint
+        self._halts = False  # after the answer that is due
         self._session = self.host.session = Session(robot, task.id, self.host)
         self._clock = robot.clock
         self._began = robot.clock.time()
@@ -183,6 +185,7 @@ class TaskRun:
         """Instead of a start: the program does again what it did, and is found suspended where it was lost."""
         self.state = TaskState.SUSPEND
         self._session.pause()
+        self._run.calls.keeps_last = True
         if not self._replay.left:
             await self._hold()
 
@@ -201,6 +204,7 @@ class TaskRun:
         self._session.resume()
         self.time.stop(False)
         await self._run.resume()
+        self._run.calls.go_on()
 
     def step(self, step: Step = Step.INTO, *, to_block: bool = False) -> None:
         """Halt after a step: before a statement, or at the begin of a block."""
@@ -237,10 +241,24 @@ class TaskRun:
         await self._run.suspend()
         self._report(done(TaskOperation.SUSPEND, self.task.id, TaskState.SUSPEND))
 
+    async def _ask_to_halt(self) -> None:
+        self._halts = True
+
+    async def _report_halt(self) -> None:
+        """Suspend; who is told of it finds the program here after a crash, too."""
+        self._halts = False
+        try:
+            await self._journal.written()
+            await self._at_breakpoint()
+        except Exception:
+            log.exception("cannot halt task %s", self.task.id)
+        if self.state is not TaskState.SUSPEND:
+            await self._run.resume()
+
     async def _halt(self, halted: Halted) -> None:
         self.time.ask(True)
         if not self._block_stops.passes():
-            await self.host.breakpoint()
+            await self._report_halt()
         self._run.calls.reply(halted.id)
         self.time.ask(False)
 
@@ -251,26 +269,33 @@ class TaskRun:
         finally:
             self.time.ask(False)
 
+    async def _value(self, request: Call) -> object:
+        """Make the call; return its value when the program may have it."""
+        await self._session.unpaused()
+        if request.interrupted:
+            value = await call_cut_off(self._session, request.name, request.args, request.kwargs)
+        else:
+            with self._clock.holding():
+                await self._journal.begin(request.name)
+            value = await call_function(self._session, request.name, request.args, request.kwargs)
+        await self.log.pace.wait()
+        if request.name in MARKS:
+            await self._pace.wait()
+            self._halts |= self._block_stops.halts(self.block)
+        elif self._insights.listening:
+            self._insights.publish(
+                Reading(self.task.id, self.line, self.module, self.block, request.name, in_short(value))
+            )
+        if request.name == "time.monotonic" and isinstance(value, float):
+            value += self._replay.ahead
+        return value
+
     async def _answer(self, request: Call) -> None:
         try:
-            await self._session.unpaused()
-            if request.interrupted:
-                value = await call_cut_off(self._session, request.name, request.args, request.kwargs)
-            else:
+            value = await self._value(request)
+            if self._halts:  # first: it must not go on by the answer, which belongs to what was done before
                 with self._clock.holding():
-                    await self._journal.begin(request.name)
-                value = await call_function(self._session, request.name, request.args, request.kwargs)
-            await self.log.pace.wait()
-            if request.name in MARKS:
-                await self._pace.wait()
-                if self._block_stops.halts(self.block):
-                    await self.host.breakpoint()
-            elif self._insights.listening:
-                self._insights.publish(
-                    Reading(self.task.id, self.line, self.module, self.block, request.name, in_short(value))
-                )
-            if request.name == "time.monotonic" and isinstance(value, float):
-                value += self._replay.ahead
+                    await self._run.suspend()
             self._run.calls.reply(request.id, value)
         except TaskEnded:
             self._ended_itself = True
@@ -280,6 +305,9 @@ class TaskRun:
         except Exception as error:
             log.exception("%s of task %s broke", request.name, self.task.id)
             self._run.calls.fail(request.id, "RuntimeError", f"{request.name} broke: {error}")
+        else:
+            if self._halts:
+                await self._report_halt()
 
 
 def in_units(stops: Stops) -> Stops:
