@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +19,11 @@ from roboglot.datasets.track import Track
 from roboglot.extras import explaining
 from roboglot.model.geometry import ORIGIN, Pose
 from roboglot.model.sensing import LaserScan
+
+if TYPE_CHECKING:
+    from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+    from foxglove_schemas_protobuf.LaserScan_pb2 import LaserScan as ScanMessage
+    from google.protobuf.timestamp_pb2 import Timestamp
 
 MAGIC = b"\x89MCAP0"
 SCAN, TRANSFORMS = "foxglove.LaserScan", "foxglove.FrameTransforms"
@@ -31,15 +36,15 @@ def read_own_recording(path: Path) -> DriveLog:
     with explaining("reading recordings", "recording"):
         decoding = import_module("google.protobuf.message")
         from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
-        from foxglove_schemas_protobuf.LaserScan_pb2 import LaserScan as Message
-    scans: dict[str, list[Any]] = {}
+        from foxglove_schemas_protobuf.LaserScan_pb2 import LaserScan as ScanMessage
+    scans: dict[str, list[ScanMessage]] = {}
     tracks: dict[str, Track] = {}
     mounts: dict[str, Pose] = {}
     unread: Counter[str] = Counter()
     for schema, data in _messages(path):
         try:
             if schema == SCAN:
-                message = Message.FromString(data)
+                message = ScanMessage.FromString(data)
                 _keep(scans.setdefault(message.frame_id.removesuffix("/laser"), []), message, path)
             else:
                 for transform in FrameTransforms.FromString(data).transforms:
@@ -85,13 +90,13 @@ def _messages(path: Path) -> Iterator[tuple[str, bytes]]:
             return  # its program was killed: what there is, is read
 
 
-def _keep(found: list[Any], message: Any, path: Path) -> None:
+def _keep(found: list[ScanMessage], message: ScanMessage, path: Path) -> None:
     if len(found) >= SCANS_MAX or len(message.ranges) > RAYS_MAX:
         raise BadDriveLog(f"{path.name}: more than {SCANS_MAX} scans or {RAYS_MAX} rays")
     found.append(message)
 
 
-def _take(transform: Any, tracks: dict[str, Track], mounts: dict[str, Pose]) -> None:
+def _take(transform: FrameTransform, tracks: dict[str, Track], mounts: dict[str, Pose]) -> None:
     robot, _, frame = transform.child_frame_id.rpartition("/")
     pose = Pose(
         transform.translation.x, transform.translation.y, 2.0 * math.atan2(transform.rotation.z, transform.rotation.w)
@@ -104,12 +109,12 @@ def _take(transform: Any, tracks: dict[str, Track], mounts: dict[str, Pose]) -> 
         mounts[robot] = pose
 
 
-def _farthest(message: Any) -> float:
+def _farthest(message: ScanMessage) -> float:
     ranges = np.array(message.ranges)
     return float(ranges[np.isfinite(ranges)].max(initial=0.0))
 
 
-def _scan(message: Any, stamp: float, reach: float, mount: Pose) -> LaserScan:
+def _scan(message: ScanMessage, stamp: float, reach: float, mount: Pose) -> LaserScan:
     ranges = np.array(message.ranges, np.float32)
     with np.errstate(invalid="ignore"):
         ranges[ranges < RANGE_MIN] = np.nan
@@ -118,5 +123,5 @@ def _scan(message: Any, stamp: float, reach: float, mount: Pose) -> LaserScan:
     return LaserScan(stamp, ranges, message.start_angle, increment, RANGE_MIN, reach + 1e-3, mount=mount)
 
 
-def _seconds(stamp: Any) -> float:
+def _seconds(stamp: Timestamp) -> float:
     return float(stamp.seconds) + 1e-9 * float(stamp.nanos)

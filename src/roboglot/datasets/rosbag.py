@@ -10,9 +10,10 @@ import math
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from roboglot.datasets.drive_log import RAYS_MAX, SCANS_MAX, BadDriveLog, DriveLog, RecordedScan
 from roboglot.datasets.track import Track
@@ -25,6 +26,61 @@ TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 ODOM_FRAMES, BASE_FRAMES = ("odom",), ("base_link", "base_footprint")
 CHAIN_MAX = 16  # frames between base and laser
 RAY_SECONDS_MAX = 0.01  # s between two rays that can be believed
+
+
+class Stamp(Protocol):
+    """builtin_interfaces/Time."""
+
+    sec: int
+    nanosec: int
+
+
+class Header(Protocol):
+    """std_msgs/Header."""
+
+    stamp: Stamp
+    frame_id: str
+
+
+class Vector(Protocol):
+    """geometry_msgs/Point or Vector3."""
+
+    x: float
+    y: float
+    z: float
+
+
+class Quaternion(Vector, Protocol):
+    """geometry_msgs/Quaternion."""
+
+    w: float
+
+
+class Transform(Protocol):
+    """geometry_msgs/Transform."""
+
+    translation: Vector
+    rotation: Quaternion
+
+
+class TransformStamped(Protocol):
+    """geometry_msgs/TransformStamped."""
+
+    header: Header
+    child_frame_id: str
+    transform: Transform
+
+
+class ScanMessage(Protocol):
+    """sensor_msgs/LaserScan."""
+
+    header: Header
+    angle_min: float
+    angle_increment: float
+    time_increment: float
+    range_min: float
+    range_max: float
+    ranges: NDArray[np.float32]
 
 
 def is_bag(path: Path, head: bytes) -> bool:
@@ -63,7 +119,7 @@ def read_bag(path: Path) -> DriveLog:
 
 def _assembled(name: str, messages: Iterator[tuple[str, int, Any]]) -> DriveLog:
     """The scans with their odometry, from messages in the order of their arrival."""
-    scans: list[Any] = []
+    scans: list[ScanMessage] = []
     wheels, tf_wheels = Track(), Track()
     fixed: dict[str, tuple[str, Pose]] = {}  # frame: the one above it, and where it is in that
     unread: Counter[str] = Counter()
@@ -93,7 +149,7 @@ def _assembled(name: str, messages: Iterator[tuple[str, int, Any]]) -> DriveLog:
     return DriveLog(name, recorded, dict(unread))
 
 
-def _take(transform: Any, fixed: dict[str, tuple[str, Pose]], wheels: Track) -> None:
+def _take(transform: TransformStamped, fixed: dict[str, tuple[str, Pose]], wheels: Track) -> None:
     """What tf says: where the base is in odom, and where parts are on the robot."""
     above, frame = (name.strip("/") for name in (transform.header.frame_id, transform.child_frame_id))
     pose = _pose(transform.transform.translation, transform.transform.rotation)
@@ -114,7 +170,7 @@ def _mount(fixed: dict[str, tuple[str, Pose]], frame: str) -> Pose:
     return mount
 
 
-def _scan(message: Any, stamp: float, mount: Pose) -> LaserScan:
+def _scan(message: ScanMessage, stamp: float, mount: Pose) -> LaserScan:
     ranges = np.array(message.ranges, np.float32)
     with np.errstate(invalid="ignore"):
         ranges[ranges > message.range_max] = np.inf
@@ -129,11 +185,11 @@ def _scan(message: Any, stamp: float, mount: Pose) -> LaserScan:
     return LaserScan(stamp, ranges, *angles, least, most, mount=mount, time_increment=increment)
 
 
-def _seconds(stamp: Any) -> float:
+def _seconds(stamp: Stamp) -> float:
     return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
 
 
-def _pose(position: Any, q: Any) -> Pose:
+def _pose(position: Vector, q: Quaternion) -> Pose:
     """The planar part; a rotation by pi around x (a laser upside down) is not one and is left out."""
     yaw = math.atan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z))
     x, y = float(position.x), float(position.y)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from foxglove_schemas_protobuf import (
@@ -20,15 +20,21 @@ from foxglove_schemas_protobuf import (
     PoseInFrame_pb2,
     SceneUpdate_pb2,
 )
-from google.protobuf.descriptor_pb2 import FileDescriptorSet  # type: ignore[import-untyped]
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
 
 from roboglot.model.geometry import Pose
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.sensing import LaserScan
 
+if TYPE_CHECKING:
+    from foxglove_schemas_protobuf.Pose_pb2 import Pose as PoseMessage
+    from google.protobuf.descriptor import FileDescriptor
+    from google.protobuf.message import Message
+    from google.protobuf.timestamp_pb2 import Timestamp
+
 PARTS_A_METRE = 1024.0  # ranges are kept to a millimetre, in a number whose last bits are zero: those compress
 LEVELS = {10: 1, 20: 2, 30: 3, 40: 4, 50: 5}  # of Python's logging
-TYPES: dict[str, Any] = {
+TYPES: dict[str, type[Message]] = {
     "foxglove.CompressedVideo": CompressedVideo_pb2.CompressedVideo,
     "foxglove.FrameTransforms": FrameTransforms_pb2.FrameTransforms,
     "foxglove.Grid": Grid_pb2.Grid,
@@ -44,9 +50,9 @@ RANGES = bytes([6 << 3 | 2])  # the field of a scan
 @cache
 def schema(name: str) -> bytes:
     """Return the descriptors of a message and of all that it is made of."""
-    files: dict[str, Any] = {}
+    files: dict[str, FileDescriptor] = {}
 
-    def collect(file: Any) -> None:
+    def collect(file: FileDescriptor) -> None:
         for needed in file.dependencies:
             collect(needed)
         files.setdefault(file.name, file)
@@ -58,11 +64,11 @@ def schema(name: str) -> bytes:
     return bytes(found.SerializeToString())
 
 
-def _stamp(message: Any, nanoseconds: int) -> None:
+def _stamp(message: Timestamp, nanoseconds: int) -> None:
     message.seconds, message.nanos = divmod(nanoseconds, 1_000_000_000)
 
 
-def _place(message: Any, pose: Pose, z: float = 0.0) -> None:
+def _place(message: PoseMessage, pose: Pose, z: float = 0.0) -> None:
     message.position.x, message.position.y, message.position.z = pose.x, pose.y, z
     message.orientation.z, message.orientation.w = math.sin(pose.yaw / 2), math.cos(pose.yaw / 2)
 

@@ -9,11 +9,11 @@ import math
 import struct
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict
 
 import msgspec
 import numpy as np
-from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
+from google.protobuf.message import DecodeError
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
@@ -21,11 +21,30 @@ from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.recording.foxglove import LEVELS, TYPES
 from roboglot.recording.reader import Record
 
+if TYPE_CHECKING:
+    from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
+    from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+    from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+    from foxglove_schemas_protobuf.Grid_pb2 import Grid
+    from foxglove_schemas_protobuf.LaserScan_pb2 import LaserScan
+    from foxglove_schemas_protobuf.Log_pb2 import Log
+    from foxglove_schemas_protobuf.Pose_pb2 import Pose as PoseMessage
+    from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
+    from rosbags.typesys.store import Msg, Msgarg
+
 JSON = "std_msgs/msg/String"
 ROS_LEVELS = {number: python for python, number in LEVELS.items()}  # rcl's levels are Python's
 SPEED_SPAN = 0.5  # s of poses that a speed is made of
-Ros: TypeAlias = Any  # a message of rosbags or protobuf, whose classes are made at run time
 STORE = get_typestore(Stores.ROS2_JAZZY)
+
+
+class _Battery(TypedDict, total=False):
+    """``roboglot.Battery`` as far as ROS has a place for it."""
+
+    charging: bool
+    voltage: float | None
+    current: float | None
+    percentage: float
 
 
 class RosMessage(NamedTuple):
@@ -38,7 +57,7 @@ class RosMessage(NamedTuple):
     kept: bool = False
 
 
-def read_cdr(data: bytes, type: str) -> Ros:
+def read_cdr(data: bytes, type: str) -> object:
     """Return a message. Raises ValueError for what is none."""
     try:
         return STORE.deserialize_cdr(data, type)
@@ -46,19 +65,19 @@ def read_cdr(data: bytes, type: str) -> Ros:
         raise ValueError(f"{type}: {error}") from None
 
 
-def _new(type: str, **fields: Ros) -> Ros:
+def _new(type: str, **fields: Msgarg) -> Msg:
     return STORE.types[type](**fields)
 
 
-def _time(at: int) -> Ros:
+def _time(at: int) -> Msg:
     return _new("builtin_interfaces/msg/Time", sec=at // 1_000_000_000, nanosec=at % 1_000_000_000)
 
 
-def _header(at: int, frame: str) -> Ros:
+def _header(at: int, frame: str) -> Msg:
     return _new("std_msgs/msg/Header", stamp=_time(at), frame_id=frame)
 
 
-def _pose(message: Ros) -> Ros:
+def _pose(message: PoseMessage) -> Msg:
     place, turn = message.position, message.orientation
     return _new(
         "geometry_msgs/msg/Pose",
@@ -67,7 +86,7 @@ def _pose(message: Ros) -> Ros:
     )
 
 
-def _vector(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Ros:
+def _vector(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Msg:
     return _new("geometry_msgs/msg/Vector3", x=x, y=y, z=z)
 
 
@@ -82,7 +101,7 @@ class Ros2Words:
         self._reach: dict[str, float] = {}
         self._past: dict[str, deque[tuple[int, Pose]]] = {}
         self._mounts: dict[str, tuple[float, ...]] = {}
-        self._by_schema: Mapping[str, Callable[[Record, Ros], Iterator[RosMessage]]] = {
+        self._by_schema: Mapping[str, Callable[[Record, Any], Iterator[RosMessage]]] = {
             "foxglove.LaserScan": self._scan,
             "foxglove.FrameTransforms": self._transforms,
             "foxglove.PoseInFrame": self._place,
@@ -112,14 +131,14 @@ class Ros2Words:
         else:
             yield self._json(record, record.topic)
 
-    def _made(self, topic: str, type: str, at: int, message: Ros, *, kept: bool = False) -> RosMessage:
+    def _made(self, topic: str, type: str, at: int, message: object, *, kept: bool = False) -> RosMessage:
         return RosMessage(topic, type, at, bytes(STORE.serialize_cdr(message, type)), kept)
 
     def _json(self, record: Record, topic: str) -> RosMessage:
         text = _new(JSON, data=record.data.decode("utf-8", "replace"))
         return self._made(topic, JSON, record.at, text)
 
-    def _scan(self, record: Record, message: Ros) -> Iterator[RosMessage]:
+    def _scan(self, record: Record, message: LaserScan) -> Iterator[RosMessage]:
         ranges = np.array(message.ranges, np.float32)
         farthest = float(ranges[np.isfinite(ranges)].max(initial=0.0))
         reach = self._reach[record.topic] = max(self._reach.get(record.topic, 0.0), farthest)
@@ -138,7 +157,7 @@ class Ros2Words:
         )
         yield self._made(record.topic, "sensor_msgs/msg/LaserScan", record.at, scan)
 
-    def _transforms(self, record: Record, message: Ros) -> Iterator[RosMessage]:
+    def _transforms(self, record: Record, message: FrameTransforms) -> Iterator[RosMessage]:
         moving = []
         for frame in message.transforms:
             robot, _, child = frame.child_frame_id.rpartition("/")
@@ -156,7 +175,7 @@ class Ros2Words:
                 "/tf", "tf2_msgs/msg/TFMessage", record.at, _new("tf2_msgs/msg/TFMessage", transforms=moving)
             )
 
-    def _transform(self, at: int, frame: Ros) -> Ros:
+    def _transform(self, at: int, frame: FrameTransform) -> Msg:
         turn, way = frame.rotation, frame.translation
         return _new(
             "geometry_msgs/msg/TransformStamped",
@@ -169,7 +188,7 @@ class Ros2Words:
             ),
         )
 
-    def _mount(self, at: int, frame: Ros, transform: Ros) -> Iterator[RosMessage]:
+    def _mount(self, at: int, frame: FrameTransform, transform: Msg) -> Iterator[RosMessage]:
         """Where the laser is mounted, when that is new."""
         place = (frame.translation.x, frame.translation.y, frame.rotation.z, frame.rotation.w)
         if self._mounts.get(frame.child_frame_id) != place:
@@ -177,7 +196,7 @@ class Ros2Words:
             message = _new("tf2_msgs/msg/TFMessage", transforms=[transform])
             yield self._made("/tf_static", "tf2_msgs/msg/TFMessage", at, message, kept=True)
 
-    def _odometry(self, at: int, robot: str, frame: Ros) -> RosMessage:
+    def _odometry(self, at: int, robot: str, frame: FrameTransform) -> RosMessage:
         way, turn = frame.translation, frame.rotation
         here = Pose(way.x, way.y, 2.0 * math.atan2(turn.z, turn.w))
         speed = self._speed(robot, at, here)
@@ -215,12 +234,12 @@ class Ros2Words:
         way = here.relative_to(before)
         return Pose(way.x / seconds, way.y / seconds, wrap_angle(way.yaw) / seconds)
 
-    def _place(self, record: Record, message: Ros) -> Iterator[RosMessage]:
+    def _place(self, record: Record, message: PoseInFrame) -> Iterator[RosMessage]:
         type = "geometry_msgs/msg/PoseStamped"
         pose = _new(type, header=_header(record.at, message.frame_id), pose=_pose(message.pose))
         yield self._made(record.topic, type, record.at, pose)
 
-    def _grid(self, record: Record, message: Ros) -> Iterator[RosMessage]:
+    def _grid(self, record: Record, message: Grid) -> Iterator[RosMessage]:
         cells = np.frombuffer(message.data, np.int8)
         width = message.column_count
         info = _new(
@@ -235,7 +254,7 @@ class Ros2Words:
         grid = _new(type, header=_header(record.at, message.frame_id), info=info, data=cells)
         yield self._made(record.topic, type, record.at, grid, kept=True)
 
-    def _video(self, record: Record, message: Ros) -> Iterator[RosMessage]:
+    def _video(self, record: Record, message: CompressedVideo) -> Iterator[RosMessage]:
         yield self._compressed(f"{record.topic}/compressed", record.at, message.frame_id, message.format, message.data)
 
     def picture(self, at: int, frame: str, jpeg: bytes) -> RosMessage:
@@ -254,7 +273,7 @@ class Ros2Words:
         message = _new(type, header=_header(at, ""), name=list(positions), position=angles, velocity=none, effort=none)
         return self._made("", type, at, message)
 
-    def _log(self, record: Record, message: Ros) -> Iterator[RosMessage]:
+    def _log(self, record: Record, message: Log) -> Iterator[RosMessage]:
         yield self.line(record.at, ROS_LEVELS.get(message.level, 20), message.name, message.message)
 
     def line(self, at: int, level: int, name: str, text: str) -> RosMessage:
@@ -263,13 +282,13 @@ class Ros2Words:
         line = _new(type, stamp=_time(at), level=level, name=name, msg=text, file="", function="", line=0)
         return self._made("/rosout", type, at, line)
 
-    def _pressure(self, record: Record, reading: Ros) -> RosMessage:
+    def _pressure(self, record: Record, reading: Mapping[str, float]) -> RosMessage:
         header = _header(record.at, f"{record.topic.split('/')[1]}/base_link")
         type, deviation = "sensor_msgs/msg/FluidPressure", float(reading["deviation"])
         message = _new(type, header=header, fluid_pressure=float(reading["pressure"]), variance=deviation * deviation)
         return self._made(record.topic, type, record.at, message)
 
-    def _battery(self, record: Record, state: Ros) -> Iterator[RosMessage]:
+    def _battery(self, record: Record, state: _Battery) -> Iterator[RosMessage]:
         type, unknown = "sensor_msgs/msg/BatteryState", math.nan
         charging = 1 if state.get("charging") else 2
         message = _new(

@@ -11,11 +11,11 @@ from roboglot.protocols.ros2.chapters import subscriptions  # noqa: F401 - fills
 from roboglot.protocols.ros2.context import Context
 from roboglot.protocols.ros2.errors import level_of
 from roboglot.protocols.ros2.table import TABLE
-from roboglot.protocols.ros2.vocabulary import DOOR, TYPES, Ros
+from roboglot.protocols.ros2.vocabulary import DOOR, TYPES
 
 log = logging.getLogger(__name__)
 MESSAGE_MAX = 65536  # bytes
-Read = Callable[[bytes, str], Ros]  # CDR and type; raises ValueError
+Read = Callable[[bytes, str], object]  # CDR and type; raises ValueError
 
 
 async def answer(context: Context, key: str, data: bytes | None, read: Read) -> tuple[int, str]:

@@ -10,7 +10,7 @@ import time
 import uuid
 from collections.abc import Coroutine, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING
 
 from roboglot.extras import explaining
 from roboglot.model.actions import Action, ActionStatus
@@ -28,12 +28,14 @@ from roboglot.transport.seldom import Seldom
 from roboglot.wire.ros2.zenoh import KEPT, RELIABLE, Node, attachment, topic_key
 
 if TYPE_CHECKING:
+    import zenoh
+    from zenoh.ext import AdvancedPublisher
+
     from roboglot.recording.entries import Entry
     from roboglot.recording.ros2 import Ros2Words, RosMessage
     from roboglot.recording.sampler import Sampler
 
 log = logging.getLogger(__name__)
-Zenoh: TypeAlias = Any  # what the library hands out; it is imported when the door opens
 PENDING_MAX = 32  # messages that wait to be done; then they are dropped, and the log says so
 PICTURE_PERIOD = 0.2  # s
 JPEG_QUALITY = 80
@@ -49,10 +51,10 @@ class Ros2Door:
     def __init__(self, robot: Robot, address: str, config: Ros2Config) -> None:
         self._robot, self._address, self._config = robot, address, config
         self._namespace = config.namespaces.get(robot.id, robot.id)
-        self._session: Zenoh = None
+        self._session: zenoh.Session | None = None
         self._node: Node | None = None
-        self._tokens: list[Zenoh] = []
-        self._publishers: dict[str, Zenoh] = {}
+        self._tokens: list[object] = []  # what is announced, for as long as they are kept
+        self._publishers: dict[str, zenoh.Publisher | AdvancedPublisher] = {}
         self._numbers = 0
         self._sequence = 0
         self._gid = uuid.uuid4().bytes
@@ -94,7 +96,7 @@ class Ros2Door:
             from roboglot.recording.sampler import Sampler
         loop = asyncio.get_running_loop()
         try:
-            self._session = await loop.run_in_executor(None, zenoh.open, self._zenoh_config(zenoh))
+            self._session = await loop.run_in_executor(None, zenoh.open, self._zenoh_config())
         except zenoh.ZError as error:
             raise OSError(f"{self._locator}: {error}") from None
         self._translator = Ros2Words(self._robot.id)
@@ -107,7 +109,9 @@ class Ros2Door:
         if Camera in self._robot:
             self._follow(self._film())
 
-    def _zenoh_config(self, zenoh: Zenoh) -> Zenoh:
+    def _zenoh_config(self) -> zenoh.Config:
+        import zenoh
+
         config = zenoh.Config()
         for key, value in {
             "mode": "router",
@@ -150,13 +154,14 @@ class Ros2Door:
         from roboglot.recording.ros2 import STORE
 
         assert self._node is not None
+        assert self._session is not None
         topic, hashed = self._topic(key), STORE.hash_rihs01(type)
         self._numbers += 1
         token = self._node.subscription_token(self._numbers, topic, type, hashed, RELIABLE)
         self._tokens.append(self._session.liveliness().declare_token(token))
         loop = asyncio.get_running_loop()
 
-        def hear(sample: Zenoh) -> None:  # in a thread of Zenoh's
+        def hear(sample: zenoh.Sample) -> None:  # in a thread of Zenoh's
             if self._room.acquire(blocking=False):
                 data = sample.payload.to_bytes() if len(sample.payload) <= MESSAGE_MAX else None
                 loop.call_soon_threadsafe(self._take, key, data)
@@ -220,7 +225,7 @@ class Ros2Door:
         async for _ in self._robot.clock.every(PICTURE_PERIOD):
             topic = self._topic("image/compressed")
             publisher = self._publishers.get(topic)
-            if publisher is not None and not publisher.matching_status.matching:
+            if publisher is not None and not _is_watched(publisher):
                 continue
             if publisher is None:
                 self._declare(topic, "sensor_msgs/msg/CompressedImage", kept=False)
@@ -264,23 +269,32 @@ class Ros2Door:
         self._sequence += 1
         publisher.put(message.data, attachment=attachment(self._sequence, time.time_ns(), self._gid))
 
-    def _declare(self, topic: str, type: str, *, kept: bool) -> Zenoh:
+    def _declare(self, topic: str, type: str, *, kept: bool) -> zenoh.Publisher | AdvancedPublisher:
         import zenoh
         from zenoh.ext import CacheConfig, declare_advanced_publisher
 
         from roboglot.recording.ros2 import STORE
 
         assert self._node is not None
+        assert self._session is not None
         hashed = STORE.hash_rihs01(type)
         self._numbers += 1
         token = self._node.publisher_token(self._numbers, topic, type, hashed, KEPT if kept else RELIABLE)
         key = topic_key(self._config.domain, topic, type, hashed)
-        options: dict[str, Zenoh] = {"congestion_control": zenoh.CongestionControl.DROP}
-        publisher = (
-            declare_advanced_publisher(self._session, key, cache=CacheConfig(1), publisher_detection=True, **options)
-            if kept
-            else self._session.declare_publisher(key, **options)
-        )
+        drop = zenoh.CongestionControl.DROP
+        publisher: zenoh.Publisher | AdvancedPublisher
+        if kept:
+            cache = CacheConfig(1)
+            publisher = declare_advanced_publisher(
+                self._session, key, cache=cache, publisher_detection=True, congestion_control=drop
+            )
+        else:
+            publisher = self._session.declare_publisher(key, congestion_control=drop)
         self._publishers[topic] = publisher
         self._tokens.append(self._session.liveliness().declare_token(token))
         return publisher
+
+
+def _is_watched(publisher: object) -> bool:
+    """Return True if someone listens. Zenoh's stubs know nothing of its status' own field."""
+    return bool(getattr(getattr(publisher, "matching_status", None), "matching", True))

@@ -14,7 +14,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 import grpc
-from google.protobuf.message import DecodeError, Message  # type: ignore[import-untyped]
+from google.protobuf.message import DecodeError, Message
 
 from roboglot.clients.cyberdog.link import Certificates
 from roboglot.model.tap import Direction

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 
-from google.protobuf.json_format import MessageToDict, ParseDict, ParseError  # type: ignore[import-untyped]
+from google.protobuf.json_format import MessageToDict, ParseDict, ParseError
 
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 
