@@ -13,13 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.support import GRAVITY
 from roboglot.simulation.building.props import AWAY, Props
 
-ROOM = 0.05  # m that are kept free of doubt: more than contacts reach beyond the shapes
+Floats = NDArray[np.float64]
+
+ROOM = 0.02  # m that are kept free of doubt: more than contacts reach beyond the shapes
 PERSON_MAX = 3.0  # m/s
 STILL = 1e-6  # m/s
-HORIZON = 1.0  # s
-AGAIN, AGAIN_MAX = 0.1, 1.0  # s until it is looked again after something was near: the first time; at most
+HORIZON, FAR = 1.0, 1000.0  # s, m
+AGAIN, AGAIN_MAX = 0.06, 0.5  # s until it is looked again after something was near: the first time; at most
 WORTH = 0.06  # s: for less it does not pay to look
 NO_CONTACTS = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
 
@@ -37,8 +40,9 @@ class Meetings:
         self._geoms = model.body_geomadr[bodies]
         self._round = model.geom_type[self._geoms] == mujoco.mjtGeom.mjGEOM_CAPSULE  # people; else boxes
         self._radii = np.array([hull.body.hull.radius for hull in hulls])
-        self._tops = np.array([hull.body.base.speed for hull in hulls])
+        self._pulls = np.array([hull.body.base.traction * GRAVITY for hull in hulls])  # m/s2 that wheels can give
         self._revision = -1
+        self._others: tuple[NDArray[np.int64], Floats, Floats] | None = None  # see ``_there``
         self._off = False  # whether it looks for none now
         self._left = 0.0  # s until it has to be looked again
         self._wait = AGAIN
@@ -46,7 +50,7 @@ class Meetings:
     def forget(self) -> None:
         """Something was put elsewhere at once."""
         self._switch(off=False)
-        self._left = 0.0
+        self._left, self._others = 0.0, None
 
     def look(self, seconds: float) -> None:
         """Before a step of so many ``seconds``: have the physics look for contacts in it, or not."""
@@ -81,30 +85,40 @@ class Meetings:
             hull.disturbed = False
         return not self._data.nefc and all(hull.support.sprung and not hull.touches for hull in self._hulls)
 
+    def _there(self) -> tuple[NDArray[np.int64], Floats, Floats]:
+        """Which of what is moved by hand is there, how far it reaches around its middle (m), how fast it may be."""
+        there = np.flatnonzero(self._data.mocap_pos[:, 2] > AWAY[2] / 2)
+        people, sizes = self._round[there], self._model.geom_size[self._geoms[there]]
+        radii = np.where(people, sizes[:, 0], np.hypot(sizes[:, 0], sizes[:, 1]))
+        return there, radii, np.where(people, PERSON_MAX, 0.0)
+
     def _free(self) -> float:
         """Seconds in which nothing can come to touch a robot, HORIZON at most."""
-        places, sizes = self._data.mocap_pos, self._model.geom_size[self._geoms]
-        there = places[:, 2] > AWAY[2] / 2
+        if self._others is None:
+            self._others = self._there()
+        there, radii, people = self._others
+        places = self._data.mocap_pos[there]
         hulls = np.array([(hull.x, hull.y) for hull in self._hulls])
-        speeds = np.array([0.0 if hull.rests else math.hypot(*hull.motion[:2]) for hull in self._hulls])
-        speeds = np.where([hull.rests for hull in self._hulls], 0.0, np.maximum(speeds, self._tops))
-        radii = np.where(self._round, sizes[:, 0], np.hypot(sizes[:, 0], sizes[:, 1]))[there]
-        away = np.hypot(hulls[:, 0, None] - places[there, 0], hulls[:, 1, None] - places[there, 1])
+        rest = np.array([hull.rests for hull in self._hulls])
+        speeds = np.where(rest, 0.0, [math.hypot(*hull.motion[:2]) for hull in self._hulls])
+        pulls = np.where(rest, 0.0, self._pulls)
+        away = np.hypot(hulls[:, 0, None] - places[:, 0], hulls[:, 1, None] - places[:, 1])
         gaps = away - radii - self._radii[:, None] - ROOM
-        closing = speeds[:, None] + np.where(self._round[there], PERSON_MAX, 0.0)
-        free = min(HORIZON, _soonest(gaps, closing))
-        for index, hull in enumerate(self._hulls):
-            if speeds[index] > 0.0:
-                free = min(free, (hull.walls.gap(hull.x, hull.y, hull.floor) - ROOM) / speeds[index])
+        free = min(HORIZON, _soonest(gaps, speeds[:, None] + people, pulls[:, None] + 0.0 * people))
+        moving = np.flatnonzero(~rest)
+        walls = [hull.walls.gap(hull.x, hull.y, hull.floor) - ROOM for hull in self._hulls]
+        free = min(free, _soonest(np.array(walls)[moving], speeds[moving], pulls[moving]))
         if len(hulls) > 1:
             first, second = np.triu_indices(len(hulls), 1)
             away = np.hypot(*(hulls[first] - hulls[second]).T)
             gaps = away - self._radii[first] - self._radii[second] - ROOM
-            free = min(free, _soonest(gaps, speeds[first] + speeds[second]))
+            free = min(free, _soonest(gaps, speeds[first] + speeds[second], pulls[first] + pulls[second]))
         return free
 
 
-def _soonest(gaps: NDArray[np.float64], closing: NDArray[np.float64]) -> float:
-    """When the first of the gaps (m) that close at these speeds (m/s) may be closed; never where nothing moves."""
-    moving = closing > 0.0
-    return float(np.min(gaps[moving] / closing[moving], initial=math.inf))
+def _soonest(gaps: Floats, speeds: Floats, pulls: Floats) -> float:
+    """When the first of the gaps (m) may be closed, at these speeds (m/s) that grow so fast (m/s2); inf: never."""
+    moving = (speeds > 0.0) | (pulls > 0.0)
+    gap, speed, pull = np.clip(gaps[moving], 0.0, FAR), speeds[moving], pulls[moving]
+    ways = speed + np.sqrt(speed * speed + 2.0 * pull * gap)
+    return float(np.min(2.0 * gap / np.maximum(ways, 1e-9), initial=math.inf))
