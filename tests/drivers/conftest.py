@@ -8,7 +8,6 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
 
-import bad_link
 import pytest
 
 from roboglot.clients.slamware import SlamwareClient
@@ -24,6 +23,7 @@ from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.storage.database import Database
 from roboglot.testing import Forward
+from tests.drivers import bad_link
 from tests.drivers.bad_link import Connect
 from tests.drivers.chain import EP_ADDRESS, Drive, Open, OpenRest, TextClient, Until, ep_config, url_of
 from tests.drivers.rig import Rig, rig, time_passes

@@ -75,7 +75,7 @@ class FleetClasses:
             self._server = await asyncio.start_unix_server(serve, sock=listening, limit=LINE_MAX)
         except OSError as error:
             listening.close()
-            log.warning("there are no classes in this fleet: %s: %s", path, error)
+            log.warning("cannot open classes in this fleet: %s: %s", path, error)
 
     async def close(self) -> None:
         """Stop listening and hang up."""
@@ -110,7 +110,7 @@ class _Link:
             while text := await reader.readline():
                 await self._hear(_decode(text))
         except (OSError, ValueError, msgspec.MsgspecError, RecursionError) as error:
-            log.warning("hung up on world %s: %s", self._world, error)
+            log.warning("disconnected world %s: %s", self._world, error)
         finally:
             if mine is not None and self._room.worlds.get(self._world) is mine:
                 del self._room.worlds[self._world]

@@ -149,5 +149,5 @@ def _not_there(code: int) -> dict[str, int] | None:
     if code not in KNOWN:
         log.info("code %d is not supported", code)
         return None
-    log.warning("%d (%s): no robot of this program does that; it is refused", code, _NAMES.get(code, "not in the text"))
+    log.warning("code %d (%s) is not supported", code, _NAMES.get(code, "not in the text"))
     return None if code in SILENT_WITHOUT_SERVICE else error(InBandError.UNAVAILABLE)

@@ -69,7 +69,7 @@ class ControlConnection(asyncio.Protocol):
         who = self._context.robot.admission.known(self._name) if peer else None
         self._shown = f"{who} at {self.host}" if who else self.host
         if not peer or len(self._connections) >= CONTROL_CONNECTIONS_MAX:
-            log.warning("robomaster: %s turned away, %d connections are open", self.host, len(self._connections))
+            log.warning("robomaster: refused %s: %d connections are open", self.host, len(self._connections))
             transport.abort()
             return
         self.driver = Driver(self._name, self.host, transport.get_extra_info("socket"))

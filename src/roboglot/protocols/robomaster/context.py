@@ -121,7 +121,7 @@ class Context:
             try:
                 undo()
             except RobotError as error:  # a real robot that is gone; it has ended its own session
-                log.info("robomaster: not put back: %s", error)
+                log.info("robomaster: cannot restore a setting: %s", error)
         self._undo.clear()
         self._members.clear()
         return stopping

@@ -80,7 +80,7 @@ class Context:
     def take_order(self, payload: bytes) -> None:
         """Take an order or an update and drive it. Raises Rejected."""
         if self.hibernating:
-            log.info("robot %s: hibernates, and takes no order", self.robot.id)
+            log.info("robot %s hibernates: refused an order", self.robot.id)
             return
         order = self._read(payload, Order)
         check_order(order, self.robot, self.version, self.map_id)
@@ -112,7 +112,7 @@ class Context:
             if action.action_id in self.instant:
                 continue  # sent again
             if self.hibernating and action.action_type != "stopHibernation":
-                log.info("robot %s: hibernates, and does no %s", self.robot.id, action.action_type)
+                log.info("robot %s hibernates: refused %s", self.robot.id, action.action_type)
                 continue
             state = self.instant[action.action_id] = ActionState(action)
             _forget_oldest(self.instant)

@@ -104,7 +104,7 @@ class Vda5050Door:
                     "dial", "robot %s: no fleet control at %s:%d: %s", self._robot.id, host, port, error
                 )
             except SwitchedOff:
-                log.info("robot %s: takes leave of fleet control, it is switched off", self._robot.id)
+                log.info("robot %s leaves fleet control: it is switched off", self._robot.id)
             finally:
                 self._client = None
             while self._is_off:  # noqa: ASYNC110 - seldom, and no event says so of every robot

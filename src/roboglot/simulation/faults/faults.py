@@ -119,7 +119,7 @@ class Faults:
                 try:
                     self.inject(plan.kind, plan.robot, duration=plan.duration, **plan.options)
                 except (ValueError, TypeError, RobotError) as error:
-                    log.warning("the planned fault %s cannot be: %s", plan.kind, error)
+                    log.warning("cannot schedule fault %s: %s", plan.kind, error)
 
         return begin
 

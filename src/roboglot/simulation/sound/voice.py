@@ -53,5 +53,5 @@ def spoken(text: str) -> Sound | None:
         done = subprocess.run(command, input=text.encode(), capture_output=True, timeout=SECONDS_MAX, check=True)
         return read_wav(io.BytesIO(done.stdout), name="speech")
     except (OSError, subprocess.SubprocessError, ValueError) as error:
-        log.warning("%s said nothing: %s", PROGRAM, error)
+        log.warning("%s cannot speak: %s", PROGRAM, error)
         return None

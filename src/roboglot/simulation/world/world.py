@@ -260,4 +260,4 @@ class World:
         try:
             self._environment.air.emit(Source(sound, walker.pose.point, walker.floor, self._clock.time(), 1.0, speech))
         except ValueError as error:
-            log.warning("%s is not heard: %s", walker.key, error)
+            log.warning("cannot play the sound of %s: %s", walker.key, error)

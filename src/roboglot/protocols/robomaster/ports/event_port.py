@@ -34,7 +34,7 @@ class Readers:
         """One write to each; who lets EVENT_BACKLOG_MAX bytes wait is cut off."""
         for transport in tuple(self._transports):
             if transport.get_write_buffer_size() > EVENT_BACKLOG_MAX:
-                log.warning("robomaster: a reader of events does not read and is cut off")
+                log.warning("robomaster: disconnected a client that does not read its events")
                 transport.abort()
             else:
                 transport.write(message)

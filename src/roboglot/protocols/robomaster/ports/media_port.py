@@ -67,7 +67,7 @@ class MediaPort:
                     await watcher.writable.wait()
                     watcher.transport.write(packet.data)
         except RobotError as error:
-            log.warning("robomaster: a viewer gets no stream: %s", error)
+            log.warning("robomaster: refused a viewer: %s", error)
 
 
 class _Watcher(asyncio.Protocol):

@@ -67,7 +67,7 @@ async def _played(context: Context, stand_in: StandIn, code: int, params: str) -
         async for reply in stand_in.answer("cyberdog", str(int(code)), params.encode(), reads=code == Code.SAVED_FILE):
             yield pb.FileChunk.FromString(reply.payload)
     except (NotFound, DecodeError) as error:
-        log.info("no file: %s", error)
+        log.info("cannot send a file: %s", error)
         yield pb.FileChunk(error_code=FileError.NOT_THERE)
 
 

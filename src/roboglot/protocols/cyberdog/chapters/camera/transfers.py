@@ -68,7 +68,7 @@ class Transfers:
             else:
                 self._files.remove(path)
         except (RobotError, OSError) as error:
-            log.info("no file: %s", error)
+            log.info("cannot send a file: %s", error)
             yield pb.FileChunk(error_code=error_of(error))
         finally:
             self._under_way -= 1

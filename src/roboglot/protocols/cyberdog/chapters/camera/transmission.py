@@ -70,7 +70,7 @@ class Transmission:
             case Candidate(uid, candidate, mid, index) if peer := self._peer(uid):
                 peer.put(candidate, mid, index)
             case _:
-                log.info("nothing to do with %s", type(signal).__name__)
+                log.info("ignored a signal of type %s", type(signal).__name__)
 
     async def close(self) -> None:
         """Hang up on everybody."""
@@ -83,7 +83,7 @@ class Transmission:
         """That app's; a new one if there is room."""
         if uid not in self._peers:
             if len(self._peers) >= PEERS_MAX:
-                log.warning("more than %d apps want pictures: %r gets none", PEERS_MAX, uid)
+                log.warning("refused pictures to %r: %d apps have some", uid, PEERS_MAX)
                 return None
             peer = self._peers[uid] = _Peer(uid)
             peer.give_up = asyncio.get_running_loop().call_later(PATIENCE, self._late, peer)
