@@ -246,7 +246,7 @@ class Stage(ABC):
 
     @abstractmethod
     def add_person(self, pose: Pose, floor: int = 0, name: str = "") -> str:
-        """Have somebody more stand there; return their name. Raises ValueError for a taken name, or too many."""
+        """Put one more person there; return their name. Raises ValueError for a taken name, or too many."""
 
     @abstractmethod
     def remove_person(self, name: str) -> None:

@@ -40,7 +40,7 @@ class Entrance:
 
 @dataclass(frozen=True, slots=True)
 class Opened:
-    """A client that came in; ``early`` is what it sent after its request. ``identity`` is empty if nobody asked."""
+    """A client that came in; ``early`` is what it sent after its request. ``identity`` is empty if no one asked."""
 
     channel: Channel
     protocol: ServerProtocol

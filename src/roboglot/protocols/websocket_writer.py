@@ -39,7 +39,7 @@ class Writer:
 
     @property
     def lost(self) -> bool:
-        """True if nobody is there to read."""
+        """True if no one is there to read."""
         return self._transport is None
 
     @property

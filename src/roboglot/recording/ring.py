@@ -1,6 +1,6 @@
 """The last minutes, kept in memory, compressed second by second; written to a file when something went wrong.
 
-What is told only when it changes (the map, faults) is kept when its block is forgotten: the file begins with it.
+What is noted only when it changes (the map, faults) is kept when its block is forgotten: the file begins with it.
 """
 
 from __future__ import annotations

@@ -78,7 +78,7 @@ class Sampler:
             self._filming = None
 
     def again(self) -> None:
-        """Tell once more what is told only when it changes: another recording begins."""
+        """Report once more what is noted only when it changes: another recording begins."""
         self._before.clear()
         self._shown = False
 

@@ -22,7 +22,7 @@ class TruthSampler:
         self._before: object = None
 
     def again(self) -> None:
-        """Tell once more what is told only when it changes."""
+        """Report once more what is noted only when it changes."""
         self._before = None
 
     def beat(self, number: int, at: int) -> None:

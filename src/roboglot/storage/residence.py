@@ -1,7 +1,7 @@
 """Lease of a program's robots in the registry: taken before doors open, renewed, and lost in time.
 
 The holder gives its robots up ``HOLD`` s after it began its last successful renewal; another program takes them when it
-has seen no renewal for ``LEASE`` s. Both count by a clock that nobody can set, so that a robot never runs twice.
+has seen no renewal for ``LEASE`` s. Both count by a clock that no one can set, so that a robot never runs twice.
 """
 
 from __future__ import annotations

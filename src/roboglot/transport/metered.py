@@ -61,7 +61,7 @@ class Valve:
         self.is_closing = transport.is_closing  # asked for every message
         self._paused = False  # by the inner protocol
         self.uncounted = 0
-        """Bytes; whoever adds to them has them counted from STEP on."""
+        """Bytes; they are counted from STEP on by the one that adds to them."""
         self._waiting: asyncio.TimerHandle | None = None
 
     def count(self) -> None:

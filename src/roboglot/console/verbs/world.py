@@ -139,7 +139,7 @@ async def make_sound(
 async def add_person(
     stage: Stage, *, x: Meters, y: Meters, yaw: Radians = 0.0, floor: Floor = 0, name: PersonName = ""
 ) -> str:
-    """Have somebody more stand there; the answer is their name."""
+    """Put one more person there; the answer is their name."""
     return stage.add_person(Pose(x, y, yaw), floor, name)
 
 

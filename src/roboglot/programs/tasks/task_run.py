@@ -245,7 +245,7 @@ class TaskRun:
         self._halts = True
 
     async def _report_halt(self) -> None:
-        """Suspend; who is told of it finds the program here after a crash, too."""
+        """Suspend, when a crash would leave the program here, too."""
         self._halts = False
         try:
             await self._journal.written()

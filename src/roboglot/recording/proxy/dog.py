@@ -141,7 +141,7 @@ class DogRelay:
             yield message
 
     async def _beat(self, request: bytes, context: grpc.aio.ServicerContext) -> bytes:
-        """The robot's heartbeat; without an app there is nobody to take it."""
+        """The robot's heartbeat; without an app no one takes it."""
         app = self._app()
         if app is None:
             await context.abort(grpc.StatusCode.UNAVAILABLE, "no app has come yet")

@@ -69,7 +69,7 @@ class Table:
         """Write how it went; the disk has it when this returns."""
         row = Row(
             trial.scenario,
-            " ".join(trial.name.split()),  # a row is a line: half of one can be told
+            " ".join(trial.name.split()),  # a row is a line: half of one can be seen
             trial.seed,
             result.outcome,
             " ".join(result.why.split()),

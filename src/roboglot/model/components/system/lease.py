@@ -98,7 +98,7 @@ class Lease(Component):
         self._fence = why_not
 
     def halt(self, reason: str) -> None:
-        """End everything that moves the robot, whoever has control."""
+        """End everything that moves the robot, no matter who has control."""
         for action in self._robot.actions.running():
             if moves(action):
                 action.cancel(reason)

@@ -1,6 +1,6 @@
 """Chapter "status" on the wire: a heartbeat as text, for those who follow what a robot says.
 
-Heartbeats come twice a second and mostly say the same: they are told when they say something else, and now and then.
+Heartbeats come twice a second and mostly say the same: they are reported when they say something else, and now and then.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from google.protobuf.json_format import MessageToDict, ParseDict, ParseError
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 
 HEARTBEAT = "heartbeat"  # the operation; the service's name for it
-AGAIN = 20  # heartbeats until one that says nothing new is told, too
+AGAIN = 20  # heartbeats until one that says nothing new is reported, too
 
 
 class Beats:
@@ -33,12 +33,12 @@ class Beats:
         return json.dumps(fields, ensure_ascii=False, separators=(",", ":"))
 
     def forget(self) -> None:
-        """Nobody follows: the next one is news."""
+        """Forget the last one: no one follows, and the next one is news."""
         self._last = b""
 
 
 def ticks_of(text: str, address: str) -> pb.Ticks | None:
-    """Return a heartbeat that was told, from another address; None where the text is none."""
+    """Return a heartbeat that was reported, from another address; None where the text is none."""
     try:
         ticks = ParseDict(json.loads(text), pb.Ticks(), ignore_unknown_fields=True)
     except (ParseError, ValueError, RecursionError):

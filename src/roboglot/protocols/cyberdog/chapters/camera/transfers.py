@@ -89,7 +89,7 @@ class Transfers:
 
     def _found(self) -> None:
         self._offering = asyncio.get_running_loop().create_task(self._offer(), name="offer files")
-        if Disk in self._robot and (free := self._robot[Disk].free) < LOW:  # it was told to nobody
+        if Disk in self._robot and (free := self._robot[Disk].free) < LOW:  # no app heard of it
             self._app.push(DISK_LOW, {"remain_size": free})
 
     async def _offer(self) -> None:

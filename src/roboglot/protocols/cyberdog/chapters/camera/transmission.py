@@ -39,7 +39,7 @@ SIGNAL = push(Code.VIDEO, depth=20)
 PATIENCE = 10.0  # s, outside time, until a way to the app must be found
 PEERS_MAX = 16  # apps that look, or begin to, at once
 EARLY_MAX = 32  # candidates of one app that came before its offer
-SCREEN_WIDTH = 640  # of pictures for a screen that was told
+SCREEN_WIDTH = 640  # of pictures for a screen that was reported
 PLACES = {Alignment.TOP: 0.0, Alignment.MIDDLE: 0.5, Alignment.BOTTOM: 1.0}
 
 
