@@ -1,6 +1,6 @@
 """Chapter "status" on the wire: a heartbeat as text, for those who follow what a robot says.
 
-Heartbeats come twice a second and mostly say the same: they are reported when they say something else, and now and then.
+Heartbeats come twice a second and mostly say the same: they are reported when they say something else, and sometimes.
 """
 
 from __future__ import annotations
