@@ -29,14 +29,14 @@ def binary_folder() -> Path | None:
 
 
 class PostgreSQLServer:
-    """``url`` is a database that trusts any client that reaches its socket."""
+    """``url`` is a database that trusts any client that reaches its socket, or the network of ``address``."""
 
-    def __init__(self, folder: Path, binaries: Path) -> None:
-        self._folder, self._binaries = folder, binaries
+    def __init__(self, folder: Path, binaries: Path, address: str = "") -> None:
+        self._folder, self._binaries, self._address = folder, binaries, address
         # The server refuses to run as root: then it is no one's, and the folder, too.
         self._user = pwd.getpwuid(65534) if os.geteuid() == 0 else None
         self._server: subprocess.Popen[bytes] | None = None
-        self.url = f"postgresql:///postgres?host={folder}&user=robots"
+        self.url = f"postgresql:///postgres?host={address or folder}&user=robots"
 
     def create(self) -> None:
         """The empty database."""
@@ -47,10 +47,20 @@ class PostgreSQLServer:
         subprocess.run(
             self._command("initdb", *data, *settings), check=True, capture_output=True, timeout=60, **self._as
         )
+        if self._address:
+            with (self._folder / "data/pg_hba.conf").open("a") as rules:
+                rules.write("host all robots samenet trust\n")
 
     def start(self) -> None:
         """Returns when it answers."""
-        where = ("-c", "listen_addresses=", "-c", f"unix_socket_directories={self._folder}", "-c", "fsync=off")
+        where = (
+            "-c",
+            f"listen_addresses={self._address}",
+            "-c",
+            f"unix_socket_directories={self._folder}",
+            "-c",
+            "fsync=off",
+        )
         command = self._command("postgres", "-D", str(self._folder / "data"), *where)
         self._server = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, **self._as)
         ready = self._command("pg_isready", "-h", str(self._folder), "-t", "1")
@@ -85,10 +95,10 @@ class PostgreSQLServer:
 
 
 @contextmanager
-def postgresql_server(binaries: Path) -> Iterator[PostgreSQLServer]:
+def postgresql_server(binaries: Path, address: str = "") -> Iterator[PostgreSQLServer]:
     """Made, started and stopped again, with its folder."""
     with tempfile.TemporaryDirectory(prefix="pg") as folder:  # sockets' paths are short
-        server = PostgreSQLServer(Path(folder), binaries)
+        server = PostgreSQLServer(Path(folder), binaries, address)
         server.create()
         try:
             server.start()
