@@ -64,6 +64,17 @@ class Exchange(NamedTuple):  # made for each message: a frozen dataclass takes f
     seconds: float = 0.0
 
 
+class _Answer(NamedTuple):
+    """How it went, and when what is answered was asked, if that is known."""
+
+    status: str = ""
+    refusal: str = ""
+    began: float | None = None
+
+
+NO_ANSWER = _Answer()
+
+
 class Tap:
     """One robot's exchanges. ``watched`` says whether anybody follows; doors look at it first."""
 
@@ -96,7 +107,7 @@ class Tap:
 
     def request(self, door: str, operation: str, payload: bytes | str) -> float:
         """A client asks. Returns when, for its ``reply``."""
-        return self._pass(door, connection(), Direction.REQUEST, operation, payload)
+        return self._pass(Direction.REQUEST, door, connection(), operation, payload)
 
     def reply(
         self,
@@ -108,26 +119,24 @@ class Tap:
         began: float | None = None,
     ) -> None:
         """The door answers what was asked at ``began`` (None: that is not known)."""
-        self._pass(door, connection(), Direction.REPLY, operation, payload, status, refusal, began)
+        self._pass(Direction.REPLY, door, connection(), operation, payload, _Answer(status, refusal, began))
 
     def push(self, door: str, to: str, operation: str, payload: bytes | str) -> None:
         """The door sends by itself, to the address ``to``."""
-        self._pass(door, to, Direction.PUSH, operation, payload)
+        self._pass(Direction.PUSH, door, to, operation, payload)
 
     def _pass(
         self,
+        direction: Direction,
         door: str,
         other_end: str,
-        direction: Direction,
         operation: str,
         payload: bytes | str,
-        status: str = "",
-        refusal: str = "",
-        began: float | None = None,
+        answer: _Answer = NO_ANSWER,
     ) -> float:
         now = self._clock.time()
         data = payload.encode("utf-8", "replace") if isinstance(payload, str) else bytes(payload)
-        seconds = 0.0 if began is None else now - began
+        seconds = 0.0 if answer.began is None else now - answer.began
         if b"assword" in data:
             data = without_secrets(data)
         exchange = Exchange(
@@ -139,8 +148,8 @@ class Tap:
             direction,
             operation,
             data[:PAYLOAD_MAX],
-            status,
-            refusal,
+            answer.status,
+            answer.refusal,
             seconds,
         )
         for listener in tuple(self._listeners):
@@ -167,14 +176,14 @@ class Line:
 
     def request(self, operation: str, payload: bytes | str) -> float:
         """The robot is asked. Returns when, for its ``reply``."""
-        return self._tap._pass(self._door, self.address, Direction.REQUEST, operation, payload)
+        return self._tap._pass(Direction.REQUEST, self._door, self.address, operation, payload)
 
     def reply(
         self, operation: str, payload: bytes | str, status: str, refusal: str = "", began: float | None = None
     ) -> None:
         """The robot answers what it was asked at ``began``; status LOST: it does not."""
-        self._tap._pass(self._door, self.address, Direction.REPLY, operation, payload, status, refusal, began)
+        self._tap._pass(Direction.REPLY, self._door, self.address, operation, payload, _Answer(status, refusal, began))
 
     def push(self, operation: str, payload: bytes | str) -> None:
         """The robot says something by itself."""
-        self._tap._pass(self._door, self.address, Direction.PUSH, operation, payload)
+        self._tap._pass(Direction.PUSH, self._door, self.address, operation, payload)

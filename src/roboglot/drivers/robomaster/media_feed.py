@@ -9,6 +9,7 @@ import asyncio
 import contextlib
 import logging
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
+from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from roboglot.clients.errors import ClientError
@@ -25,27 +26,31 @@ T = TypeVar("T")
 D = TypeVar("D")
 
 
-class PacketFeed(Feed[P]):
-    """Packets of one media port. Survives link losses.
+@dataclass(frozen=True, slots=True)
+class Stream(Generic[P]):
+    """A stream of the robot: ``on`` and ``off`` switch it; ``packets`` yields what arrives, until ClientError."""
 
-    ``on`` and ``off`` switch the robot's stream; ``packets`` yields what arrives, until ClientError.
-    """
+    on: Callable[[], Awaitable[None]]
+    off: Callable[[], Awaitable[None]]
+    packets: Callable[[], AsyncIterator[P]]
+
+
+class PacketFeed(Feed[P]):
+    """Packets of one media port. Survives link losses."""
 
     def __init__(
         self,
         what: str,
         supervisor: Supervisor,
         clock: Clock,
-        on: Callable[[], Awaitable[None]],
-        off: Callable[[], Awaitable[None]],
-        packets: Callable[[], AsyncIterator[P]],
+        stream: Stream[P],
         *,
         queue_max: int,
         joinable: Callable[[P], bool] = lambda _: True,
     ) -> None:
         super().__init__(self._start, self._stop, queue_max=queue_max, joinable=joinable)
         self._what, self._supervisor, self._clock = what, supervisor, clock
-        self._on, self._off, self._packets = on, off, packets
+        self._stream = stream
         self._carrying: asyncio.Task[None] | None = None
 
     def _start(self) -> None:
@@ -57,7 +62,7 @@ class PacketFeed(Feed[P]):
             self._carrying = None
 
         async def off() -> None:
-            await self._off()
+            await self._stream.off()
 
         with contextlib.suppress(RobotError):  # without a link it has ended anyway
             self._supervisor.send(f"stopping the {self._what}", off())
@@ -65,8 +70,8 @@ class PacketFeed(Feed[P]):
     async def _run(self) -> None:
         while True:
             try:
-                await self._on()
-                async for packet in self._packets():
+                await self._stream.on()
+                async for packet in self._stream.packets():
                     self.push(packet)
             except ClientError as error:
                 log.info("%s: no %s: %s", self._supervisor.link.address, self._what, error)

@@ -8,7 +8,6 @@ from collections.abc import Awaitable, Callable
 from roboglot.drivers.robomaster.vocabulary import robot_errors
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.actions import Action
-from roboglot.model.clock import Clock
 from roboglot.model.errors import Blocked
 from roboglot.model.robot import Robot
 
@@ -18,43 +17,37 @@ PERIOD = 0.05  # s
 Run = Callable[[], Awaitable[None]]
 
 
-def start(
-    robot: Robot,
-    supervisor: Supervisor,
-    name: str,
-    run: Run,
-    halt: Run,
-    *,
-    resource: str,
-    goal: object,
-    source: str,
-) -> Action:
-    """Start an action that runs ``run`` and sends ``halt`` if that fails. Raises Unconnected."""
-    supervisor.link.require()
+class Motions:
+    """Those of one component: starts them, and waits until they arrive."""
 
-    async def execute(_: Action) -> None:
-        with robot_errors():
-            try:
-                await run()
-            except BaseException:
-                await halt()
-                raise
+    def __init__(self, robot: Robot, supervisor: Supervisor) -> None:
+        self._robot, self._supervisor = robot, supervisor
 
-    return robot.actions.start(name, execute, resources={resource}, goal=goal, source=source)
+    def start(self, name: str, run: Run, halt: Run, *, resource: str, goal: object, source: str) -> Action:
+        """Start an action that runs ``run`` and sends ``halt`` if that fails. Raises Unconnected."""
+        self._supervisor.link.require()
 
+        async def execute(_: Action) -> None:
+            with robot_errors():
+                try:
+                    await run()
+                except BaseException:
+                    await halt()
+                    raise
 
-async def arrive(
-    clock: Clock, supervisor: Supervisor, left: Callable[[], Awaitable[float]], good: float, what: str
-) -> None:
-    """Wait until at most ``good`` is left. Raises Blocked without progress, Unconnected without a link."""
-    best, best_at = math.inf, clock.time()
-    while True:
-        now = await left()
-        if now <= good:
-            return
-        if now < best - good / 2:
-            best, best_at = now, clock.time()
-        elif clock.time() - best_at > PATIENCE:
-            raise Blocked(f"{what} stays {now:.3g} off")
-        supervisor.link.require()
-        await clock.sleep(PERIOD)
+        return self._robot.actions.start(name, execute, resources={resource}, goal=goal, source=source)
+
+    async def arrive(self, left: Callable[[], Awaitable[float]], good: float, what: str) -> None:
+        """Wait until at most ``good`` is left. Raises Blocked without progress, Unconnected without a link."""
+        clock = self._robot.clock
+        best, best_at = math.inf, clock.time()
+        while True:
+            now = await left()
+            if now <= good:
+                return
+            if now < best - good / 2:
+                best, best_at = now, clock.time()
+            elif clock.time() - best_at > PATIENCE:
+                raise Blocked(f"{what} stays {now:.3g} off")
+            self._supervisor.link.require()
+            await clock.sleep(PERIOD)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Collection, Coroutine, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import datetime, tzinfo
 from zlib import crc32
 
@@ -61,11 +61,17 @@ class Background:
         await asyncio.gather(*self._tasks)
 
 
+@dataclass(frozen=True, slots=True)
+class RunTerms:
+    """What holds for every program: its limits, and the time zone that its ``time.localtime`` shows."""
+
+    limits: Limits
+    zone: tzinfo
+
+
 class Runner:
     """``runs``: what runs or is suspended, by the task's id; ``stops``: where tasks halt that start from now on.
     ``ended`` hears of each task in its new state.
-
-    ``zone`` is what programs' ``time.localtime`` shows.
     """
 
     def __init__(
@@ -76,8 +82,7 @@ class Runner:
         library: ModuleLibrary,
         lock: asyncio.Lock,
         *,
-        limits: Limits,
-        zone: tzinfo,
+        terms: RunTerms,
         ended: Callable[[StoredProgram, TaskState], None],
     ) -> None:
         self.runs: dict[str, TaskRun] = {}
@@ -92,8 +97,7 @@ class Runner:
         self._journals = stores.journals
         self._library = library
         self._lock = lock
-        self._limits = limits
-        self._zone = zone
+        self._terms = terms
         self._ended = ended
         self._prelude = ability_set()
         self._supervisors = Background()
@@ -110,7 +114,7 @@ class Runner:
 
     async def start(self, task: StoredProgram, uses: Collection[str]) -> None:
         """Bring a task in run_wait to life; its own news come after the caller's. Raises ProgramError."""
-        here = datetime.fromtimestamp(self._robot.clock.epoch(), self._zone).utcoffset()
+        here = datetime.fromtimestamp(self._robot.clock.epoch(), self._terms.zone).utcoffset()
         journal = Journal(self._journals, task.id)
         clock = self._robot.clock
         clock.hold(journal)
@@ -179,7 +183,7 @@ class Runner:
         run = await self._engine.start(
             header.body,
             replace(self._prelude, utc_offset=header.utc_offset),
-            self._limits,
+            self._terms.limits,
             modules=header.modules,
             seed=header.seed,
             history=answers,
@@ -194,9 +198,9 @@ class Runner:
                 logged=self.log_entries.publish,
                 at_breakpoint=lambda: self._at_breakpoint(living),
                 insights=self.insights,
+                pace=self.pace,
                 log_pace=self.log_pace,
             ),
-            pace=self.pace,
             journal=journal,
             replaying=len(answers),
             stops=stops,

@@ -31,7 +31,7 @@ from roboglot.programs.tasks.reports import (
     done,
 )
 from roboglot.programs.tasks.robot_modes import check_mode
-from roboglot.programs.tasks.runner import Background, Runner
+from roboglot.programs.tasks.runner import Background, Runner, RunTerms
 from roboglot.programs.tasks.states import (
     DEBUG,
     TaskOperation,
@@ -71,8 +71,7 @@ class ProgramService:
             stores,
             self.library,
             self._lock,
-            limits=limits or Limits(),
-            zone=zone,
+            terms=RunTerms(limits or Limits(), zone),
             ended=self._timetable.wait_again,
         )
         self.reports, self.log_entries, self.pace = self._runner.reports, self._runner.log_entries, self._runner.pace

@@ -69,13 +69,14 @@ class Outcome:
 class RunListeners:
     """Who hears of a run: of its state and blocks, of each log entry, and that it halts at a breakpoint.
 
-    The program waits for those in ``log_pace`` after each line of its log.
+    The program waits for those in ``pace`` after each block, for those in ``log_pace`` after each line of its log.
     """
 
     report: Report
     logged: LogListener
     at_breakpoint: Callable[[], Awaitable[None]]
     insights: Audience[[Insight]]
+    pace: Pace
     log_pace: Pace
 
 
@@ -89,7 +90,6 @@ class TaskRun:
         robot: Robot,
         *,
         listeners: RunListeners,
-        pace: Pace,
         journal: Journal,
         replaying: int = 0,
         stops: Stops | None = None,
@@ -105,7 +105,7 @@ class TaskRun:
         self._clock = robot.clock
         self._began = robot.clock.time()
         self._report = listeners.report
-        self._pace = pace
+        self._pace = listeners.pace
         self._answering: asyncio.Task[None] | None = None
         self._ended_itself = False
         self._journal = journal

@@ -29,6 +29,7 @@ class RoboMasterArm(Arm):
 
     def __init__(self, robot: Robot, client: RoboMasterClient, supervisor: Supervisor) -> None:
         self._robot, self._client, self._supervisor = robot, client, supervisor
+        self._motions = motion.Motions(robot, supervisor)
         self._position = HOME
 
     async def refresh(self) -> None:
@@ -78,11 +79,11 @@ class RoboMasterArm(Arm):
 
     def _start(self, name: str, run: motion.Run, goal: ArmPosition, source: str) -> Action:
         halt = self._client.robotic_arm.stop
-        return motion.start(self._robot, self._supervisor, name, run, halt, resource=ARM, goal=goal, source=source)
+        return self._motions.start(name, run, halt, resource=ARM, goal=goal, source=source)
 
     async def _arrive(self, goal: ArmPosition) -> None:
         async def left() -> float:
             await self.refresh()
             return math.hypot(goal.x - self._position.x, goal.z - self._position.z)
 
-        await motion.arrive(self._robot.clock, self._supervisor, left, GOOD, "the arm")
+        await self._motions.arrive(left, GOOD, "the arm")

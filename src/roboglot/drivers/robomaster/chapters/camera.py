@@ -9,7 +9,7 @@ from collections.abc import AsyncIterator, Sequence
 from typing import TYPE_CHECKING
 
 from roboglot.clients.robomaster.client import RoboMasterClient
-from roboglot.drivers.robomaster.media_feed import DecodedFeed, PacketFeed
+from roboglot.drivers.robomaster.media_feed import DecodedFeed, PacketFeed, Stream
 from roboglot.drivers.robomaster.state import ReportedState
 from roboglot.drivers.robomaster.vocabulary import EXPOSURES
 from roboglot.drivers.supervisor import Supervisor
@@ -50,10 +50,10 @@ def video_feed(clock: Clock, client: RoboMasterClient, supervisor: Supervisor) -
         async for unit in client.video():
             yield VideoPacket(clock.time(), unit.data, unit.keyframe)
 
+    stream = Stream(client.stream.on, client.stream.off, packets)
     return PacketFeed(
-        "video", supervisor, clock, client.stream.on, client.stream.off, packets,
-        queue_max=PACKETS_MAX, joinable=lambda packet: packet.keyframe,
-    )  # fmt: skip
+        "video", supervisor, clock, stream, queue_max=PACKETS_MAX, joinable=lambda packet: packet.keyframe
+    )
 
 
 class RoboMasterCamera(Camera):

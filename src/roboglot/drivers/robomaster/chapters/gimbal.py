@@ -40,6 +40,7 @@ class RoboMasterGimbal(Gimbal):
 
     def __init__(self, robot: Robot, client: RoboMasterClient, supervisor: Supervisor, reported: ReportedState) -> None:
         self._robot, self._client, self._supervisor, self._reported = robot, client, supervisor, reported
+        self._motions = motion.Motions(robot, supervisor)
         self._mode, self._suspended = FollowMode.CHASSIS_LEAD, False
 
     async def learn(self) -> None:
@@ -162,9 +163,7 @@ class RoboMasterGimbal(Gimbal):
     def _start(self, name: str, turn: motion.Run, goal: object, source: str) -> Action:
         if self._suspended:
             raise Refused("the gimbal is suspended")
-        return motion.start(
-            self._robot, self._supervisor, name, turn, self._halt, resource=GIMBAL, goal=goal, source=source
-        )
+        return self._motions.start(name, turn, self._halt, resource=GIMBAL, goal=goal, source=source)
 
     async def _halt(self) -> None:
         await self._client.gimbal.speed(0.0, 0.0)
@@ -196,7 +195,7 @@ class RoboMasterGimbal(Gimbal):
                 turn = abs(yaw - now.yaw)
             return max(0.0 if pitch is None else abs(pitch - now.pitch), turn)
 
-        await motion.arrive(self._robot.clock, self._supervisor, left, GOOD, "the gimbal")
+        await self._motions.arrive(left, GOOD, "the gimbal")
 
 
 def _degrees(angle: float | None) -> float | None:

@@ -21,6 +21,7 @@ class RoboMasterGripper(Gripper):
 
     def __init__(self, robot: Robot, client: RoboMasterClient, supervisor: Supervisor) -> None:
         self._robot, self._client, self._supervisor = robot, client, supervisor
+        self._motions = motion.Motions(robot, supervisor)
         self._status = GripperStatus.BETWEEN
 
     async def refresh(self) -> None:
@@ -64,6 +65,4 @@ class RoboMasterGripper(Gripper):
                 raise Blocked(f"the gripper stays {self._status}")  # otherwise it grips an object
 
         name = f"{'open' if goal is GripperStatus.OPEN else 'close'} gripper"
-        return motion.start(
-            self._robot, self._supervisor, name, run, gripper.stop, resource=GRIPPER, goal=goal, source=source
-        )
+        return self._motions.start(name, run, gripper.stop, resource=GRIPPER, goal=goal, source=source)

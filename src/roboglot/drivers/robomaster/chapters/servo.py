@@ -25,6 +25,7 @@ class RoboMasterServos(Servos):
 
     def __init__(self, robot: Robot, client: RoboMasterClient, supervisor: Supervisor) -> None:
         self._robot, self._client, self._supervisor = robot, client, supervisor
+        self._motions = motion.Motions(robot, supervisor)
         self._angles: list[float] = []
 
     async def learn(self) -> None:
@@ -56,7 +57,7 @@ class RoboMasterServos(Servos):
 
         async def run() -> None:
             await self._client.servo.angle(number, round(math.degrees(angle), 3))
-            await motion.arrive(self._robot.clock, self._supervisor, left, GOOD, f"servo {number}")
+            await self._motions.arrive(left, GOOD, f"servo {number}")
 
         return self._start("move servo", number, run, angle, source)
 
@@ -93,4 +94,4 @@ class RoboMasterServos(Servos):
             await self._client.servo.stop(number)
 
         resource = servo_resource(number)
-        return motion.start(self._robot, self._supervisor, name, run, halt, resource=resource, goal=goal, source=source)
+        return self._motions.start(name, run, halt, resource=resource, goal=goal, source=source)

@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator, Callable, Sequence
 from typing import TYPE_CHECKING
 
 from roboglot.clients.robomaster.client import RoboMasterClient
-from roboglot.drivers.robomaster.media_feed import DecodedFeed, PacketFeed
+from roboglot.drivers.robomaster.media_feed import DecodedFeed, PacketFeed, Stream
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.extras import lazy
 from roboglot.media.audio import AudioStream
@@ -40,7 +40,8 @@ def audio_feed(clock: Clock, client: RoboMasterClient, supervisor: Supervisor) -
         async for data in client.sounds():
             yield AudioPacket(clock.time() - BLOCK / SAMPLE_RATE, data)
 
-    return PacketFeed("sound", supervisor, clock, client.audio.on, client.audio.off, packets, queue_max=QUEUE_MAX)
+    stream = Stream(client.audio.on, client.audio.off, packets)
+    return PacketFeed("sound", supervisor, clock, stream, queue_max=QUEUE_MAX)
 
 
 class RoboMasterMicrophone(Microphone):

@@ -8,7 +8,7 @@ from contextlib import AbstractAsyncContextManager
 
 from roboglot.clients.slamware import SlamwareClient
 from roboglot.drivers.reported import ReportedMapping
-from roboglot.drivers.slamware.chapters.motion.actions import ActionRunner
+from roboglot.drivers.slamware.chapters.motion.actions import ActionRunner, VendorAction
 from roboglot.drivers.slamware.state import ReportedState
 from roboglot.drivers.slamware.telemetry import TelemetryPoller
 from roboglot.drivers.slamware.vocabulary import explored_of, pose3d
@@ -92,9 +92,7 @@ class SlamwareLocalization(Localization):
         options = RelocalizationOptions(recover_movement_type=movement)
         return self._runner.start(
             "relocalize",
-            "RecoverLocalizationAction",
-            RecoverLocalizationOptions(area, options),
-            _nothing,
+            VendorAction("RecoverLocalizationAction", RecoverLocalizationOptions(area, options), _nothing),
             goal=region,
             source=source,
             on_busy=on_busy,

@@ -139,6 +139,7 @@ class MotionSpec:
 
 
 TURN, QUARTER = math.tau, math.pi / 2
+FLIP_PEAK = 0.40  # m that feet fly in a flip
 _DOWN: frozenset[Foot] = frozenset()
 _LF, _RF = frozenset({Foot.LEFT_FRONT}), frozenset({Foot.RIGHT_FRONT})
 _LR, _RR = frozenset({Foot.LEFT_REAR}), frozenset({Foot.RIGHT_REAR})
@@ -160,9 +161,8 @@ def _flip(
     pitch: float = 0.0,
     jumps: int = 1,
     run_up: float = 0.0,
-    peak: float = 0.40,
 ) -> MotionSpec:
-    return MotionSpec(duration, Pose(x, y), peak, jumps, roll, pitch, run_up)
+    return MotionSpec(duration, Pose(x, y), FLIP_PEAK, jumps, roll, pitch, run_up)
 
 
 def _figure(duration: float, x: float = 0.0, footfalls: tuple[Footfall, ...] = (), **sway: float) -> MotionSpec:

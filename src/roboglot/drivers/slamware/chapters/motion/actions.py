@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Awaitable, Callable, Iterable
+from dataclasses import dataclass
 
 import msgspec
 
@@ -25,6 +26,15 @@ PERIOD = 0.1  # s between two polls
 ORPHANS_MAX = 64
 
 Feedback = Callable[[ActionInfo], Awaitable[object]]
+
+
+@dataclass(frozen=True, slots=True)
+class VendorAction:
+    """An action in the vendor's words, and what makes the model's feedback of its."""
+
+    name: str
+    options: msgspec.Struct | None
+    feedback: Feedback
 
 
 class ActionRunner:
@@ -76,9 +86,7 @@ class ActionRunner:
     def start(
         self,
         name: str,
-        vendor_name: str,
-        options: msgspec.Struct | None,
-        feedback: Feedback,
+        wanted: VendorAction,
         *,
         goal: object,
         source: str,
@@ -90,7 +98,7 @@ class ActionRunner:
 
         async def run(action: Action) -> None:
             with robot_errors():
-                while not await self._follow(action, await self.begin(vendor_name, options), feedback):
+                while not await self._follow(action, await self.begin(wanted.name, wanted.options), wanted.feedback):
                     await action.hold(lambda: None)  # paused: start again on resume
 
         return self._robot.actions.start(name, run, resources=resources, goal=goal, source=source, on_busy=on_busy)

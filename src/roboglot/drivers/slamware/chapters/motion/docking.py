@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from roboglot.clients.slamware import SlamwareClient
-from roboglot.drivers.slamware.chapters.motion.actions import ActionRunner
+from roboglot.drivers.slamware.chapters.motion.actions import ActionRunner, VendorAction
 from roboglot.drivers.slamware.state import ReportedState
 from roboglot.drivers.slamware.vocabulary import pose3d
 from roboglot.drivers.supervisor import Supervisor
@@ -42,9 +42,8 @@ class SlamwareDocking(Docking):
             self._supervisor.send("setting the dock", self._client.set_home_pose(pose3d(pose)))
 
     def dock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
-        return self._runner.start(
-            "dock", "GoHomeAction", GoHomeOptions(), _stage, goal=self.home, source=source, on_busy=on_busy
-        )
+        wanted = VendorAction("GoHomeAction", GoHomeOptions(), _stage)
+        return self._runner.start("dock", wanted, goal=self.home, source=source, on_busy=on_busy)
 
     def undock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
         if not self._reported.docked:

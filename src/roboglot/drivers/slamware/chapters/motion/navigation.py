@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
-from roboglot.drivers.slamware.chapters.motion.actions import ActionRunner
+from roboglot.drivers.slamware.chapters.motion.actions import ActionRunner, VendorAction
 from roboglot.drivers.slamware.state import ReportedState
 from roboglot.drivers.slamware.vocabulary import location, robot_errors
 from roboglot.extras import lazy
@@ -61,9 +61,8 @@ class SlamwareNavigation(Navigation):
             name, wanted = "MoveToAction", MoveToOptions(location(goals[0]), how)
         else:
             name, wanted = "SeriesMoveToAction", SeriesMoveToOptions([location(goal) for goal in goals], how)
-        return self._runner.start(
-            "navigate", name, wanted, self._feedback, goal=tuple(goals), source=source, on_busy=on_busy
-        )
+        action = VendorAction(name, wanted, self._feedback)
+        return self._runner.start("navigate", action, goal=tuple(goals), source=source, on_busy=on_busy)
 
     async def plan(self, start: Point, goal: Point) -> Path:
         if start.distance_to(self._reported.pose) > HERE:
