@@ -68,7 +68,9 @@ async def test_a_block_for_each_function_in_both_languages(shown: Shown) -> None
     for function in table()["functions"]:
         assert function["zh"] != function["en"], function
         assert any("\u4e00" <= letter <= "\u9fff" for letter in function["zh"]), function
-        assert function["about"]
+        assert function["about"]["en"]
+        assert any("\u4e00" <= letter <= "\u9fff" for letter in function["about"]["zh"]), function
+        assert all(table()["members"][name]["zh"] for p in function["parameters"] for name in p.get("choices", ()))
         assert [p for p in function["parameters"] if not (p["en"] and p["zh"])] == []
         for parameter in function["parameters"]:
             if "minimum" in parameter:

@@ -8,7 +8,9 @@ from __future__ import annotations
 import hashlib
 import importlib.resources
 import inspect
+import re
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -45,11 +47,14 @@ def table() -> dict[str, Any]:
     """The groups, the functions in the manual's order of groups, enumerations, and what a text editor completes."""
     labels = _labels()
     functions = [_function(operation, labels) for operation in ABILITIES]
+    parameters = [parameter for function in functions for parameter in function["parameters"]]
+    shown = {*ENUMS["StateCode"], *(name for parameter in parameters for name in parameter.get("choices", ()))}
     order = list(labels["groups"])
     functions.sort(key=lambda function: order.index(function["group"]))
     return {
         "groups": [{"id": id, **group} for id, group in labels["groups"].items()],
         "functions": functions,
+        "members": {name: _member(name, labels["members"]) for name in sorted(shown)},
         "enums": {name: dict(members) for name, members in ENUMS.items()},
         "records": {name: list(kind.fields) for name, kind in RECORDS.items()},
         "builtins": sorted(BUILTINS),
@@ -72,11 +77,29 @@ def _function(operation: Operation[str], labels: dict[str, Any]) -> dict[str, An
         "group": _group(key),
         "en": labels["english"].get(key) or name.replace("_", " "),
         "zh": labels["chinese"][key],
-        "about": operation.summary,
+        "about": {
+            "en": operation.summary.replace("``", ""),
+            "zh": _about(operation, labels),
+        },
         "attribute": key in ability_set().attributes,
         "answers": operation.answer != "None" and operation.answer is not None,
         "parameters": [_parameter(name, parameter, labels) for parameter in parameters],
     }
+
+
+def _about(operation: Operation[str], labels: Mapping[str, Mapping[str, str]]) -> str:
+    about, key = labels["about"], operation.key
+    general = "perform" if operation.summary.startswith("Perform the motion") else key.rpartition(".")[2]
+    return about.get(key) or about[general].format(name=labels["chinese"][key])
+
+
+def _member(name: str, words: dict[str, dict[str, str]]) -> dict[str, str]:
+    """What a drop-down shows: a colour and an effect, or a name of its own."""
+    found = re.sub("^(system_)?effect_(line_)?", "", name)
+    colour, _, effect = found.partition("_")
+    if found in words:
+        return words[found]
+    return {language: words[colour][language] + words[effect][language] for language in ("en", "zh")}
 
 
 def _group(key: str) -> str:

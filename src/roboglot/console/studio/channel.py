@@ -240,7 +240,7 @@ class Session:
                 self._trial.close()
 
     async def _take_class(self, wish: Member) -> None:
-        if wish.do == "join" and (who := identity()) in self._desk.pupils:  # signed in by a code: as nobody else
+        if wish.do == "join" and (who := identity()) in self._desk.pupils:  # signed in by a code: as that pupil
             name, _, code = who.rpartition("@")
             wish = msgspec.structs.replace(wish, name=name, code=code)
         await self._seat.take(wish, may_teach=self._desk.may_teach)

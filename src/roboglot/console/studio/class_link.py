@@ -102,7 +102,7 @@ class Ended(msgspec.Struct, tag=True, frozen=True):
     code: str
 
 
-class Told(msgspec.Struct, tag=True, frozen=True):
+class News(msgspec.Struct, tag=True, frozen=True):
     """From the classroom: what a page is to hear."""
 
     seat: int
@@ -117,7 +117,7 @@ class Stop(msgspec.Struct, tag=True, frozen=True):
 
 
 ToRoom = Hello | Wished | At | Drawn | Left | Opened | Closed | Stopped | Shows
-FromRoom = Told | Stop | Admitted | Ended
+FromRoom = News | Stop | Admitted | Ended
 _decode = msgspec.json.Decoder(FromRoom).decode
 
 
@@ -221,9 +221,9 @@ class LinkedRoom:
                 task = asyncio.get_running_loop().create_task(self._do_stop(message), name=f"stop {message.robot}")
                 self._stopping.add(task)
                 task.add_done_callback(self._stopping.discard)
-            case Told(seat=number, message=told):
+            case News(seat=number, message=news):
                 if (seat := self._seats.get(number)) is not None:
-                    seat.tell(told)
+                    seat.tell(news)
             case Admitted(id=id):
                 if (waiting := self._admitting.get(id)) is not None and not waiting.done():
                     waiting.set_result(message)
@@ -253,7 +253,7 @@ class LinkedSeat:
         self._room.send(Wished(self.number, wish, may_teach), self)
 
     def at(self, robot: str) -> None:
-        """The page works with this robot from now on: told with its next wish."""
+        """The page works with this robot from now on: said with its next wish."""
         self._robot = robot
 
     def draw(self, picture: str) -> None:

@@ -72,7 +72,7 @@ class Class:
 
     @property
     def is_empty(self) -> bool:
-        """Whether nobody is there."""
+        """Whether no page is in it."""
         return not self.teachers and all(pupil.seat is None for pupil in self.pupils.values())
 
     def enrol(self, name: str) -> Pupil:
@@ -104,7 +104,7 @@ class Seated(Protocol):
     """One page's place in a classroom."""
 
     async def take(self, wish: Member, *, may_teach: bool) -> None:
-        """Do what the page wishes. Raises NotFound, Refused, unless its ``tell`` is told so."""
+        """Do what the page wishes. Raises NotFound, Refused, unless its ``tell`` hears that."""
 
     def at(self, robot: str) -> None:
         """The page works with this robot from now on."""
@@ -165,7 +165,7 @@ class Classroom:
         await self.end(code)
 
     async def begin(self, name: str, code: str = "", only: str = "") -> Class:
-        """Open a class; where there are too many, the oldest one that nobody is in gives way. Raises Refused."""
+        """Open a class; where there are too many, the oldest without a page in it gives way. Raises Refused."""
         if len(self.classes) >= CLASSES_MAX:
             if (oldest := next((one for one in self.classes.values() if one.is_empty), None)) is None:
                 raise Refused(f"{CLASSES_MAX} classes are open")
@@ -180,7 +180,7 @@ class Classroom:
         return opened
 
     async def end(self, code: str) -> None:
-        """Forget a class, with what was handed in; whoever is in it is told."""
+        """Forget a class, with what was handed in; pages in it hear that."""
         if (ended := self.classes.pop(code, None)) is None:
             return
         for seat in [*ended.teachers, *(pupil.seat for pupil in ended.pupils.values() if pupil.seat is not None)]:

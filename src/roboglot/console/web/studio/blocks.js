@@ -1,5 +1,6 @@
 // Blocks made at run time from the table of functions (GET /api/blocks), and the Python that they write.
 import * as Blockly from "blockly";
+import { signal } from "@preact/signals";
 import { language } from "../base.js";
 import { defineLanguage } from "./language.js";
 
@@ -8,6 +9,7 @@ const ALPHABET = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz
 const INLINE_MAX = 4; // values beside each other; more stand below each other
 /** @type {any} */
 export let table = null;
+export const asked = signal(/** @type {any} */ (null)); // the function that help is wanted of
 
 /** The table's words in the language that is shown. @param {any} named */
 export const words = (named) => named[language.value] ?? named.en;
@@ -51,7 +53,9 @@ function defineFunction(f, value) {
       if (value) this.setOutput(true, null);
       else { this.setPreviousStatement(true); this.setNextStatement(true); }
       this.setColour(group.colour);
-      this.setTooltip(f.about.replaceAll("``", ""));
+      this.setTooltip(() => words(f.about));
+      this.setHelpUrl("#"); // a window of ours
+      this.showHelp = () => { asked.value = f; };
     },
   };
   python.forBlock[type] = (block) => {
@@ -171,7 +175,7 @@ function defineValues() {
   };
 }
 
-const labelOf = (/** @type {string} */ name) => name.replace(/^(system_)?(effect_)?(line_|mini_)?/, (all) => (/mini/.test(all) && /effect/.test(all) ? "eyes " : "")).replace(/^target_/, "").replaceAll("_", " ");
+const labelOf = (/** @type {string} */ name) => (table.members[name] ? words(table.members[name]) : name.replaceAll("_", " "));
 
 /** The Python of a workspace. @param {any} workspace */
 export function pythonOf(workspace) { return python.workspaceToCode(workspace); }

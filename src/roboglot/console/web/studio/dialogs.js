@@ -1,7 +1,8 @@
 // Windows over the page: the library, versions and files; the schedule of a program in plain words.
-import { signal } from "@preact/signals";
+import { effect, signal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { Button, html, notice, say, t } from "../base.js";
+import { asked, table, words } from "./blocks.js";
 import * as editor from "./editor.js";
 import { frame, listen } from "./link.js";
 import { openModule, removeModule } from "./modules.js";
@@ -10,7 +11,7 @@ import { catchUp, operate } from "./runner.js";
 
 const SOON = 150; // ms after news of a program until the list is asked for
 export const shown = signal("");
-const close = () => { shown.value = ""; };
+const close = () => { shown.value = ""; asked.value = null; };
 
 /** @param {{title: string, children?: any}} props */
 function Dialog({ title, children }) {
@@ -104,6 +105,15 @@ export function Schedule() {
     <p role="status"><b>${plainly(mode.value, condition.value)}</b></p>
     <div class="buttons"><${Button} kind="main" label=${t("studio.plan")} onClick=${() => { if (python().trim()) plan(true); else say(t("studio.empty")); }} /></div><//>`;
 }
+
+/** What a function does, and what it takes. */
+export function Help() {
+  const f = asked.value;
+  const range = (p) => (p.kind === "choice" ? p.choices.map((name) => words(table.members[name])).join(", ") : p.minimum !== undefined ? `${p.minimum} … ${p.maximum} ${p.unit}` : p.unit);
+  return html`<${Dialog} title=${words(f)}><p>${words(f.about)}</p><pre class="printed">${f.key}${f.attribute ? "" : `(${f.parameters.map((p) => p.name).join(", ")})`}</pre>
+    <dl class="values">${f.parameters.map((p) => html`<div><dt>${words(p)} (${p.name})</dt><dd>${range(p)}</dd></div>`)}</dl><//>`;
+}
+effect(() => { if (asked.value) shown.value = "help"; });
 
 const KEYS = [["F5", "run"], ["F8", "step"], ["F10", "over"], ["Shift+F8", "out"], ["F6", "pause"], ["Shift+F5", "stop"], ["F9", "break"], ["T", "toolbox"], ["Enter", "edit"], ["M", "move"], ["I", "speak"], ["Ctrl+Z", "undo"], ["Ctrl+Enter", "menu"], ["Esc", "halt"]];
 export function Keys() {

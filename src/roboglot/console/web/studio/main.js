@@ -6,11 +6,11 @@ import { Button, Icon, html, kept, language, loadWords, notice, say, t, theme } 
 import { choose, command, connect as connectRobot, current, hello, status } from "../link.js";
 import { loadTable } from "./blocks.js";
 import { Group } from "./class.js";
-import { Keys, Library, Schedule, shown } from "./dialogs.js";
+import { Help, Keys, Library, Schedule, shown } from "./dialogs.js";
 import * as editor from "./editor.js";
 import { connect, online, open, opened, unopened } from "./link.js";
 import { Inside } from "./modules.js";
-import { Missions, allowHere, loadMissions } from "./missions.js";
+import { Missions, allowHere, forget, loadMissions } from "./missions.js";
 import { Output, Python, RobotPanel, TextEditor, Values } from "./panels.js";
 import { body, changed, handOver, list, listed, program, rename, restore, stored } from "./program.js";
 import * as runner from "./runner.js";
@@ -42,6 +42,14 @@ function Header() {
   </header>`;
 }
 
+/** Where a program is held, in words: read aloud at each step. */
+function held() {
+  if (runner.phase.value !== "paused" || runner.module.value) return "";
+  if (program.value.kind === "text") return runner.line.value ? ` · ${t("studio.line", { n: runner.line.value })}` : "";
+  const block = runner.lit.value && editor.workspace?.getBlockById(runner.lit.value);
+  return block ? ` · ${block.toString(60)}` : "";
+}
+
 function Bar() {
   const phase = runner.phase.value, busy = phase === "running" || phase === "starting";
   const word = phase === "idle" ? (runner.failure.value ? t("studio.phase.failed") : t("studio.phase.idle")) : `${t(`studio.phase.${phase}`)}${runner.module.value ? ` · ${t("studio.phase.module", { name: runner.module.value })}` : ""}`;
@@ -52,7 +60,7 @@ function Bar() {
     <${Button} compact icon="over" label=${t("studio.over")} title=${`${t("studio.over")} (F10)`} disabled=${phase !== "paused"} onClick=${() => runner.step("over")} /><${Button} compact icon="out" label=${t("studio.out")} title=${`${t("studio.out")} (Shift+F8)`} disabled=${phase !== "paused"} onClick=${() => runner.step("out")} />
     <${Button} icon="stop" label=${t("studio.stop")} title="Shift+F5" disabled=${phase === "idle"} onClick=${() => runner.stop()} />
     ${program.value.kind === "blocks" && html`<${Button} compact icon="dot" label=${t("studio.break.on")} title="F9" onClick=${() => editor.toggleBreak()} />`}
-    <span class=${`phase ${phase} ${runner.failure.value ? "failed" : ""}`} role="status" aria-live="polite">${word}</span>
+    <span class=${`phase ${phase} ${runner.failure.value ? "failed" : ""}`} role="status" aria-live="polite" title=${word + held()}>${word}${held()}</span>
     <span class="grow"></span>
     ${program.value.kind === "blocks" && html`<label class="search"><span class="unseen">${t("studio.search")}</span><input type="search" placeholder=${t("studio.search")} value=${sought.value} onInput=${(e) => { sought.value = e.target.value; editor.search(e.target.value); }} /></label>`}
     <${Button} compact icon="undo" label=${t("studio.undo")} onClick=${() => editor.undo(false)} /><${Button} compact icon="redo" label=${t("studio.redo")} onClick=${() => editor.undo(true)} />
@@ -90,7 +98,7 @@ function Side() {
     <div id="panel" class="panel" role="tabpanel" aria-labelledby=${`tab-${tab.value}`} tabindex="0"><${Shown} /></div></aside>`;
 }
 
-const WINDOWS = { library: Library, schedule: Schedule, keys: Keys };
+const WINDOWS = { library: Library, schedule: Schedule, keys: Keys, help: Help };
 function App() {
   useEffect(() => {
     const keys = { F5: () => runner.run(), F6: () => runner.pause(), F8: (e) => runner.step(e.shiftKey ? "out" : "step"), F10: () => runner.step("over") };
@@ -132,6 +140,7 @@ effect(() => {
   if (id === shownId) return;
   shownId = id;
   runner.forget();
+  forget();
   open(id); // the answer says what runs
 });
 loadMissions().catch(() => undefined);

@@ -24,10 +24,13 @@ export const results = () => JSON.parse(stars.value);
 export async function loadMissions() { missions.value = await (await fetch("/api/lessons")).json(); allowHere(); }
 export function allowHere() { const m = mission(); editor.allow(m?.allowed.length ? m.allowed : null); }
 
+/** What was tried was another program. */
+export function forget() { outcome.value = null; trace.value = []; }
+
 /** Begin a mission with its blocks. @param {any} m */
 function begin(m) {
   fresh("blocks", { name: said(m.title), lesson: m.id });
-  outcome.value = null; trace.value = []; hints.value = 0;
+  forget(); hints.value = 0;
   allowHere();
   const states = m.blocks.map((key) => { const f = table.functions.find((f) => f.key === key); return f ? stateOf(f, false) : null; }).filter(Boolean);
   let top = null;

@@ -191,6 +191,7 @@ listen((message) => {
 function blameRun(found) {
   const owner = found.line && !found.module && program.value.kind === "blocks" ? blocksOfLines(editor.code.value)[found.line - 1] : "";
   failure.value = { ...found, block: owner || (found.line ? lit.value : "") };
+  say(words(found), true); // whatever panel is shown
   show();
 }
 

@@ -91,7 +91,7 @@ function complete(context) {
   for (const f of table.functions.filter((f) => f.key.startsWith(owner))) {
     const [part, ...rest] = f.key.slice(owner.length).split(".");
     if (rest.length) found.set(part, found.get(part) ?? { label: part, type: "namespace" });
-    else found.set(part, { label: part, type: f.attribute ? "property" : "function", detail: signature(f), info: `${words(f)}: ${f.about}`, apply: f.attribute ? part : `${part}(` });
+    else found.set(part, { label: part, type: f.attribute ? "property" : "function", detail: signature(f), info: `${words(f)}: ${words(f.about)}`, apply: f.attribute ? part : `${part}(` });
   }
   return found.size ? { from, options: [...found.values()] } : null;
 }

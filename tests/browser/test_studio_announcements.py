@@ -1,0 +1,100 @@
+"""What a screen reader hears of the studio, and what a phone shows of it."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import pytest
+
+from tests.browser.served import until
+from tests.browser.test_studio import COUNTING, Open, loaded, phase, studio
+from tests.browser.test_studio_class import WRONG
+
+__all__ = ["studio"]  # the fixture
+pytestmark = pytest.mark.asyncio(loop_scope="session")
+LISTEN = """() => {
+  const live = "[aria-live], [role=status], [role=alert]";
+  window.heard = [];
+  new MutationObserver((changes) => {
+    for (const { target, addedNodes } of changes) {
+      const at = target.nodeType === 1 ? target : target.parentElement;
+      for (const region of [at?.closest(live), ...[...addedNodes].filter((n) => n.nodeType === 1 && n.matches(live))])
+        if (region && !region.closest("[inert]")) window.heard.push(region.textContent.trim());
+    }
+  }).observe(document.body, { subtree: true, childList: true, characterData: true });
+}"""
+WIDTHS = """() => Object.fromEntries(
+  ["header .name input", ".looks select", "#tab-python", "#tab-group", ".stop", ".phase"]
+  .map((each) => [each, document.querySelector(each).getBoundingClientRect()])
+  .map(([each, box]) => [each, [Math.round(box.left), Math.round(box.right)]]))"""
+
+
+async def announced(page: Any, words: str) -> None:
+    """Wait until a live region said this; what was said before is forgotten."""
+    await until(page, f"window.heard.some((text) => text.includes({words!r}))")
+    await page.evaluate("window.heard.length = 0")
+
+
+async def test_a_run_and_its_halts_are_told(studio: Open) -> None:
+    page = await loaded(await studio(), COUNTING)
+    await page.evaluate(LISTEN)
+    await page.evaluate("studio.editor.toggleBreak('say')")
+    await page.keyboard.press("F5")
+    await announced(page, "Paused · print n")  # where it is, in the block's words
+    await page.keyboard.press("F8")
+    await until(page, "studio.runner.phase.value === 'paused' && studio.runner.lit.value !== 'say'")
+    words = await page.evaluate("studio.editor.workspace.getBlockById(studio.runner.lit.value).toString(60)")
+    await announced(page, f"Paused · {words}")
+    await page.click("#tab-output")
+    await page.keyboard.press("F5")
+    await announced(page, "Paused · print n")  # the next time round
+    await page.keyboard.press("F5")
+    await announced(page, "9")  # what was printed
+    await page.keyboard.press("Shift+F5")
+    await announced(page, "Ready")
+    await page.click("#tab-python")
+    await loaded(page, WRONG)
+    await page.keyboard.press("F5")
+    await announced(page, "The list is not that long")  # though the panel of the output is not shown
+    assert page.errors == []
+
+
+async def test_messages_of_a_window_are_told_in_it(studio: Open) -> None:
+    page = await loaded(await studio(language="zh"), COUNTING)
+    await page.click("button[aria-label=何时运行]")
+    await until(page, "document.querySelector('dialog[open]')")
+    await page.evaluate(LISTEN)
+    await page.fill("dialog input", "no time at all")
+    await page.click("dialog .main")
+    await announced(page, "被拒绝")
+    assert await page.is_visible("dialog .notice")
+    assert page.errors == []
+
+
+@pytest.mark.parametrize("language", ["en", "zh"])
+async def test_a_phone_shows_names_and_panels_whole(studio: Open, language: str) -> None:
+    page = await studio(language=language)
+    await page.set_viewport_size({"width": 360, "height": 740})
+    await page.fill("header .name input", "Walk round and bark")
+    await page.click(".switch button:nth-child(2)")
+    await asyncio.sleep(0.1)
+    boxes = await page.evaluate(WIDTHS)
+    assert all(0 <= left < right <= 360 for left, right in boxes.values()), boxes
+    assert await page.evaluate("(i => i.scrollWidth <= i.clientWidth)(document.querySelector('header .name input'))")
+    assert await page.evaluate("document.documentElement.scrollWidth") <= 360
+
+
+async def test_help_is_a_window_in_the_own_language(studio: Open) -> None:
+    page = await studio(language="zh")
+    block = {"type": "cyberdog.motion.turn", "id": "turn", "x": 40, "y": 40}
+    await loaded(page, {"blocks": {"languageVersion": 0, "blocks": [block]}})
+    await page.evaluate("studio.editor.workspace.getBlockById('turn').showHelp()")
+    await until(page, "document.querySelector('dialog[open]')")
+    words = await page.inner_text("dialog")
+    assert "cyberdog.motion.turn(angle, duration)" in words
+    assert "-360 … 359.9 °" in words
+    assert "秒内转" in words
+    await page.keyboard.press("Escape")
+    await until(page, "!document.querySelector('dialog')")
+    await phase(page, "idle")
