@@ -41,13 +41,15 @@ class RobotConfig:
     """One robot: its name, its body, the address all its doors bind to (empty: the next one after the robot before).
 
     A body with "://" in it is no simulated one: it is the URL of a real robot, "slamware://192.168.11.1".
-    ``start`` is for a simulated one; without it the robot starts on a dock, or beside the others.
+    ``start`` is for a simulated one; without it the robot starts on a dock, or beside the others. Who has more
+    ``priority`` goes first where robots meet that hear each other.
     """
 
     name: str = "a"
     body: str = "universal"
     address: str = ""
     start: StartConfig | None = None
+    priority: Annotated[int, msgspec.Meta(ge=-100, le=100)] = 0
 
     @property
     def is_real(self) -> bool:

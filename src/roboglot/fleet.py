@@ -24,6 +24,7 @@ from roboglot.model.client_context import concerning
 from roboglot.model.clock import Clock, LockstepClock
 from roboglot.model.components.interaction.input_device import InputDevice
 from roboglot.model.components.interaction.members import Members
+from roboglot.model.components.logistics.traffic_radio import TrafficRadio
 from roboglot.model.components.mapping.annotations import MapAnnotations
 from roboglot.model.components.mapping.map_library import MapLibrary
 from roboglot.model.components.mapping.map_memory import MapMemory
@@ -125,6 +126,8 @@ def build_fleet(world: str, robots: Sequence[RobotConfig], *, clock: Clock, seed
                 simulated.equip(robot)
                 add_streams(robot)
                 robot.add(InputDevice, InputDevice())
+            if TrafficRadio in robot:
+                robot[TrafficRadio].priority = config.priority
             _add_memory(robot, clock, database)
             robot.add(Lease, Lease(robot))
     return Fleet(simulated, built, [Autonomy(robot) for robot in built.values()], drivers.all)

@@ -29,6 +29,7 @@ from roboglot.autonomy.slam.localization import LidarLocalization
 from roboglot.autonomy.slam.mapping import LidarMapping
 from roboglot.autonomy.slam.odometry.memory import OdometryMemory
 from roboglot.autonomy.stairs.alignment import SeenStairAlignment
+from roboglot.autonomy.traffic.traffic import Traffic
 from roboglot.autonomy.training import HeardWords
 from roboglot.kernels import NAVIGATION, loading
 from roboglot.kernels.ahead import KernelsUnavailable, compile_beside, missing
@@ -100,6 +101,7 @@ class Autonomy:
         self._memory: OdometryMemory | None = None
         self._stop_treading: Callable[[], None] = lambda: None
         self._localization: LidarLocalization | None = None
+        self._traffic: Traffic | None = None
         self._shoves: InertialDisplacement | None = None
         if Hearing in robot and Settings in robot:
             robot.add(TrainingWords, HeardWords(robot))
@@ -119,7 +121,8 @@ class Autonomy:
         if Vision in robot or UltraWideband in robot:
             robot.add(Following, SightFollowing(robot))
         belief = Belief(robot[Odometry])
-        self._course = Course(robot, belief)
+        self._traffic = Traffic(robot, belief)
+        self._course = Course(robot, belief, self._traffic)
         self._localization = LidarLocalization(robot, belief)
         robot.add(Localization, self._localization)
         robot.add(Mapping, LidarMapping(robot, belief))
@@ -186,6 +189,7 @@ class Autonomy:
             self._area_watch,
             self._landmarks,
             self._restricted,
+            self._traffic,
             self._carried,
             self._shoves,
         ):

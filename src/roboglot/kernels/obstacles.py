@@ -203,6 +203,19 @@ def free_way(path: FloatArray, points: FloatArray, x: float, y: float, radius: f
     return np.inf
 
 
+@kernel("int64[::1](int16[:,::1], float64[:,::1], float64, float64, float64)")
+def unexplained(evidence: Int16Array, points: FloatArray, x: float, y: float, resolution: float) -> IntArray:
+    """The numbers of ``points`` (n, 2; m) inside the grid with its corner at (x, y) that lie a cell off all it has."""
+    height, width = evidence.shape
+    found, count = np.empty(points.shape[0], np.int64), 0
+    for i in range(points.shape[0]):
+        row, col = int(np.floor((points[i, 1] - y) / resolution)), int(np.floor((points[i, 0] - x) / resolution))
+        if 0 <= row < height and 0 <= col < width and not beside_occupied(evidence, row, col):
+            found[count] = i
+            count += 1
+    return found[:count]
+
+
 @kernel("int64[::1](float32[:,::1], float64, float64, float64)")
 def nearest_open(cost: SingleArray, row: float, col: float, reach: float) -> IntArray:
     """(row, column) of the open cell whose centre is nearest to a place and within ``reach`` of it, all in cells.

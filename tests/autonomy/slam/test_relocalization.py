@@ -130,6 +130,14 @@ async def test_people_around_robot_do_not_hide_its_place(tour: Tour) -> None:
     assert found.pose.distance_to(tour.truth.relative_to(tour.start)) < 0.05
 
 
+@pytest.mark.parametrize(("wide", "count"), [(0.6, 1), (1.2, 2), (2.2, 3), (3.0, None)])
+def test_people_who_stand_side_by_side_count_each(wide: float, count: int | None) -> None:
+    from roboglot.autonomy.slam.certainty import _count, _things
+
+    row = np.stack([np.full(100, 1.5), np.linspace(-wide / 2, wide / 2, 100)], axis=1)
+    assert [_count(row, thing) for thing in _things(row, np.arange(100))] == ([] if count is None else [count])
+
+
 @pytest.mark.world(LONG_CORRIDOR)
 async def test_robot_looks_around_until_one_place_is_left(tour: Tour) -> None:
     await tour.go((tour.start.x + 25.0, tour.start.y))

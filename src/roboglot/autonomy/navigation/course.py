@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,8 +12,9 @@ from roboglot.autonomy.computing import computed
 from roboglot.autonomy.docking.shelf_legs import Load
 from roboglot.autonomy.navigation.pilot_tuning import PilotTuning
 from roboglot.autonomy.navigation.rules import Frame
-from roboglot.autonomy.navigation.terms import Terms
+from roboglot.autonomy.navigation.terms import Shunned, Terms
 from roboglot.autonomy.slam.belief import Belief
+from roboglot.autonomy.traffic.traffic import Traffic
 from roboglot.model.components.mapping.annotations import Annotations, MapAnnotations
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.navigation import NavigationOptions
@@ -44,6 +45,7 @@ class Course:
 
     robot: Robot
     belief: Belief
+    traffic: Traffic
     planner: Planner | None = None
     unavailable: RobotError | None = None
     load: Load = field(default_factory=Load)
@@ -103,9 +105,16 @@ class Course:
                 obstacles=obstacles,
                 things=things,
                 straight=straight,
+                shunned=self.traffic.shunned() if obstacles else (),
             ),
         )
         return await computed(self.robot.clock, task.solve)
+
+    async def waiting_place(self, here: Point, ways: Shunned) -> Point | None:
+        """The nearest place that lies farther from ``ways`` than they say; None if there is none around."""
+        planner = await self.ready()
+        task = planner.task(here, (here,), replace(self._slowly(0.0), shunned=ways))
+        return await computed(self.robot.clock, task.waiting_place)
 
     async def lengths(self, stops: tuple[Point, ...], reach: float) -> NDArray[np.float64]:
         """Metres between each two of ``stops``, roughly; inf where no way leads to within ``reach`` m."""

@@ -21,6 +21,8 @@ from roboglot.model.geometry import Point, Pose
 if TYPE_CHECKING:
     from roboglot.autonomy.navigation.planner import Planner
 
+ANNOUNCED_MAX = 12.0  # m of the way that others may hear of
+
 
 class Lookout:
     """Examines every scan from now until ``close``; ``follower`` is set when there is a way to look at."""
@@ -28,6 +30,7 @@ class Lookout:
     def __init__(self, course: Course, planner: Planner, action: Action) -> None:
         self._robot, self._clock, self._belief = course.robot, course.robot.clock, course.belief
         self._tuning, self._planner, self._action = course.tuning, planner, action
+        self._traffic = course.traffic
         self._narrow, self._low = NarrowWatch(planner.radius), LowSight(course.robot)
         self._scan_at = -math.inf
         self.follower: Follower | None = None
@@ -67,6 +70,8 @@ class Lookout:
         low = self._planner.observe_low(self._low.look(), points, pose, event.stamp)
         points = np.concatenate((points, low)) if len(low) else points
         self._scan_at = event.stamp
+        self._traffic.observe(points, pose, event.stamp)
+        self._planner.forget_soon(self._traffic.moving, event.stamp)
         if self.follower:
             self._look_ahead(self.follower, pose, points)
             if (width := self._narrow.entered(scan.points)) is not None:
@@ -82,14 +87,27 @@ class Lookout:
             path = self._path(follower, pose)
             tight = planner.free_way(path, points, pose, tuning.slow_margin)
         follower.slow_at = follower.along + tight
-        stop = planner.free_way(path, points, pose, tuning.touch_margin) if math.isfinite(tight) else tight
-        follower.stop_at = follower.along + stop
-        blocked = math.isfinite(follower.stop_at)
+        free = planner.free_way(path, points, pose, tuning.touch_margin) if math.isfinite(tight) else tight
+        follower.stop_at, blocked = follower.along + free, math.isfinite(free)
+        self._mind_others(follower, pose, path)
         if blocked and not self.blocked:
             self.blocked_at = self._clock.time()
             at = Point(*path[min(int((follower.stop_at - follower.along) / SPACING), len(path) - 1)].tolist())
             self._robot.events.publish(PathBlocked(stamp=self.blocked_at, action=self._action, at=at))
         self.blocked = blocked
+
+    def _mind_others(self, follower: Follower, pose: Pose, path: NDArray[np.float64]) -> None:
+        """Stop for what moves and for who goes first, and tell them where this one goes."""
+        traffic = self._traffic
+        free = follower.along + traffic.free(path, pose, follower.speed, self._planner.radius)
+        follower.stop_at = min(follower.stop_at, free)
+        carrot, beyond = follower.carrot()
+        traffic.follow(follower.route.ahead(pose, carrot, beyond, ANNOUNCED_MAX))
+
+    @property
+    def meets(self) -> bool:
+        """True if another one is about to come into the way, or goes first."""
+        return self._traffic.meets
 
     def _path(self, follower: Follower, pose: Pose) -> NDArray[np.float64]:
         carrot, beyond = follower.carrot()

@@ -18,6 +18,7 @@ from roboglot.autonomy.navigation.journey import Journey
 from roboglot.autonomy.navigation.lookout import Lookout
 from roboglot.autonomy.navigation.patience import Patience
 from roboglot.autonomy.navigation.replanner import Replanner
+from roboglot.autonomy.traffic.giving_way import Courtesy
 from roboglot.model.actions import Action
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.navigation import NavigationFeedback
@@ -38,6 +39,7 @@ class State(Enum):
     """What the pilot does; each leads to the next, ARRIVING back to FOLLOWING while it stands too far off."""
 
     FOLLOWING = auto()
+    GIVING_WAY = auto()
     TURNING = auto()
     ARRIVING = auto()
     DONE = auto()
@@ -56,11 +58,13 @@ class Pilot:
         journey: Journey,
     ) -> None:
         self._robot, self._clock, self._belief = course.robot, course.robot.clock, course.belief
+        self._traffic = course.traffic
         self._tuning, self._base = course.tuning, course.robot[Base]
         self._action, self._goal, self._journey = action, goal, journey
         self._publish, self._stage, self._reported_at = report, "", -math.inf
         self._lookout = Lookout(course, planner, action)
         self._replanner = Replanner(course, planner, goal, journey, self._lookout)
+        self._courtesy = Courtesy(course, self._lookout, action)
         patience = self._tuning.patience_for(goal.options.tracks)
         self._patience = Patience(self._clock, self._belief, self._tuning, patience)
         self._top = course.top_speed(goal.options)
@@ -71,12 +75,14 @@ class Pilot:
     def close(self) -> None:
         """Stop listening and planning."""
         self._lookout.close()
+        self._traffic.rest()
         self._replanner.close()
 
     async def drive(self) -> None:
         """To all goals in turn and to the final yaw; Unreachable, Blocked or NotLocalized if that fails."""
         steps = {
             State.FOLLOWING: self._follow,
+            State.GIVING_WAY: self._give_way,
             State.TURNING: self._turn,
             State.ARRIVING: self._arrive,
         }
@@ -125,10 +131,22 @@ class Pilot:
             if waiting:
                 self._journey.waits(self._robot, self._action)
             self._tell(follower, pose, "waiting" if waiting else "driving")
+            if self._courtesy.is_due(follower):
+                return State.GIVING_WAY
             await self._clock.sleep(PERIOD)
         await stand_still(self._robot)
         follower.halt()
         return State.TURNING
+
+    async def _give_way(self, follower: Follower) -> State:
+        """Go aside, wait there, and set out anew."""
+        self._report("waiting", Path(), 0.0)
+        await self._courtesy.give_way(follower)
+        self._replanner.begin_again(follower)
+        follower.take(await self._first_route())
+        self._patience.take(follower.left)
+        self._patience.begin_anew()
+        return State.FOLLOWING
 
     async def _is_over(self, follower: Follower) -> bool:
         """True where it should brake. Raises Blocked or NotLocalized where it gives up."""

@@ -29,6 +29,7 @@ class PilotTuning:
     detours_max: int = 10  # in one drive
     around: float = 0.5  # a way so much longer than the blocked one is another way …
     arounds_max: int = 40  # … and taken so often in one drive
+    polite_period: float = 1.0  # between two plans around another one that comes into the way
     stray: float = 0.4  # beside the route at which it plans anew
     unknown_seam: float = 1.0  # of unknown floor on a way that count as known: the map has holes along its edges
     search_after: float = 10.0  # s of waiting for what stands on a known way before unknown floor is searched

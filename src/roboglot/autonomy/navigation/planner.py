@@ -15,10 +15,11 @@ from roboglot.autonomy.navigation.low_sight import LowView
 from roboglot.autonomy.navigation.route import Route
 from roboglot.autonomy.navigation.rules import Frame, Layers, layers
 from roboglot.autonomy.navigation.scan_memory import Cells, ScanMemory
-from roboglot.autonomy.navigation.terms import Terms
+from roboglot.autonomy.navigation.terms import Shunned, Terms
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.evidence import RESOLUTION, is_too_large
 from roboglot.autonomy.slam.scan_points import ScanPoints
+from roboglot.autonomy.traffic.waiting_place import shun, waiting_place
 from roboglot.kernels.distance import distances
 from roboglot.kernels.obstacles import free_way, inflated_cost, nearest_open, reopen, without_things
 from roboglot.kernels.search import shortest_path, ways_from
@@ -35,6 +36,7 @@ UNKNOWN_COST = 3.0
 SLACK = 1.02  # a straight line may cost this much more than the cells it replaces
 ESCAPE_MAX = 0.8  # m to the nearest open cell for a robot that stands too close to something
 OBSTACLE_SECONDS = 10.0  # how long one is remembered that is out of sight
+MOVING_SECONDS, MOVING_REACH = 1.0, 0.4  # … of what moves, and m around its middle that it takes
 GONE_NEAR = 0.1  # m around where a leg stood that is taken away: what the map shows there counts no more
 SLOW = 0.35  # m/s past obstacles
 HALF_DIAGONAL = 0.036  # m from a cell's centre to its corner: such a cell may reach into a goal's tolerance
@@ -68,6 +70,7 @@ class Task:
     tracks: Tracks
     straight: bool = False
     explains: bool = False  # says how narrow the way is if there is none
+    shunned: Shunned = ()
 
     def solve(self) -> Route:
         """The route through all goals, or Unreachable."""
@@ -162,7 +165,14 @@ class Task:
         self._reopen(cost)
         if rules and rules.extra is not None:
             cost += rules.extra
+        shun(cost, Frame(self.corner, self.evidence.shape), self.shunned)
         return cost
+
+    def waiting_place(self) -> Point | None:
+        """The nearest place beside what is shunned."""
+        frame = Frame(self.corner, self.evidence.shape)
+        cost = self.cost(layers(self.drawn, frame, self.tracks, self.start, self.goals))
+        return waiting_place(cost, frame, self.start, self.shunned)
 
     def _reopen(self, cost: NDArray[np.float32]) -> None:
         """Open what the robot has trodden as far as the hull fits."""
@@ -267,6 +277,14 @@ class Planner:
         evidence = _without(shown, grid.corner, gone) if len(gone) else shown
         return self._scans.observe(grid, evidence, scan, pose, now)
 
+    def forget_soon(self, places: Sequence[Point], now: float) -> None:
+        """What was seen around ``places`` is about to be elsewhere: remember it for a moment only."""
+        grid, until = self._belief.map, max(now - OBSTACLE_SECONDS + MOVING_SECONDS, 1e-3)
+        seen, frame = self._scans.seen(grid), Frame(grid.corner, grid.evidence.shape)
+        for place in places:
+            cells = seen[frame.around((place,), MOVING_REACH)]
+            cells[cells > until] = until
+
     def observe_low(self, view: LowView, echoes: NDArray[np.float64], pose: Pose, now: float) -> NDArray[np.float64]:
         """Remember what stands beside the lidar's plane and is not among ``echoes`` (map); returns it in map (n, 2)."""
         return self._low.observe(self._belief.map, view, echoes, pose, now)
@@ -298,12 +316,7 @@ class Planner:
         """Metres along ``path`` that the hull can go before one of ``points`` is within ``margin`` m; inf: all."""
         return float(free_way(path, points, pose.x, pose.y, self.radius + margin))
 
-    def task(
-        self,
-        start: Point,
-        goals: Sequence[Point],
-        terms: Terms,
-    ) -> Task:
+    def task(self, start: Point, goals: Sequence[Point], terms: Terms) -> Task:
         """What is to be solved, on copies of the map and of what was seen."""
         evidence, seen, trodden, corner = self._window(start, *goals)
         if not (terms.obstacles and terms.things):
@@ -324,6 +337,7 @@ class Planner:
             terms.tracks,
             terms.straight,
             not terms.obstacles,
+            terms.shunned,
         )
 
     def _window(self, *points: Point) -> tuple[NDArray[np.int16], NDArray[np.float32], NDArray[np.uint8], Point]:

@@ -30,7 +30,7 @@ class Replanner:
         self._first = journey.passed  # the goal that the route begins with
         self._plan: asyncio.Task[Route | None] | None = None
         self._planned_at = -math.inf
-        self._stale = False
+        self._stale = self._polite = False  # the plan goes around others only
         self._detours = self._arounds = 0
         events = course.robot.events
         self._listeners = [events.listen(kind, self._distrust) for kind in DISTRUSTED]
@@ -52,6 +52,11 @@ class Replanner:
     def passed(self, follower: Follower) -> int:
         """How many goals of the drive have been passed."""
         return self._first + follower.passed
+
+    def begin_again(self, follower: Follower) -> None:
+        """The next ``first`` begins with the goal that the follower is on the way to."""
+        self._first += follower.passed
+        self._stale = False
 
     async def first(self) -> Route | None:
         """Plan from here through all goals that are left; see ``_route``."""
@@ -126,8 +131,10 @@ class Replanner:
             self._plan = None
             return taken
         needed = self._lookout.blocked or self._stale or follower.beside > tuning.stray
-        if now - self._planned_at >= tuning.replan_period and needed:
-            self._planned_at, self._stale = now, False
+        polite = not needed and self._lookout.meets
+        period = tuning.polite_period if polite else tuning.replan_period
+        if now - self._planned_at >= period and (needed or polite):
+            self._polite, self._planned_at, self._stale = polite, now, False
             self._plan = asyncio.ensure_future(self._route(self._goal.points[self.passed(follower) :]))
         return False
 
@@ -137,6 +144,8 @@ class Replanner:
         if route is None:
             self._planned_at = self._clock.time() + tuning.wait_period - tuning.replan_period
             return False
+        if self._polite and route.length > follower.left + tuning.around:
+            return False  # to wait takes less
         detour = route.length > follower.left + tuning.detour
         if detour and lookout.blocked and self._clock.time() - lookout.blocked_at < tuning.detour_after:
             return False

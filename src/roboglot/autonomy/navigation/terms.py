@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
 
 from roboglot.model.components.mapping.annotations import Annotations
 from roboglot.model.components.motion.navigation import Tracks
+
+Shunned = Sequence[tuple[NDArray[np.float64], float]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -13,7 +19,8 @@ class Terms:
     """How to plan: the time, the robot's limits (m/s, m/s2), how near a goal counts (m), and what is heeded.
 
     ``obstacles`` False: the map, and what is ``drawn`` on it, alone. ``things`` False as well: what stands alone on the
-    map does not count either. It may be a person whom a robot that woke up beside them took for a pillar.
+    map does not count either. It may be a person whom a robot that woke up beside them took for a pillar. ``shunned``:
+    points (n, 2; map) and the metres around them where others are about to drive.
     """
 
     now: float
@@ -25,3 +32,4 @@ class Terms:
     obstacles: bool = True
     things: bool = True
     straight: bool = False
+    shunned: Shunned = ()

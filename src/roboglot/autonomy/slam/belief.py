@@ -37,6 +37,7 @@ class Belief:
     search: bool = False  # the next scan is to be matched in a wide window
     map: EvidenceGrid = field(default_factory=EvidenceGrid)
     revision: int = 0  # of the map
+    frame: str = ""  # names the map that was loaded: who loaded the same one means the same places
     reader: ScanReader = field(init=False)
 
     def __post_init__(self) -> None:
@@ -65,11 +66,11 @@ class Belief:
     def take_map(self, grid: EvidenceGrid, pose: Pose) -> None:
         """Use ``grid`` from now on; the client says that the robot is at ``pose`` in it."""
         self.take_pose(pose)
-        self.map = grid
+        self.map, self.frame = grid, grid.fingerprint()
         self.revision += 1
 
     def start_anew(self) -> None:
         """Forget the map; here is its new origin."""
         self.move_to(ORIGIN, self.odometry.reading.pose)
-        self.covariance, self.search, self.map = _sure(), False, EvidenceGrid()
+        self.covariance, self.search, self.map, self.frame = _sure(), False, EvidenceGrid(), ""
         self.revision += 1

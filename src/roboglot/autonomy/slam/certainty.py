@@ -6,6 +6,7 @@ points that hang together in the midst of free floor are set aside, and the rest
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +21,7 @@ from roboglot.model.geometry import Pose
 SLACK = 0.15  # m that a point may lie off what the map shows
 JUDGED_POINTS_MAX, ALL_POINTS = 120, 500
 APART, MISSED = 0.3, 3  # m, points between two that still belong to one thing
-THING_SIZE, THING_POINTS = 0.8, 3  # m at most, points at least, of a thing that may stand in the way
+THING_SIZE, THING_POINTS = 0.8, 3  # m at most, points at least, of a thing that may stand in the way: a person
 THINGS_MAX, THINGS_SHARE = 3, 0.4  # as many may stand around the robot, hiding so much of what it sees
 INLIER, CLOSE = 0.08, 0.04  # m off the surface
 WELL_KNOWN, SURE_WELL_KNOWN = 4.0, 0.5  # weight of a surface that many hits made; share of points near such ones
@@ -129,7 +130,7 @@ def look_at(grid: EvidenceGrid, scan: ScanPoints, pose: Pose) -> Look:
     fitting, floating, close = (said == FITTING) | crossing, said == FLOATING, off < CLOSE
     return Look(
         aside=1.0 - count / max(1, len(points)),
-        things=len(things),
+        things=sum(_count(points, thing) for thing in things),
         fitting=float((fitting & rest).sum()) / count,
         hidden=float((said == HIDDEN).mean()) if len(said) else 0.0,
         floating=float((floating & rest).sum()) / count,
@@ -170,6 +171,9 @@ def _things(points: NDArray[np.float64], floating: NDArray[np.intp]) -> list[lis
             groups.append([number])
     if len(groups) > 1 and np.hypot(*(points[groups[0][0]] - points[groups[-1][-1]])) < APART:  # behind the robot
         groups[0] = groups.pop() + groups[0]
-    return [
-        group for group in groups if len(group) >= THING_POINTS and np.hypot(*np.ptp(points[group], 0)) < THING_SIZE
-    ]
+    return [group for group in groups if len(group) >= THING_POINTS and _count(points, group) <= THINGS_MAX]
+
+
+def _count(points: NDArray[np.float64], group: list[int]) -> int:
+    """As how many things it counts: people may stand side by side."""
+    return math.ceil(float(np.hypot(*np.ptp(points[group], 0))) / THING_SIZE)

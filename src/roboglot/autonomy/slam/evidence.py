@@ -6,6 +6,7 @@ corner of cell (0, 0) with the smallest x and y.
 
 from __future__ import annotations
 
+import hashlib
 import logging
 import math
 from collections.abc import Callable
@@ -47,6 +48,11 @@ class EvidenceGrid:
     def corner(self) -> Point:
         """The map position (m) of the corner of cell (0, 0)."""
         return Point(self.first_column * RESOLUTION, self.first_row * RESOLUTION)
+
+    def fingerprint(self) -> str:
+        """A name that grids have in common only if they are the same and lie at the same place."""
+        place = np.array((self.first_row, self.first_column, *self.evidence.shape), np.int64)
+        return hashlib.blake2b(place.tobytes() + self.evidence.tobytes(), digest_size=8).hexdigest()
 
     def kept(self, name: str, made: Callable[[], T]) -> T:
         """What ``made`` makes of the map, kept until the map changes."""

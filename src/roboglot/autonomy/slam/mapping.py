@@ -65,7 +65,7 @@ class LidarMapping(Mapping):
         column, row = round(point.x / RESOLUTION), round(point.y / RESOLUTION)
         origin = Pose(column * RESOLUTION, row * RESOLUTION)
         belief = self._belief
-        belief.map = belief.map.seen_from(column, row)
+        belief.map, belief.frame = belief.map.seen_from(column, row), ""
         belief.map_to_odom = belief.map_to_odom.relative_to(origin)
         belief.revision += 1
         self._robot.events.publish(MapReplaced(stamp=self._robot.clock.time(), origin=origin))

@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from roboglot.model.components.logistics.traffic_radio import Announcement
 from roboglot.model.geometry import Point, Pose
 from roboglot.simulation.building.blueprint import Kind, solids_of
 from roboglot.simulation.world.description import AccessPoint, Mobile, WorldDescription
@@ -28,6 +29,10 @@ class Claimant(Protocol):
     @property
     def claims(self) -> frozenset[str]:
         """The places that it claims."""
+
+    @property
+    def announced(self) -> Announcement | None:
+        """What it announced of itself last."""
 
     @property
     def pose(self) -> Pose:

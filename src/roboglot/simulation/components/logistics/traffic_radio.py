@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from roboglot.model.components.logistics.traffic_radio import CLAIM_MAX, CLAIMS_MAX, TrafficRadio
+from roboglot.model.components.logistics.traffic_radio import (
+    CLAIM_MAX,
+    CLAIMS_MAX,
+    WAY_MAX,
+    Announcement,
+    TrafficRadio,
+)
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Pose
 from roboglot.simulation.bodies.hull import Hull
@@ -27,6 +33,7 @@ class SimulatedTrafficRadio(TrafficRadio):
     def __init__(self, section: TrafficRadioSection, hull: Hull, air: list[Claimant]) -> None:
         self._section, self._hull, self._air = section, hull, air
         self._claims: frozenset[str] = frozenset()
+        self._announced: Announcement | None = None
         air.append(self)
 
     @property
@@ -44,10 +51,24 @@ class SimulatedTrafficRadio(TrafficRadio):
         self._claims = frozenset(names)
 
     def others(self, name: str) -> int:
+        return sum(name in radio.claims for radio in self._in_range())
+
+    @property
+    def announced(self) -> Announcement | None:
+        """What this robot announced last."""
+        return self._announced
+
+    def announce(self, announcement: Announcement | None) -> None:
+        if announcement is not None and len(announcement.way) > WAY_MAX:
+            raise InvalidGoal(f"the radio carries ways of {WAY_MAX} points")
+        self._announced = announcement
+
+    def heard(self) -> Sequence[Announcement]:
+        return [radio.announced for radio in self._in_range() if radio.announced is not None]
+
+    def _in_range(self) -> Sequence[Claimant]:
         here, reach = self._hull.pose, self._section.range
-        return sum(
-            name in radio.claims and radio.pose.distance_to(here) <= reach for radio in self._air if radio is not self
-        )
+        return [radio for radio in self._air if radio is not self and radio.pose.distance_to(here) <= reach]
 
 
 def _fit(fit: Fitting) -> SimulatedTrafficRadio:

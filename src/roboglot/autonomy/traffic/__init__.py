@@ -1,0 +1,1 @@
+"""Robots among robots: what moves around, who goes first, and where to let others pass."""

@@ -1,0 +1,74 @@
+"""What a robot tells others by radio of where it is and goes next, and what it hears from them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.autonomy.slam.belief import Belief
+from roboglot.model.components.logistics.traffic_radio import WAY_MAX, Announcement, TrafficRadio
+from roboglot.model.events import ScanTaken
+from roboglot.model.geometry import Point
+from roboglot.model.robot import Robot
+
+HEARD_MAX = 1.0  # s that an announcement counts
+HEARD_REACH = 12.0  # m within which announcements matter
+PERIOD = 0.2  # s between two announcements
+
+
+class Announcer:
+    """Announces ``way`` (n, 2; map, m) with the robot's place as long as it lives; silent without a radio or a map."""
+
+    def __init__(self, robot: Robot, belief: Belief) -> None:
+        self._robot, self._belief = robot, belief
+        self.way: NDArray[np.float64] = np.empty((0, 2))
+        self.inside = False  # whether it is where two robots cannot pass each other
+        self._announced_at = -math.inf
+        self._stop = robot.events.listen(ScanTaken, self._announce)
+
+    def close(self) -> None:
+        """Fall silent."""
+        self._stop()
+        if TrafficRadio in self._robot:
+            self._robot[TrafficRadio].announce(None)
+
+    @property
+    def frame(self) -> str:
+        """Names the map that announcements are about; "" while there are none."""
+        speaks = TrafficRadio in self._robot and not self._belief.in_doubt
+        return self._belief.frame if speaks else ""
+
+    def heard(self, stamp: float) -> list[Announcement]:
+        """What others tell that is new, near, and of the same map."""
+        frame = self.frame
+        if not frame:
+            return []
+        here = self._belief.pose
+        return [
+            other
+            for other in self._robot[TrafficRadio].heard()
+            if other.frame == frame and stamp - other.stamp <= HEARD_MAX and other.pose.distance_to(here) <= HEARD_REACH
+        ]
+
+    def announcement(self, stamp: float) -> Announcement:
+        """What it tells now."""
+        robot, belief = self._robot, self._belief
+        return Announcement(
+            robot=robot.id,
+            frame=self.frame,
+            stamp=stamp,
+            pose=belief.pose,
+            speed=belief.odometry.reading.twist.speed,
+            radius=robot.description.radius,
+            priority=robot[TrafficRadio].priority,
+            way=tuple(Point(x, y) for x, y in self.way[:WAY_MAX].tolist()),
+            inside=self.inside,
+        )
+
+    def _announce(self, event: ScanTaken) -> None:
+        if event.stamp - self._announced_at < PERIOD - 0.01 or TrafficRadio not in self._robot:
+            return
+        self._announced_at = event.stamp
+        self._robot[TrafficRadio].announce(self.announcement(event.stamp) if self.frame else None)

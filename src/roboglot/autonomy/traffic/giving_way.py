@@ -1,0 +1,129 @@
+"""Going aside for who goes first, or for who stands face to face, and waiting there until they have passed."""
+
+from __future__ import annotations
+
+import math
+import zlib
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.autonomy.navigation.base_actions import stand_still
+from roboglot.autonomy.navigation.course import Course
+from roboglot.autonomy.navigation.follower import PERIOD, Follower
+from roboglot.autonomy.navigation.lookout import Lookout
+from roboglot.model.actions import Action
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.navigation import NavigationOptions
+from roboglot.model.errors import Unreachable
+from roboglot.model.geometry import STILL
+
+if TYPE_CHECKING:
+    from roboglot.autonomy.navigation.route import Route
+
+STANDS = 0.05  # m/s
+RULED_AFTER = 0.6  # s of standing in the way of one that goes first: a plan may lead around meanwhile
+FACED_AFTER, FACED_MORE = 3.0, 4.0  # s of standing before something that may want to come here; more by the name
+FACED_MAX = 4  # times in one drive that it goes aside for what may not want anything
+ASIDE_MAX = 40  # times in one drive
+GO_SECONDS, STUCK_SECONDS = 10.0, 2.0
+WAIT_MIN, WAIT_MAX = 0.6, 12.0  # s in the waiting place
+LOOK = 0.2  # s
+THERE = 0.08  # m
+OLD_WAY = 2.5  # m of its way that must be free before it goes on
+
+Points = NDArray[np.float64]
+
+
+class Courtesy:
+    """For one drive: knows when to give way, and does."""
+
+    def __init__(self, course: Course, lookout: Lookout, action: Action) -> None:
+        self._course, self._lookout, self._action = course, lookout, action
+        self._robot, self._clock, self._traffic = course.robot, course.robot.clock, course.traffic
+        self._ruled_since = self._faced_since = math.inf
+        self._faced = self._asides = 0
+
+    def is_due(self, follower: Follower) -> bool:
+        """True if the robot should go aside now; ask at every step."""
+        now, traffic = self._clock.time(), self._traffic
+        stands = follower.speed < STANDS and follower.stop_at - follower.along < 0.4
+        ruled = stands and traffic.meeting is not None and traffic.meeting.stands_in_it
+        faced = stands and self._lookout.blocked and traffic.is_faced(self._course.belief.pose)
+        self._ruled_since = min(self._ruled_since, now) if ruled else math.inf
+        self._faced_since = min(self._faced_since, now) if faced else math.inf
+        if self._asides >= ASIDE_MAX:
+            return False
+        return now - self._ruled_since > RULED_AFTER or (
+            self._faced < FACED_MAX and now - self._faced_since > FACED_AFTER + FACED_MORE * self._chance
+        )
+
+    @property
+    def _chance(self) -> float:
+        """From 0 to 1, by the name and how often it was asked: not the same for two that stand face to face."""
+        return zlib.crc32(f"{self._robot.id} {self._faced}".encode()) / 2**32
+
+    async def give_way(self, follower: Follower) -> None:
+        """Go aside, and return when the way is free, or after a while."""
+        pose, traffic = self._course.belief.pose, self._traffic
+        carrot, beyond = follower.carrot()
+        path = follower.route.ahead(pose, carrot, beyond, OLD_WAY)
+        ruled = self._ruled_since < math.inf
+        self._asides += 1
+        self._faced += not ruled
+        ways = traffic.to_leave() if ruled else [*traffic.to_leave(), *traffic.face_to_face(pose)]
+        chance = self._chance
+        self._ruled_since = self._faced_since = math.inf
+        traffic.giving_way = True
+        self._lookout.follower = None
+        traffic.rest()
+        try:
+            route = await self._route_aside(ways)
+            if route is not None:
+                await self._go(Follower(follower.limits, follower.top, route))
+            await stand_still(self._robot)
+            follower.halt()
+            self._lookout.follower = None
+            await self._wait(path, WAIT_MAX if ruled else FACED_AFTER + FACED_MORE * chance, ruled)
+        finally:
+            traffic.giving_way = False
+            self._lookout.follower = follower
+
+    async def _route_aside(self, ways: list[tuple[Points, float]]) -> Route | None:
+        here = self._course.belief.pose.point
+        place = await self._course.waiting_place(here, ways)
+        if place is None:
+            return None
+        try:
+            return await self._course.plan(here, (place,), NavigationOptions(tolerance=0.2))
+        except Unreachable:
+            return None
+
+    async def _go(self, follower: Follower) -> None:
+        """Drive there, as long as it gets on."""
+        belief, base = self._course.belief, self._robot[Base]
+        self._lookout.follower = follower
+        begun = moved = self._clock.time()
+        while (now := self._clock.time()) - begun < GO_SECONDS and now - moved < STUCK_SECONDS:
+            if await self._action.hold(lambda: base.set_velocity(STILL)):
+                return
+            pose = belief.pose
+            follower.locate(pose)
+            if follower.last and pose.distance_to(follower.end) < THERE:
+                return
+            if not self._lookout.sees or belief.in_doubt:
+                follower.stop_at = follower.along
+            base.set_velocity(follower.command(pose))
+            if follower.speed > STANDS or abs(follower.yaw_rate) > STANDS:
+                moved = now
+            await self._clock.sleep(PERIOD)
+
+    async def _wait(self, path: Points, most: float, ruled: bool) -> None:
+        """Until no other wants to come along ``path``."""
+        begun = self._clock.time()
+        while True:
+            await self._clock.sleep(LOOK)
+            waited = self._clock.time() - begun
+            if waited > most or (waited > WAIT_MIN and self._traffic.is_free(path, ruled=ruled)):
+                return

@@ -1,0 +1,122 @@
+"""What moves around the robot, by its own lidar: echoes that the map does not explain, followed from scan to scan.
+
+Knows no robot and no radio; needs the kernels. All positions are in map, m.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
+from roboglot.kernels.obstacles import unexplained
+from roboglot.model.geometry import Point, Pose
+
+LINK = 0.25  # m between neighbouring echoes of one thing
+WIDE_MAX = 0.9  # m; what is wider is no robot and no person
+ECHOES_MIN = 3
+HULL = 0.27  # m: the radius that a thing is taken to have, whose back is not seen
+DEPTH = 0.6 * HULL  # m from the middle of the echoes to that of the thing
+SAME = 0.45  # m from where a thing is expected to where it is found
+KEPT = 5  # sightings from which a velocity is made
+FORGOTTEN = 0.5  # s without a sighting
+MOVES = 0.2  # m/s, less is noise
+THINGS_MAX = 32
+
+Points = NDArray[np.float64]
+
+
+@dataclass(slots=True)
+class Mover:
+    """Something that stands or moves: ``vx`` and ``vy`` in m/s, 0 for what hardly moves; ``radius`` in m."""
+
+    x: float
+    y: float
+    stamp: float
+    radius: float = HULL
+    vx: float = 0.0
+    vy: float = 0.0
+    _seen: deque[tuple[float, float, float]] = field(default_factory=lambda: deque(maxlen=KEPT))
+
+    @property
+    def point(self) -> Point:
+        """Its middle."""
+        return Point(self.x, self.y)
+
+    @property
+    def speed(self) -> float:
+        """m/s."""
+        return float(np.hypot(self.vx, self.vy))
+
+    def take(self, x: float, y: float, stamp: float) -> None:
+        """It is here now."""
+        self._seen.append((stamp, x, y))
+        self.x, self.y, self.stamp = x, y, stamp
+        if len(self._seen) < 3:
+            return
+        times, xs, ys = np.array(self._seen).T
+        times = times - times.mean()
+        spread = float(times @ times)
+        if spread <= 0.0:
+            return
+        vx, vy = float(times @ xs) / spread, float(times @ ys) / spread
+        moves = np.hypot(vx, vy) >= MOVES
+        self.vx, self.vy = (vx, vy) if moves else (0.0, 0.0)
+
+
+class MoverTracker:
+    """Give it every scan's echoes."""
+
+    def __init__(self) -> None:
+        self.movers = list[Mover]()
+
+    def observe(self, echoes: Points, grid: EvidenceGrid, pose: Pose, stamp: float) -> Sequence[Mover]:
+        """All that stands or moves around; ``echoes`` (n, 2) in the order of the scan."""
+        self.movers = [mover for mover in self.movers if stamp - mover.stamp <= FORGOTTEN]
+        free = list(self.movers)
+        corner = grid.corner
+        odd = unexplained(grid.evidence, echoes, corner.x, corner.y, RESOLUTION)
+        for x, y in _things(echoes[odd], pose):
+            mover = _expected(free, x, y, stamp)
+            if mover is not None:
+                free.remove(mover)
+            elif len(self.movers) < THINGS_MAX:
+                mover = Mover(x, y, stamp)
+                self.movers.append(mover)
+            else:
+                continue
+            mover.take(x, y, stamp)
+        return self.movers
+
+
+def _expected(movers: Sequence[Mover], x: float, y: float, stamp: float) -> Mover | None:
+    """Which of them has come here."""
+    best, found = SAME, None
+    for mover in movers:
+        seconds = stamp - mover.stamp
+        away = float(np.hypot(mover.x + mover.vx * seconds - x, mover.y + mover.vy * seconds - y))
+        if away < best:
+            best, found = away, mover
+    return found
+
+
+def _things(echoes: Points, pose: Pose) -> list[tuple[float, float]]:
+    """The middles of what hangs together."""
+    if len(echoes) < ECHOES_MIN:
+        return []
+    gaps = np.hypot(*(echoes - np.roll(echoes, 1, axis=0)).T) > LINK
+    starts = np.flatnonzero(gaps)
+    if len(starts):
+        echoes, starts = np.roll(echoes, -starts[0], axis=0), starts - starts[0]
+    found = []
+    for thing in np.split(echoes, starts[1:]) if len(starts) else [echoes]:
+        if len(thing) < ECHOES_MIN or float(np.hypot(*np.ptp(thing, axis=0))) > WIDE_MAX:
+            continue
+        x, y = thing.mean(axis=0).tolist()
+        away = max(float(np.hypot(x - pose.x, y - pose.y)), 1e-6)
+        found.append((x + DEPTH * (x - pose.x) / away, y + DEPTH * (y - pose.y) / away))
+    return found

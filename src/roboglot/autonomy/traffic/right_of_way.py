@@ -1,0 +1,155 @@
+"""Who goes first where robots meet: by what they announce, where they use the same map; else by what the lidar sees.
+
+First goes one that is where two cannot pass each other, then who has more priority, then the name decides. All
+positions are in map, m.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.autonomy.navigation.route import SPACING
+from roboglot.autonomy.traffic.movers import Mover
+from roboglot.model.components.logistics.traffic_radio import Announcement
+from roboglot.model.geometry import Pose
+
+CLEAR = 0.10  # m kept between two hulls
+CLEAR_MOVING = 0.06  # m kept from where something that moves can come to a stand
+DECELERATION, REACTION = 0.6, 0.2  # m/s2 and s that others are taken to need
+STEP = 0.2  # m between two points of a way that are compared
+SLOW = 0.4  # m/s at least, when it is asked who comes first
+BEFORE, AFTER = 1.0, 2.0  # s that one comes later, or earlier, from which two do not meet
+LEAVES = 1.2  # m within which a path leaves another's way that it begins in
+ALIKE = 0.5  # cosine from which two go the same way
+SIGHT = 2.5  # s that what the lidar sees is taken to go straight on
+ASIDE = 0.15  # m to its right that something will give way
+
+Points = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """Where another one goes next: ``points`` (n, 2) every STEP or so, from where it is; ``radius`` of its hull."""
+
+    points: Points
+    speed: float
+    radius: float
+    outranks: bool  # whether it goes first by rule
+    name: str = ""
+
+    @property
+    def seconds(self) -> Points:
+        """When it comes to each point, from now on."""
+        steps = np.hypot(*np.diff(self.points, axis=0, prepend=self.points[:1]).T)
+        times: Points = np.cumsum(steps) / max(self.speed, SLOW)
+        return times
+
+    def distances(self, path: Points) -> Points:
+        """Metres between each point of ``path`` and each of its own."""
+        away: Points = np.hypot(*(path[:, None] - self.points[None, :]).transpose(2, 0, 1))
+        return away
+
+    def is_within(self, reach: float, pose: Pose) -> bool:
+        """True if it is now within ``reach`` m of ``pose``."""
+        x, y = self.points[0].tolist()
+        return math.hypot(x - pose.x, y - pose.y) < reach
+
+    def stopping(self) -> Points:
+        """The points that it cannot help coming to."""
+        reach = self.speed * REACTION + self.speed**2 / (2.0 * DECELERATION)
+        steps = np.hypot(*np.diff(self.points, axis=0, prepend=self.points[:1]).T)
+        return self.points[np.cumsum(steps) <= reach]
+
+
+@dataclass(frozen=True, slots=True)
+class Meeting:
+    """The first place of a path that is not to be driven to before ``way`` is free: ``along`` m from its begin."""
+
+    along: float
+    way: Way
+    stands_in_it: bool  # the robot itself is where the other wants to go
+
+
+def rank(announcement: Announcement) -> tuple[bool, int, str]:
+    """Who has the smaller one goes first."""
+    return not announcement.inside, -announcement.priority, announcement.robot
+
+
+def announced_way(other: Announcement, mine: Announcement) -> Way:
+    """The way that a robot announced."""
+    points = [(other.pose.x, other.pose.y), *((point.x, point.y) for point in other.way)]
+    outranks = rank(other) < rank(mine)
+    return Way(np.array(points), other.speed, other.radius, outranks, other.robot)
+
+
+def expected_way(mover: Mover) -> Way:
+    """Straight on, and a little to the right: as those that meet pass each other."""
+    speed = mover.speed
+    away = np.arange(0.0, speed * SIGHT + STEP, STEP) if speed > 0.0 else np.zeros(1)
+    ux, uy = (mover.vx / speed, mover.vy / speed) if speed > 0.0 else (0.0, 0.0)
+    return Way(np.stack([mover.x + away * ux, mover.y + away * uy], axis=1), speed, mover.radius, outranks=False)
+
+
+def shifted(way: Way) -> Points:
+    """Its points, moved to its right, so that who plans around them passes on the other side."""
+    if len(way.points) < 2:
+        return way.points
+    ahead = way.points[-1] - way.points[0]
+    ahead /= max(float(np.hypot(*ahead)), 1e-6)
+    moved: Points = way.points + ASIDE * np.array((ahead[1], -ahead[0]))
+    return moved
+
+
+def meetings(path: Points, speed: float, radius: float, ways: Sequence[Way]) -> Iterator[Meeting]:
+    """Where the hull would meet others if it went on along ``path`` (dense) at ``speed`` m/s."""
+    mine = path[:: round(STEP / SPACING)]
+    if len(mine) < 2:
+        return
+    seconds = np.arange(len(mine)) * STEP / max(speed, SLOW)
+    for way in ways:
+        if len(way.points) < 2:
+            continue
+        close = way.distances(mine) < radius + way.radius + CLEAR
+        if not close.any():
+            continue
+        against = _directions(mine) @ _directions(way.points).T < ALIKE
+        later = way.seconds[None, :] - seconds[:, None]
+        close &= against
+        meets = np.asarray((close & (later > -BEFORE) & (later < AFTER)).any(axis=1))
+        stands = bool(close[0].any())
+        if stands:  # one that is on its way out of the other's goes on
+            clear = np.flatnonzero(~close.any(axis=1))
+            leaves = int(clear[0]) if len(clear) else len(mine)
+            if leaves * STEP <= LEAVES:
+                meets[:leaves], stands = False, False
+        if meets.any():
+            yield Meeting(float(meets.argmax()) * STEP, way, stands)
+
+
+def _directions(points: Points) -> Points:
+    """Unit vectors along a way."""
+    ahead = np.diff(points, axis=0, append=points[-1:])
+    ahead[-1] = ahead[-2]
+    length = np.hypot(*ahead.T)
+    directions: Points = ahead / np.maximum(length, 1e-6)[:, None]
+    return directions
+
+
+def free_of_movers(path: Points, pose: Pose, radius: float, ways: Sequence[Way]) -> float:
+    """Metres along ``path`` that the hull can go and still stand clear of whatever brakes now; inf: all."""
+    free = math.inf
+    for way in ways:
+        points = way.stopping()
+        if len(points) < 2:
+            continue
+        away = np.hypot(path[:, None, 0] - points[None, :, 0], path[:, None, 1] - points[None, :, 1])
+        now = np.hypot(points[:, 0] - pose.x, points[:, 1] - pose.y)
+        hits = ((away < radius + way.radius + CLEAR_MOVING) & (away < now[None, :] - 0.01)).any(axis=1)
+        if hits.any():
+            free = min(free, float(hits.argmax()) * SPACING)
+    return free

@@ -1,0 +1,173 @@
+"""One robot among others: sees and hears where they go, tells them where it goes, and knows where it has to wait."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.autonomy.navigation.route import SPACING
+from roboglot.autonomy.slam.belief import Belief
+from roboglot.autonomy.traffic.announcer import Announcer
+from roboglot.autonomy.traffic.right_of_way import (
+    CLEAR,
+    STEP,
+    Meeting,
+    Way,
+    announced_way,
+    expected_way,
+    free_of_movers,
+    meetings,
+    shifted,
+)
+from roboglot.model.geometry import Point, Pose
+from roboglot.model.robot import Robot
+
+if TYPE_CHECKING:
+    from roboglot.autonomy.traffic.movers import MoverTracker
+    from roboglot.autonomy.traffic.narrow_places import NarrowPlaces
+
+ANNOUNCED = 5.0  # m of the way that are, and what is narrow beyond
+SAME = 0.6  # m between what is seen and what is heard of the same robot
+BEFORE_NARROW = 0.35  # m before a narrow place where it waits
+FACING = 0.27 + 0.5  # m between a hull and the middle of what stands before it
+AROUND = 4.0  # m within which others may be what closes the way
+TRAIL = 20  # places that it came by
+TRAIL_STEP = 0.2  # m between two of them
+
+Points = NDArray[np.float64]
+
+
+class Traffic:
+    """Announces where the robot stands as long as it lives; the rest is asked by drives."""
+
+    def __init__(self, robot: Robot, belief: Belief) -> None:
+        self._robot, self._belief = robot, belief
+        self._announcer = Announcer(robot, belief)
+        self._tracker: MoverTracker | None = None  # once something drives: these two need the kernels
+        self._narrow: NarrowPlaces | None = None
+        self._ways: list[Way] = []
+        self._trail: deque[Point] = deque(maxlen=TRAIL)
+        self.meeting: Meeting | None = None  # with one that goes first
+        self.meets = False  # whether another is about to come into the way
+        self.giving_way = False  # it has to leave: no rule holds it up
+
+    def close(self) -> None:
+        """Fall silent."""
+        self._announcer.close()
+
+    # -- others --------------------------------------------------------------------------------------------------------
+
+    def observe(self, echoes: Points, pose: Pose, stamp: float) -> None:
+        """Look where everybody goes; ``echoes`` (n, 2; map) in the order of the scan."""
+        if not self._trail or self._trail[-1].distance_to(pose) > TRAIL_STEP:
+            self._trail.append(pose.point)
+        heard = self._announcer.heard(stamp)
+        self._ways = []
+        if heard:
+            mine = self._announcer.announcement(stamp)
+            self._ways = [announced_way(other, mine) for other in heard]
+        for mover in self._watch().observe(echoes, self._belief.map, pose, stamp):
+            if not any(mover.point.distance_to(other.pose) < SAME for other in heard):
+                self._ways.append(expected_way(mover))
+
+    def _watch(self) -> MoverTracker:
+        if self._tracker is None:
+            from roboglot.autonomy.traffic.movers import MoverTracker
+
+            self._tracker = MoverTracker()
+        return self._tracker
+
+    @property
+    def moving(self) -> list[Point]:
+        """Where those are now that go somewhere."""
+        return [Point(*way.points[0].tolist()) for way in self._ways if len(way.points) >= 2]
+
+    def is_among_others(self, pose: Pose) -> bool:
+        """True if robots, or other things that move, are near."""
+        return any((way.name or way.speed > 0.0) and way.is_within(AROUND, pose) for way in self._ways)
+
+    def free(self, path: Points, pose: Pose, speed: float, radius: float) -> float:
+        """Metres along ``path`` (dense) that are free of what moves, and of what goes first."""
+        if not self._ways:
+            self.meeting, self.meets = None, False
+            return math.inf
+        free = free_of_movers(path, pose, radius, self._ways)
+        found = [] if self.giving_way else list(meetings(path, speed, radius, self._ways))
+        self.meets = bool(found)
+        ruled = [meeting for meeting in found if meeting.way.outranks]
+        self.meeting = min(ruled, key=lambda meeting: meeting.along, default=None)
+        if self.meeting is not None:
+            free = min(free, self._before_narrow(path, self.meeting.along))
+        return free
+
+    def _before_narrow(self, path: Points, along: float) -> float:
+        """Where to wait for a meeting ``along`` metres ahead: not inside what is narrow."""
+        narrow = self._narrow_at(path)
+        last = min(int(along / SPACING), len(narrow) - 1)
+        if narrow[0] or not narrow[last]:
+            return along
+        wide = np.flatnonzero(~narrow[: last + 1])
+        return max(0.0, float(wide[-1]) * SPACING - BEFORE_NARROW)
+
+    def _narrow_at(self, path: Points) -> NDArray[np.bool_]:
+        if self._narrow is None:
+            from roboglot.autonomy.traffic.narrow_places import NarrowPlaces
+
+            self._narrow = NarrowPlaces()
+        return self._narrow.at(self._belief.map, path, self._robot.clock.time())
+
+    def shunned(self) -> list[tuple[Points, float]]:
+        """Ways, and the metres around them, that are better not driven along: of who goes first, or is unheard of."""
+        mine = self._robot.description.radius
+        return [
+            (way.points if way.outranks else shifted(way), mine + way.radius + CLEAR)
+            for way in self._ways
+            if len(way.points) >= 2 and (way.outranks or not way.name)
+        ]
+
+    def to_leave(self) -> list[tuple[Points, float]]:
+        """Ways that who gives way must be beside, with the metres."""
+        mine = self._robot.description.radius
+        return [(way.points, mine + way.radius + 2 * CLEAR) for way in self._ways if way.outranks or not way.name]
+
+    def is_faced(self, pose: Pose) -> bool:
+        """True if what stands close may be another robot, or a person."""
+        reach = self._robot.description.radius + FACING
+        return any(way.is_within(reach, pose) for way in self._ways)
+
+    def face_to_face(self, pose: Pose) -> list[tuple[Points, float]]:
+        """What would have to be free for those that stand close: they may want to go where the robot came from."""
+        mine, trail = self._robot.description.radius, [(point.x, point.y) for point in self._trail]
+        near = [tuple(way.points[0].tolist()) for way in self._ways if way.is_within(mine + FACING, pose)]
+        return [(np.array([*trail, (pose.x, pose.y), *near]), 2 * mine + CLEAR)]
+
+    def is_free(self, path: Points, *, ruled: bool) -> bool:
+        """True if none that goes first, or else none at all, is about to come to ``path`` or stands on it."""
+        mine = self._robot.description.radius + CLEAR
+        ways = [way for way in self._ways if way.outranks or not ruled]
+        return not any((way.distances(path) < mine + way.radius).any() for way in ways)
+
+    # -- itself --------------------------------------------------------------------------------------------------------
+
+    def follow(self, path: Points) -> None:
+        """It drives along ``path`` (dense), no farther than to where it has to wait for others."""
+        announcer = self._announcer
+        if not announcer.frame:
+            return
+        end, announcer.inside = round(ANNOUNCED / SPACING), False
+        if self._ways:  # no other asks whether it is in a narrow place
+            narrow = self._narrow_at(path)
+            announcer.inside = bool(narrow[0])
+            while end < len(narrow) and narrow[end]:
+                end += 1
+        if self.meeting is not None:
+            end = min(end, int(self.meeting.along / SPACING))
+        announcer.way = path[: end : round(STEP / SPACING)]
+
+    def rest(self) -> None:
+        """It goes nowhere."""
+        self._announcer.way, self.meeting, self.meets = np.empty((0, 2)), None, False

@@ -1,0 +1,62 @@
+"""Where to let others pass: the nearest place beside their ways. Needs the kernels."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.autonomy.navigation.rules import Frame
+from roboglot.autonomy.slam.evidence import RESOLUTION
+from roboglot.kernels.search import ways_from
+from roboglot.model.geometry import Point
+
+REACH = 6.0  # m around in which it is looked for
+SHUN_COST = 4.0  # what a cell on another's way costs more
+SHUN_POINTS = 40
+
+Points = NDArray[np.float64]
+
+
+def shun(cost: NDArray[np.float32], frame: Frame, ways: Sequence[tuple[Points, float]]) -> None:
+    """Make the cells dearer that lie within so many metres of where others go."""
+    for points, reach in ways:
+        window, away = _distances(frame, points[:SHUN_POINTS], reach)
+        cost[window] += np.where(away < reach, np.float32(SHUN_COST), np.float32(0.0))
+
+
+def waiting_place(
+    cost: NDArray[np.float32], frame: Frame, here: Point, ways: Sequence[tuple[Points, float]]
+) -> Point | None:
+    """The place that takes the least to reach and lies farther from all ways than their metres; None if none does."""
+    rows, columns = frame.around((here,), REACH)
+    near = np.ascontiguousarray(cost[rows, columns])
+    row, column = (
+        int((v - c) // RESOLUTION) - s.start
+        for v, c, s in zip((here.y, here.x), (frame.corner.y, frame.corner.x), (rows, columns), strict=True)
+    )
+    if not (0 <= row < near.shape[0] and 0 <= column < near.shape[1]):
+        return None
+    near[row, column] = min(near[row, column], 10.0)
+    paid = ways_from(near, row, column)
+    corner = Point(frame.corner.x + columns.start * RESOLUTION, frame.corner.y + rows.start * RESOLUTION)
+    part = Frame(corner, (near.shape[0], near.shape[1]))
+    for points, reach in ways:
+        window, away = _distances(part, points[:SHUN_POINTS], reach)
+        paid[window] = np.where(away < reach, np.float32(math.inf), paid[window])
+    best = np.unravel_index(int(paid.argmin()), paid.shape)
+    if not np.isfinite(paid[best]):
+        return None
+    return Point(corner.x + (int(best[1]) + 0.5) * RESOLUTION, corner.y + (int(best[0]) + 0.5) * RESOLUTION)
+
+
+def _distances(frame: Frame, points: Points, reach: float) -> tuple[tuple[slice, slice], Points]:
+    """The part of a grid around ``points``, and how far each of its cells is from the nearest of them, m."""
+    window = frame.around(tuple(Point(x, y) for x, y in points.tolist()), reach)
+    x, y = frame.centres(*window)
+    away = np.full((window[0].stop - window[0].start, window[1].stop - window[1].start), math.inf)
+    for px, py in points.tolist():
+        np.minimum(away, np.hypot(x - px, y - py), out=away)
+    return window, away
