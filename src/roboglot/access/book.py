@@ -25,17 +25,17 @@ class Book:
         return self._tokens.get(kept)
 
     def password_of(self, name: str) -> str:
-        """What is kept of a person's password; empty: there is no such person."""
+        """Return what is kept of a person's password; empty: there is no such person."""
         identity = self._identities.get(name)
         return identity.password if identity is not None and identity.kind is Kind.PERSON else ""
 
     def has(self, name: str, kind: Kind) -> bool:
-        """Whether there is one of this kind."""
+        """Return whether there is one of this kind."""
         identity = self._identities.get(name)
         return identity is not None and identity.kind is kind
 
     def rights(self, robot: str, now: float, *, local: bool) -> Rights:
-        """Who has which rights on ``robot`` at ``now`` (Unix s)."""
+        """Return who has which rights on ``robot`` at ``now`` (Unix s)."""
         found: Rights = {LOCAL: EVERYTHING} if local else {}
         for identity in self._identities.values():
             valid = [
@@ -47,7 +47,7 @@ class Book:
         return found
 
     def next_end(self, now: float) -> float:
-        """When the next right ends; infinity: none does."""
+        """Return when the next right ends; infinity: none does."""
         ends = [grant.until for identity in self._identities.values() for grant in identity.grants]
         return min((end for end in ends if end is not None and end > now), default=float("inf"))
 

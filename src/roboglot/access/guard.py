@@ -139,7 +139,7 @@ class Guard:
         return LOCAL if self.config.local and is_loopback(host) else None
 
     def may(self, who: str, robot: str, right: Right) -> bool:
-        """Whether ``who`` has the right on the robot."""
+        """Return whether ``who`` has the right on the robot."""
         return right in self._book.rights(robot, self.now(), local=self.config.local).get(who, NOTHING)
 
     async def admit(self, address: str, proof: Proof) -> str:
@@ -208,11 +208,11 @@ class RobotAdmission(Admission):
         robot.tap.listen(self._note_reply)
 
     def known(self, address: str, proof: Proof = NO_PROOF) -> str | None:
-        """Who the client is, if that needs no work."""
+        """Return who the client is, if that needs no work."""
         return self._guard.known(address, proof)
 
     async def admit(self, address: str, proof: Proof = NO_PROOF) -> str:
-        """Who the client is. Raises Unknown."""
+        """Return who the client is. Raises Unknown."""
         try:
             return await self._guard.admit(address, proof)
         except Unknown as unknown:
@@ -224,11 +224,11 @@ class RobotAdmission(Admission):
         return self._guard.bytes.spend(client, amount)
 
     def carries_datagrams(self, address: str) -> bool:
-        """Whether the client came by no tunnel."""
+        """Return whether the client came by no tunnel."""
         return host_of(address) not in self._guard.tunnels
 
     def may_shake_hands(self, host: str) -> bool:
-        """Whether one more TLS handshake may begin."""
+        """Return whether one more TLS handshake may begin."""
         return self._guard.may_shake_hands(host)
 
     async def invite(self, name: str, rights: frozenset[Right], seconds: float) -> Proof | None:
@@ -272,7 +272,7 @@ class RobotAdmission(Admission):
         self._note(identity(), connection(), door, operation, "done", "")
 
     def may(self, right: Right) -> bool:
-        """Whether the client that is asked for has ``right``."""
+        """Return whether the client that is asked for has ``right``."""
         return right in self._rights.get(identity(), NOTHING)
 
     def offer(self, server: asyncio.Server, factory: Callable[[], asyncio.Protocol]) -> None:

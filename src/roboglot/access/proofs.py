@@ -71,7 +71,7 @@ class Proofs:
         return name if secret and self._book.by_token(token_hash(secret)) == name else None
 
     async def _by_password(self, proof: Proof, host: str) -> str | None:
-        """Who has this password; what is wrong counts against the host and the name. Raises LockedOut."""
+        """Return who has this password; what is wrong counts against the host and the name. Raises LockedOut."""
         name, password = basic_of(proof.value)
         if not self._tries.take(host):
             raise LockedOut("too many wrong passwords and tokens from your address: wait a minute")

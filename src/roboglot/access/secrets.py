@@ -19,12 +19,12 @@ def new_token() -> str:
 
 
 def token_hash(token: str) -> str:
-    """What is kept of a token; its 256 bits need no slow hash."""
+    """Return what is kept of a token; its 256 bits need no slow hash."""
     return hashlib.sha256(token.encode("utf-8", "surrogatepass")).hexdigest()
 
 
 def password_hash(password: str) -> str:
-    """What is kept of a password: "scrypt$salt$key". Raises ValueError for one that is too short or too long."""
+    """Return what is kept of a password: "scrypt$salt$key". Raises ValueError for one that is too short or too long."""
     if not PASSWORD_MIN <= len(password) <= PASSWORD_MAX:
         raise ValueError(f"a password has {PASSWORD_MIN} to {PASSWORD_MAX} characters")
     salt = secrets.token_bytes(_SALT_BYTES)

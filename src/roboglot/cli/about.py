@@ -35,7 +35,7 @@ def _kernels() -> str:
 
 
 def _jail() -> str:
-    """What keeps other people's programs in, found out by starting it."""
+    """Return what keeps other people's programs in, found out by starting it."""
     if not is_there("numpy"):
         return "not here: programs need numpy, of roboglot[programs]"
     from roboglot.cli.doctor import examine_sandbox

@@ -160,7 +160,7 @@ def _take(transform: TransformStamped, fixed: dict[str, tuple[str, Pose]], wheel
 
 
 def _mount(fixed: dict[str, tuple[str, Pose]], frame: str) -> Pose:
-    """Where the laser is on the robot: up tf's tree as far as it goes."""
+    """Return where the laser is on the robot: up tf's tree as far as it goes."""
     mount, frame = ORIGIN, frame.strip("/")
     for _ in range(CHAIN_MAX):
         if frame in BASE_FRAMES or frame not in fixed:

@@ -91,7 +91,7 @@ class _PacketTrack(MediaStreamTrack, Generic[P]):
         return Packet(media.data)
 
     def _due(self, now: int) -> int:
-        """When the packet is to be shown, in units of ``base``; ``now`` is when it was made."""
+        """Return when the packet is to be shown, in units of ``base``; ``now`` is when it was made."""
         return max(self._last + 1, now)
 
     def _shown_at(self, stamp: float) -> float:

@@ -103,7 +103,7 @@ class Actions:
         self._events.publish(ActionChanged(stamp=self.clock.time(), action=action))
 
     def running(self, resource: str | None = None) -> list[Action]:
-        """Those not ended, oldest first; only those that hold ``resource`` if given."""
+        """Return those not ended, oldest first; only those that hold ``resource`` if given."""
         return [a for a in self._running.values() if resource is None or resource in a.resources]
 
     def get(self, id: int) -> Action:

@@ -53,11 +53,11 @@ class Admission:
     connections_max = 0  # of one address at once, where ``asks``
 
     def known(self, address: str, proof: Proof = NO_PROOF) -> str | None:
-        """Who the client at ``address`` ("10.0.0.7:40312") is, if that needs no work; None: ask ``admit``."""
+        """Return who the client at ``address`` ("10.0.0.7:40312") is, if that needs no work; None: ask ``admit``."""
         return ""
 
     async def admit(self, address: str, proof: Proof = NO_PROOF) -> str:
-        """Who the client is; the name of a person or machine, or an address. Raises Unknown."""
+        """Return who the client is; the name of a person or machine, or an address. Raises Unknown."""
         return ""
 
     def check(self, door: str, operation: str, right: Right | None) -> None:
@@ -84,18 +84,18 @@ class Admission:
         return 0.0
 
     def may_shake_hands(self, host: str) -> bool:
-        """Whether one more TLS handshake with ``host`` may begin now: each costs as much as 50 requests."""
+        """Return whether one more TLS handshake with ``host`` may begin now: each costs as much as 50 requests."""
         return True
 
     def carries_datagrams(self, address: str) -> bool:
-        """Whether a client can be sent UDP of any port: not through a tunnel, which carries the vendors' own."""
+        """Return whether a client can be sent UDP of any port: not through a tunnel, which carries the vendors' own."""
         return True
 
     def offer(self, server: Server, factory: Callable[[], Protocol]) -> None:
         """A door listens by ``server``; what comes to its port gets ``factory``'s protocols."""
 
     def offered(self, port: int) -> tuple[Server, Callable[[], Protocol]] | None:
-        """What was offered last for ``port``."""
+        """Return what was offered last for ``port``."""
         return None
 
     def on_lost(self, listener: Callable[[str], None]) -> Callable[[], None]:

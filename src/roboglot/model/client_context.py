@@ -37,7 +37,7 @@ def connection() -> str:
 
 
 def identity() -> str:
-    """Who it is, as admitted; empty: no client asked, the robot or a program acts by itself."""
+    """Return who it is, as admitted; empty: no client asked, the robot or a program acts by itself."""
     return _identity.get()
 
 

@@ -225,7 +225,7 @@ class RealClock(Clock):
         return real + (stamp - robot) / self._speed
 
     def late(self, _when: float) -> bool:
-        """Whether the clock stood still since a timer for then was armed, so that it is not yet due."""
+        """Return whether the clock stood still since a timer for then was armed, so that it is not yet due."""
         return False
 
     def forget(self, timer: _RealTimer) -> None:

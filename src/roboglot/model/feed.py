@@ -46,7 +46,7 @@ class Viewer(Generic[T]):
         return self._queue.popleft()
 
     def drain(self) -> list[T]:
-        """All that is queued now, oldest first, without waiting."""
+        """Return all that is queued now, oldest first, without waiting."""
         items = list(self._queue)
         self._queue.clear()
         return items

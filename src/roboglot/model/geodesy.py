@@ -35,7 +35,7 @@ class GlobeAnchor:
     north: float | None = None
 
     def around(self, fix: GpsReading) -> Region:
-        """Where in the map the robot can be that has this fix: a square that holds the place with its error."""
+        """Return where in the map the robot can be that has this fix: a square that holds the place with its error."""
         east, north = offset(self.latitude, self.longitude, fix.latitude, fix.longitude)
         reach = self._reach(fix)
         x, y = self.point.x, self.point.y
@@ -88,7 +88,7 @@ def offset(latitude: float, longitude: float, to_latitude: float, to_longitude: 
 
 
 def metres_a_degree(latitude: float) -> tuple[float, float]:
-    """What a degree of longitude and one of latitude measure there, m."""
+    """Return what a degree of longitude and one of latitude measure there, m."""
     phi = math.radians(latitude)
     e2 = FLATTENING * (2.0 - FLATTENING)
     bulge = 1.0 - e2 * math.sin(phi) ** 2

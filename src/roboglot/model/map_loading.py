@@ -17,5 +17,5 @@ def load_map(robot: Robot, stored: StoredMap, pose: Pose) -> None:
 
 
 def known_dock(robot: Robot) -> Pose | None:
-    """Where base_link stands in map when docked; None for a robot that knows no dock, or cannot dock."""
+    """Return where base_link stands in map when docked; None for a robot that knows no dock, or cannot dock."""
     return robot[Docking].home if Docking in robot else None

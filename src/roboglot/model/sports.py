@@ -23,11 +23,11 @@ class _Figure:
         self.measure = max(torso, 1.3 * shoulders, 1e-6)
 
     def above(self, upper: str, lower: str) -> float:
-        """How much higher in the picture the one pair of joints lies than the other, in measures."""
+        """Return how much higher in the picture the one pair of joints lies than the other, in measures."""
         return (self._at(lower)[1] - self._at(upper)[1]) / self.measure
 
     def knees_apart(self) -> float:
-        """How much higher one knee is than the other."""
+        """Return how much higher one knee is than the other."""
         return abs(self._one("left_knee")[1] - self._one("right_knee")[1]) / self.measure
 
     def off_the_hands(self) -> float:

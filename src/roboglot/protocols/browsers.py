@@ -98,7 +98,7 @@ class Browsers:
         return host is not None and (_is_address(host) or host.endswith(".localhost") or host in self._hosts)
 
     def _welcomes(self, origin: str, host: str | None) -> bool:
-        """Whether a page of ``origin`` may use the door as ``host``."""
+        """Return whether a page of ``origin`` may use the door as ``host``."""
         if self.any_origin or origin.lower() in self._origins:
             return True
         try:
@@ -130,13 +130,13 @@ def host_name(text: str) -> str | None:
 
 
 def of_rows(rows: Iterable[tuple[bytes, bytes]], method: str) -> Headers:
-    """What an ASGI request's header rows (names in lower case) say."""
+    """Return what an ASGI request's header rows (names in lower case) say."""
     found = {name: value for name, value in rows if name in _NAMES}
     return of_texts({name.decode(): value.decode("latin-1") for name, value in found.items()}, method)
 
 
 def of_texts(found: dict[str, str], method: str) -> Headers:
-    """What headers by their names in lower case say."""
+    """Return what headers by their names in lower case say."""
     opens_page = (
         method == "GET" and found.get("sec-fetch-mode") == "navigate" and found.get("sec-fetch-dest") == "document"
     )

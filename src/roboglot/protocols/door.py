@@ -178,7 +178,7 @@ class DoorType:
         return config.doors.get(self.name) or self.config()
 
     def listens(self, config: Config) -> bool:
-        """Whether clients reach it at a robot's address."""
+        """Return whether clients reach it at a robot's address."""
         reached = any(port.kind in (PortKind.TCP, PortKind.ROUTER) for port in self.ports)
         return reached and bool(getattr(self.section(config), "enabled", True))
 

@@ -18,7 +18,7 @@ class Connections:
         return self._hosts.total()
 
     def of(self, host: str) -> int:
-        """How many of them are this host's."""
+        """Return how many of them are this host's."""
         return self._hosts[host]
 
     def enter(self, host: str, share: int) -> bool:

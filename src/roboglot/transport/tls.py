@@ -204,7 +204,7 @@ class TlsPort(TlsEnd):
             super().data_received(data)
 
     def _begin(self, data: bytes) -> bool:
-        """Whether it is TLS and may be; plain connections go to their protocol."""
+        """Return whether it is TLS and may be; plain connections go to their protocol."""
         if data[0] != HELLO:
             self._calm_down()
             if not self._tls.plain:

@@ -125,7 +125,7 @@ class Dialling:
         return False
 
     async def _is_there(self, place: Place) -> bool:
-        """Whether a gateway that refused us is still the robot's."""
+        """Return whether a gateway that refused us is still the robot's."""
         try:
             now = await self._places.of(self._robot)
         except OSError:

@@ -296,7 +296,7 @@ class _Calls:
 
 
 def _is_free(address: str, ports: tuple[int, ...]) -> bool:
-    """Whether nothing listens at these ports of a loopback address."""
+    """Return whether nothing listens at these ports of a loopback address."""
     for port in ports:
         with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -38,7 +38,7 @@ def examine_security(config: Config) -> Iterator[Finding]:
 
 
 def reach_of(address: str) -> str:
-    """Who can reach what listens at this address."""
+    """Return who can reach what listens at this address."""
     if is_loopback(address):
         return "programs on this machine"
     return "every network of this machine" if address in ("0.0.0.0", "::") else f"the network of {address}"
@@ -171,7 +171,7 @@ def _unused(config: Config, identities: list[Identity]) -> Iterator[Finding]:
 
 
 def _used(config: Config, since: float) -> tuple[Mapping[str, set[Right]], float | None]:
-    """Which rights each identity made use of, and when the audit begins."""
+    """Return which rights each identity made use of, and when the audit begins."""
     needed: dict[tuple[str, str], Right] = {
         (door.name, str(_key(operation.key))): operation.right
         for door in DOORS

@@ -49,7 +49,7 @@ class Subscription(Generic[E_]):
         self._wakeup.set()
 
     def drain(self) -> list[E_]:
-        """All that is queued now, oldest first, without waiting."""
+        """Return all that is queued now, oldest first, without waiting."""
         events = list(self._queue)
         self._queue.clear()
         self._wakeup.clear()

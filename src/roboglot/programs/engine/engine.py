@@ -185,7 +185,7 @@ class Engine:
     async def check(
         self, source: str, prelude: Prelude = _EMPTY, *, functions: frozenset[str] = frozenset()
     ) -> list[Problem]:
-        """What is wrong with a program, found by a jailed worker; ``functions`` are names its modules define.
+        """Return what is wrong with a program, found by a jailed worker; ``functions`` are names its modules define.
 
         Raises as ``start``.
         """

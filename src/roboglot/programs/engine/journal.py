@@ -54,7 +54,7 @@ class History:
 
 
 def does_something(name: str) -> bool:
-    """Whether a call has an effect beyond its answer."""
+    """Return whether a call has an effect beyond its answer."""
     return not name.startswith("time.") and not name.endswith(_READING)
 
 

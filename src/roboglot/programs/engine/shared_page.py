@@ -55,7 +55,7 @@ class Page:
         self._set(0, 0)
 
     def stops(self, unit: int, line: int) -> bool:
-        """Whether it halts there each time."""
+        """Return whether it halts there each time."""
         number = self._places.number(unit, line)
         return not self._memory.closed and number > 0 and bool(self._memory[self._places.stops + number])
 

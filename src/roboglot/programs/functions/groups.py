@@ -48,7 +48,7 @@ GROUPS = ("motion", "task", *PARTS)
 
 
 def state_of(session: Session, group: str) -> Record:
-    """How the group is: its sensor's health, else how its last call went."""
+    """Return how the group is: its sensor's health, else how its last call went."""
     component = PARTS.get(group)
     if component is None:
         return session.states.get(group, state())

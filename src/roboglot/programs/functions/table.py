@@ -114,7 +114,7 @@ def bind(operation: Operation[str], args: Sequence[object], kwargs: Mapping[str,
 
 
 def _in_words(error: str) -> str:
-    """What does not fit, said for pupils."""
+    """Return what does not fit, said for pupils."""
     if misfit := _MISFIT.search(error):
         wanted, given, name = misfit.groups()
         found = "a fraction" if (wanted, given) == ("int", "float") else _KINDS.get(given, given)

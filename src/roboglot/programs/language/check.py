@@ -26,7 +26,7 @@ _LOOKED_AT_MAX = 4 * PROBLEMS_MAX
 
 
 def check(source: str, names: Names | None = None) -> list[Problem]:
-    """What is wrong with a program, in the order of its lines; empty if it can run.
+    """Return what is wrong with a program, in the order of its lines; empty if it can run.
 
     ``names`` is what the host offers; without it, unknown names are not looked for.
     """

@@ -70,7 +70,7 @@ _IDENTIFIERS: dict[type[ast.AST], tuple[str, ...]] = {
 
 
 def attribute_allowed(name: str) -> bool:
-    """Whether ``object.name`` may be read; ``getattr`` asks the same question while the program runs."""
+    """Return whether ``object.name`` may be read; ``getattr`` asks the same question while the program runs."""
     if name.startswith("__") and name.endswith("__"):
         return name in _READABLE
     return name not in _BLOCKED

@@ -25,7 +25,7 @@ class Inspector:
         self._prelude = prelude
 
     def reserved(self, name: str) -> bool:
-        """Whether the language or the robot's functions use this name already."""
+        """Return whether the language or the robot's functions use this name already."""
         names = self._prelude.names()
         return name in BUILTINS or name in names.plain or name in names.roots or name in MODULES
 

@@ -77,7 +77,7 @@ class ModuleLibrary:
             raise ModuleGone(f"the module {gone} was deleted just now") from None
 
     async def modules(self, ids: Collection[str] = ()) -> list[ListedProgram]:
-        """Those of ``ids`` that exist, or all, by id."""
+        """Return those of ``ids`` that exist, or all, by id."""
         self._allow(TaskOperation.INQUIRY)
         return await self._store.all(ids)
 

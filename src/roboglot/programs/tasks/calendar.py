@@ -20,7 +20,7 @@ def due_of(mode: str, condition: str, now: float, zone: tzinfo) -> float | None:
 
 
 def due_once(moment: Moment, now: float, zone: tzinfo) -> float | None:
-    """When ``moment`` is, in seconds since 1970; None: it is past, or after the end of the calendar.
+    """Return when ``moment`` is, in seconds since 1970; None: it is past, or after the end of the calendar.
 
     A clock time without a date is today's, or tomorrow's if today's is past; what is added counts from there.
     """

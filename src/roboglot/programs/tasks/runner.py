@@ -266,7 +266,7 @@ class Runner:
         self.reports.publish(TaskReport(id, TaskOperation.STOP, "stop task"))
 
     async def _put_away(self, run: TaskRun, before: TaskState, operation: TaskOperation) -> TaskState:
-        """What becomes of a task whose program is gone; its mode may have been changed while it ran."""
+        """Return what becomes of a task whose program is gone; its mode may have been changed while it ran."""
         id = run.task.id
         self.runs.pop(id, None)
         task = await self._store.get(id) or run.task

@@ -133,7 +133,7 @@ class TaskRun:
         return self._run.position.watched
 
     def figures(self) -> RunFigures:
-        """What it takes just now."""
+        """Return what it takes just now."""
         usage = usage_of(self._run.pid)
         return RunFigures(self.task.id, self.state, usage.cpu, usage.memory, self._clock.time() - self._began)
 

@@ -40,11 +40,11 @@ class Vector(list[object]):
         return self[index]
 
     def size(self) -> int:
-        """How many items."""
+        """Return how many items."""
         return len(self)
 
     def empty(self) -> bool:
-        """Whether there is none."""
+        """Return whether there is none."""
         return not self
 
     def max_size(self) -> int:
@@ -62,11 +62,11 @@ class Dictionary(dict[object, object]):
     __slots__ = ()
 
     def size(self) -> int:
-        """How many entries."""
+        """Return how many entries."""
         return len(self)
 
     def empty(self) -> bool:
-        """Whether there is none."""
+        """Return whether there is none."""
         return not self
 
     def max_size(self) -> int:

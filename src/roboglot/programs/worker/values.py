@@ -93,7 +93,7 @@ def _pack_int(value: int) -> object:
 
 
 def separators(text: bytes) -> int:
-    """How many values a JSON text can have at most, without looking at any."""
+    """Return how many values a JSON text can have at most, without looking at any."""
     return len(text) - len(text.translate(None, SEPARATORS))
 
 
@@ -108,7 +108,7 @@ def unpack(packed: object, join: Join = Record) -> Any:
 
 
 def drained(steps: Generator[None, None, T]) -> T:
-    """What ``steps`` give in the end."""
+    """Return what ``steps`` give in the end."""
     try:
         while True:
             next(steps)

@@ -67,7 +67,7 @@ class Whereabouts:
         return memoryview(self._memory)[self._places.stops : self._places.memory()]
 
     def works(self) -> bool:
-        """Whether this Python keeps lists as expected; if not, no line could be reported."""
+        """Return whether this Python keeps lists as expected; if not, no line could be reported."""
         other = self._marked(1) if len(self._table) > 2 else self._marks[0]
         before, self.cell[0] = self.cell[0], other
         held = self._table[0] == id(other)

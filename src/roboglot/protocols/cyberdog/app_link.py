@@ -120,7 +120,7 @@ class AppLink:
         self._news.set()
 
     async def alive(self) -> bool:
-        """Whether a heartbeat that is sent from now on gets through; the app is lost if none does."""
+        """Return whether a heartbeat that is sent from now on gets through; the app is lost if none does."""
         if not self.connected:
             return False
         answer: asyncio.Future[bool] = asyncio.get_running_loop().create_future()

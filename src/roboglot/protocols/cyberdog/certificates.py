@@ -52,7 +52,7 @@ class Certificates:
 
 
 def ensure_certificates(folder: Path) -> Certificates:
-    """Those in ``folder``/tls; made first if there are none. Raises BadCertificates, or OSError from the disk.
+    """Return those in ``folder``/tls; made first if there are none. Raises BadCertificates, or OSError from the disk.
 
     All files appear at once or not at all, so two robots starting together agree on one CA.
     """
@@ -154,7 +154,7 @@ def fingerprint(certificate: Path) -> str:
 
 
 def _serves(path: Path, names: Collection[str]) -> bool:
-    """Whether a certificate of ours is for all these names and still good for a month."""
+    """Return whether a certificate of ours is for all these names and still good for a month."""
     try:
         certificate = x509.load_pem_x509_certificate(path.read_bytes())
         listed = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName).value

@@ -103,7 +103,7 @@ def _own(address: str) -> IPAddress | None:
 
 
 def _peers(own: IPAddress | None, port: int) -> dict[str, str]:
-    """Who is connected there, or was a moment ago, as gRPC writes it; and the connection's state."""
+    """Return who is connected there, or was a moment ago, as gRPC writes it; and the connection's state."""
     peers: dict[str, str] = {}
     for table in TABLES:
         try:

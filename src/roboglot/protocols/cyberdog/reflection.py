@@ -81,7 +81,7 @@ def _answer(question: Any, answer: Any) -> Any:
 
 
 def _ours(symbol: str, service: str) -> bool:
-    """Whether the service, one of its methods or a message has that name."""
+    """Return whether the service, one of its methods or a message has that name."""
     package, _, name = symbol.rpartition(".")
     return (
         symbol == service

@@ -162,7 +162,7 @@ class CyberDogDoor:
         return context
 
     def _parts(self, app: AppLink) -> Context:
-        """What the chapters keep."""
+        """Return what the chapters keep."""
         robot, gaits, updates = self._robot, Gaits(self._robot), Updates(self._robot, app)
         files = CameraFiles(robot, self._data / FOLDER / "camera" / robot.id)
         voice = Voice(robot, gaits, lambda code, id: app.push(TRAINED, {"code": code, "voiceprint_id": id}))
@@ -298,13 +298,13 @@ class _Service(GrpcAppServicer):  # type: ignore[misc]
 
 
 def _as_client(store: CertificateStore) -> object:
-    """How the robot proves itself to the app it dials."""
+    """Return how the robot proves itself to the app it dials."""
     proof = store.newest()
     return grpc.ssl_channel_credentials(proof.callers, proof.key, proof.certificate)
 
 
 def _as_server(store: CertificateStore, handshakes: Handshakes) -> object:
-    """How it proves itself to who calls, and whom it lets in; looked up again at every connection."""
+    """Return how it proves itself to who calls, and whom it lets in; looked up again at every connection."""
 
     def configured(proof: Certificates) -> object:
         return grpc.ssl_server_certificate_configuration(((proof.key, proof.certificate),), proof.callers)

@@ -53,7 +53,7 @@ def extras() -> dict[int, bool]:
 
 
 def _rows() -> dict[str, str]:
-    """What each row that is there cannot do; one row may be a request and a push."""
+    """Return what each row that is there cannot do; one row may be a request and a push."""
     whys: dict[str, list[str]] = {}
     for key, partial in (
         [(op.key, op.partial) for op in TABLE]

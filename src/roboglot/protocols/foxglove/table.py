@@ -29,5 +29,5 @@ class Messages:
 
     @staticmethod
     def partly() -> dict[str, str]:
-        """What is sent in part."""
+        """Return what is sent in part."""
         return {"fetchAssetResponse": "refusals only: there are no files to fetch"}

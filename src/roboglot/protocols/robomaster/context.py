@@ -127,7 +127,7 @@ class Context:
         return stopping
 
     def moves(self, name: str) -> bool:
-        """Whether anything runs that ``name`` commanded."""
+        """Return whether anything runs that ``name`` commanded."""
         return any(action.source == f"{self._name} {name}" for action in self.robot.actions.running())
 
     def stop_speaker(self, name: str) -> None:

@@ -35,5 +35,5 @@ class Datagrams:
 
 
 def broadcast_address(address: str) -> str:
-    """Where everybody hears it who shares a network with ``address``."""
+    """Return where everybody hears it who shares a network with ``address``."""
     return "127.255.255.255" if IPv4Address(address).is_loopback else "255.255.255.255"

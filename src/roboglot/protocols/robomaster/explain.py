@@ -32,7 +32,7 @@ def _spelt(key: str, words: typing.Iterable[str]) -> str:
 
 
 def nearest_values(name: str, shape: Shape, values: Mapping[str, Value]) -> str:
-    """Which values are wrong, what they may be, and the command with the nearest ones that are right."""
+    """Return which values are wrong, what they may be, and the command with the nearest ones that are right."""
     wrong: list[str] = []
     better = dict(values)
     for parameter, value in values.items():
@@ -98,7 +98,7 @@ def _worded(kind: Any) -> str:
 
 
 def _nearest(kind: Any, value: Value) -> Value | None:
-    """What is valid and nearest to ``value``; None if nothing can be said."""
+    """Return what is valid and nearest to ``value``; None if nothing can be said."""
     if choices := _choices(kind):
         if isinstance(value, int | float) and all(isinstance(choice, int) for choice in choices):
             nearest: int = min(choices, key=lambda choice: abs(choice - value))

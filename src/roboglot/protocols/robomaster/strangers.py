@@ -73,7 +73,7 @@ def _protocol(head: bytes) -> str:
 
 
 def _undecided(head: bytes) -> bool:
-    """Whether more bytes could make it a stranger's."""
+    """Return whether more bytes could make it a stranger's."""
     if _SSH.startswith(head) or _PERHAPS_HTTP.fullmatch(head):
         return True
     return any(method.startswith(head.lower()) for method in _METHODS)

@@ -30,5 +30,5 @@ class Messages:
 
     @staticmethod
     def partly() -> dict[str, str]:
-        """What is published in part."""
+        """Return what is published in part."""
         return {"joint_states": "the gimbal alone, of robots that have one"}

@@ -184,7 +184,7 @@ class Application:
             return await self._carry_out(row, match, scope, receive)
 
     def _page(self, path: str, method: str) -> tuple[Headers, bytes]:
-        """What is served besides the API."""
+        """Return what is served besides the API."""
         if (page := self._pages.find(path)) is None:
             raise HttpError(404, "Not Found")
         if method not in ("GET", "HEAD"):
@@ -302,6 +302,6 @@ def not_allowed(methods: Iterable[str]) -> HttpError:
 
 
 def _only_plain(scope: Scope) -> bool:
-    """Whether the client accepts text/plain and nothing else."""
+    """Return whether the client accepts text/plain and nothing else."""
     accepted = b",".join(value for name, value in scope["headers"] if name == b"accept")
     return {entry.partition(b";")[0].strip().lower() for entry in accepted.split(b",")} == {b"text/plain"}

@@ -76,7 +76,7 @@ class Routes:
                 self._by_length.setdefault(len(template.segments), []).append(template)
 
     def find(self, path: str) -> Match | None:
-        """What is at ``path``, given as it came: each segment is percent-decoded by itself.
+        """Return what is at ``path``, given as it came: each segment is percent-decoded by itself.
 
         So ``%3A`` is as good as a colon, and a ``%2F`` belongs to its segment.
         """

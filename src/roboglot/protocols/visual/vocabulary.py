@@ -12,7 +12,7 @@ def key_of(request: Request) -> str:
 
 
 def program(request: Request) -> StoredProgram:
-    """What a frame wants saved."""
+    """Return what a frame wants saved."""
     return StoredProgram(
         id=request.targets[0],
         describe=request.describe,

@@ -118,11 +118,11 @@ class Annotations:
     last_id: int = 0
 
     def lines_of(self, kind: LineKind) -> tuple[Line, ...]:
-        """Those of one kind, oldest first."""
+        """Return those of one kind, oldest first."""
         return tuple(line for line in self.lines if line.kind is kind)
 
     def areas_of(self, kind: AreaKind) -> tuple[Area, ...]:
-        """Those of one kind, oldest first."""
+        """Return those of one kind, oldest first."""
         return tuple(area for area in self.areas if area.kind is kind)
 
     def with_new(self, *entries: Line | Area) -> Annotations:
@@ -142,7 +142,7 @@ class MapAnnotations(Component):
     @property
     @abstractmethod
     def current(self) -> Annotations:
-        """Now; a value, so compare it by identity to see whether anything changed."""
+        """Everything drawn at this moment; a value, so compare it by identity to see whether anything changed."""
 
     @abstractmethod
     async def change(self, edit: Callable[[Annotations], Annotations]) -> None:

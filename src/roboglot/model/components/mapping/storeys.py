@@ -26,7 +26,7 @@ class StoreyMaps(Protocol):
         """The floor that the robot is on."""
 
     def places(self) -> list[StoreyPlace]:
-        """Those of all other floors, in the order of the floors."""
+        """Return those of all other floors, in the order of the floors."""
 
     def home(self) -> str:
         """The floor of the dock that the robot goes home to."""

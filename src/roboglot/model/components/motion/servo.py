@@ -24,7 +24,7 @@ class Servos(Component):
 
     @abstractmethod
     def angle(self, number: int) -> float:
-        """Where it stands, rad in [-pi, pi]; half a turn has the sign of the side from which it got there."""
+        """Return where it stands, rad in [-pi, pi]; half a turn has the sign of the side from which it got there."""
 
     @abstractmethod
     def move_to(self, number: int, angle: float, *, speed: float | None = None, source: str = "") -> Action:

@@ -18,7 +18,7 @@ class Detector(ABC, Generic[T]):
 
     @abstractmethod
     def subscribe(self) -> Viewer[Sighting[T]]:
-        """What it makes out from now on, also when that is nothing; the same for every viewer.
+        """Return what it makes out from now on, also when that is nothing; the same for every viewer.
 
         Closing the viewer switches the detector off, if it was the last. Raises Busy when there are too many.
         """

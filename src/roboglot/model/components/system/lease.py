@@ -132,7 +132,7 @@ class Lease(Component):
         return "" if self._taken_by == PERSON else self._taken_by.partition(" ")[2]
 
     def is_of(self, who: str) -> bool:
-        """Whether control is taken by the client that showed to be ``who``, by whatever door."""
+        """Return whether control is taken by the client that showed to be ``who``, by whatever door."""
         return bool(who) and (self.client == who or self.client.startswith(f"{who}:"))
 
     async def release(self) -> None:

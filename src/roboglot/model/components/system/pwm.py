@@ -25,7 +25,7 @@ class PwmPorts(Component):
 
     @abstractmethod
     def signal(self, port: int) -> PwmSignal:
-        """What it puts out."""
+        """Return what it puts out."""
 
     @abstractmethod
     def set_duty(self, port: int, duty: float) -> None:

@@ -269,7 +269,7 @@ async def _newest(robot: Robot, *, outdoor: bool | None = None) -> StoredMap:
 
 
 def same_origin(stored: OccupancyGrid, used: OccupancyGrid) -> bool:
-    """Whether the walls of ``stored`` lie where ``used`` has them: a map of an earlier life lies elsewhere."""
+    """Return whether the walls of ``stored`` lie where ``used`` has them: a map of an earlier life lies elsewhere."""
     rows, columns = np.nonzero(stored.log_odds >= WALL)
     if not len(rows) or not used.width:
         return False

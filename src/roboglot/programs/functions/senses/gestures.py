@@ -59,7 +59,7 @@ class GestureWatch:
             self._viewer = None
 
     def seen(self, within: float) -> set[str]:
-        """What was seen in the last so many seconds, by the manual's names."""
+        """Return what was seen in the last so many seconds, by the manual's names."""
         for sighting in self._viewer.drain() if self._viewer else ():
             for gesture in sighting.seen:
                 if gesture.gesture in KINDS:

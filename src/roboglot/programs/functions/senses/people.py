@@ -36,7 +36,7 @@ class Ear:
         self._heard: deque[SpeechHeard] = deque(maxlen=HEARD_MAX)
 
     def heard(self, since: float) -> list[SpeechHeard]:
-        """What ended after ``since`` (robot time, s)."""
+        """Return what ended after ``since`` (robot time, s)."""
         self._heard.extend(self._viewer.drain())
         return [speech for speech in self._heard if speech.stamp > since]
 

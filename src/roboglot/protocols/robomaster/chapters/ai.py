@@ -83,7 +83,7 @@ class Ai:
                     self._context.send(profile.push("AI", attribute))
 
     def _numbers(self, name: str, seen: Sequence[object]) -> Numbers:
-        """How many, then the numbers of each."""
+        """Return how many, then the numbers of each."""
         targets = [target for target in (WORDED[name](self, each) for each in seen) if target is not None]
         kept = targets[:TARGETS_MAX]
         return (len(kept), *(number for target in kept for number in target))
@@ -111,7 +111,7 @@ class Ai:
         )
 
     def target(self, seen: PersonSeen | RobotSeen) -> Numbers | None:
-        """Where it is."""
+        """Return where it is."""
         return _box(seen.box)
 
 

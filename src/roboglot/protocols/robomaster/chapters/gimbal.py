@@ -137,7 +137,7 @@ async def push(
 
 
 def _near(goal: float | None, now: float) -> bool:
-    """Whether an axis has nowhere to go; then it needs no speed either."""
+    """Return whether an axis has nowhere to go; then it needs no speed either."""
     return goal is not None and abs(goal - now) <= THERE
 
 

@@ -23,7 +23,7 @@ class Readers:
         self._transports: set[asyncio.Transport] = set()
 
     def __bool__(self) -> bool:
-        """Whether anybody reads."""
+        """Return whether anybody reads."""
         return bool(self._transports)
 
     def connect(self) -> asyncio.Protocol:

@@ -49,7 +49,7 @@ class MediaPort:
             watcher.transport.abort()
 
     def admit(self, watcher: _Watcher) -> bool:
-        """Whether there is room for one more."""
+        """Return whether there is room for one more."""
         if len(self._watchers) >= MEDIA_CONNECTIONS_MAX:
             return False
         self._watchers.add(watcher)

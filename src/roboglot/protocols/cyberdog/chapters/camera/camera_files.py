@@ -31,7 +31,7 @@ class CameraFiles:
             self._take(name)
 
     def names(self) -> list[str]:
-        """What is to be fetched, oldest first; not what is being recorded."""
+        """Return what is to be fetched, oldest first; not what is being recorded."""
         if not self._folder.is_dir():
             return []
         return sorted(path.name for path in self._folder.iterdir() if path.suffix in (".jpg", ".mp4"))

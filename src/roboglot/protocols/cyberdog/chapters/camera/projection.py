@@ -52,7 +52,7 @@ class CameraView:
         return self._at.compose(Pose(float(x[index]), float(y[index]))).point
 
     def extent(self, box: Box, place: Point) -> Extent:
-        """How large what fills ``box`` is if it stands at ``place``."""
+        """Return how large what fills ``box`` is if it stands at ``place``."""
         away = max(0.1, Pose(place.x, place.y).relative_to(self._at).x)
         c, s = math.cos(self._pitch), math.sin(self._pitch)
 
@@ -64,7 +64,7 @@ class CameraView:
         return Extent(away * box.width / (2.0 * self._across), low, high)
 
     def box(self, extent: Extent, place: Point) -> Box:
-        """Where in the picture a thing at ``place`` appears; empty behind the camera."""
+        """Return where in the picture a thing at ``place`` appears; empty behind the camera."""
         seen = Pose(place.x, place.y).relative_to(self._at)
         if seen.x <= 0.1:
             return Box(0.0, 0.0, 0.0, 0.0)

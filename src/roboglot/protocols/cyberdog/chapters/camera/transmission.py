@@ -100,7 +100,7 @@ class Transmission:
             self._begin(peer.close())
 
     def _forget(self, peer: _Peer) -> bool:
-        """Whether it was still there."""
+        """Return whether it was still there."""
         peer.give_up.cancel()
         if self._peers.get(peer.uid) is not peer:
             return False

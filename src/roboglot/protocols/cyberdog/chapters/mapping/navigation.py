@@ -172,5 +172,5 @@ async def _arrive(context: Context, task: Task, action: Action) -> TaskResult:
 
 
 def has_map(robot: Robot) -> bool:
-    """Whether anything is known of the surroundings."""
+    """Return whether anything is known of the surroundings."""
     return robot[Mapping].grid.width > 0

@@ -112,7 +112,7 @@ def _hindrance(context: Context, order: Order) -> str:
 
 
 def _run(context: Context, order: Order, goal: Goal, manner: Manner) -> Callable[[Task], Awaitable[TaskResult]]:
-    """What does the work of a task."""
+    """Return what does the work of a task."""
     match order.kind:
         case TaskType.NAVIGATION:
             return partial(navigate, context, goal=goal)

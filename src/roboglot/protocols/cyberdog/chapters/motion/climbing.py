@@ -25,7 +25,7 @@ Points = NDArray[np.float32]
 
 
 def sees(robot: Robot) -> bool:
-    """Whether it has eyes for its way."""
+    """Return whether it has eyes for its way."""
     return DepthCamera in robot or TimeOfFlight in robot
 
 

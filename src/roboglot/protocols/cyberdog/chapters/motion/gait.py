@@ -216,7 +216,7 @@ class Gaits:
         return code
 
     def _leading_to(self, motion: int) -> list[int]:
-        """What must come first in the present posture: standing up, sitting down."""
+        """Return what must come first in the present posture: standing up, sitting down."""
         posture, first = self.posture, []
         if begins_in(motion) == {Posture.SITTING} and posture is not Posture.SITTING:
             first = [int(Motion.SIT_DOWN)]

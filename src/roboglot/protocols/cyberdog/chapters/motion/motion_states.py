@@ -35,5 +35,5 @@ def under_way(action: Action | None) -> bool:
 
 
 def of_another(action: Action | None) -> bool:
-    """Whether ``action`` is under way for another client than the one that asks now."""
+    """Return whether ``action`` is under way for another client than the one that asks now."""
     return action is not None and not action.status.ended and action.client != client()

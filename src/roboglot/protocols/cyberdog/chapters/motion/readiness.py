@@ -19,7 +19,7 @@ UPDATING = frozenset({FirmwareState.INSTALLING, FirmwareState.INSTALLED, Firmwar
 
 
 def machine_state(robot: Robot) -> MachineState:
-    """What charge, power mode and updates allow."""
+    """Return what charge, power mode and updates allow."""
     mode = robot[Power].mode if Power in robot else PowerMode.AWAKE
     if mode is PowerMode.OFF:
         return MachineState.SHUT_DOWN

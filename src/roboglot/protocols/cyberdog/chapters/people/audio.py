@@ -56,7 +56,7 @@ async def audio_token(
 
 
 def activated(robot: Robot, uid: str | None = None) -> bool:
-    """Whether the voice board has an account (``uid``'s, if given) whose token still holds."""
+    """Return whether the voice board has an account (``uid``'s, if given) whose token still holds."""
     account: object = kept(robot, ACCOUNT, None)
     if Hearing not in robot or not isinstance(account, dict) or account["until"] <= robot.clock.epoch():
         return False

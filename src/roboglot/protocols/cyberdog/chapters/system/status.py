@@ -45,7 +45,7 @@ class Status:
 
 
 def status_of(context: Context) -> Status:
-    """Now, from the model."""
+    """Report the state of this moment, from the model."""
     check, errors = self_check(context.robot)
     battery = context.robot[Battery].state if Battery in context.robot else None
     return Status(

@@ -17,7 +17,7 @@ UPDATE = "cyberdog.update"  # the version that the robot restarts for
 
 
 def kept(robot: Robot, key: str, default: object) -> object:
-    """What was set under ``key``; ``default`` for a robot that keeps no settings."""
+    """Return what was set under ``key``; ``default`` for a robot that keeps no settings."""
     return robot[Settings].get(key, default) if Settings in robot else default
 
 
@@ -27,7 +27,7 @@ def nickname(robot: Robot) -> str:
 
 
 def wake_words(robot: Robot) -> tuple[str, ...]:
-    """What it listens to: its default name said twice, and the nickname's word while that is on."""
+    """Return what it listens to: its default name said twice, and the nickname's word while that is on."""
     own = (DEFAULT_NAME * 2,)
     word = str(kept(robot, WAKE_WORD, ""))
     return (*own, word) if word and kept(robot, NICKNAME_ON, False) else own

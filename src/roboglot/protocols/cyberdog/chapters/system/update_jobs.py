@@ -109,7 +109,7 @@ class UpdateJobs:
     # -- what can be wanted; each returns the result's data ----------------------------------------------------------
 
     async def inquire(self, _: Goal) -> dict[str, object]:
-        """What runs, what is downloaded, what the maker offers."""
+        """Return what runs, what is downloaded, what the maker offers."""
         firmware = self._robot[Firmware]
         offered, package = firmware.available, firmware.progress.package
         return {
@@ -172,7 +172,7 @@ class UpdateJobs:
         return {}
 
     async def disk(self, _: Goal) -> dict[str, object]:
-        """How much room there is, in bytes."""
+        """Return how much room there is, in bytes."""
         disk = self._robot[Disk]
         return {"size": disk.size, "free": disk.free}
 

@@ -69,7 +69,7 @@ def wire_area(area: Area) -> wire.RectangleArea:
 
 
 def seen_from(origin: Point, drawn: Drawings) -> Drawings:
-    """All of it in the frame of the same map whose origin is moved to ``origin``."""
+    """Return all of it in the frame of the same map whose origin is moved to ``origin``."""
     by = Pose(origin.x, origin.y)
 
     def point(p: Point) -> Point:

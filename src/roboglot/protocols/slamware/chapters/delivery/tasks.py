@@ -54,7 +54,7 @@ async def get_tasks(
 
 
 def is_asked(status: OrderStatus, asked: StatusFilter | None) -> bool:
-    """Whether a query by status means this; none means what has not ended."""
+    """Return whether a query by status means this; none means what has not ended."""
     match asked:
         case None:
             return not status.ended

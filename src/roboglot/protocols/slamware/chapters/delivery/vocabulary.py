@@ -109,7 +109,7 @@ STOCKS = {Stock.EMPTY: "EMPTY", Stock.PARTLY: "SEMIFULL", Stock.FULL: "FULL"}
 
 
 def request_of(body: TaskRequest) -> OrderRequest:
-    """What the client wants, in the model's words. Box "000" is number 0."""
+    """Return what the client wants, in the model's words. Box "000" is number 0."""
     boxes = boxes_of(body.cargos or ())
     return OrderRequest(KINDS[body.type], body.location.poi_name, tuple(body.location.task_points), boxes)
 
@@ -133,7 +133,7 @@ def reason_of(failure: Failure | None) -> str:
 
 
 def results_of(results: Sequence[PickUp]) -> list[PickupResult]:
-    """What became of boxes and stops."""
+    """Return what became of boxes and stops."""
     found = []
     for result in results:
         entry = PickupResult("FAILED" if result.failure else "SUCCEEDED", reason=reason_of(result.failure))
@@ -171,7 +171,7 @@ def task_request_of(robot: Robot, order: Order) -> DeliveryTaskRequest:
 
 
 def ride_word(action: Action | None) -> str:
-    """How far a ride in the lift is; empty where there is none."""
+    """Return how far a ride in the lift is; empty where there is none."""
     stage = part_of(action).feedback if action else None
     return RIDE_STAGES[stage] if isinstance(stage, RideStage) else ""
 

@@ -73,5 +73,5 @@ def run_errand(
 
 
 def part_of(action: Action) -> Action:
-    """What an errand is at now; any other action itself."""
+    """Return what an errand is at now; any other action itself."""
     return action.feedback if isinstance(action.feedback, Action) else action

@@ -34,7 +34,7 @@ def home_dock(robot: Robot) -> PointOfInterest | None:
 
 
 def before(dock: PointOfInterest) -> Pose:
-    """Where a robot stands in front of ``dock``."""
+    """Return where a robot stands in front of ``dock``."""
     return dock.pose.compose(Pose(BEFORE_DOCK))
 
 

@@ -85,7 +85,7 @@ def _near_enough(precision: float | None) -> float:
 
 
 def has_tracks(robot: Robot) -> bool:
-    """Whether the map has any."""
+    """Return whether the map has any."""
     return MapAnnotations in robot and bool(robot[MapAnnotations].current.lines_of(LineKind.TRACK))
 
 
@@ -109,7 +109,7 @@ def follow_path_points(context: Context, options: FollowPathPointsOptions) -> Ac
 
 
 def sweep(context: Context, options: SweepOptions) -> Action:
-    """All coverage areas of the map or those with the given ids, in lanes."""
+    """Return all coverage areas of the map or those with the given ids, in lanes."""
     wanted = options.sweep_options
     drawn = context.robot[MapAnnotations].current.areas_of(AreaKind.COVERAGE)
     ids = set(wanted.region_ids or ()) if wanted else set()

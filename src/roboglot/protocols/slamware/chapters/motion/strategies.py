@@ -17,7 +17,7 @@ SHARES = {"default": 1.0, "careful": 0.5}  # of the speed of every way that a cl
 
 
 def speed_share(robot: Robot) -> float:
-    """What the strategy in use leaves of the speed."""
+    """Return what the strategy in use leaves of the speed."""
     return SHARES.get(_current(robot), 1.0)
 
 

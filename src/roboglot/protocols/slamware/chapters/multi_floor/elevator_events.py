@@ -34,7 +34,7 @@ class RideEvents:
         self._told: tuple[int, RideStage | None] = (0, None)
 
     def of(self, action: Action) -> tuple[ElevatorEvent, ...]:
-        """What a change of ``action`` means."""
+        """Return what a change of ``action`` means."""
         stage = action.feedback
         if not isinstance(stage, RideStage):
             return ()

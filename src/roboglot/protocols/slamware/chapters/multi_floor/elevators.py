@@ -81,7 +81,7 @@ class Elevator:
         return Pose(door.x, door.y, wrap_angle(yaw)).compose(Pose(-self.sill - self.distance))
 
     def relation(self, robot: Robot) -> PoseRelation:
-        """Where the robot's middle is, and whether its hull reaches over a door's sill."""
+        """Return where the robot's middle is, and whether its hull reaches over a door's sill."""
         here = robot[Localization].pose
         if self.area.contains(here):
             return PoseRelation.IN
@@ -101,7 +101,7 @@ class Elevator:
 
 
 def elevators_of(drawn: Annotations) -> list[Elevator]:
-    """Those that are drawn on a map; areas without extent are none."""
+    """Return those that are drawn on a map; areas without extent are none."""
     return [_elevator(area) for area in drawn.areas_of(AreaKind.ELEVATOR) if area.start != area.end]
 
 
@@ -124,7 +124,7 @@ def _metres(words: dict[str, str], key: str, default: float) -> float:
 
 
 def elevators_here(robot: Robot) -> list[Elevator]:
-    """Those of the map in memory."""
+    """Return those of the map in memory."""
     return elevators_of(robot[MapAnnotations].current)
 
 

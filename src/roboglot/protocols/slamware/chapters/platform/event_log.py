@@ -94,7 +94,7 @@ class EventLog:
         self._unblock()
 
     def read(self) -> list[RobotEvent]:
-        """What happened since the last read, oldest first."""
+        """Return what happened since the last read, oldest first."""
         events = list(self._ring)
         if not self._keep:
             self._ring.clear()
@@ -177,14 +177,14 @@ class EventLog:
 
 
 def _same_obstacle(before: PathBlocked, now: PathBlocked) -> bool:
-    """Whether a client knows of it already: a scan or two without it do not make it another one."""
+    """Return whether a client knows of it already: a scan or two without it do not make it another one."""
     if now.stamp - before.stamp >= OCCUPIED_AGAIN:
         return False
     return before.at is None or now.at is None or before.at.distance_to(now.at) < SAME_PLACE
 
 
 def _waits(action: Action) -> bool:
-    """Whether it still stands before an obstacle."""
+    """Return whether it still stands before an obstacle."""
     if action.status.ended:
         return False
     return not isinstance(action.feedback, NavigationFeedback) or action.feedback.stage == "waiting"

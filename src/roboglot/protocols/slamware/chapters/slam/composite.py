@@ -220,5 +220,5 @@ def _texts(metadata: dict[str, str]) -> dict[str, str]:
 
 
 def clean(text: str) -> str:
-    """What is left of a file's text once it is Unicode."""
+    """Return what is left of a file's text once it is Unicode."""
     return text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")

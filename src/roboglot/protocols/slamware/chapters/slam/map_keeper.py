@@ -274,7 +274,7 @@ class MapKeeper:
             others[last] = seen_from(Point(-shift[0], -shift[1]), now)
 
     async def _others(self) -> dict[str, Drawings]:
-        """What is drawn on the other floors, by their ids, where the robot was since the map was loaded."""
+        """Return what is drawn on the other floors, by their ids, where the robot was since the map was loaded."""
         try:
             return msgspec.json.decode(await self._robot[FileStore].read(DRAWN), type=dict[str, Drawings])
         except NotFound:
@@ -286,7 +286,7 @@ class MapKeeper:
 
 
 def _replacement(floor: FloorMap, basis: dict[str, Sequence[float]], drawn: dict[str, Drawings]) -> Replacement:
-    """What was ``drawn`` on ``floor``, else what the file has there; the others are kept."""
+    """Return what was ``drawn`` on ``floor``, else what the file has there; the others are kept."""
     left = dict(drawn)
     here = left.pop(floor.name.map_id, Drawings(floor.places, floor.annotations))
     return Replacement(here, {BASIS: basis, FLOOR: floor.name.map_id}, {DRAWN: _encoded(left)})

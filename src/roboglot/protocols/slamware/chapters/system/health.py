@@ -73,7 +73,7 @@ async def get_robot_health(context: Context) -> BaseHealthInfo:
 
 
 def _records(robot: Robot) -> list[BaseError]:
-    """What is wrong and not dismissed. Limp legs are an emergency stop that the model has no fault for."""
+    """Return what is wrong and not dismissed. Limp legs are an emergency stop that the model has no fault for."""
     records = [record_of(fault) for fault in (robot[Health].faults if Health in robot else ())]
     if _stopped(robot) and not _has(robot, STOP):
         records.append(health_record(*NUMBERS[STOP], "emergency stop: the legs are limp"))
@@ -81,12 +81,12 @@ def _records(robot: Robot) -> list[BaseError]:
 
 
 def _has(robot: Robot, name: str) -> bool:
-    """Whether this is wrong now, dismissed or not."""
+    """Return whether this is wrong now, dismissed or not."""
     return Health in robot and robot[Health].has(name)
 
 
 def _stopped(robot: Robot) -> bool:
-    """Whether an emergency stop holds the robot: the button, an application, or another door (limp legs)."""
+    """Return whether an emergency stop holds the robot: the button, an application, or another door (limp legs)."""
     engaged = EmergencyStop in robot and robot[EmergencyStop].engaged
     return engaged or (Legs in robot and robot[Legs].posture is Posture.LIMP)
 

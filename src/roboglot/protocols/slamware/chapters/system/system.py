@@ -100,7 +100,7 @@ async def get_robot_info(context: Context) -> DeviceInfo:
 
 
 def software_version(robot: Robot) -> str:
-    """What runs now: updates change it."""
+    """Return what runs now: updates change it."""
     return robot[Firmware].version if Firmware in robot else robot.description.software_version
 
 

@@ -128,7 +128,7 @@ class Reader:
         return taken
 
     def rest(self) -> bytes:
-        """All that is left."""
+        """Return all that is left."""
         return self.take(len(self._data) - self.at)
 
     def short(self) -> int:
