@@ -15,6 +15,7 @@ import statistics
 from _claim import Claims
 from _worlds import drive, loops, warm
 
+CORES = 2  # worlds at a time, where there are more: see _worlds.py
 ROUNDS = 5  # alone and together in turns; the median counts
 MORE = (4, 8)
 
@@ -34,9 +35,12 @@ def main() -> None:
         bare.append(2 * loops(1) / loops(2))
     print(f"one shard takes {statistics.median(alone):.3f} cores for {chosen.robots_each} robots at real time")
     for shards in MORE:
-        used = sum(drive(shards, chosen.robots_each, chosen.seconds).used) / chosen.seconds
+        used = sum(drive(shards, chosen.robots_each, chosen.seconds, CORES).used) / chosen.seconds
         robots = shards * chosen.robots_each
-        print(f"{shards} shards, {robots} robots: {used:.2f} cores at real time, {used / robots * 1e3:.2f} m each")
+        each = used / shards / statistics.median(alone)
+        print(
+            f"{shards} shards, {robots} robots in turns: {used:.2f} cores at real time, a shard {each:.2f} x one alone"
+        )
     reference = statistics.median(bare)
     print(f"reference: two loops of plain Python do {reference:.2f} x one (runs {min(bare):.2f} to {max(bare):.2f})")
     print(f"two shards: runs {min(ratios):.2f} to {max(ratios):.2f}")
