@@ -136,7 +136,9 @@ class Route:
         """The next metres as they will be driven (dense): straight to ``carrot``, then on from ``beyond`` m along."""
         first = bisect_left(self._marks, beyond)
         last = bisect_left(self._marks, beyond + horizon) + 1
-        straight, _, _ = _densified(np.array([[pose.x, pose.y], [carrot.x, carrot.y]]))
+        count = math.ceil(math.hypot(carrot.x - pose.x, carrot.y - pose.y) / SPACING)
+        start, way = np.array((pose.x, pose.y)), np.array((carrot.x - pose.x, carrot.y - pose.y))
+        straight = start + (np.arange(count + 1) / max(1, count))[:, None] * way
         return np.concatenate([straight, self.points[first:last]])
 
     def remaining(self, pose: Pose, along: float) -> Path:
