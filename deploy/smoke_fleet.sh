@@ -1,5 +1,5 @@
-# Starts a head and a node of Ray as KubeRay does, asks both as its probes do, and runs two worlds on them; scripts/image
-# runs it in the image.
+# Starts a head and a node of Ray as KubeRay does, asks both as its probes do, runs two worlds and a campaign on them;
+# scripts/image runs it in the image.
 set -euo pipefail
 export RAY_USAGE_STATS_ENABLED=0 RAY_AUTH_MODE=disabled ROBOGLOT_INSECURE=1
 work=$(mktemp -d)
@@ -43,5 +43,18 @@ done
 roboglot fleet list --data "$work/fleet" | sed 's/^/    /'
 roboglot fleet where --registry "$work/homes.db" | sed 's/^/    /'
 (($(roboglot fleet list --data "$work/fleet" | grep -c ready) == 2))
-wget -T 5 -q -O- http://127.10.0.2:1448/api/core/slam/v1/localization/pose | sed 's/^/    a2: /'
+wget -T 5 -q -O- http://127.10.0.2:1448/api/core/slam/v1/localization/pose | sed 's/^/    a2: /' && echo
 kill "$up" && wait "$up" || true
+
+# As the submitter of campaign.yaml does.
+mkdir "$work/scenarios"
+cat >"$work/scenarios/stands.yaml" <<'END'
+name: it stands
+given: {world: empty, body: robomaster_ep, lockstep: true}
+when: [{wait: 1}]
+then: [{travelled: {at_most: 0.1}}]
+END
+ray job submit --address=http://localhost:8265 -- \
+    roboglot campaign "$work/scenarios" --seeds 4 --on auto --out "$work/out" >"$work/job.log" 2>&1
+grep 'trials passed' "$work/job.log" | sed 's/^/    /'
+(($(grep -c ',passed,' "$work/out/table.csv") == 4))
