@@ -19,7 +19,7 @@ os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
 import ray
 from ray.cluster_utils import Cluster
 
-from roboglot.shards.cluster import ClusterFleet, joined
+from roboglot.shards.cluster import ClusterFleet, join, joined
 from roboglot.shards.plan import plan_fleet
 from roboglot.shards.supervisor import State
 from roboglot.storage.homes import Home, Homes
@@ -109,6 +109,17 @@ async def test_killed_nodes_robots_run_elsewhere_and_none_twice(cluster: Cluster
         finally:
             await fleet.close()
     assert not ray.is_initialized()
+
+
+def test_failed_client_server_is_named_by_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    reason = "RuntimeError: Starting Ray client server failed."
+
+    def refuse(**_: object) -> None:
+        raise ConnectionAbortedError(f"Initialization failure from server:\nTraceback:\n{reason}")
+
+    monkeypatch.setattr(ray, "init", refuse)
+    with pytest.raises(OSError, match=f"^--on ray://head: Initialization failure from server: {reason}$"):
+        join("ray://head")
 
 
 async def test_a_cluster_without_a_registry_is_refused(tmp_path: Path) -> None:

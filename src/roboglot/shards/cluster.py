@@ -69,7 +69,8 @@ def join(where: str) -> None:
         ray.init(address=address, namespace=NAMESPACE, log_to_driver=False, configure_logging=False)
     except Exception as error:  # noqa: BLE001 - Ray raises bare ones, too
         lines = str(error).strip().splitlines() or [type(error).__name__]
-        raise OSError(f"--on {where}: {lines[0]}") from None
+        why = f"{lines[0]} {lines[-1]}" if lines[0].endswith(":") else lines[0]  # a server's own error comes last
+        raise OSError(f"--on {where}: {why}") from None
 
 
 @contextmanager
