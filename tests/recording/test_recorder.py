@@ -123,7 +123,7 @@ async def test_last_minutes_are_written_when_a_fault_comes(tmp_path: Path) -> No
     assert 2.0 <= recording.seconds <= 5.0
     events = [message.json()["event"] for message in read_messages(path, "/a/events")]
     assert "FaultRaised" in events
-    assert {"/a/body", "/a/map", "/a/control", "/truth/state"} <= set(recording.topics)  # told before the last minutes
+    assert {"/a/body", "/a/map", "/a/control", "/truth/state"} <= set(recording.topics)  # from before the last minutes
 
 
 async def test_a_second_recording_knows_how_things_stand(tmp_path: Path) -> None:

@@ -17,16 +17,26 @@ from roboglot.recording.reader import Asked, pair
 
 HEARD_SECONDS_MAX = 5.0  # real, until a request must have come in, or an answer that needs no robot time
 LOOK = 0.0005  # real s between two looks
+HANDED_ON = ("ipv4:", "ipv6:", "unix:")  # with which the names of gRPC's connections begin
 AT_ONCE = 1e-9  # s of robot time
 Where = Callable[[str, str], Line]  # robot and door
+
+
+def of_clients(exchanges: Sequence[Exchange]) -> Sequence[Exchange]:
+    """Return what clients said and heard: no drivers, and no frames that a dog's door handed on, for it is asked."""
+    return [
+        exchange
+        for exchange in exchanges
+        if not exchange.door.startswith(DRIVER)
+        and not (exchange.door == "visual" and exchange.connection.startswith(HANDED_ON))
+    ]
 
 
 class Inputs:
     """Plays the requests of a recording. ``where`` returns a new connection to a robot's door, not yet open."""
 
     def __init__(self, exchanges: Sequence[Exchange], clock: LockstepClock, where: Where) -> None:
-        doors = [exchange for exchange in exchanges if not exchange.door.startswith(DRIVER)]
-        self._asked, self._clock, self._where = pair(doors)[0], clock, where
+        self._asked, self._clock, self._where = pair(of_clients(exchanges))[0], clock, where
         self._lines: dict[tuple[str, str, str], Line] = {}
         self._tasks: set[asyncio.Task[object]] = set()
         self._heard: Counter[tuple[str, str, Direction]] = Counter()

@@ -54,10 +54,15 @@ def difference(recorded: Path, now: Path) -> Verdict:
 
 
 def _messages(path: Path) -> Iterator[tuple[str, int, bytes]]:
-    counted = (record for record in read_messages(path) if record.topic not in LEFT_OUT)
+    counted = (record for record in read_messages(path) if record.topic not in LEFT_OUT and not _is_heartbeat(record))
     for at, records in groupby(counted, lambda record: record.at):
         for record in sorted(records, key=_stream):
             yield record.topic, at, _bytes(record)
+
+
+def _is_heartbeat(record: Record) -> bool:
+    """A dog's, which come from when its app is connected on: as soon as the machine has done that."""
+    return record.topic.endswith("/cyberdog") and bool(record.json()["operation"] == "heartbeat")
 
 
 def _stream(record: Record) -> tuple[str, str]:
