@@ -54,5 +54,4 @@ def test_untyped_parameters_fail_at_once() -> None:
     with pytest.raises(TypeError, match="speed has no type"):
 
         @table().on("fly")
-        async def fly(robot: str, speed) -> None:  # type: ignore[no-untyped-def]
-            ...
+        async def fly(robot: str, speed) -> None: ...

@@ -13,6 +13,7 @@ from roboglot.protocols.robomaster import dispatch as _robomaster  # noqa: F401
 from roboglot.protocols.robomaster.table import TABLE as TEXT
 from roboglot.protocols.slamware import dispatch as _slamware  # noqa: F401
 from roboglot.protocols.slamware.table import TABLE as REST
+from tests.narrowing import known
 
 
 @pytest.mark.parametrize("door", DOORS, ids=lambda door: door.name)
@@ -30,14 +31,14 @@ def test_what_moves_the_robot_needs_more_than_sight() -> None:
         (CODES, 1002),
         (CODES, 6004),
     ):
-        operation = table.get(key)  # type: ignore[arg-type, attr-defined]
-        assert operation.right is Right.DRIVE, key  # type: ignore[union-attr]
+        (operation,) = (operation for operation in table if operation.key == key)
+        assert operation.right is Right.DRIVE, key
 
 
 def test_passwords_are_for_administrators() -> None:
     keys = [operation.key for operation in REST if "password" in operation.key]
     assert keys
-    assert all(REST.get(key).right is Right.ADMIN for key in keys)  # type: ignore[union-attr]
+    assert all(known(REST.get(key)).right is Right.ADMIN for key in keys)
 
 
 def test_reading_needs_no_more_than_sight() -> None:

@@ -34,7 +34,7 @@ SEE, DRIVE = frozenset({Right.SEE}), frozenset({Right.DRIVE})
 DRIVER = next(caller for caller in CALLERS if caller.name == "drive")
 
 
-def guard_of(runtime: Runtime):  # type: ignore[no-untyped-def]
+def guard_of(runtime: Runtime):
     assert runtime.guard is not None
     return runtime.guard
 
@@ -260,7 +260,7 @@ async def test_control_goes_with_the_right(runtime: Runtime, store: AccessStore,
     await until(lambda: not robot[Lease].taken_by)
 
 
-async def until(condition) -> None:  # type: ignore[no-untyped-def]
+async def until(condition) -> None:
     async with asyncio.timeout(10.0):
         while not condition():  # noqa: ASYNC110 - a thread looks at the clock
             await asyncio.sleep(0.02)

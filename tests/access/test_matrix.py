@@ -78,7 +78,7 @@ def reached(monkeypatch: pytest.MonkeyPatch) -> Iterator[set[object]]:
         return handler
 
     for table in (REST, TEXT, DOG, VIEWER, FLEET):
-        kept: dict[Any, Any] = table._operations  # type: ignore[attr-defined]
+        kept: dict[Any, Any] = table._operations
         for key, operation in list(kept.items()):
             monkeypatch.setitem(kept, key, dataclasses.replace(operation, handler=stand_in(key, operation.handler)))
     return seen  # type: ignore[return-value]

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from mcp import Client, StdioServerParameters
-from mcp.types import ImageContent
+from mcp.types import ImageContent, TextContent
 
 from roboglot.agents.console import ConsoleClient
 from roboglot.agents.server import make_server
@@ -17,6 +17,7 @@ from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.geometry import Pose
 from roboglot.testing.addresses import free_port
 from tests.console.conftest import Shown
+from tests.narrowing import of_kind
 
 TOOLS = {"robots", "where_am_i", "look", "map_picture", "go_to", "drive", "stop", "run_program", "rehearse"}
 PNG, JPEG = "iVBORw0KGgo", "/9j/"
@@ -46,7 +47,7 @@ async def call(client: Client, tool: str, **values: Any) -> Any:
     assert not answer.is_error, answer.content
     if answer.structured_content is not None:
         return answer.structured_content.get("result", answer.structured_content)
-    return json.loads(answer.content[0].text)  # type: ignore[union-attr]
+    return json.loads(of_kind(answer.content[0], TextContent).text)
 
 
 async def refusal(client: Client, tool: str, **values: Any) -> str:

@@ -53,7 +53,7 @@ class Tour:
         """After it was carried elsewhere."""
         return self.robot[Localization].relocalize()
 
-    async def until(self, condition: Callable[[], bool], seconds: float = 120.0) -> None:
+    async def until(self, condition: Callable[[], object], seconds: float = 120.0) -> None:
         """Let time pass until something is so."""
         end = self.clock.time() + seconds
         while not condition():

@@ -11,12 +11,13 @@ from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.motion.base import Base, BaseLimits, WheelSpeeds
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.driving import Driving
-from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
+from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.geometry import STILL, Point, Pose, Twist
 from roboglot.model.robot import Description, Robot
 from roboglot.model.sensing import LaserScan, OdometryReading
+from tests.narrowing import of_kind
 
 
 class Still(Base, Odometry, Lidar):
@@ -66,7 +67,7 @@ async def test_navigation_waits_for_kernels_start_does_not() -> None:
     assert robot[Mapping].grid.width == 0
     action = robot[Navigation].navigate_to([Point(1.0, 1.0)], NavigationOptions())
     await asyncio.sleep(0.05)
-    assert action.feedback.stage == "planning"  # type: ignore[attr-defined]
+    assert of_kind(action.feedback, NavigationFeedback).stage == "planning"
     action.cancel()
     await action.done()
     await autonomy.start(wait=True)

@@ -23,6 +23,7 @@ from roboglot.operations import Right
 from roboglot.runtime import Runtime
 from roboglot.transport.limiter import Limiter
 from tests.browser.served import ADDRESS
+from tests.narrowing import known
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 PASSWORD, LOGINS = "a long password", 3
@@ -103,7 +104,7 @@ async def open_page(browser: Any, guarded: Guarded) -> AsyncIterator[Open]:
         await page.goto(guarded.url + path)
         return page
 
-    yield open_it  # type: ignore[misc]
+    yield open_it
     for context in contexts:
         await context.close()
 
@@ -182,7 +183,7 @@ async def test_header_of_phone_has_room_for_a_name(guarded: Guarded, open_page: 
 
 async def test_token_signs_in_and_its_rotation_signs_out(guarded: Guarded, open_page: Open) -> None:
     token = guarded.store.add_machine("cell7", [Grant("b", frozenset({Right.DRIVE}))])
-    guarded.runtime.guard.reload()  # type: ignore[union-attr]
+    known(guarded.runtime.guard).reload()
     page = await open_page()
     await page.click("text=Token")
     await page.fill("input[name=token]", token)
@@ -190,7 +191,7 @@ async def test_token_signs_in_and_its_rotation_signs_out(guarded: Guarded, open_
     await page.wait_for_selector("text=Scan fits map")
     assert await page.locator("header option").all_inner_texts() == ["b"]
     guarded.store.rotate("cell7")
-    guarded.runtime.guard.reload()  # type: ignore[union-attr]
+    known(guarded.runtime.guard).reload()
     await page.wait_for_selector(".sign")
 
 
@@ -224,7 +225,7 @@ async def test_a_driver_whose_right_is_revoked_stands(guarded: Guarded, open_pag
         await guarded.clock.advance(0.08)
     assert robot[Base].velocity.speed > 0.1
     guarded.store.revoke("carl")
-    guarded.runtime.guard.reload()  # type: ignore[union-attr]
+    known(guarded.runtime.guard).reload()
     await guarded.clock.advance(0.5)
     assert robot[Base].velocity.speed < 0.02
     await page.wait_for_selector("text=Your rights have changed")
@@ -241,7 +242,7 @@ async def test_reduced_right_leaves_the_page_with_the_rest(guarded: Guarded, ope
     assert await offered(page, "drive")
     [dora] = [identity for identity in guarded.store.identities() if identity.name == "dora"]
     guarded.store.put(replace(dora, grants=(Grant("a", frozenset({Right.SEE})),)))
-    guarded.runtime.guard.reload()  # type: ignore[union-attr]
+    known(guarded.runtime.guard).reload()
     await page.wait_for_selector("button[aria-disabled=true]:has-text('Take control')")
 
 

@@ -16,6 +16,7 @@ from prometheus_client.parser import text_string_to_metric_families
 from roboglot.console.otlp import Pusher
 from roboglot.model.components.energy.battery import Battery
 from tests.console.conftest import ADDRESS, Shown
+from tests.narrowing import known
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -101,7 +102,7 @@ async def test_a_collector_gets_the_same_values(shown: Shown) -> None:
     await scraped(shown)
     await say("command;", "robot battery ?;", "chassis speed x 99;")
     assert shown.runtime.console is not None
-    metrics = await shown.runtime.console._application.metrics()  # type: ignore[union-attr]
+    metrics = await known(known(shown.runtime.console)._application).metrics()
     seen = await scraped(shown)
     taken: list[tuple[str, str, bytes]] = []
     with collector(taken) as address:
@@ -125,11 +126,11 @@ async def test_a_collector_gets_the_same_values(shown: Shown) -> None:
     assert len(latency.bucket_counts) == len(latency.explicit_bounds) + 1
     battery = shown.robot[Battery].state.percentage
     assert pushed["roboglot_battery_ratio"].gauge.data_points[0].as_double == pytest.approx(battery, abs=0.01)
-    shown.runtime.console._application._metrics.close()  # type: ignore[union-attr]
+    known(known(known(shown.runtime.console)._application)._metrics).close()
 
 
 async def test_a_collector_that_is_not_there_is_logged(shown: Shown, caplog: pytest.LogCaptureFixture) -> None:
-    metrics = await shown.runtime.console._application.metrics()  # type: ignore[union-attr]
+    metrics = await known(known(shown.runtime.console)._application).metrics()
     pushing = asyncio.create_task(Pusher(metrics, f"http://{ADDRESS}:9", 0.01).run())
     while "took no metrics" not in caplog.text:  # noqa: ASYNC110
         await asyncio.sleep(0.01)

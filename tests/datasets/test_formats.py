@@ -99,7 +99,7 @@ def check(recording: DriveLog, mount: float) -> None:
 
 
 @pytest.mark.parametrize("write", [carmen, robotlaser, rawlog])
-def test_each_format_gives_the_same_drive(tmp_path: Path, write) -> None:  # type: ignore[no-untyped-def]
+def test_each_format_gives_the_same_drive(tmp_path: Path, write) -> None:
     check(read_drive_log(write(tmp_path / "drive")), 0.1)
 
 
@@ -152,7 +152,7 @@ def test_files_that_are_no_recording_are_refused(tmp_path: Path, content: bytes)
 @given(st.data())
 def test_damaged_files_raise_nothing_else(tmp_path: Path, data: st.DataObject) -> None:
     writers = (carmen, robotlaser, columns, lambda path: rawlog(path, old=True))
-    path = data.draw(st.sampled_from(writers))(tmp_path / "drive")  # type: ignore[no-untyped-call]
+    path = data.draw(st.sampled_from(writers))(tmp_path / "drive")
     content = bytearray(path.read_bytes())
     for _ in range(data.draw(st.integers(1, 8))):
         at = data.draw(st.integers(0, len(content) - 1))

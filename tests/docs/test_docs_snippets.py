@@ -28,8 +28,10 @@ from roboglot.model.sound import claps
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.engine.events import Call, Failed, Finished, Output
 from roboglot.programs.worker.prelude import Prelude
+from roboglot.simulation.components.motion.emergency_stop import SimulatedEmergencyStop
 from roboglot.simulation.world.world import World
 from tests.docs.test_docs import ROOT, blocks
+from tests.narrowing import of_kind
 
 LOOK = re.compile(r"(async for frame in frames|async for packet in packets): \.\.\.")
 SECONDS = 3.0  # of the robot, for snippets that look on for ever
@@ -82,7 +84,7 @@ async def test_people_do_as_asked(robot: Robot, world: World, clock: LockstepClo
 async def test_hands_on_a_delivery_robot(robot: Robot, world: World, clock: LockstepClock) -> None:
     code = snippet("worlds/worlds.md", "cargo.put").replace('robot("b")', 'robot("a")')
     await run(code, clock, world=world, Cargo=Cargo, EmergencyStop=EmergencyStop, Pose=Pose)
-    assert robot[EmergencyStop].pressed  # type: ignore[attr-defined]
+    assert of_kind(robot[EmergencyStop], SimulatedEmergencyStop).pressed
 
 
 async def test_an_engine_by_hand() -> None:

@@ -5,6 +5,7 @@ import math
 import shutil
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -174,7 +175,7 @@ async def test_moves_of_late_ep_arrive_at_full_speed(
         for offset in (Pose(0.2), Pose(0.3, 0.2, math.pi / 2)):
             start = world.truth.pose_of("a")
             action = driven[Driving].move_by(offset, source="test")
-            await until(driven.clock, lambda action=action: action.status.ended, 10)  # type: ignore[misc]
+            await until(driven.clock, partial(lambda action: action.status.ended, action), 10)
             assert action.status is ActionStatus.SUCCEEDED, action.reason
             here = world.truth.pose_of("a").relative_to(start)
             assert_pose(here, x=offset.x, y=offset.y, deg=math.degrees(offset.yaw), within=0.02)

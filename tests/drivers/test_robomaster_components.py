@@ -25,9 +25,11 @@ from roboglot.model.errors import InvalidGoal, NotFound, Refused
 from roboglot.model.events import ArmorHit
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.chapters.camera.camera_files import CameraFiles
+from roboglot.simulation.components.interaction.armor import SimulatedArmor
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
 from tests.drivers.chain import Open, Script
+from tests.narrowing import of_kind
 
 pytestmark = pytest.mark.world("empty", body="robomaster_ep")
 
@@ -118,7 +120,7 @@ async def test_a_hit_is_reported_to_every_door(script: Script, robot: Robot, dri
     await script.forward(seconds=0.2)
     assert robot[Armor].sensitivity == 8
     assert driven_ep[Armor].plates == tuple(sorted(robot[Armor].plates, key=driven_ep[Armor].plates.index))
-    robot[Armor].touch(PlatePlace.GIMBAL_LEFT)  # type: ignore[attr-defined]
+    of_kind(robot[Armor], SimulatedArmor).touch(PlatePlace.GIMBAL_LEFT)
     await script.forward(seconds=0.3)
     assert [(hit.place, hit.kind) for hit in heard] == [(PlatePlace.GIMBAL_LEFT, HitKind.HAND)]
 

@@ -23,8 +23,12 @@ from roboglot.model.events import BoxChanged, EmergencyStopChanged
 from roboglot.model.geometry import Twist
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.server import SlamwareDoor
+from roboglot.simulation.components.logistics.cargo import SimulatedCargo
+from roboglot.simulation.components.logistics.jack import SimulatedJack
+from roboglot.simulation.components.motion.emergency_stop import SimulatedEmergencyStop
 from roboglot.testing import Forward
 from tests.drivers.chain import Drive, OpenRest, Until
+from tests.narrowing import of_kind
 
 pytestmark = pytest.mark.world("empty", body="hermes")
 
@@ -36,19 +40,20 @@ async def ended(action: Action, until: Until) -> ActionStatus:
 
 async def test_boxes_open_close_and_report_their_contents(driven: Robot, robot: Robot, until: Until) -> None:
     far, near = robot[Cargo], driven[Cargo]
+    assert isinstance(far, SimulatedCargo)
     assert near.compartments == far.compartments
     heard: list[BoxChanged] = []
     driven.events.listen(BoxChanged, heard.append)
     assert await ended(near.open_box(1, source="test"), until) is ActionStatus.SUCCEEDED
     assert far.box(1).door is DoorState.OPEN
-    far.put(1, 0.5)  # type: ignore[attr-defined]
+    far.put(1, 0.5)
     await until(lambda: near.box(1).stock is Stock.PARTLY, patience=2)
     assert heard[-1].box == far.box(1)
-    far.hold_hand_into(1, True)  # type: ignore[attr-defined]
+    far.hold_hand_into(1, True)
     stalled = near.close_box(1, source="test")
     assert await ended(stalled, until) is ActionStatus.ABORTED
     assert isinstance(stalled.error, Blocked)
-    far.hold_hand_into(1, False)  # type: ignore[attr-defined]
+    far.hold_hand_into(1, False)
     assert await ended(near.close_box(1, source="test"), until) is ActionStatus.SUCCEEDED
     assert near.box(1) == far.box(1)
     assert near.box(1).locked
@@ -58,6 +63,7 @@ async def test_boxes_open_close_and_report_their_contents(driven: Robot, robot: 
 
 async def test_the_jack_lifts_stops_and_fails(driven: Robot, robot: Robot, until: Until) -> None:
     far, near = robot[Jack], driven[Jack]
+    assert isinstance(far, SimulatedJack)
     lifting = near.raise_platform(source="test")
     await until(lambda: 0.2 < far.position / far.stroke < 0.8)
     lifting.cancel()
@@ -67,7 +73,7 @@ async def test_the_jack_lifts_stops_and_fails(driven: Robot, robot: Robot, until
     assert near.position / near.stroke == pytest.approx(far.position / far.stroke, abs=0.01)
     assert await ended(near.raise_platform(source="test"), until) is ActionStatus.SUCCEEDED
     assert (far.stage, near.stage) == (JackStage.UP, JackStage.UP)
-    far.jammed = True  # type: ignore[attr-defined]
+    far.jammed = True
     jammed = near.lower_platform(source="test")
     assert await ended(jammed, until) is ActionStatus.ABORTED
     assert isinstance(jammed.error, Blocked)
@@ -75,7 +81,7 @@ async def test_the_jack_lifts_stops_and_fails(driven: Robot, robot: Robot, until
         near.lower_platform()
     with pytest.raises(Refused):
         _ = near.loaded
-    far.jammed = False  # type: ignore[attr-defined]
+    far.jammed = False
     near.clear_alarm()
     await until(lambda: not near.alarm, patience=2)
     assert not far.alarm
@@ -130,7 +136,7 @@ async def test_emergency_stop_holds_and_reaches_every_door(
     driven[EmergencyStop].release_brake(True)
     await until(lambda: driven[EmergencyStop].brake_released, patience=1)
     assert robot[EmergencyStop].brake_released
-    robot[EmergencyStop].press(True)  # type: ignore[attr-defined]  # by hand: the driver hears of it all the same
+    of_kind(robot[EmergencyStop], SimulatedEmergencyStop).press(True)  # by hand: the driver hears of it all the same
     await until(lambda: driven[EmergencyStop].engaged, patience=1)
 
 

@@ -25,7 +25,7 @@ from roboglot.model.components.motion.base import Base, WheelSpeeds
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.motion.gimbal import Gimbal
-from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
+from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions
 from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.sensing.odometry import Odometry
@@ -45,6 +45,7 @@ from roboglot.storage.database import Database
 from roboglot.testing import Forward, assert_pose
 from roboglot.wire.slamware.chapters.motion import AngleOptions
 from tests.drivers.chain import Open, OpenRest, Script
+from tests.narrowing import of_kind
 
 
 def points_of(scan: LaserScan) -> np.ndarray:
@@ -165,8 +166,8 @@ async def test_it_navigates_by_the_robots_own_skill(driven: Robot, world: World,
     start = world.truth.pose_of("a")
     action = driven[Navigation].navigate_to([Point(1.0, 0.5)], NavigationOptions(yaw=-1.0), source="test")
     await forward(seconds=1)
-    assert action.feedback.stage == "driving"  # type: ignore[attr-defined]
-    assert action.feedback.remaining.length > 0.3  # type: ignore[attr-defined]
+    assert of_kind(action.feedback, NavigationFeedback).stage == "driving"
+    assert of_kind(action.feedback, NavigationFeedback).remaining.length > 0.3
     await forward(seconds=15)
     assert action.status is ActionStatus.SUCCEEDED
     assert_pose(world.truth.pose_of("a").relative_to(start), x=1.0, y=0.5, deg=math.degrees(-1.0))

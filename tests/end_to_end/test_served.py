@@ -11,6 +11,7 @@ import time
 import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -22,7 +23,7 @@ POSE = "/api/core/slam/v1/localization/pose"
 TCP_PORTS = (1448, 40923, 40925, 50052)
 
 
-def get(path: str, address: str = FIRST) -> object:
+def get(path: str, address: str = FIRST) -> Any:
     with urllib.request.urlopen(f"http://{address}:1448{path}", timeout=10) as answer:
         return json.load(answer)
 
@@ -69,8 +70,8 @@ def test_second_robot_has_same_ports_on_next_address(pair: ServedRobot) -> None:
             socket.create_connection((address, port), timeout=5).close()
     with Line(SECOND) as line:
         assert line.say("command;chassis move x 0.3") == ["ok;", "ok;"]
-        assert wait_for(lambda: float(get(POSE, SECOND)["x"]) > 0.2)  # type: ignore[index]
-    assert abs(float(get(POSE, FIRST)["x"])) < 0.05  # type: ignore[index]
+        assert wait_for(lambda: float(get(POSE, SECOND)["x"]) > 0.2)
+    assert abs(float(get(POSE, FIRST)["x"])) < 0.05
 
 
 def test_task_begun_at_one_door_ends_at_another(pair: ServedRobot) -> None:
@@ -82,9 +83,9 @@ def test_task_begun_at_one_door_ends_at_another(pair: ServedRobot) -> None:
     action = get("/api/core/motion/v1/actions/:current")
     with Line(FIRST) as line:
         assert line.say("command;chassis speed x 0 y 0 z 0")[1] == "ok;"
-    ended = get(f"/api/core/motion/v1/actions/{action['action_id']}")  # type: ignore[index]
-    assert ended["state"]["status"] == 4  # type: ignore[index]
-    assert ended["state"]["result"] == -2  # type: ignore[index]
+    ended = get(f"/api/core/motion/v1/actions/{action['action_id']}")
+    assert ended["state"]["status"] == 4
+    assert ended["state"]["result"] == -2
 
 
 def test_garbage_at_every_door_harms_no_one(pair: ServedRobot) -> None:
@@ -92,23 +93,23 @@ def test_garbage_at_every_door_harms_no_one(pair: ServedRobot) -> None:
     half_open = []
     for port in TCP_PORTS:
         for junk in garbage:
-            with socket.create_connection((FIRST, port), timeout=5) as line:
-                line.settimeout(5)
+            with socket.create_connection((FIRST, port), timeout=5) as connection:
+                connection.settimeout(5)
                 try:
-                    line.sendall(junk)
+                    connection.sendall(junk)
                 except OSError:
                     continue  # it may hang up in the middle
         half_open.append(socket.create_connection((FIRST, port), timeout=5))
     assert isinstance(get(POSE), dict)
-    with Line(FIRST) as line:  # type: ignore[assignment]
-        assert line.say("command;quit") == ["ok;", "ok;"]  # type: ignore[attr-defined]
+    with Line(FIRST) as line:
+        assert line.say("command;quit") == ["ok;", "ok;"]
     assert pair.process.poll() is None
-    for line in half_open:
-        line.close()
+    for kept in half_open:
+        kept.close()
 
 
 def test_memory_does_not_grow_with_requests(pair: ServedRobot) -> None:
-    assert wait_for(lambda: get("/api/core/slam/v1/knownarea")["width"] > 0)  # type: ignore[index]  # all is loaded
+    assert wait_for(lambda: get("/api/core/slam/v1/knownarea")["width"] > 0)  # all is loaded
     for _ in range(1500):  # what is loaded late, once, does not count
         get(POSE)
     before = pair.resident_megabytes
@@ -125,10 +126,10 @@ def test_what_was_acknowledged_survives_kill_9(tmp_path: Path) -> None:
         robot.process.send_signal(signal.SIGKILL)
         robot.process.wait()
     with served(data, "--world", "empty", address="127.0.0.53"):
-        [stored] = get(POIS, "127.0.0.53")  # type: ignore[misc]
-    assert stored["id"] == "kitchen"  # type: ignore[has-type]
-    assert stored["metadata"]["display_name"] == "厨房"  # type: ignore[has-type]
-    assert stored["pose"]["y"] == pytest.approx(-2.25)  # type: ignore[has-type]
+        [stored] = get(POIS, "127.0.0.53")
+    assert stored["id"] == "kitchen"
+    assert stored["metadata"]["display_name"] == "厨房"
+    assert stored["pose"]["y"] == pytest.approx(-2.25)
 
 
 def test_it_stops_cleanly_on_a_signal(tmp_path: Path) -> None:
@@ -178,11 +179,11 @@ def test_lockstep_time_passes_by_lines_on_standard_input(tmp_path: Path) -> None
         assert [robot.process.stdout.readline() for _ in range(3)] == ["time 0.000\n"] * 3
         with Line("127.0.0.55") as line:
             assert line.say("command;chassis move x 0.5") == ["ok;", "ok;"]
-            assert abs(float(get(POSE, "127.0.0.55")["x"])) < 0.001  # type: ignore[index]
+            assert abs(float(get(POSE, "127.0.0.55")["x"])) < 0.001
             robot.process.stdin.write("5\n")
             robot.process.stdin.flush()
             assert robot.process.stdout.readline() == "time 5.000\n"
-            assert float(get(POSE, "127.0.0.55")["x"]) == pytest.approx(0.5, abs=0.05)  # type: ignore[index]
+            assert float(get(POSE, "127.0.0.55")["x"]) == pytest.approx(0.5, abs=0.05)
 
 
 SEVERAL = """

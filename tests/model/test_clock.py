@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+from functools import partial
 
 import pytest
 from hypothesis import given
@@ -44,7 +45,7 @@ def test_callbacks_run_by_time_then_by_registration(times: list[float]) -> None:
     async def run() -> list[int]:
         clock, order = LockstepClock(), []
         for index, when in enumerate(times):
-            clock.call_at(when, lambda index=index: order.append(index))  # type: ignore[misc]
+            clock.call_at(when, partial(order.append, index))
         await clock.advance(10)
         return order
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -91,7 +92,7 @@ async def anna_gestures(scene: Scene) -> list[Act]:
     await scene.anna_stands_before_it()
     anna = scene.world.hands.person("anna")
     kinds = ((1.0, Gesture.STOP), (9.0, Gesture.THUMB_UP), (18.0, Gesture.PULL))
-    return [(at, lambda kind=kind: anna.gesture(kind, seconds=2)) for at, kind in kinds]  # type: ignore[misc]
+    return [(at, partial(anna.gesture, kind, seconds=2)) for at, kind in kinds]
 
 
 async def anna_then_ben(scene: Scene) -> list[Act]:
@@ -106,7 +107,7 @@ async def anna_speaks(scene: Scene) -> list[Act]:
     await scene.anna_stands_before_it(2.0)
     anna = scene.world.hands.person("anna")
     said = ((1.0, "暂停任务"), (9.0, "good dog"), (15.0, "继续任务"), (24.0, "终止任务"))
-    return [(at, lambda text=text: anna.say(text)) for at, text in said]  # type: ignore[misc]
+    return [(at, partial(anna.say, text)) for at, text in said]
 
 
 async def a_tune(scene: Scene) -> list[Act]:

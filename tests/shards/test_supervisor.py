@@ -6,6 +6,7 @@ import asyncio
 import signal
 import socket
 from collections.abc import AsyncIterator, Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -106,7 +107,7 @@ async def test_one_that_grows_too_large_is_restarted_orderly(supervisor: Supervi
     forks(supervisor).say(1, Ready({}))
     await supervisor.until(lambda: [s.state for s in supervisor.shards.values()].count(State.READY) == STARTING_MAX)
     for number in (STARTING_MAX + 1, STARTING_MAX + 2):
-        await supervisor.until(lambda n=number: n in forks(supervisor).links)  # type: ignore[misc]
+        await supervisor.until(partial(lambda number: number in forks(supervisor).links, number))
         forks(supervisor).say(number, Ready({}))
     supervisor._look_after()
     supervisor._look_after()

@@ -18,6 +18,7 @@ from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.simulation.world.world import RobotPlacement, World
 from roboglot.simulation.world.world_files import load_world
+from tests.narrowing import known
 
 
 async def trace(seed: int) -> str:
@@ -49,7 +50,7 @@ async def trace(seed: int) -> str:
             world.faults.inject("lost_localization", "c")
             robots["c"][LiftClient].call(1)
         if second == 15:
-            digest.update(robots["c"][DepthCamera].image.points.tobytes())  # type: ignore[union-attr]
+            digest.update(known(robots["c"][DepthCamera].image).points.tobytes())
         for name, robot in robots.items():
             digest.update(struct.pack("3d", *pose(world.truth.pose_of(name))))
             digest.update(repr((robot[Imu].reading, robot[Battery].state, robot[Network].signal)).encode())

@@ -37,21 +37,21 @@ def database(tmp_path: Path) -> Iterator[Database]:
     opened.close()
 
 
-def annotations(database: Database, robot: str = "a", events: EventStream | None = None) -> StoredAnnotations:  # type: ignore[no-redef]
+def stored_in(database: Database, robot: str = "a", events: EventStream | None = None) -> StoredAnnotations:
     return StoredAnnotations(database, robot, LockstepClock(), events or EventStream())
 
 
 async def test_everything_drawn_comes_back(database: Database) -> None:
     dock = PointOfInterest("d", Pose(1, 2, 3), {"display_name": "home"})
-    await annotations(database).change(lambda now: replace(now.with_new(CURVE, ICE), docks=(dock,)))  # type: ignore[operator]
-    again = annotations(database).current  # type: ignore[operator]
+    await stored_in(database).change(lambda now: replace(now.with_new(CURVE, ICE), docks=(dock,)))
+    again = stored_in(database).current
     assert again == Annotations((replace(CURVE, id=1),), (replace(ICE, id=2),), (dock,), last_id=2)
-    assert annotations(database, "other").current == Annotations()  # type: ignore[operator]
+    assert stored_in(database, "other").current == Annotations()
 
 
 async def test_changes_at_the_same_time_all_count(database: Database) -> None:
     events = EventStream()
-    stored = annotations(database, events=events)  # type: ignore[operator]
+    stored = stored_in(database, events=events)
     with events.subscribe(AnnotationsChanged) as heard:
         await asyncio.gather(*(stored.change(lambda now: now.with_new(CURVE)) for _ in range(5)))
         assert len(heard.drain()) == 5
@@ -61,7 +61,7 @@ async def test_changes_at_the_same_time_all_count(database: Database) -> None:
 async def test_a_refused_change_leaves_everything(database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("roboglot.storage.annotations.AREAS_MAX", 1)
     assert model.AREAS_MAX > 1
-    stored = annotations(database)  # type: ignore[operator]
+    stored = stored_in(database)
     await stored.change(lambda now: now.with_new(ICE))
     before = stored.current
     with pytest.raises(InvalidGoal, match="more than 1 areas"):

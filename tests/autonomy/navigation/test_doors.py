@@ -9,8 +9,10 @@ import pytest
 
 from roboglot.model.actions import ActionStatus
 from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.navigation import NavigationFeedback
 from roboglot.model.errors import Blocked, Unreachable
 from roboglot.model.geometry import Pose, Twist
+from tests.narrowing import of_kind
 
 if TYPE_CHECKING:
     from tests.autonomy.conftest import Tour
@@ -78,7 +80,7 @@ async def test_person_in_the_only_door_is_waited_for(tour: Tour) -> None:
     action = tour.head_for((6.0, 3.0))
     await tour.clock.advance(10.0)
     assert action.status is ActionStatus.EXECUTING, action.reason
-    assert action.feedback.stage == "waiting"  # type: ignore[attr-defined]
+    assert of_kind(action.feedback, NavigationFeedback).stage == "waiting"
     assert tour.blocks
     tour.world.hands.remove_obstacle(person)
     await tour.end_of(action)
@@ -123,7 +125,7 @@ async def test_a_search_through_unknown_floor_is_bounded(tour: Tour) -> None:
     while not action.status.ended:
         await tour.clock.advance(0.1)
         far, last = far + last.distance_to(tour.truth), tour.truth
-        stages.add(action.feedback.stage)  # type: ignore[attr-defined]
+        stages.add(of_kind(action.feedback, NavigationFeedback).stage)
     assert isinstance(action.error, Unreachable), action.reason
     assert "unknown floor" in action.reason or "no path" in action.reason
     assert far < 60.0

@@ -21,6 +21,7 @@ from roboglot.model.errors import Blocked
 from roboglot.model.events import ActionChanged
 from roboglot.model.geometry import Point, Pose, Twist
 from roboglot.testing import passed_in_order
+from tests.narrowing import of_kind
 
 if TYPE_CHECKING:
     from tests.autonomy.conftest import Tour
@@ -122,7 +123,7 @@ async def test_second_try_continues_at_the_next_goal(tour: Tour) -> None:
     for _ in range(450):
         await tour.clock.advance(0.1)
         west = min(west, tour.truth.x)
-    assert len(action.feedback.milestones) == 1  # type: ignore[attr-defined]
+    assert len(of_kind(action.feedback, NavigationFeedback).milestones) == 1
     tour.world.hands.remove_obstacle(wall)
     await tour.end_of(action)
     assert action.status is ActionStatus.SUCCEEDED, action.reason

@@ -20,6 +20,7 @@ from roboglot.model.events import ActionChanged, LocalizationLost, LocalizationR
 from roboglot.model.geometry import Point, Pose, Twist
 from roboglot.model.maps import OccupancyGrid
 from roboglot.testing import assert_pose
+from tests.narrowing import of_kind
 
 if TYPE_CHECKING:
     from tests.autonomy.conftest import Tour
@@ -54,7 +55,7 @@ async def test_several_goals_in_turn_are_all_passed(tour: Tour) -> None:
     while not action.status.ended:
         await tour.clock.advance(0.02)
         nearest = [min(old, tour.truth.distance_to(Point(*spot))) for old, spot in zip(nearest, spots, strict=True)]
-        reached.append(4 - len(action.feedback.milestones))  # type: ignore[attr-defined]
+        reached.append(4 - len(of_kind(action.feedback, NavigationFeedback).milestones))
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     assert max(nearest) < 0.07
     assert nearest[-1] < 0.05
@@ -96,7 +97,7 @@ async def test_waits_where_there_is_no_way_around(tour: Tour) -> None:
     wall = tour.world.hands.add_obstacle(Pose(5.0, 1.2, 0.0), WALL)
     await tour.clock.advance(10.0)
     assert action.status is ActionStatus.EXECUTING
-    assert action.feedback.stage == "waiting"  # type: ignore[attr-defined]
+    assert of_kind(action.feedback, NavigationFeedback).stage == "waiting"
     assert tour.truth.x < 4.7
     tour.world.hands.remove_obstacle(wall)
     await tour.end_of(action)

@@ -23,32 +23,35 @@ def made(clock: LockstepClock, **belief: Any) -> Patience:
 
 async def test_another_way_alone_is_no_progress() -> None:
     clock = LockstepClock()
-    patience, follower = made(clock), SimpleNamespace(left=5.0, speed=0.0)
-    assert patience.look(follower)  # type: ignore[arg-type]
+    patience = made(clock)
+    follower: Any = SimpleNamespace(left=5.0, speed=0.0)
+    assert patience.look(follower)
     for _ in range(31):
         await clock.advance(1.0)
         patience.take(5.0)
-        assert not patience.look(follower)  # type: ignore[arg-type]
+        assert not patience.look(follower)
     assert patience.spent
 
 
 async def test_getting_closer_is_progress() -> None:
     clock = LockstepClock()
-    patience, follower = made(clock), SimpleNamespace(left=5.0, speed=0.0)
+    patience = made(clock)
+    follower: Any = SimpleNamespace(left=5.0, speed=0.0)
     for _ in range(40):
         await clock.advance(1.0)
         follower.left -= 0.11
-        assert patience.look(follower)  # type: ignore[arg-type]
+        assert patience.look(follower)
     assert not patience.spent
 
 
 async def test_wheels_that_turn_in_vain_are_reported() -> None:
     clock = LockstepClock()
-    patience, follower = made(clock), SimpleNamespace(left=5.0, speed=0.3)
-    patience.look(follower)  # type: ignore[arg-type]
+    patience = made(clock)
+    follower: Any = SimpleNamespace(left=5.0, speed=0.3)
+    patience.look(follower)
     await clock.advance(3.5)
     with pytest.raises(Blocked):
-        patience.look(follower)  # type: ignore[arg-type]
+        patience.look(follower)
 
 
 async def test_lost_robot_gives_up() -> None:

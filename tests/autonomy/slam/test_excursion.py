@@ -16,6 +16,8 @@ from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.events import LocalizationLost, LocalizationRecovered, LostReason, ScanTaken
 from roboglot.model.geometry import Pose, Twist, wrap_angle
+from roboglot.simulation.components.sensing.lidar import SimulatedLidar
+from tests.narrowing import of_kind
 
 if TYPE_CHECKING:
     from tests.autonomy.conftest import Tour
@@ -80,13 +82,13 @@ async def test_a_covered_lidar_is_a_silent_one(tour: Tour) -> None:
     lidar, odometry = tour.robot[Lidar], tour.robot[Odometry]
     assert lidar.scan is not None
     blind = replace(lidar.scan, ranges=np.full_like(lidar.scan.ranges, np.nan))
-    lidar.silent = True  # type: ignore[attr-defined]
+    of_kind(lidar, SimulatedLidar).silent = True
     for _ in range(40):
         now = tour.clock.time()
         tour.robot.events.publish(ScanTaken(stamp=now, scan=replace(blind, stamp=now), odometry=odometry.reading.pose))
         await tour.clock.advance(0.1)
     assert [event.reason for event in news] == [LostReason.NO_SCANS]
-    lidar.silent = False  # type: ignore[attr-defined]
+    of_kind(lidar, SimulatedLidar).silent = False
     await tour.clock.advance(5.0)
     assert tour.robot[Localization].lost is None
     assert tour.error[0] < 0.05

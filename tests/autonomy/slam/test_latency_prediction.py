@@ -14,7 +14,7 @@ from roboglot.testing import assert_pose
 class _Base(Base):
     """Late by ``delay``; moves nothing."""
 
-    delay = 0.3  # type: ignore[assignment]
+    delay = 0.3
     set_velocity = set_wheel_speeds = wheel_speeds = velocity = None  # type: ignore[assignment]
 
 

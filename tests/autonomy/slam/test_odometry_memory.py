@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from roboglot.autonomy.slam.localization import LidarLocalization
 from roboglot.autonomy.slam.odometry.memory import KEY
 from roboglot.autonomy.slam.odometry.noise import FACTOR_MAX, SCALE_BIAS_MAX, Doubt, LearntBias, LearntNoise
 from roboglot.config import RobotConfig
@@ -20,6 +21,7 @@ from roboglot.model.components.system.settings import Settings
 from roboglot.model.geometry import Pose
 from roboglot.simulation.bodies.files import BODIES
 from roboglot.storage.database import Database
+from tests.narrowing import known, of_kind
 
 
 def misjudged(folder: Path) -> str:
@@ -38,11 +40,11 @@ async def test_what_was_learnt_outlives_a_restart(tmp_path: Path) -> None:
         await fleet.start(wait=True)
         robot = fleet.robots["a"]
         assert robot[Odometry].noise.along == 0.02
-        learnt.append(robot[Localization].estimator.odometry.kept)  # type: ignore[attr-defined]
+        learnt.append(known(of_kind(robot[Localization], LidarLocalization).estimator).odometry.kept)
         await clock.advance(1.0)
         robot[Driving].move_by(Pose(3.0), speed=0.6)
         await clock.advance(8.0)
-        learnt.append(robot[Localization].estimator.odometry.kept)  # type: ignore[attr-defined]
+        learnt.append(known(of_kind(robot[Localization], LidarLocalization).estimator).odometry.kept)
         await fleet.close()
         assert robot[Settings].get(KEY) == learnt[-1]
     database.close()

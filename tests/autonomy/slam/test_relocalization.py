@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from roboglot.autonomy.slam.localization import LidarLocalization
 from roboglot.model.actions import ActionStatus
 from roboglot.model.components.mapping.localization import Localization, Region
 from roboglot.model.components.mapping.mapping import Mapping
@@ -17,6 +18,7 @@ from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.errors import InvalidGoal, NotLocalized
 from roboglot.model.events import LocalizationLost, LocalizationRecovered, PoseJumped
 from roboglot.model.geometry import Pose
+from tests.narrowing import known, of_kind
 
 if TYPE_CHECKING:
     from tests.autonomy.conftest import Tour
@@ -121,11 +123,12 @@ async def test_people_around_robot_do_not_hide_its_place(tour: Tour) -> None:
 
     await tour.go((12.0, 9.8))
     await tour.go((12.0, 6.5))
-    estimator, scan = tour.robot[Localization].estimator, tour.robot[Lidar].scan  # type: ignore[attr-defined]
-    ranges, angles = scan.ranges.copy(), scan.angles  # type: ignore[union-attr]
+    estimator = known(of_kind(tour.robot[Localization], LidarLocalization).estimator)
+    scan = known(tour.robot[Lidar].scan)
+    ranges, angles = scan.ranges.copy(), scan.angles
     for bearing, width, away in ((0.0, 0.6, 0.5), (2.0, 0.2, 1.2)):  # one stands right in front, one further off
         ranges[abs(angles - bearing) < width] = away
-    hidden = ScanReader().read(replace(scan, ranges=ranges))  # type: ignore[arg-type, type-var]
+    hidden = ScanReader().read(replace(scan, ranges=ranges))
     (found,) = places(estimator._belief.map, hidden, None)
     assert found.pose.distance_to(tour.truth.relative_to(tour.start)) < 0.05
 

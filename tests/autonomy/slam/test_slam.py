@@ -109,10 +109,10 @@ async def test_rough_pose_is_corrected_a_wrong_one_reported(tour: Tour) -> None:
     tour.robot.events.listen(LocalizationLost, lambda event: lost.append((event, tour.robot[Mapping].revision)))
     tour.robot.events.listen(LocalizationRecovered, found.append)
     localization.set_pose(wrong)
-    await tour.until(lambda: lost, 3.0)  # type: ignore[arg-type, return-value]
+    await tour.until(lambda: lost, 3.0)
     assert lost[0][0].reason is LostReason.NO_FIT
     assert lost[0][1] == revision  # a robot that is lost does not spoil its map
-    await tour.until(lambda: found, 5.0)  # type: ignore[arg-type, return-value]
+    await tour.until(lambda: found, 5.0)
     assert localization.lost is None
     assert tour.error[0] < 0.03
 

@@ -19,6 +19,8 @@ from roboglot.protocols.cyberdog.table import pushes
 from roboglot.wire.contracts import contract
 from roboglot.wire.cyberdog.chapters.camera import End
 from roboglot.wire.cyberdog.codes import Code, SkinMode, TaskType
+from tests.narrowing import known
+from tests.protocols.cyberdog.phone import context_of
 
 pytestmark = pytest.mark.world("office", body="cyberdog2")
 BRACELET = values.Device("C4:7C:8D:00:00:01", "Bracelet", "random")
@@ -175,14 +177,14 @@ EXAMPLES: dict[int, values.Value] = {
 async def test_every_push_arrives_as_its_value(client: CyberDogClient, door: CyberDogDoor) -> None:
     assert {int(code) for code in pushes} - {int(Code.VIDEO)} == EXAMPLES.keys()
     await client.found()
-    await _until(lambda: door._context.app.connected)  # type: ignore[union-attr]
+    await _until(lambda: context_of(door).app.connected)
     for code, value in EXAMPLES.items():
         with client.watch(type(value)) as reported:
-            door._context.app.push(pushes[code], msgspec.to_builtins(value))  # type: ignore[union-attr]
+            context_of(door).app.push(pushes[code], msgspec.to_builtins(value))
             async with asyncio.timeout(5):
                 assert await anext(reported) == value
     with client.signals.subscribe() as signals:
-        door._context.app.push(pushes[Code.VIDEO], {"is_closed": True, "uid": "x"})  # type: ignore[union-attr]
+        context_of(door).app.push(pushes[Code.VIDEO], {"is_closed": True, "uid": "x"})
         async with asyncio.timeout(5):
             assert await anext(signals) == End("x", done=True)
 
@@ -249,7 +251,7 @@ async def test_pictures_move(client: CyberDogClient, door, world) -> None:
 async def test_dead_link_is_reported_at_once_and_mends(client: CyberDogClient, door: CyberDogDoor) -> None:
     await client.found()
     port = door.port
-    await door._server.stop(None)
+    await known(door._server).stop(None)
     with pytest.raises(LinkLost):
         await client.status()
     again = type(door)(

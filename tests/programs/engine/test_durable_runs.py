@@ -13,7 +13,7 @@ import pytest
 import pytest_asyncio
 
 from roboglot.model.clock import RealClock
-from roboglot.model.robot import Robot
+from roboglot.model.robot import Description, Robot
 from roboglot.programs.engine import journal
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.engine.events import Answer
@@ -24,6 +24,9 @@ from roboglot.storage.database import Database
 from roboglot.storage.journals import DatabaseJournalStore
 from roboglot.storage.programs import program_stores
 from roboglot.testing.process import child
+
+TEXTS = dict.fromkeys(("maker", "model", "serial", "hardware_version", "software_version"), "")
+UNKNOWN = Description(**TEXTS, radius=0.2, height=0.3)
 
 PROGRAM = """import random
 began = time.monotonic()
@@ -99,7 +102,7 @@ async def second(tmp_path: Path) -> AsyncIterator[Callable[[], ProgramService]]:
 
         def begin() -> ProgramService:
             database = Database(tmp_path / "robot.db")
-            service = ProgramService(Robot("a", None, RealClock(5000.0)), engine, program_stores(database, "a"))  # type: ignore[arg-type]
+            service = ProgramService(Robot("a", UNKNOWN, RealClock(5000.0)), engine, program_stores(database, "a"))
             opened.append((service, database))
             service.start()
             return service

@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 import textwrap
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -198,7 +199,7 @@ async def test_workers_die_with_the_server() -> None:
     process.kill()
     await asyncio.wait_for(process.wait(), 60)
     for pid in (zygote, *workers):
-        await until(lambda pid=pid: process_state(pid) in {"", "Z"})  # type: ignore[misc]
+        await until(partial(lambda pid: process_state(pid) in {"", "Z"}, pid))
 
 
 async def test_many_programs_at_once() -> None:

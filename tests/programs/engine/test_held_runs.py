@@ -10,7 +10,7 @@ import pytest
 import pytest_asyncio
 
 from roboglot.model.clock import RealClock
-from roboglot.model.robot import Robot
+from roboglot.model.robot import Description, Robot
 from roboglot.programs.engine.calls import NONE_REPLY
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.engine.events import Answer, Finished, Output, Replayed
@@ -20,6 +20,9 @@ from roboglot.storage.database import Database
 from roboglot.storage.journals import DatabaseJournalStore
 from roboglot.storage.programs import program_stores
 from tests.programs.playing import PRELUDE, until
+
+TEXTS = dict.fromkeys(("maker", "model", "serial", "hardware_version", "software_version"), "")
+UNKNOWN = Description(**TEXTS, radius=0.2, height=0.3)
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 PROGRAM = "cyberdog.task.block('one')\nprint('one')\ncyberdog.task.breakpoint_block('two')\nprint('two')\n"
@@ -45,7 +48,7 @@ def stores() -> Stores:
 
 @pytest_asyncio.fixture(loop_scope="module")
 async def service(engine: Engine, stores: Stores) -> AsyncIterator[ProgramService]:
-    made = ProgramService(Robot("a", None, RealClock()), engine, stores)  # type: ignore[arg-type]
+    made = ProgramService(Robot("a", UNKNOWN, RealClock()), engine, stores)
     made.start()
     await made.save(StoredProgram("t", "", "", "single", "now", PROGRAM, ""))
     yield made

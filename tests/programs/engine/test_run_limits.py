@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
+from functools import partial
 
 import pytest
 
@@ -116,7 +117,7 @@ async def test_greedy_programs_get_turns_one_by_one() -> None:
             accounts[number].go_on(lambda: work(number))
 
     for number in range(3):
-        accounts[number].go_on(lambda number=number: work(number))  # type: ignore[misc]
+        accounts[number].go_on(partial(work, number))
     assert turns == []
     share.account().go_on(lambda: turns.append(9))  # it has taken nothing yet: no need to wait
     await until(lambda: len(turns) >= 9)

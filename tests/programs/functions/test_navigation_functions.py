@@ -59,7 +59,7 @@ async def test_going_to_a_preset(home: Caller, world: World) -> None:
         assert result_of(await home("cyberdog.navigation.to_preset", "kitchen", False, True, 40)) == (0, 0)
         assert (await said.next()).text == "navigation succeeded"
     pose = home.robot[Localization].pose
-    assert pose.distance_to(Point(1.6, 0.3)) < 0.1  # type: ignore[arg-type]
+    assert pose.distance_to(Point(1.6, 0.3)) < 0.1
 
 
 async def test_going_to_coordinates_needs_navigation_on(home: Caller, world: World) -> None:
@@ -196,7 +196,7 @@ async def test_newer_outdoor_map_leaves_indoor_points_alone(home: Caller) -> Non
     assert result_of(await home("cyberdog.navigation.turn_on_navigation")) == (0, 0)
     assert result_of(await home("cyberdog.navigation.navigation_to_preset", "kitchen")) == (0, 0)
     pose = home.robot[Localization].pose
-    assert pose.distance_to(Point(1.6, 0.3)) < 0.1  # type: ignore[arg-type]
+    assert pose.distance_to(Point(1.6, 0.3)) < 0.1
     await home.robot[MapLibrary].remove("home")
     assert result_of(await home("cyberdog.navigation.navigation_to_preset", "kitchen")) == (1, 3)
 

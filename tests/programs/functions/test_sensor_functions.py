@@ -13,6 +13,7 @@ from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import ComponentMissing
 from roboglot.model.sensing import BatteryState, Supply
 from roboglot.programs.functions.records import RECORDS
+from tests.narrowing import known
 from tests.programs.functions.calling import Caller, field
 
 pytestmark = pytest.mark.world("empty")
@@ -135,7 +136,7 @@ async def test_the_imu_feels_gravity(caller: Caller) -> None:
 
 async def test_a_scan_is_whole(caller: Caller) -> None:
     scan = await caller("cyberdog.lidar.get_data", 2)
-    assert len(field(scan, "ranges")) == len(caller.robot[Lidar].scan.ranges)  # type: ignore[union-attr]
+    assert len(field(scan, "ranges")) == len(known(caller.robot[Lidar].scan).ranges)
     last = field(scan, "angle_min") + field(scan, "angle_increment") * (len(field(scan, "ranges")) - 1)
     assert field(scan, "angle_max") == pytest.approx(last)
     assert field(scan, "scan_time") == pytest.approx(0.1)

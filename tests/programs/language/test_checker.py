@@ -147,7 +147,7 @@ x = f(5)
     scope: dict[str, object] = {}
     exec(code, scope)
     assert scope["x"] == 161
-    assert scope["f"].__doc__ == "doc"  # type: ignore[attr-defined]
+    assert scope["f"].__doc__ == "doc"
     assert set(seen) == {(3, line) for line in (1, 3, 4, 6, 7, 8)}
     assert seen[-4:] == [(3, 4), (3, 3), (3, 6), (3, 7)]
 

@@ -15,6 +15,8 @@ from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from grpc_tools import protoc
 
 import roboglot.wire.cyberdog.proto as proto
+from roboglot.protocols.cyberdog.context import Context
+from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.testing import Forward
 from tests.drivers.pace import settle
 
@@ -215,3 +217,9 @@ def examples(page: str) -> list[tuple[int, str, str]]:
     """The documentation's example of every code: its number, params, and what is said of the answer."""
     text = (DOCS / page).read_text(encoding="utf-8")
     return [(int(code), params or "{}", answer.strip()) for code, params, answer in EXAMPLE.findall(text)]
+
+
+def context_of(door: CyberDogDoor) -> Context:
+    """Return what the chapters of an open door keep."""
+    assert door._context is not None
+    return door._context

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import AsyncIterator, Awaitable, Callable
+from functools import partial
 from pathlib import Path
 
 import grpc
@@ -21,8 +22,9 @@ from roboglot.protocols.cyberdog.outbox import Outbox
 from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.protocols.cyberdog.table import push, pushes
 from roboglot.simulation.world.world import World
+from roboglot.wire.cyberdog.proto.cyberdog_app_pb2 import Ticks
 from roboglot.wire.visual.relay import FrontEnd
-from tests.protocols.cyberdog.phone import ADDRESS, App, Client, Messages, Pems, until
+from tests.protocols.cyberdog.phone import ADDRESS, App, Client, Messages, Pems, context_of, until
 
 Passing = Callable[[Callable[[], object]], Awaitable[None]]
 
@@ -64,7 +66,7 @@ async def test_heartbeats_come_every_half_second(phoned, app, clock: LockstepClo
     await asyncio.sleep(0.05)
     for beats in range(len(app.ticks) + 1, len(app.ticks) + 5):
         await clock.advance(0.5)
-        await until(lambda beats=beats: len(app.ticks) == beats)  # type: ignore[misc]
+        await until(partial(lambda beats: len(app.ticks) == beats, beats))
         await asyncio.sleep(0.03)  # for the reply to get home
         assert len(app.ticks) == beats
 
@@ -93,7 +95,7 @@ async def test_lying_dog_gets_up_for_its_first_app(door, client, app, robot, for
 async def test_a_lost_app_is_dialled_again(
     phoned: CyberDogDoor, app: App, messages: Messages, pems: Pems, passing: Passing, clock: LockstepClock
 ) -> None:
-    link = phoned._context.app  # type: ignore[union-attr]
+    link = context_of(phoned).app
     await passing(lambda: link.connected)
     await app.stop()
     lost_from = clock.time()
@@ -151,7 +153,7 @@ class Dialling(AppLink):
 
 
 async def test_call_during_attempt_leads_to_next_at_once(clock: LockstepClock) -> None:
-    link = Dialling(clock, None, AppRoute(ADDRESS, "127.0.0.1:1", 1), ticks=str)
+    link = Dialling(clock, None, AppRoute(ADDRESS, "127.0.0.1:1", 1), ticks=lambda _: Ticks())
     link.start()
     await clock.advance(2.0)
     link.seen("ipv4:127.0.0.1:4711")
@@ -247,7 +249,7 @@ async def test_program_frames_pass_through(robot, data, app, pems, messages, pas
     async with pems.channel(door.port) as channel:
         client = Client(channel, messages)
         await client.ask(10001)
-        await passing(lambda: door._context.app.connected)  # type: ignore[union-attr]
+        await passing(lambda: context_of(door).app.connected)
         frame = '{ "type":"task",   "body":"1+1\\n" }'
         assert await client.raw(2002, frame) == []
         assert programs.got == [frame]

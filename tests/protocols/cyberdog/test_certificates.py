@@ -21,7 +21,7 @@ from roboglot.protocols.cyberdog.certificates import (
 )
 from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.server import CyberDogDoor
-from tests.protocols.cyberdog.phone import ADDRESS, App, Client, Messages, Pems
+from tests.protocols.cyberdog.phone import ADDRESS, App, Client, Messages, Pems, context_of
 
 
 def mode(path: Path) -> int:
@@ -149,8 +149,8 @@ async def test_certificates_that_are_replaced_count_at_next_connection(
         new = proof()
         app = App(messages)
         await app.start(grpc.ssl_server_credentials(((new.key, new.certificate),), new.ca, require_client_auth=True))
-        door._context.app._app_port = app.port  # type: ignore[union-attr]
-        door._context.app.seen("ipv4:127.0.0.1:1")  # type: ignore[union-attr]
+        context_of(door).app._app_port = app.port
+        context_of(door).app.seen("ipv4:127.0.0.1:1")
         await passing(lambda: app.ticks)  # dialled with the new ones
         await app.stop()
     finally:

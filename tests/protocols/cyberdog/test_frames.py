@@ -7,6 +7,7 @@ import contextlib
 import json
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,7 @@ from roboglot.simulation.world.world import World
 from roboglot.storage.database import Database
 from roboglot.storage.programs import program_stores
 from roboglot.wire.visual.codes import FeedbackState
-from tests.protocols.cyberdog.phone import ADDRESS, App, Client, Messages, Pems, until
+from tests.protocols.cyberdog.phone import ADDRESS, App, Client, Messages, Pems, context_of, until
 
 Frame = dict[str, Any]
 PUSH_ROOM = 4_194_304
@@ -89,7 +90,8 @@ async def phone(
         stack.push_async_callback(door.close)
         client = Client(await stack.enter_async_context(pems.channel(door.port)), messages)
         await client.ask(10001)
-        await passing(lambda: door._context.app.connected)  # type: ignore[union-attr]
+        context = context_of(door)
+        await passing(lambda: context.app.connected)
         yield Phone(client, app, service, door)
 
 
@@ -111,7 +113,7 @@ async def test_an_inquiry_overtakes_what_programs_do(phone: Phone) -> None:
     for round in range(1, 4):
         before = len(phone.blocks())
         await phone.ask("inquiry", "t")
-        await until(lambda round=round: len(phone.answers("inquiry")) == round)  # type: ignore[misc]
+        await until(partial(lambda round: len(phone.answers("inquiry")) == round, round))
         assert len(phone.blocks()) - before <= ROOM
     await phone.ask("shutdown", "t")
     await until(lambda: any(frame["feedback"]["id"] == "shutdown" for frame in phone.frames if "feedback" in frame))
@@ -122,10 +124,11 @@ async def test_an_inquiry_overtakes_what_programs_do(phone: Phone) -> None:
 async def test_a_program_waits_for_a_slow_phone(phone: Phone) -> None:
     phone.app.gate.clear()
     await phone.start("t", "for n in range(10000): cyberdog.task.block(str(n))\nprint('through')")
-    queue = phone.door._context.frames  # type: ignore[union-attr]
-    await until(lambda: queue._news >= ROOM)  # type: ignore[union-attr]
+    queue = context_of(phone.door).frames
+    assert queue is not None
+    await until(lambda: queue._news >= ROOM)
     await asyncio.sleep(0.2)
-    assert queue._news < 2 * ROOM  # type: ignore[union-attr]
+    assert queue._news < 2 * ROOM
     assert not any(entry.text == "through" for entry in await phone.service.log("t"))
     phone.app.gate.set()
     await phone.ask("shutdown", "t")

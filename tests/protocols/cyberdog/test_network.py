@@ -20,7 +20,7 @@ from roboglot.protocols.cyberdog.chapters.camera.camera_files import CameraFiles
 from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.server import CyberDogDoor
 from tests.drivers.link_proxy import Fault, Proxy
-from tests.protocols.cyberdog.phone import ADDRESS, App, Client, Messages, Pems, Stream, state
+from tests.protocols.cyberdog.phone import ADDRESS, App, Client, Messages, Pems, Stream, context_of, state
 from tests.protocols.cyberdog.test_upkeep import FILE, MD5, MODULE
 
 pytestmark = pytest.mark.world("empty", body="cyberdog2")
@@ -49,7 +49,7 @@ class Afar:
     async def fall_silent(self) -> None:
         """Half-open: no one is notified, and the app is missed in the end."""
         self.fault.silent = True
-        await self.passing(lambda: not self.door._context.app.connected)  # type: ignore[union-attr]
+        await self.passing(lambda: not context_of(self.door).app.connected)
 
     async def heal(self) -> None:
         """The network is back, with new connections, and so is the app."""
@@ -57,7 +57,7 @@ class Afar:
         for way in self.ways:
             way.cut()
         await self.near.ask(10001)
-        await self.passing(lambda: self.door._context.app.connected)  # type: ignore[union-attr]
+        await self.passing(lambda: context_of(self.door).app.connected)
 
 
 @pytest.fixture
@@ -73,7 +73,7 @@ async def afar(
     await way.start()
     async with pems.channel(way.port, address="127.0.0.1") as channel, pems.channel(door.port) as direct:
         made = Afar(Client(channel, messages), Client(direct, messages), app, door, fault, passing, (way, back))
-        await passing(lambda: door._context.app.connected)  # type: ignore[union-attr]
+        await passing(lambda: context_of(door).app.connected)
         yield made
         fault.heal()
     for proxy in made.ways:
@@ -91,7 +91,7 @@ async def test_slow_or_lossy_network_delays_and_loses_nothing(afar: Afar, robot:
     await afar.passing(lambda: stream.ended)
     assert stream.answers[-1] == {"result": 0}
     assert list(await robot[MapLibrary].names()) == ["far"]
-    assert afar.door._context.app.connected  # type: ignore[union-attr]
+    assert context_of(afar.door).app.connected
 
 
 async def test_silence_while_mapping(afar: Afar, robot: Robot) -> None:
@@ -120,14 +120,14 @@ async def test_silence_while_a_file_is_sent(
         return await stop(files, at_once=at_once)
 
     monkeypatch.setattr(CameraFiles, "stop", stop_late)
-    files = afar.door._context.files  # type: ignore[union-attr]
+    files = context_of(afar.door).files
     for name in files.names():  # another test's
         files.remove(files.path(name))
     robot[Camera].rate = 5.0
     assert await afar.ask(4002, {"command": 2}) == {"result": 0}
     afar.fault.silent = True
     fetching = asyncio.ensure_future(afar.client.file(4002, {"command": 3}))
-    await afar.passing(lambda: not afar.door._context.app.connected)  # type: ignore[union-attr]
+    await afar.passing(lambda: not context_of(afar.door).app.connected)
     await afar.heal()
     await asyncio.gather(fetching, return_exceptions=True)
     await afar.passing(lambda: afar.app.of(4003))
@@ -141,9 +141,9 @@ async def test_push_to_a_lost_app_spares_later_ones(afar: Afar, robot: Robot) ->
     low, silent_since = DiskLow(stamp=0.0, free=1), robot.clock.time()
     afar.fault.silent = True
     await afar.passing(lambda: robot.clock.time() > silent_since + 3.5)  # soon enough to be waited for at the end
-    assert afar.door._context.app.connected  # type: ignore[union-attr]
+    assert context_of(afar.door).app.connected
     robot.events.publish(low)
-    await afar.passing(lambda: not afar.door._context.app.connected)  # type: ignore[union-attr]
+    await afar.passing(lambda: not context_of(afar.door).app.connected)
     await afar.heal()
     robot.events.publish(low)
     await afar.passing(lambda: afar.app.of(4005))

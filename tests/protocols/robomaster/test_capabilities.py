@@ -8,11 +8,13 @@ import pytest
 from roboglot.cli.capabilities import BODIES, Kind
 from roboglot.media.audio import AudioStream
 from roboglot.media.video import VideoStream
+from roboglot.model.clock import LockstepClock
 from roboglot.model.robot import Robot
 from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.dispatch import answer
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.wire.robomaster.replies import PROFILES
+from tests.narrowing import of_kind
 
 WORDS = {  # after the command; those that are not here need none
     "robot mode": "free", "chassis speed": "x 0.1", "chassis wheel": "w1 10", "chassis move": "x 0.1",
@@ -67,7 +69,7 @@ async def test_every_command_answers_as_the_page_says(body: str, robot: Robot) -
         await answer(context, "command")
         asked = asyncio.ensure_future(answer(context, text))
         for _ in range(60):
-            await robot.clock.advance(0.1)  # type: ignore[attr-defined]
+            await of_kind(robot.clock, LockstepClock).advance(0.1)
             if asked.done():
                 break
         got = await asked
@@ -78,5 +80,5 @@ async def test_every_command_answers_as_the_page_says(body: str, robot: Robot) -
         if refused != (kind.judge(operation.needs) == "refused"):
             wrong[text] = (got.reply, got.why)
         context.end("the next one")
-        await robot.clock.advance(0.6)  # type: ignore[attr-defined]
+        await of_kind(robot.clock, LockstepClock).advance(0.6)
     assert not wrong

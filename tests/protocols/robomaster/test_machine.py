@@ -128,7 +128,7 @@ class Machine(RuleBasedStateMachine):
         got = self.run(self._ask(client, text))
         assert got == (right if inside else IDLE), text
         if inside:
-            self.members.add(client)  # type: ignore[arg-type]
+            self.members.add(client)
         return inside and got != MISSING
 
     # -- connections ---------------------------------------------------------------------------------------------------
@@ -156,7 +156,7 @@ class Machine(RuleBasedStateMachine):
         right = "Already in SDK mode;" if self.modes is not None else "ok;"
         assert self.run(self._ask(client, "command")) == right
         self.modes = self.modes or Modes()
-        self.members.add(client)  # type: ignore[arg-type]
+        self.members.add(client)
 
     @rule(client=clients, really=st.integers(0, 3).map(lambda number: number == 3))
     def leave(self, client: TextClient, really: bool) -> None:

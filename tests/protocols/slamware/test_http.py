@@ -175,7 +175,7 @@ async def test_bodies_are_bounded(bare_door: SlamwareDoor, bare_client: httpx.As
     reply = await bare_client.post(POIS, content=b"x" * (parameters.BODY_MAX + 1))
     assert reply.status_code == 413
 
-    async def chunks():  # type: ignore[no-untyped-def]
+    async def chunks():
         for _ in range(40):
             yield b"x" * 65536
 

@@ -1,6 +1,7 @@
 """Every chapter through a real socket, against what happens to the simulated robot. Motion has its own file."""
 
 import math
+from typing import Any
 
 import httpx
 import numpy as np
@@ -31,7 +32,7 @@ SYSTEM, SLAM = "/api/core/system/v1", "/api/core/slam/v1"
 POIS = "/api/core/artifact/v1/pois"
 
 
-async def get(client: httpx.AsyncClient, path: str) -> object:
+async def get(client: httpx.AsyncClient, path: str) -> Any:
     reply = await client.get(path)
     assert reply.status_code == 200, reply.text
     return reply.json()
@@ -115,11 +116,11 @@ async def test_a_low_battery_is_a_warning(
 
 
 async def test_the_scan_lies_on_the_walls(world: World, client: httpx.AsyncClient, forward: Forward) -> None:
-    assert (await get(client, f"{SYSTEM}/laserscan"))["laser_points"] == []  # type: ignore[index]
+    assert (await get(client, f"{SYSTEM}/laserscan"))["laser_points"] == []
     world.hands.place("a", Pose(3.0, 2.0, 0.7))  # nothing here is symmetric
     await forward(seconds=1)
     where = world.truth.pose_of("a")
-    points = (await get(client, f"{SYSTEM}/laserscan"))["laser_points"]  # type: ignore[index]
+    points = (await get(client, f"{SYSTEM}/laserscan"))["laser_points"]
     assert len(points) >= 300
     assert set(points[0]) == {"distance", "angle", "valid"}
     hits = [where.compose(Pose(p["distance"] * math.cos(p["angle"]), p["distance"] * math.sin(p["angle"])))
@@ -138,7 +139,7 @@ async def test_scan_comes_with_pose_where_it_was_taken(
     assert scan is not None
     behind = 0.5 * (robot.clock.time() - scan.stamp)
     assert behind > 0.01
-    pose = (await get(client, f"{SYSTEM}/laserscan"))["pose"]  # type: ignore[index]
+    pose = (await get(client, f"{SYSTEM}/laserscan"))["pose"]
     assert robot[Localization].pose.x - pose["x"] == pytest.approx(behind, abs=0.011)  # odometry beats at 50 Hz
     await forward(seconds=2)
 

@@ -8,11 +8,14 @@ import json
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from roboglot.model.robot import Robot
+from roboglot.model.robot import Description, Robot
 from roboglot.programs.tasks.states import TaskOperation
 from roboglot.storage.database import Database
 from roboglot.storage.programs import program_stores
 from tests.protocols.visual.front_end import FrontEnd
+
+TEXTS = dict.fromkeys(("maker", "model", "serial", "hardware_version", "software_version"), "")
+UNKNOWN = Description(**TEXTS, radius=0.2, height=0.3)
 
 
 async def test_frames_that_are_none(app: FrontEnd) -> None:
@@ -74,7 +77,7 @@ class FrontEndOnly:
         self.sent: list[str] = []
         engine = Engine()
         engine._closed = True
-        robot = Robot("a", None, LockstepClock())  # type: ignore[arg-type]
+        robot = Robot("a", UNKNOWN, LockstepClock())
         self.database = Database(":memory:")
         self.door = VisualDoor(ProgramService(robot, engine, program_stores(self.database, robot.id)))
         self.door.subscribe(self.sent.append)

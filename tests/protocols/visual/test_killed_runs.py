@@ -13,12 +13,15 @@ from collections import Counter, defaultdict
 from pathlib import Path
 
 from roboglot.model.clock import RealClock
-from roboglot.model.robot import Robot
+from roboglot.model.robot import Description, Robot
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.storage.database import Database
 from roboglot.storage.programs import program_stores
 from tests.protocols.visual.killed_robot import STEPS
+
+TEXTS = dict.fromkeys(("maker", "model", "serial", "hardware_version", "software_version"), "")
+UNKNOWN = Description(**TEXTS, radius=0.2, height=0.3)
 
 KILLS = int(os.environ.get("ROBOGLOT_KILLS", "2"))
 TASKS = 3
@@ -44,7 +47,7 @@ async def life(database: Path, words: Path, seconds: float | None) -> Counter[tu
 
 async def log(database: Path) -> list[str]:
     opened = Database(database)
-    service = ProgramService(Robot("a", None, RealClock()), Engine(), program_stores(opened, "a"))  # type: ignore[arg-type]
+    service = ProgramService(Robot("a", UNKNOWN, RealClock()), Engine(), program_stores(opened, "a"))
     entries = [entry.text for number in range(TASKS) for entry in await service.log(f"t{number}")]
     assert service._journals.headers_now() == {}
     opened.close()

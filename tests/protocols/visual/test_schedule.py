@@ -150,16 +150,17 @@ async def test_run_that_was_acknowledged_but_not_begun_begins(connect: Connect, 
 
 
 async def test_forbidden_start_is_reported_at_its_time(app: FrontEnd, plain_robot: Robot) -> None:
-    battery = plain_robot.add(Battery, Charge())
+    battery = Charge()
+    plain_robot.add(Battery, battery)
     await plan(app, "once", "single", "now + 1minutes")
     await plan(app, "again", "cycle", "* * * * *")
-    battery.charge = 0.04  # type: ignore[attr-defined]
+    battery.charge = 0.04
     await app.clock.advance(60)
     await app.until(lambda: starts(app, "once") and starts(app, "again"), pace=0.0)
     assert [app.news(id, "start")[0]["feedback"]["state"] for id in ("once", "again")] == [27, 27]
     assert (await app.state("once"), await app.state("again")) == ("shutdown", "run_wait")
     assert "not started" in (await app.service.log("once"))[-1].text
-    battery.charge = 1.0  # type: ignore[attr-defined]
+    battery.charge = 1.0
     await app.clock.advance(60)
     await app.ends("again", pace=0.0)
 

@@ -263,9 +263,10 @@ async def test_debug_runs_at_once_replacing_itself_unlisted(app: FrontEnd) -> No
 
 
 async def test_the_robots_mode_refuses_in_the_vendors_words(app: FrontEnd, plain_robot: Robot) -> None:
-    battery = plain_robot.add(Battery, Charge())
+    battery = Charge()
+    plain_robot.add(Battery, battery)
     await app.start("t", BUSY)
-    battery.charge = 0.04  # type: ignore[attr-defined]
+    battery.charge = 0.04
     [answer] = await app.ask("recover", "t")
     words = "The current robot is in [LowPower] mode and does not support <recover> operation."
     assert (answer["state"], answer["describe"]) == (27, words)

@@ -11,7 +11,6 @@ import re
 from collections.abc import AsyncGenerator, Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import grpc
 
@@ -69,7 +68,7 @@ class Heartbeat:
     audio: bool
 
 
-def _heartbeat(ticks: Any, at: float) -> Heartbeat:
+def _heartbeat(ticks: pb.Ticks, at: float) -> Heartbeat:
     return Heartbeat(
         at,
         ticks.ip,
@@ -107,9 +106,9 @@ class Link:
         self.app_port = app_port
         self.line: Line | None = None  # what is asked, answered and pushed is noted there
         self._host, self._port, self._certificates, self._pushed = host, port, certificates, pushed
-        self._channel: Any = None
-        self._stub: object = None
-        self._server: Any = None
+        self._channel: grpc.aio.Channel | None = None
+        self._stub: GrpcAppStub | None = None
+        self._server: grpc.aio.Server | None = None
         self._stopping: asyncio.Future[object] | None = None
 
     @property
@@ -129,9 +128,9 @@ class Link:
             self._channel = grpc.aio.insecure_channel(f"{name}:{self._port}", options=options)
         self._stub = GrpcAppStub(self._channel)
         if self.app_port is not None:
-            await self._serve(self.app_port)
+            await self._serve(self.app_port, self._channel)
 
-    async def _serve(self, port: int) -> None:
+    async def _serve(self, port: int, channel: grpc.aio.Channel) -> None:
         limits = [("grpc.so_reuseport", 0), ("grpc.max_receive_message_length", PUSH_MAX)]
         self._server = grpc.aio.server(options=[*limits, ("grpc.http2.min_ping_interval_without_data_ms", 500)])
         add_GrpcAppServicer_to_server(_App(self), self._server)
@@ -145,7 +144,7 @@ class Link:
             else:
                 self.app_port = self._server.add_insecure_port(where)
         except RuntimeError as error:
-            await self._channel.close()
+            await channel.close()
             raise LinkLost(f"the robot cannot call back: {where} is taken, perhaps by another app") from error
         await self._server.start()
 
@@ -160,7 +159,7 @@ class Link:
             self._stub = None
             await self._channel.close()
 
-    def _robot(self) -> Any:
+    def _robot(self) -> GrpcAppStub:
         if self._stub is None:
             raise LinkLost("hung up")
         return self._stub
@@ -184,7 +183,7 @@ class Link:
         finally:
             call.cancel()
 
-    async def fetch(self, code: int, text: str) -> AsyncGenerator[object, None]:
+    async def fetch(self, code: int, text: str) -> AsyncGenerator[pb.FileChunk, None]:
         """The chunks of a file. Raises LinkLost."""
         call = self._robot().getFile(pb.SendRequest(nameCode=code, params=text))
         line = self.line if self.line is not None and self.line.watched else None
@@ -211,13 +210,13 @@ class Link:
         return self.heartbeat
 
 
-class _App(GrpcAppServicer):  # type: ignore[misc]
+class _App(GrpcAppServicer):
     """The service of the app, which the robot calls."""
 
     def __init__(self, link: Link) -> None:
         self._link, self._beats = link, Beats()
 
-    async def heartbeat(self, request: object, _context: object) -> object:
+    async def heartbeat(self, request: pb.Ticks, _context: object) -> pb.Result:
         self._link.heartbeat = _heartbeat(request, self._link.clock.time())
         if self._link.line is None or not self._link.line.watched:
             self._beats.forget()
@@ -225,7 +224,9 @@ class _App(GrpcAppServicer):  # type: ignore[misc]
             self._link.line.push(HEARTBEAT, news)
         return pb.Result(result="ok")
 
-    async def sendMsg(self, request: Any, _context: Any) -> Any:  # noqa: N802 - the service's name
+    async def sendMsg(  # noqa: N802 - the service's name
+        self, request: pb.SendRequest, _context: grpc.aio.ServicerContext
+    ) -> AsyncGenerator[pb.RecResponse, None]:
         if self._link.line is not None and self._link.line.watched:
             self._link.line.push(str(int(request.nameCode)), request.params)
         self._link._pushed(request.nameCode, request.params)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import math
+from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ TASK, STOP, POSE, FRAME_DOWN, FRAME_UP = 6004, 6009, 6005, 2002, 2001
 NAVIGATE, RELOCALISE = 1, 7
 
 
-class Phone(service.GrpcAppServicer):  # type: ignore[misc]
+class Phone(service.GrpcAppServicer):
     """``certificates`` is a folder with ca-cert.pem, client-cert.pem and client-key.pem."""
 
     def __init__(self, address: str, certificates: Path, port: int = 50052) -> None:
@@ -51,7 +52,9 @@ class Phone(service.GrpcAppServicer):  # type: ignore[misc]
         """Receive the heartbeat of the robot, twice a second."""
         return pb.Result(result="ok")
 
-    async def sendMsg(self, request: Any, _context: Any) -> Any:  # noqa: N802 - the service's name
+    async def sendMsg(  # noqa: N802 - the service's name
+        self, request: pb.SendRequest, _context: grpc.aio.ServicerContext
+    ) -> AsyncIterator[pb.RecResponse]:
         """The robot pushes a report."""
         async with self._arrived:
             self._pushed[request.nameCode] = json.loads(request.params)

@@ -9,10 +9,9 @@ from __future__ import annotations
 import asyncio
 import logging
 import zlib
-from collections.abc import Callable
+from collections.abc import AsyncIterable, Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 from urllib.parse import unquote
 
 import grpc
@@ -66,7 +65,7 @@ class AppLink:
         credentials: Callable[[], grpc.ChannelCredentials] | None,
         route: AppRoute,
         *,
-        ticks: Callable[[str], object],
+        ticks: Callable[[str], pb.Ticks],
         tap: Tap | None = None,
         on_host: Callable[[str], None] = lambda _: None,
     ) -> None:
@@ -85,7 +84,7 @@ class AppLink:
         self._target = self._configured or (f"{last}:{app_port}" if last else "")
         self._host, self._on_host = last, on_host
         self._news = asyncio.Event()  # the address changed, or a client called: worth dialling at once
-        self._stub: Any = None
+        self._stub: GrpcAppStub | None = None
         self._outboxes: dict[int, Outbox] = {}
         self._beats = Beats()
         self._task: asyncio.Task[None] | None = None
@@ -168,21 +167,21 @@ class AppLink:
         else:
             channel = grpc.aio.secure_channel(target, self._credentials(), options=options)
         try:
-            self._stub = GrpcAppStub(channel)
-            return await self._beat(target)
+            self._stub = stub = GrpcAppStub(channel)
+            return await self._beat(target, stub)
         finally:
             self._stub = None
             self._set_connected(False)
             await channel.close()
 
-    async def _beat(self, target: str) -> bool:
+    async def _beat(self, target: str, stub: GrpcAppStub) -> bool:
         heard = False
         own = await _route_to(target) if self._address in WILDCARDS else self._address
         last = self._clock.time()
         while self._target == target:
             began, asked = self._clock.time(), len(self._asking)
             try:
-                await self._clock.wait_for(self._stub.heartbeat(self._noted(self._ticks(own))), HEARTBEAT_DEADLINE)
+                await self._clock.wait_for(stub.heartbeat(self._noted(self._ticks(own))), HEARTBEAT_DEADLINE)
             except (grpc.aio.AioRpcError, TimeoutError) as error:
                 log.debug("no heartbeat to %s: %s", target, _in_short(error))
                 if self._clock.time() - last >= LOST_AFTER:
@@ -267,11 +266,11 @@ def _after(error: grpc.aio.AioRpcError | grpc.aio.UsageError) -> Delivery:
     return Delivery.DONE if arrived else Delivery.FAILED
 
 
-def _request(code: int, text: str) -> object:
+def _request(code: int, text: str) -> pb.SendRequest:
     return pb.SendRequest(nameCode=code, params=text)
 
 
-async def _read_to_the_end(call: Any) -> None:
+async def _read_to_the_end(call: AsyncIterable[object]) -> None:
     """The app may answer; real robots read that and ignore it."""
     async for _ in call:
         pass

@@ -8,7 +8,6 @@ import logging
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 from urllib.parse import unquote
 
 import grpc
@@ -82,7 +81,7 @@ class CyberDogDoor:
         self._data = data
         self._robot = robot
         self._relay = frames
-        self._server: Any = None
+        self._server: grpc.aio.Server | None = None
         self._context: Context | None = None
         self._handshakes: Handshakes
         self._resting: asyncio.Task[None] | None = None
@@ -93,13 +92,13 @@ class CyberDogDoor:
         """Bind and listen, and dial the app if its address is configured."""
         certificates = None if self._config.plaintext else CertificateStore(self._data / FOLDER)
         self._context = self._assemble(certificates)
-        self._server = grpc.aio.server(options=server_options(), maximum_concurrent_rpcs=CALLS_MAX)
+        self._server = server = grpc.aio.server(options=server_options(), maximum_concurrent_rpcs=CALLS_MAX)
         self._handshakes = Handshakes(self._address, self._config.port)
         self._cleanup.append(self._handshakes.close)
         add_GrpcAppServicer_to_server(_Service(self._context, self._handshakes), self._server)
         if self._config.reflection:
             add_reflection(self._server)
-        self.port = self._bind(certificates)
+        self.port = self._bind(server, certificates)
         self._handshakes.port = self.port
         await self._server.start()
         self._context.app.start()
@@ -203,14 +202,14 @@ class CyberDogDoor:
         ):
             self._resting = asyncio.get_running_loop().create_task(context.tasks.stop())
 
-    def _bind(self, certificates: CertificateStore | None) -> int:
+    def _bind(self, server: grpc.aio.Server, certificates: CertificateStore | None) -> int:
         where = f"[{self._address}]" if ":" in self._address else self._address
         where = f"{where}:{self._config.port}"
         try:
             if certificates is None:
-                port = self._server.add_insecure_port(where)
+                port = server.add_insecure_port(where)
             else:
-                port = self._server.add_secure_port(where, _as_server(certificates, self._handshakes))
+                port = server.add_secure_port(where, _as_server(certificates, self._handshakes))
         except RuntimeError:
             port = 0
         if not port:
@@ -223,13 +222,13 @@ def _reads() -> set[str]:
     return {str(int(operation.key)) for operation in TABLE if operation.right is Right.SEE}
 
 
-class _Service(GrpcAppServicer):  # type: ignore[misc]
+class _Service(GrpcAppServicer):
     """The three calls of the service as the robot serves them."""
 
     def __init__(self, context: Context, handshakes: Handshakes) -> None:
         self._context, self._handshakes = context, handshakes
 
-    async def sendMsg(self, request: Any, rpc: Any) -> None:  # noqa: N802 - the service's name
+    async def sendMsg(self, request: pb.SendRequest, rpc: grpc.aio.ServicerContext) -> None:  # noqa: N802 - the service's name
         """One request: any number of answers; the status is always OK."""
         peer, code = rpc.peer(), request.nameCode
         self._handshakes.asked(peer)
@@ -251,7 +250,7 @@ class _Service(GrpcAppServicer):  # type: ignore[misc]
         if last is not None:
             await rpc.write(_answer(code, last))
 
-    async def getFile(self, request: Any, rpc: Any) -> None:  # noqa: N802
+    async def getFile(self, request: pb.SendRequest, rpc: grpc.aio.ServicerContext) -> None:  # noqa: N802
         """Photos and recordings in chunks; errors are chunks, too."""
         peer, tap = rpc.peer(), self._context.robot.tap
         self._handshakes.asked(peer)
@@ -274,7 +273,7 @@ class _Service(GrpcAppServicer):  # type: ignore[misc]
         if admission.asks:
             await pay(admission.spend(identity() or host_of(peer), size))
 
-    async def _enter(self, rpc: Any, peer: str) -> None:
+    async def _enter(self, rpc: grpc.aio.ServicerContext, peer: str) -> None:
         """From here on it is asked for who calls; only who may see becomes the app that the robot talks to."""
         admission, app = self._context.robot.admission, self._context.app
         if not admission.asks:
@@ -292,7 +291,7 @@ class _Service(GrpcAppServicer):  # type: ignore[misc]
             app.seen(peer)
             self._context.owner = who
 
-    async def heartbeat(self, _request: Any, rpc: Any) -> None:
+    async def heartbeat(self, _request: pb.Ticks, rpc: grpc.aio.ServicerContext) -> None:
         """Only the app serves heartbeats."""
         await rpc.abort(grpc.StatusCode.UNIMPLEMENTED, "the robot sends heartbeats, it takes none")
 
@@ -320,7 +319,7 @@ def _as_server(store: CertificateStore, handshakes: Handshakes) -> object:
     return grpc.dynamic_ssl_server_credentials(configured(used), changed, require_client_authentication=True)
 
 
-def _answer(code: int, value: object) -> object:
+def _answer(code: int, value: object) -> pb.RecResponse:
     """One message to the app."""
     text = write(value)
     if len(text) > CHARACTERS_MAX and len(text.encode()) > MESSAGE_MAX - FRAME:

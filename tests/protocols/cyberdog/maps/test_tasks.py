@@ -207,7 +207,7 @@ async def test_tasks_that_no_one_can_do(client, robot) -> None:
 async def test_an_empty_battery_stops_the_task(client, robot, passing: Passing) -> None:
     stream = Stream(client, 6004, {"type": 5})
     await passing(lambda: 6 in stream.codes)
-    robot[Battery].set_charge(0.03)  # type: ignore[attr-defined]
+    robot[Battery].set_charge(0.03)
     await passing(lambda: stream.ended)
     assert stream.answers[-1] == {"result": 5}
     assert await client.ask(6004, {"type": 5}) == {"accepted": 2}

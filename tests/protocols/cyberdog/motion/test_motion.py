@@ -234,10 +234,10 @@ async def test_motion_longer_than_20_s_is_a_timeout(client, robot, world, forwar
 
 
 async def test_low_battery_allows_little(client, robot, world, forward) -> None:
-    robot[Battery].set_charge(0.15)  # type: ignore[attr-defined]
+    robot[Battery].set_charge(0.15)
     assert (await client.ask(1004, {"motion_id": 308, "duration": 500, "vel_des": [0.1, 0, 0]}))["code"] == 3013
     assert (await client.ask(10001))["state_switch_status"] == {"state": 1, "code": 0}
-    robot[Battery].set_charge(0.04)  # type: ignore[attr-defined]
+    robot[Battery].set_charge(0.04)
     assert (await client.ask(1004, {"motion_id": 308, "duration": 500, "vel_des": [0.1, 0, 0]}))["code"] == 3003
     assert (await answered(client, 1004, {"motion_id": 101}, forward))["code"] == 0
 

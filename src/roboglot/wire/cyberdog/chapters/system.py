@@ -40,7 +40,7 @@ class Beats:
 def ticks_of(text: str, address: str) -> pb.Ticks | None:
     """Return a heartbeat that was reported, from another address; None where the text is none."""
     try:
-        ticks = ParseDict(json.loads(text), pb.Ticks(), ignore_unknown_fields=True)
+        ticks: pb.Ticks = ParseDict(json.loads(text), pb.Ticks(), ignore_unknown_fields=True)
     except (ParseError, ValueError, RecursionError):
         return None
     ticks.ip = address

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
 from contextlib import aclosing
 from dataclasses import dataclass
-from typing import Any
 
 import msgspec
 
 from roboglot.clients.cyberdog.calls import Calls, CyberDogRefused, check
 from roboglot.clients.errors import BadAnswer, TimedOut
 from roboglot.wire.cyberdog.codes import Code, FileError
+from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 
 PHOTO, RECORD, STOP = 1, 2, 3
 FILE_MAX = 2**32 - 1  # bytes: the largest size that the protocol can express
@@ -75,7 +75,7 @@ class Camera(Calls):
             raise BadAnswer(f"{name or 'the file'} has {len(data)} of {size} bytes")
         return CameraFile(name, bytes(data))
 
-    async def _next(self, chunks: Any, code: Code) -> Any:
+    async def _next(self, chunks: AsyncIterator[pb.FileChunk], code: Code) -> pb.FileChunk | None:
         try:
             return await self.clock.wait_for(anext(chunks, None), CHUNK_WAIT)
         except TimeoutError:

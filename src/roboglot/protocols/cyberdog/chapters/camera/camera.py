@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections.abc import AsyncGenerator, Mapping
 from pathlib import Path
-from typing import Any
 
 from google.protobuf.message import DecodeError
 
@@ -28,7 +27,9 @@ log = logging.getLogger(__name__)
 files.add(Code.SAVED_FILE)
 
 
-def get_file(context: Context, code: int, fields: Mapping[str, object], params: str = "") -> AsyncGenerator[Any, None]:
+def get_file(
+    context: Context, code: int, fields: Mapping[str, object], params: str = ""
+) -> AsyncGenerator[pb.FileChunk, None]:
     """The chunks that answer a ``getFile``; ``params`` is the text of which ``fields`` were read."""
     if (stand_in := context.robot.stand_in) is not None:
         return _played(context, stand_in, code, params)
@@ -58,7 +59,7 @@ def _may_fetch(context: Context, code: int) -> bool:
     return True
 
 
-async def _played(context: Context, stand_in: StandIn, code: int, params: str) -> AsyncGenerator[Any, None]:
+async def _played(context: Context, stand_in: StandIn, code: int, params: str) -> AsyncGenerator[pb.FileChunk, None]:
     """The chunks of a file that was fetched when the robot was recorded."""
     if not _may_fetch(context, code):
         yield pb.FileChunk(error_code=FileError.CAMERA_SILENT)
@@ -75,7 +76,7 @@ async def _saved(files: CameraFiles, name: str) -> Path:
     return files.path(name)
 
 
-async def _refused(error: FileError) -> AsyncGenerator[object, None]:
+async def _refused(error: FileError) -> AsyncGenerator[pb.FileChunk, None]:
     yield pb.FileChunk(error_code=error)
 
 

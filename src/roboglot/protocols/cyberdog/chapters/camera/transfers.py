@@ -49,7 +49,7 @@ class Transfers:
         app.on_found.append(self._found)
         app.on_lost.append(self._lost)
 
-    async def send(self, command: Callable[[], Awaitable[Path]]) -> AsyncGenerator[object, None]:
+    async def send(self, command: Callable[[], Awaitable[Path]]) -> AsyncGenerator[pb.FileChunk, None]:
         """The file that ``command`` yields, or one chunk that tells the error."""
         if self._under_way >= TRANSFERS_MAX:
             yield pb.FileChunk(error_code=FileError.TOO_MANY)

@@ -60,7 +60,7 @@ def status_of(context: Context) -> Status:
     )
 
 
-def ticks(context: Context, address: str) -> object:
+def ticks(context: Context, address: str) -> pb.Ticks:
     """One heartbeat; ``address`` is where the app finds the robot."""
     if context.played is not None and (recorded := context.played.ticks(address)) is not None:
         return recorded

@@ -1,0 +1,16 @@
+import grpc
+
+from roboglot.wire.cyberdog.proto.cyberdog_app_pb2 import SendRequest, Ticks
+
+class GrpcAppStub:
+    sendMsg: grpc.aio.UnaryStreamMultiCallable
+    heartbeat: grpc.aio.UnaryUnaryMultiCallable
+    getFile: grpc.aio.UnaryStreamMultiCallable
+    def __init__(self, channel: grpc.aio.Channel) -> None: ...
+
+class GrpcAppServicer:
+    def sendMsg(self, request: SendRequest, context: grpc.aio.ServicerContext) -> object: ...
+    def heartbeat(self, request: Ticks, context: grpc.aio.ServicerContext) -> object: ...
+    def getFile(self, request: SendRequest, context: grpc.aio.ServicerContext) -> object: ...
+
+def add_GrpcAppServicer_to_server(servicer: GrpcAppServicer, server: grpc.aio.Server) -> None: ...
