@@ -29,6 +29,8 @@ from roboglot.programs.engine.events import (
 )
 from tests.programs.playing import PRELUDE, Played, open_descriptors, play, process_state
 
+# Twenty seconds of processor have to be used up, by programs that give way to all else: minutes on a busy machine.
+pytestmark = pytest.mark.timeout(380)
 ATTACKS = sorted((Path(__file__).parent / "attacks").rglob("*.py"))
 LIMITS = Limits(memory=32 * 1024 * 1024, cpu=1, output=300_000)
 AT_ONCE = 8
