@@ -72,17 +72,17 @@ async def test_messages_of_a_window_are_told_in_it(studio: Open) -> None:
     assert page.errors == []
 
 
-@pytest.mark.parametrize("language", ["en", "zh"])
-async def test_a_phone_shows_names_and_panels_whole(studio: Open, language: str) -> None:
+@pytest.mark.parametrize(("language", "width"), [("en", 360), ("zh", 360), ("en", 820)])
+async def test_small_screens_show_names_and_panels_whole(studio: Open, language: str, width: int) -> None:
     page = await studio(language=language)
-    await page.set_viewport_size({"width": 360, "height": 740})
+    await page.set_viewport_size({"width": width, "height": 740})
     await page.fill("header .name input", "Walk round and bark")
     await page.click(".switch button:nth-child(2)")
     await asyncio.sleep(0.1)
     boxes = await page.evaluate(WIDTHS)
-    assert all(0 <= left < right <= 360 for left, right in boxes.values()), boxes
+    assert all(0 <= left < right <= width for left, right in boxes.values()), boxes
     assert await page.evaluate("(i => i.scrollWidth <= i.clientWidth)(document.querySelector('header .name input'))")
-    assert await page.evaluate("document.documentElement.scrollWidth") <= 360
+    assert await page.evaluate("document.documentElement.scrollWidth") <= width
 
 
 async def test_help_is_a_window_in_the_own_language(studio: Open) -> None:

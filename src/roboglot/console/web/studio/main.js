@@ -133,6 +133,8 @@ effect(() => { if (current.value && online.value === "open") open(program.peek()
 const robot = computed(() => opened.value?.robot ?? "");
 effect(() => { if (robot.value) list().then(() => editor.modules.value.length && editor.remake()).then(handOver).catch(() => undefined); });
 effect(() => { void language.value; runner.show(); });
+effect(() => { if (runner.others.value.some((id) => !listed.peek().some((one) => one.id === id))) list().catch(() => undefined); }); // their names
+effect(() => { if (status.value === "out") location.assign("/?to=studio"); }); // a name is needed (again)
 let shownId = program.peek().id;
 effect(() => {
   const { id } = program.value;
