@@ -109,7 +109,8 @@ class Calls:
         self._answer(id, msgspec.json.encode({"t": "raise", "type": type, "message": message}))
 
     def go_on(self) -> None:
-        """Send the answer that was kept back; do nothing without one."""
+        """Send the answer that was kept back, if there is one, and keep none back from here on."""
+        self.keeps_last = False  # the program may come to that answer later
         kept, self._kept = self._kept, b""
         if kept and not self._host.over:
             self._host.write(kept)
