@@ -162,7 +162,7 @@ CASES = {
     ),
     "measure_room": Case("length 9.9 m, width 10.0 m, area 99 m2\n"),
     "parking_aid": Case(
-        "0.66 m\n0.50 m\n0.38 m\n0.34 m\nparked after 3 steps\n", a_box_nearby, said=("bark 4000",), ends_at=(2.35, 5.0)
+        "0.66 m\n0.49 m\n0.39 m\n0.34 m\nparked after 3 steps\n", a_box_nearby, said=("bark 4000",), ends_at=(2.35, 5.0)
     ),
     "touch_piano": Case("tune: woof bow-wow grrr woof\n", a_tune, said=("bark 4000", "bark 4001", "grrr", "bark 4000")),
     "voice_commands": Case(
