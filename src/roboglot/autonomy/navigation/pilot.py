@@ -116,6 +116,8 @@ class Pilot:
                 self._robot.events.publish(PathBlocked(stamp=self._clock.time(), action=self._action))
             self._journey.waits(self._robot, self._action)
             self._report("waiting", Path(), 0.0)
+            if self._courtesy.is_due_without_route():
+                await self._courtesy.go_aside(self._top)
             await self._clock.sleep(FIRST_ROUTE_PERIOD)
 
     async def _follow(self, follower: Follower) -> State:

@@ -47,10 +47,18 @@ class Courtesy:
 
     def is_due(self, follower: Follower) -> bool:
         """True if the robot should go aside now; ask at every step."""
-        now, traffic = self._clock.time(), self._traffic
+        traffic = self._traffic
         stands = follower.speed < STANDS and follower.stop_at - follower.along < 0.4
         ruled = stands and traffic.meeting is not None and traffic.meeting.stands_in_it
-        faced = stands and self._lookout.blocked and traffic.is_faced(self._course.belief.pose)
+        return self._is_due(ruled, stands and self._lookout.blocked and traffic.is_faced(self._course.belief.pose))
+
+    def is_due_without_route(self) -> bool:
+        """The same for a robot that stands because it finds no route: the others may find none for it."""
+        pose, traffic = self._course.belief.pose, self._traffic
+        return self._is_due(traffic.is_in_the_way(pose), traffic.is_faced(pose))
+
+    def _is_due(self, ruled: bool, faced: bool) -> bool:
+        now = self._clock.time()
         self._ruled_since = min(self._ruled_since, now) if ruled else math.inf
         self._faced_since = min(self._faced_since, now) if faced else math.inf
         if self._asides >= ASIDE_MAX:
@@ -66,14 +74,23 @@ class Courtesy:
 
     async def give_way(self, follower: Follower) -> None:
         """Go aside, and return when the way is free, or after a while."""
-        pose, traffic = self._course.belief.pose, self._traffic
         carrot, beyond = follower.carrot()
-        path = follower.route.ahead(pose, carrot, beyond, OLD_WAY)
+        path = follower.route.ahead(self._course.belief.pose, carrot, beyond, OLD_WAY)
+        ruled = self._ruled_since < math.inf
+        try:
+            await self.go_aside(follower.top)
+            follower.halt()
+            await self._wait(path, WAIT_MAX if ruled else FACED_AFTER + FACED_MORE * self._chance, ruled)
+        finally:
+            self._lookout.follower = follower
+
+    async def go_aside(self, top: float) -> None:
+        """Leave the others' ways at up to ``top`` m/s, if there is room beside them, and stand."""
+        pose, traffic = self._course.belief.pose, self._traffic
         ruled = self._ruled_since < math.inf
         self._asides += 1
         self._faced += not ruled
         ways = traffic.to_leave() if ruled else [*traffic.to_leave(), *traffic.face_to_face(pose)]
-        chance = self._chance
         self._ruled_since = self._faced_since = math.inf
         traffic.giving_way = True
         self._lookout.follower = None
@@ -81,14 +98,11 @@ class Courtesy:
         try:
             route = await self._route_aside(ways)
             if route is not None:
-                await self._go(Follower(follower.limits, follower.top, route))
+                await self._go(Follower(self._robot[Base].limits, top, route))
             await stand_still(self._robot)
-            follower.halt()
-            self._lookout.follower = None
-            await self._wait(path, WAIT_MAX if ruled else FACED_AFTER + FACED_MORE * chance, ruled)
         finally:
             traffic.giving_way = False
-            self._lookout.follower = follower
+            self._lookout.follower = None
 
     async def _route_aside(self, ways: list[tuple[Points, float]]) -> Route | None:
         here = self._course.belief.pose.point

@@ -9,14 +9,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.autonomy.navigation.route import SPACING
-from roboglot.autonomy.traffic.movers import Mover
 from roboglot.model.components.logistics.traffic_radio import Announcement
 from roboglot.model.geometry import Pose
+
+if TYPE_CHECKING:
+    from roboglot.autonomy.traffic.movers import Mover  # it needs the kernels
 
 CLEAR = 0.10  # m kept between two hulls
 CLEAR_MOVING = 0.06  # m kept from where something that moves can come to a stand

@@ -134,6 +134,14 @@ class Traffic:
         mine = self._robot.description.radius
         return [(way.points, mine + way.radius + 2 * CLEAR) for way in self._ways if way.outranks or not way.name]
 
+    def is_in_the_way(self, pose: Pose) -> bool:
+        """True if one that goes first wants to where the robot stands."""
+        here, mine = np.array([(pose.x, pose.y)]), self._robot.description.radius + CLEAR
+        return any(
+            way.outranks and len(way.points) >= 2 and bool((way.distances(here) < mine + way.radius).any())
+            for way in self._ways
+        )
+
     def is_faced(self, pose: Pose) -> bool:
         """True if what stands close may be another robot, or a person."""
         reach = self._robot.description.radius + FACING
