@@ -21,6 +21,7 @@ from roboglot.recording.proxy.relay import Book, Relay
 from roboglot.recording.proxy.sniffers import RestSniffer, TextSniffer, rest_operation
 from roboglot.recording.reader import pair, read_recording
 from roboglot.testing.addresses import free_port
+from roboglot.wire.cyberdog.chapters.system import HEARTBEAT
 from tests.recording.test_playback import ADDRESS, PROGRAM, by_frames, by_rest, run, whole_closing
 
 assert whole_closing  # a fixture of these tests, too
@@ -105,12 +106,14 @@ async def test_a_phone_and_its_dog_do_not_notice(tmp_path: Path) -> None:
     assert [(a.request.operation, a.request.payload, [r.payload for r in a.replies]) for a in seen] == [
         (a.request.operation, a.request.payload, [r.payload for r in a.replies]) for a in asked
     ]
-    pushes = [
-        {e.payload for e in read_recording(path).of(door="cyberdog") if e.direction is Direction.PUSH}
-        for path in (own, passed)
-    ]
+    pushes, beats = [], []
+    for path in (own, passed):
+        pushed = [e for e in read_recording(path).of(door="cyberdog") if e.direction is Direction.PUSH]
+        pushes.append({e.payload for e in pushed if e.operation != HEARTBEAT})
+        beats.append([e for e in pushed if e.operation == HEARTBEAT])
     assert pushes[1]
     assert pushes[1] <= pushes[0]
+    assert beats[1]  # the dog itself notes those only that come after the one that found its app
 
 
 async def test_client_that_looks_for_ep_finds_the_proxy(tmp_path: Path) -> None:

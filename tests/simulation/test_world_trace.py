@@ -5,15 +5,17 @@ import os
 import sys
 from pathlib import Path
 
-PROGRAM = Path(__file__).with_name("trace.py")
+PROJECT = Path(__file__).parents[2]
 
 
 async def digest(seed: int, hash_seed: str) -> bytes:
     process = await asyncio.create_subprocess_exec(
         sys.executable,
-        str(PROGRAM),
+        "-m",
+        "tests.simulation.trace",
         str(seed),
         stdout=asyncio.subprocess.PIPE,
+        cwd=PROJECT,
         env={**os.environ, "PYTHONHASHSEED": hash_seed},
     )
     try:

@@ -33,7 +33,7 @@ class SimulatedDockContact(DockContact):
     ) -> None:
         self._section, self._hull, self._docks, self._events = section, hull, docks, events
         self._far = 0.0  # stamp up to which docks are out of reach
-        self._felt = 0.0, 0.0, 0.0, -1  # where it felt for one last: x, y, yaw, floor
+        self._felt: tuple[object, ...] = ()  # where it felt for one last, and where docks were
         self._docked, _ = self._touches()
 
     @property
@@ -45,8 +45,8 @@ class SimulatedDockContact(DockContact):
         if stamp < self._far:
             return
         hull = self._hull
-        here = hull.x, hull.y, hull.turned, hull.floor
-        if here == self._felt:  # it stands
+        here = hull.x, hull.y, hull.turned, hull.floor, *self._docks[hull.floor]
+        if here == self._felt:  # it stands, and so do they
             return
         self._felt = here
         touches, away = self._touches()

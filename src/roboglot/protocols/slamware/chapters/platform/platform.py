@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from roboglot.model.components.system.settings import Settings
 from roboglot.operations import Right
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
@@ -18,7 +17,7 @@ async def get_timestamp(context: Context) -> str:
     return milliseconds(context.robot.clock.time())
 
 
-@TABLE.on(f"GET {API}/events", right=Right.SEE, needs=(Settings,))
+@TABLE.on(f"GET {API}/events", right=Right.SEE)
 async def get_events(context: Context) -> list[RobotEvent]:
     """What happened since the last call."""
     return context.events.read()
