@@ -7,23 +7,15 @@ more worlds than cores lose each other's caches at every switch of processes, a 
 from __future__ import annotations
 
 import asyncio
-import gc
 import os
 import time
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from roboglot.kernels import loading
-from roboglot.model.clock import LockstepClock
-from roboglot.model.components.motion.base import Base
-from roboglot.model.components.sensing.odometry import Odometry
-from roboglot.model.events import ScanTaken
-from roboglot.model.geometry import Twist
-from roboglot.model.robot import Robot
-from roboglot.simulation.world.world import RobotPlacement, World
-from roboglot.simulation.world.world_files import load_world
+from _driving import crowd
 
-AHEAD, CIRCLE = Twist(0.15, 0.0, 0.0), Twist(0.12, 0.0, 1.0)  # off docks, then round where there is room
+from roboglot.kernels import loading
+
 READY = b"r"
 TURN = 0.1  # s of robot time: a scan of the lidars
 
@@ -50,39 +42,18 @@ class Ends(NamedTuple):
 
 async def shard(number: int, count: int, seconds: float, ends: Ends) -> tuple[float, int, float]:
     """One world, driven: its processor time (s), its scans, and how far the slowest robot drove (m)."""
-    clock = LockstepClock()
-    names = [f"r{index}" for index in range(count)]
-    world = World(load_world("office"), [RobotPlacement(name) for name in names], clock=clock, seed=number)
-    scans = 0
-
-    def scanned(_: ScanTaken) -> None:
-        nonlocal scans
-        scans += 1
-
-    robots = [Robot(name, world.description_of(name), clock) for name in names]
-    for robot in robots:
-        world.equip(robot)
-        robot.events.listen(ScanTaken, scanned)
-    await world.prepare(wait=True)
-    world.start()
-    await clock.advance(0.5)
-    gc.freeze()  # as the runtime does
-    for twist in (AHEAD, CIRCLE):
-        for robot in robots:
-            robot[Base].set_velocity(twist)
-        await clock.advance(1.0)
-    scans, began = 0, [robot[Odometry].reading.distance for robot in robots]
+    robots = await crowd(count, "universal", number, driving=True)
+    began = robots.ways
     os.write(ends.ready, READY)
     os.read(ends.go, 1)  # all begin together
     used = time.process_time()
     for _ in range(round(seconds / TURN)):
         turn = os.read(ends.take, 1)
-        await clock.advance(TURN)
+        await robots.clock.advance(TURN)
         os.write(ends.give, turn)
     used = time.process_time() - used
-    world.close()
-    ways = [robot[Odometry].reading.distance - before for robot, before in zip(robots, began, strict=True)]
-    return used, scans, min(ways)
+    robots.world.close()
+    return used, robots.scans, min(way - before for way, before in zip(robots.ways, began, strict=True))
 
 
 def become_shard(number: int, count: int, seconds: float, ends: Ends) -> None:

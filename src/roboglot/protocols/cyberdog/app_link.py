@@ -197,7 +197,7 @@ class AppLink:
         return heard
 
     def _noted(self, ticks: pb.Ticks) -> pb.Ticks:
-        """Tell those who follow what an app that is there hears."""
+        """Report a heartbeat to the tap if a connected app gets it."""
         if self._tap is None or not self._tap.watched or not self.connected:
             self._beats.forget()
         elif news := self._beats.news(ticks):
