@@ -32,7 +32,7 @@ class ActionStatus(IntEnum):
 
 
 class Announcer(Protocol):
-    """What an action belongs to: the robot's actions, which publish that it changed."""
+    """The owner of actions (``Actions``), which publishes every change of one."""
 
     clock: Clock
 
@@ -71,7 +71,7 @@ class Action:
 
     @property
     def reason(self) -> str:
-        """Why it ended short of success, in plain words; empty on success."""
+        """Reason for ending short of success, in plain words; empty on success."""
         return str(self.error) if self.error else ""
 
     async def done(self) -> ActionStatus:

@@ -24,7 +24,7 @@ HISTORY_MAX = 20
 
 
 class OnBusy(Enum):
-    """What a new action does when another one holds its resource."""
+    """Policy of a new action whose resource is held by another: replace that one, or be refused."""
 
     REPLACE = "replace"
     REFUSE = "refuse"

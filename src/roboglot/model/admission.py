@@ -1,6 +1,6 @@
-"""Who may connect to a robot, and what for: asked by every door when a client opens and before each operation.
+"""Access control: every door asks it when a client connects and before each operation.
 
-Where nothing is configured, nothing is asked: ``asks`` is false, and that is all that a door looks at.
+With nothing configured nothing is asked: ``asks`` is false, and a door looks no further.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ __all__ = ["NO_PROOF", "Admission", "Forbidden", "LockedOut", "Proof", "ProofKin
 
 
 class ProofKind(StrEnum):
-    """How a client shows who it is."""
+    """Means by which a client authenticates."""
 
     NONE = "none"
     HTTP = "http"  # the value of an Authorization header: "Bearer TOKEN" or "Basic …"
@@ -26,7 +26,7 @@ class ProofKind(StrEnum):
 
 
 class Proof(NamedTuple):
-    """What a client shows; its ``value`` may be a secret and is never logged."""
+    """Credentials of a client; ``value`` may be a secret and is never logged."""
 
     kind: ProofKind
     value: str

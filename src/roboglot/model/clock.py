@@ -178,7 +178,7 @@ class RealClock(Clock):
 
     @property
     def paused(self) -> bool:
-        """Whether robot time stands still."""
+        """True while robot time stands still."""
         return self.time() >= self._until
 
     def time(self) -> float:

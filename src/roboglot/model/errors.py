@@ -1,4 +1,4 @@
-"""What can go wrong with a robot, in the model's words. Each door translates these once, in its ``errors.py``."""
+"""Errors of a robot in the model's words. Each door translates them once, in its ``errors.py``."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Refused(RobotError):
 
 
 class Forbidden(Refused):
-    """Who asks may not do it; the message says what is missing."""
+    """The client lacks a right; the message names it."""
 
 
 class EmergencyStopped(Refused):
@@ -61,7 +61,7 @@ class EmergencyStopped(Refused):
 
 
 class NotReady(Refused):
-    """What it needs is still being prepared; the same request succeeds in a while."""
+    """Something that the request needs is still being prepared; it succeeds when repeated later."""
 
 
 class Unconnected(Refused):

@@ -87,7 +87,7 @@ class Feed(Generic[T]):
 
     @property
     def viewers(self) -> int:
-        """How many look."""
+        """Number of viewers."""
         return len(self._viewers)
 
     def subscribe(self) -> Viewer[T]:

@@ -1,4 +1,4 @@
-"""Where on the globe a map lies: found from satellite fixes taken on the way, used to look for the robot in it.
+"""Place of a map on the globe: fitted to satellite fixes taken on the way, used to look for the robot in it.
 
 A tangent plane, good for some kilometres. Knows no receiver and no map format.
 """
@@ -59,14 +59,14 @@ class GlobeAnchor:
 
 @dataclass(frozen=True, slots=True)
 class Sky:
-    """What the satellites say of a robot's place in an anchored map."""
+    """A satellite fix in an anchored map."""
 
     anchor: GlobeAnchor
     fix: GpsReading
 
     @property
     def region(self) -> Region:
-        """Where in the map it can be."""
+        """Region of the map in which the robot can be."""
         return self.anchor.around(self.fix)
 
     def allows(self, place: Point) -> bool:

@@ -1,4 +1,4 @@
-"""How late a robot's answers come: what a slow network adds."""
+"""Delay of a robot's answers by a slow network."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a robot can make out in its pictures, its scans and the sounds around it. Values only; knows no sensor.
+"""Results of perception in pictures, scans and sounds. Values only; knows no sensor. Values only; knows no sensor.
 
 In a picture, x runs from 0 (left edge) to 1 (right edge) and y from 0 (top) to 1 (bottom). Places are in base_link, m.
 """
@@ -46,7 +46,7 @@ class Colour(StrEnum):
 
 
 class Emotion(StrEnum):
-    """What a face shows."""
+    """Emotion that a face shows."""
 
     NEUTRAL = "neutral"
     HAPPY = "happy"
@@ -121,7 +121,7 @@ class FaceSeen:
 
 @dataclass(frozen=True, slots=True)
 class GestureSeen:
-    """Who makes it is ``number``, as in PersonSeen; ``box`` holds the whole person."""
+    """A gesture seen; ``number`` of the person as in PersonSeen; ``box`` holds the whole person."""
 
     box: Box
     gesture: Gesture

@@ -71,5 +71,5 @@ class Robot:
 
     @property
     def interfaces(self) -> Iterable[type[Component]]:
-        """What kinds of component it has."""
+        """Return the component interfaces that the robot has."""
         return self._components.keys()

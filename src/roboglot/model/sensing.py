@@ -1,4 +1,4 @@
-"""What sensors say. SI units, base_link unless said otherwise."""
+"""Readings of sensors. SI units, base_link unless said otherwise."""
 
 from __future__ import annotations
 
@@ -56,9 +56,9 @@ class ImuReading:
 
 @dataclass(frozen=True, slots=True)
 class RawImu:
-    """What the converters of gyro, accelerometer and compass say: counts (x, y, z) of base_link's axes.
+    """Raw counts of gyro, accelerometer and compass: x, y, z along base_link's axes.
 
-    Each times its ``unit`` gives m/s2 (gravity included), rad/s and tesla.
+    Counts times their ``unit`` are m/s2 (gravity included), rad/s and tesla.
     """
 
     stamp: float
@@ -72,7 +72,7 @@ class RawImu:
 
 @dataclass(frozen=True, slots=True)
 class OdometryReading:
-    """Where the wheels think base_link is (odom frame, drifts, never jumps) and how it moves."""
+    """Pose of base_link by the wheels (odom frame, drifts, never jumps) and its velocity."""
 
     stamp: float
     pose: Pose
@@ -81,7 +81,7 @@ class OdometryReading:
 
 
 class Supply(StrEnum):
-    """What feeds the robot besides its battery."""
+    """Source of power besides the battery."""
 
     NONE = "none"
     CONTACTS = "contacts"  # of a dock

@@ -32,7 +32,7 @@ class Sound:
 
     @property
     def seconds(self) -> float:
-        """How long it takes."""
+        """Duration, s."""
         return len(self.samples) / SAMPLE_RATE
 
 

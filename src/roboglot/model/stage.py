@@ -1,8 +1,8 @@
-"""What hands may do to a simulated world: move robots, things and people about, make sounds, break things.
+"""Hands in a simulated world: move robots, things and people about, make sounds, break things.
 
 A console, a test kit or an agent works with this interface; the simulation implements it (``simulation.world.hands``).
-All places are in the world's frame: m, rad; floor 0 is the lowest. Unknown names raise NotFound, and what cannot be
-raises ValueError in plain words.
+All places are in the world's frame: m, rad; floor 0 is the lowest. Unknown names raise NotFound, and impossible
+requests raise ValueError in plain words.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class StagePerson(ABC):
     @property
     @abstractmethod
     def pose(self) -> Pose:
-        """Where the person is."""
+        """Current pose of the person."""
 
     @property
     @abstractmethod
@@ -144,7 +144,7 @@ class Stage(ABC):
     @property
     @abstractmethod
     def seed(self) -> int:
-        """Where all chance of the world began: noise, outages, where a kidnapped robot finds itself."""
+        """Seed of all randomness in the world: noise, outages, where a kidnapped robot finds itself."""
 
     @abstractmethod
     def reseed(self, seed: int) -> None:

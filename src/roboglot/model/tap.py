@@ -1,8 +1,8 @@
-"""What a robot's doors and driver hear and say, as it happens: for the console, recordings, the audit and counters.
+"""Live exchanges of a robot's doors and driver: for the console, recordings, the audit and counters.
 
 A door calls ``request`` when it has understood what a client asks, ``reply`` when it answers, ``push`` for what it
-sends by itself, each behind ``if tap.watched``: without followers that is all that it costs. Who asks is what
-the door said with ``ask_for``. The driver of a real robot notes through a ``Line`` what it asks that robot and
+sends by itself, each behind ``if tap.watched``: without followers that is the whole cost. The client's name is the one
+that the door gave with ``ask_for``. The driver of a real robot notes through a ``Line`` what it asks that robot and
 hears from it, as the door ``driver/NAME``.
 """
 
@@ -34,7 +34,7 @@ def without_secrets(data: bytes) -> bytes:
 
 
 class Direction(StrEnum):
-    """Which way an exchange went."""
+    """Direction of an exchange."""
 
     REQUEST = "request"
     REPLY = "reply"
@@ -65,7 +65,7 @@ class Exchange(NamedTuple):  # made for each message: a frozen dataclass takes f
 
 
 class _Answer(NamedTuple):
-    """How it went, and when what is answered was asked, if that is known."""
+    """Outcome of a request, and the time when it was asked, if that is known."""
 
     status: str = ""
     refusal: str = ""
@@ -164,14 +164,14 @@ class Tap:
 
 
 class Line:
-    """What a driver asks its robot and hears from it; look at ``watched`` first, as with a tap."""
+    """Exchanges between a driver and its robot; look at ``watched`` first, as with a tap."""
 
     def __init__(self, tap: Tap, door: str, address: str) -> None:
         self._tap, self._door, self.address = tap, door, address
 
     @property
     def watched(self) -> bool:
-        """Whether anybody follows."""
+        """True if the tap has followers."""
         return self._tap.watched
 
     def request(self, operation: str, payload: bytes | str) -> float:

@@ -1,4 +1,4 @@
-"""What happened: frozen facts in the past tense, on one bounded stream. Doors turn them into pushes and reports."""
+"""Events: frozen facts in the past tense, on one bounded stream. Doors turn them into pushes and reports."""
 
 from roboglot.model.events.delivery import DeliveryNews, DeliveryReported
 from roboglot.model.events.equipment import (

@@ -1,4 +1,4 @@
-"""What happens while the robot delivers."""
+"""Events of deliveries."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from roboglot.model.events.stream import Event
 
 
 class DeliveryNews(StrEnum):
-    """What people at the reception want to hear of."""
+    """News of a delivery for the people at the reception."""
 
     LEFT_DOCK = "left the dock for an order"
     SETTINGS_CHANGED = "settings changed"

@@ -1,4 +1,4 @@
-"""What the robot carries: blaster, loudspeaker, cargo boxes, jack."""
+"""Events of the robot's equipment: blaster, loudspeaker, cargo boxes, jack."""
 
 from __future__ import annotations
 

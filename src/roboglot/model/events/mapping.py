@@ -1,4 +1,4 @@
-"""Where the robot is, what it sees of the place, and what is drawn on its map."""
+"""Events of mapping: the robot's pose, its scans, and changes of the map and its annotations."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class RobotDisplaced(Event):
 
 
 class LostReason(StrEnum):
-    """Why the robot no longer knows its place in the map."""
+    """Reason why the robot lost its pose in the map."""
 
     NO_FIT = "the scans do not fit the map"
     NO_SCANS = "the lidar is silent"
@@ -57,7 +57,7 @@ class LostReason(StrEnum):
 
 
 class RecoveryMeans(StrEnum):
-    """How the robot came to know its place in the map again."""
+    """Means by which the robot found its pose in the map again."""
 
     NEARBY = "found near where it was believed to be"
     WHOLE_MAP = "found in the whole map"

@@ -1,4 +1,4 @@
-"""What touches, hits or leaves the hull, and what its ports feel."""
+"""Events of the hull and the ports: bumpers, cliffs, hits, touches, adapter levels."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ POWER = "power"  # the resource that changes of the power mode hold
 
 
 class PowerMode(StrEnum):
-    """How awake the robot is."""
+    """Power mode of the robot, from awake to off."""
 
     AWAKE = "awake"
     WAKING_UP = "waking up"

@@ -11,7 +11,7 @@ SENSITIVITY_MAX = 10
 
 
 class PlatePlace(StrEnum):
-    """Where a plate is."""
+    """Place of an armour plate on the robot."""
 
     REAR = "rear"
     FRONT = "front"
@@ -22,7 +22,7 @@ class PlatePlace(StrEnum):
 
 
 class HitKind(StrEnum):
-    """What hit a plate."""
+    """Cause of a hit on a plate."""
 
     BEAD = "bead"
     COLLISION = "collision"

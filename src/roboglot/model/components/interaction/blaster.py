@@ -17,7 +17,7 @@ class Blaster(Component):
     @property
     @abstractmethod
     def beads(self) -> int:
-        """How many one shot fires."""
+        """Number of beads that one shot fires."""
 
     @abstractmethod
     def set_beads(self, beads: int) -> None:

@@ -13,7 +13,7 @@ NAMED_KEYS = ("space", "tab", "shift", "ctrl", "alt", "caps")
 
 
 class MouseButton(StrEnum):
-    """Which one."""
+    """A button of the mouse."""
 
     LEFT = "left"
     RIGHT = "right"
@@ -22,9 +22,9 @@ class MouseButton(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Input:
-    """What is held at a moment: keys (letters and digits in lower case, or NAMED_KEYS) in the order of pressing.
+    """Keys and buttons held at one moment; keys (lower case, or NAMED_KEYS) in the order of pressing.
 
-    ``x`` and ``y``: how fast the mouse moves to the right and up, -1..1 of its range.
+    ``x`` and ``y``: speed of the mouse to the right and up, -1..1 of its range.
     """
 
     keys: tuple[str, ...] = ()

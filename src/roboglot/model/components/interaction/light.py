@@ -30,7 +30,7 @@ WHITE = Colour(255, 255, 255)
 
 
 class LightEffect(StrEnum):
-    """How a zone's brightness goes over a period."""
+    """Course of a zone's brightness over one period."""
 
     OFF = "off"
     SOLID = "solid"

@@ -11,7 +11,7 @@ REMOTE = "remote control"  # the source of what its stick commands
 
 
 class Gear(IntEnum):
-    """How fast the stick at its end drives."""
+    """Speed range of the remote control's stick."""
 
     LOW = 0
     MIDDLE = 1

@@ -13,7 +13,7 @@ CYCLE_MIN, CYCLE_MAX = 0.1, 60.0  # s
 
 
 class Shade(StrEnum):
-    """What a patch shows."""
+    """Shade that a patch shows."""
 
     DARK = "dark"
     LIGHT = "light"
@@ -32,7 +32,7 @@ class Patch(StrEnum):
 
 
 class SkinPattern(StrEnum):
-    """What the patches do over time."""
+    """Pattern of the patches over time."""
 
     DARK = "dark"
     LIGHT = "light"
@@ -68,7 +68,7 @@ class ElectronicSkin(Component):
     @property
     @abstractmethod
     def shades(self) -> Mapping[Patch, Shade]:
-        """What each patch shows at this moment; patches of legs whose state is unknown are left out."""
+        """Current shade of each patch; patches of legs whose state is unknown are left out."""
 
     @abstractmethod
     def enable(self, on: bool) -> None:

@@ -22,7 +22,7 @@ class DoorState(StrEnum):
 
 
 class Stock(StrEnum):
-    """What the box's sensor says about its content."""
+    """Content of a box as its sensor reports it."""
 
     EMPTY = "empty"
     PARTLY = "partly"

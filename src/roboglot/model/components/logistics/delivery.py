@@ -12,7 +12,7 @@ from roboglot.model.components.motion.navigation import Tracks
 
 
 class OrderKind(StrEnum):
-    """What is to be done at the target."""
+    """Kind of a delivery order, by what is done at the target."""
 
     TAKEOUT = "takeout"  # people take their parcels out of boxes, one box after the other
     DISTRIBUTE = "distribute"  # all boxes open, people help themselves
@@ -27,7 +27,7 @@ class OrderKind(StrEnum):
 
 
 class OrderStatus(StrEnum):
-    """How far an order is."""
+    """Status of a delivery order."""
 
     READY = "ready"
     RUNNING = "running"
@@ -43,7 +43,7 @@ class OrderStatus(StrEnum):
 
 
 class OrderStage(StrEnum):
-    """What the robot does for an order."""
+    """Current stage of the robot within an order."""
 
     DRIVING_TO_STOP = "driving to stop"
     AT_STOP = "at stop"  # waits for ``end_operation``
@@ -55,7 +55,7 @@ class OrderStage(StrEnum):
 
 
 class Failure(StrEnum):
-    """Why something came to nothing."""
+    """Reason for a failed order or box."""
 
     NOT_TAKEN = "nobody took it"
     DOOR_STUCK = "the door of a box does not move"
@@ -85,7 +85,7 @@ class Phase(StrEnum):
 
 
 class WorkMode(StrEnum):
-    """Which orders people may give at the robot."""
+    """Range of orders that people may give at the robot itself."""
 
     DISPATCH = "dispatch"  # none: only from afar
     RECYCLE = "recycle"  # only collecting dishes
@@ -102,7 +102,7 @@ class BoxChoice:
 
 @dataclass(frozen=True, slots=True)
 class PickUp:
-    """What became of one box, or of one stop (``box`` None); no ``failure``: all went well."""
+    """Outcome of one box, or of one stop (``box`` None); without ``failure`` all went well."""
 
     box: BoxChoice | None = None
     stop: str = ""
@@ -111,7 +111,7 @@ class PickUp:
 
 @dataclass(frozen=True, slots=True)
 class Untaken:
-    """What a failed order left in boxes."""
+    """Boxes that a failed order left full."""
 
     target: str
     boxes: tuple[BoxChoice, ...]

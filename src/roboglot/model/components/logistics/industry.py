@@ -12,7 +12,7 @@ from roboglot.model.components.logistics.delivery import OrderStatus
 
 
 class CallKind(StrEnum):
-    """Who says what is to be done."""
+    """Kind of a call: to come, or to do the round of a template."""
 
     PLAIN = "plain"  # come here
     BY_TEMPLATE = "by template"  # do the round that a template describes

@@ -12,7 +12,7 @@ JACK = "jack"  # the resource that its movements hold
 
 
 class JackStage(StrEnum):
-    """Where the platform is."""
+    """Stage of the jack's platform."""
 
     DOWN = "down"
     MOVING = "moving"
@@ -43,7 +43,7 @@ class Jack(Component):
     @property
     @abstractmethod
     def alarm(self) -> str:
-        """Why it stopped in alarm, in plain words; empty without alarm."""
+        """Reason for the alarm that stopped the jack, in plain words; empty without one."""
 
     @abstractmethod
     def raise_platform(self, *, source: str = "") -> Action:

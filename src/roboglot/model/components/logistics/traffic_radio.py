@@ -16,11 +16,11 @@ WAY_MAX = 100  # points
 
 @dataclass(frozen=True, slots=True)
 class Announcement:
-    """What a robot tells of itself: where it is and goes next, in the frame of the map that ``frame`` names.
+    """A robot's broadcast of its pose and its next metres, in the frame of the map that ``frame`` names.
 
-    ``stamp`` s, ``speed`` m/s, ``radius`` m of its hull. ``way``: its next metres, densely, without those that it will
-    not drive before others have passed; empty for one that goes nowhere. ``priority``: who has more goes first.
-    ``inside``: it is where two robots cannot pass each other.
+    ``stamp`` s, ``speed`` m/s, ``radius`` m of its hull. ``way``: its next metres as dense points, up to where it lets
+    others pass first; empty for a robot without a goal. A higher ``priority`` goes first. ``inside``: the robot is
+    where two cannot pass each other.
     """
 
     robot: str
@@ -35,7 +35,7 @@ class Announcement:
 
 
 class TrafficRadio(Component):
-    """What a robot claims, and what it announced last, is heard by all others in range until it says something else.
+    """Radio between robots: the last claims and announcement of each are heard by all others in range.
 
     ``priority``: declared in the configuration, for announcements.
     """
@@ -45,7 +45,7 @@ class TrafficRadio(Component):
     @property
     @abstractmethod
     def claims(self) -> frozenset[str]:
-        """What this robot claims."""
+        """Names that this robot claims."""
 
     @abstractmethod
     def claim(self, names: Collection[str]) -> None:
@@ -53,7 +53,7 @@ class TrafficRadio(Component):
 
     @abstractmethod
     def others(self, name: str) -> int:
-        """How many robots in range claim this, but for this one."""
+        """Return the number of other robots in range that claim ``name``."""
 
     @abstractmethod
     def announce(self, announcement: Announcement | None) -> None:
@@ -61,4 +61,4 @@ class TrafficRadio(Component):
 
     @abstractmethod
     def heard(self) -> Sequence[Announcement]:
-        """What the others in range announced last."""
+        """Last announcements of the other robots in range."""

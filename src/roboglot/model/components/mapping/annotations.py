@@ -1,4 +1,4 @@
-"""What people draw on the map: walls, tracks, areas, docks and landmarks. What was acknowledged survives a crash."""
+"""Annotations of the map: walls, tracks, areas, docks and landmarks. Acknowledged changes survive a crash."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ CURVE_POINTS_MAX = 1000
 
 
 class LineKind(StrEnum):
-    """What a line means: no way through, or the way to take."""
+    """Meaning of a line: a wall that must not be crossed, or a track to drive on."""
 
     WALL = "wall"
     TRACK = "track"
 
 
 class AreaKind(StrEnum):
-    """What an area means."""
+    """Meaning of an area."""
 
     FORBIDDEN = "forbidden"  # no robot enters; one that stands inside may leave
     ELEVATOR = "elevator"

@@ -1,4 +1,4 @@
-"""Where the robot is in its map."""
+"""Localization: the robot's pose in its map."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Localization(Component):
 
     @property
     def lost(self) -> LostReason | None:
-        """Why the robot does not know its place in the map now; None while it does."""
+        """Reason why the robot has lost its pose in the map; None while localized."""
         return None
 
     @property

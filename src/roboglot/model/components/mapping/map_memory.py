@@ -1,4 +1,4 @@
-"""What belongs to the map in use beside its grid, replaced at one stroke: a crash leaves the old or the new."""
+"""Contents of the map in use beside its grid, replaced atomically: a crash leaves the old or the new."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from roboglot.model.maps import PointOfInterest
 
 @dataclass(frozen=True, slots=True)
 class Drawings:
-    """What people put on one map."""
+    """Points of interest and annotations of one map."""
 
     places: Sequence[PointOfInterest]
     annotations: Annotations

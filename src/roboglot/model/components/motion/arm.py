@@ -21,7 +21,7 @@ class ArmPosition:
 
 @dataclass(frozen=True, slots=True)
 class ArmReach:
-    """Where the end point can be: inside the rectangle and no further than ``radius`` (m) from the shoulder."""
+    """Workspace of the arm's end point: inside the rectangle and within ``radius`` (m) of the shoulder."""
 
     lowest: ArmPosition
     highest: ArmPosition

@@ -12,9 +12,9 @@ from roboglot.model.geometry import STILL, Twist
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BaseLimits:
-    """What the drive can do: top twist (x and y share ``twist.x``), accelerations in m/s2 and rad/s2.
+    """Limits of the drive: top twist (x and y share ``twist.x``), accelerations in m/s2 and rad/s2.
 
-    Not ``holonomic`` (a differential drive): it cannot move sideways; ``set_velocity`` does without ``y`` then.
+    Not ``holonomic`` (a differential drive): it cannot move sideways, and ``set_velocity`` ignores ``y``.
     """
 
     twist: Twist
@@ -74,9 +74,9 @@ class Base(Component):
     @property
     @abstractmethod
     def wheel_speeds(self) -> WheelSpeeds:
-        """How fast the wheels turn now."""
+        """Current speeds of the wheels."""
 
     @property
     @abstractmethod
     def velocity(self) -> Twist:
-        """How the wheels say that base_link moves now."""
+        """Current velocity of base_link as the wheels measure it, m/s and rad/s."""

@@ -17,7 +17,7 @@ class Docking(Component):
     @property
     @abstractmethod
     def home(self) -> Pose | None:
-        """Where base_link stands in map when docked; None if no dock is known."""
+        """Pose of base_link in map when docked; None if no dock is known."""
 
     @abstractmethod
     def set_home(self, pose: Pose | None) -> None:

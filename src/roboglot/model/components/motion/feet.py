@@ -33,7 +33,7 @@ class FootState:
 
 @dataclass(frozen=True, slots=True)
 class Foothold:
-    """Where a foot comes down, m beside its place below the hip (base_link), and how high it is lifted on its way."""
+    """Landing place of a foot, m from its place below the hip (base_link), and ``lift``, its height on the way."""
 
     x: float = 0.0
     y: float = 0.0

@@ -11,7 +11,7 @@ from roboglot.model.geometry import Point
 
 
 class FollowSide(StrEnum):
-    """Where to keep, by the way the person walks; beside them means a little behind."""
+    """Side of the person to keep to, seen along their walk; beside them means a little behind."""
 
     BEHIND = "behind"
     LEFT = "left"

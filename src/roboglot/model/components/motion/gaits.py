@@ -1,4 +1,4 @@
-"""How legs walk: the gaits with their speeds and footfall. A vendor's numbers live in that vendor's door."""
+"""Gaits of legged robots with their speeds and footfall. A vendor's numbers live in that vendor's door."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ GIMBAL = "gimbal"  # the resource that everything holds which turns the gimbal
 
 
 class FollowMode(StrEnum):
-    """How gimbal and chassis share yaw."""
+    """Coupling of the yaw of gimbal and chassis."""
 
     FREE = "free"  # independent: the gimbal keeps its heading in the world while the chassis turns
     CHASSIS_LEAD = "chassis_lead"  # the gimbal comes back to the chassis' front; yaw commands do nothing
@@ -21,7 +21,7 @@ class FollowMode(StrEnum):
 
 
 class Frame(StrEnum):
-    """What the angles of a goal are measured against."""
+    """Reference of the angles of a goal."""
 
     BODY = "body"  # the chassis' front and plane
     WORLD = "world"  # the heading at power-on and the horizon
@@ -63,7 +63,7 @@ class Gimbal(Component):
     @property
     @abstractmethod
     def mode(self) -> FollowMode:
-        """Who leads; CHASSIS_LEAD at power-on."""
+        """Current follow mode; CHASSIS_LEAD at power-on."""
 
     @abstractmethod
     def set_mode(self, mode: FollowMode) -> None:

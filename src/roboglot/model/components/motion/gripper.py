@@ -13,7 +13,7 @@ LEVEL_MAX = 4
 
 
 class GripperStatus(StrEnum):
-    """Where the jaws are."""
+    """Position of the jaws."""
 
     CLOSED = "closed"
     BETWEEN = "between"  # on the way, stopped, or closed around something

@@ -28,9 +28,9 @@ CENTRED = Point()
 
 @dataclass(frozen=True, slots=True)
 class BodyPose:
-    """How the body is held above its feet.
+    """Pose of the body above its feet.
 
-    ``height``: of the belly above the floor, m (None: as it is); ``attitude``: roll, pitch and yaw against standing
+        ``height``: of the belly above the floor, m (None: as it is); ``attitude``: roll, pitch and yaw against standing
     straight, rad; ``shift``: of the body's middle against the feet, m.
     """
 
@@ -41,7 +41,7 @@ class BodyPose:
 
 @dataclass(frozen=True, slots=True)
 class FootLift:
-    """How high the feet are lifted at every step, and how much nearer to the middle they come down, m."""
+    """Swing height of the feet at every step, and how much nearer to the middle they come down, m."""
 
     front: float = 0.03
     rear: float = 0.03
@@ -116,17 +116,17 @@ class Legs(Component):
     @property
     @abstractmethod
     def gait(self) -> Gait | None:
-        """How it walks; None: as the body does by default."""
+        """Current gait; None: the body's default."""
 
     @property
     @abstractmethod
     def foot_lift(self) -> FootLift:
-        """How high the feet are lifted; what is lower than the lower one is stepped over."""
+        """Current swing heights; the robot steps over anything lower than the lower of them."""
 
     @property
     @abstractmethod
     def feet(self) -> Mapping[Foot, FootState]:
-        """Where each foot is now; empty for a body that has none or does not report them."""
+        """Current state of each foot; empty for a body that has no feet or does not report them."""
 
     @abstractmethod
     def stand(self, *, source: str = "") -> Action:

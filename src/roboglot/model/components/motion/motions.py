@@ -1,7 +1,7 @@
-"""What legs perform besides walking: jumps, flips, gestures and dances, in one table.
+"""Motions of legged robots besides walking: jumps, flips, gestures and dances, in one table.
 
-A motion begins in a posture, takes its time and leaves the robot in a posture and, where it jumped or stepped, in
-another place. Knows no number of a vendor's and nothing of how a body does it.
+A motion begins in a posture, takes its time and leaves the robot in a posture and, after jumps and steps, in another
+place. Knows no vendor's numbers and no way in which a body does it.
 """
 
 from __future__ import annotations
@@ -99,9 +99,9 @@ class Motion(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Sway:
-    """How the body swings about its rest while performing: amplitudes in m and rad, ``beat`` in Hz.
+    """Swing of the body about its rest pose during a motion: amplitudes in m and rad, ``beat`` in Hz.
 
-    ``rest_*``: what it swings about (sitting is nose up, lying on a side is rolled).
+    ``rest_*``: the rest pose itself (sitting is nose up, lying on a side is rolled).
     """
 
     beat: float = 0.5

@@ -13,7 +13,7 @@ from roboglot.model.geometry import Path, Point
 
 
 class Tracks(StrEnum):
-    """What the tracks of the map mean for one drive."""
+    """Meaning of the map's tracks for one drive."""
 
     FREE = "free"  # nothing: any way will do
     PREFERRED = "preferred"  # worth some way round
@@ -22,9 +22,9 @@ class Tracks(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NavigationOptions:
-    """How to go: final ``yaw`` (rad in map, None: any), share of top speed, ``tolerance`` (m), tries after failure.
+    """Options of a drive: final ``yaw`` (rad in map, None: any), share of top speed, ``tolerance`` (m), retries.
 
-    ``waits``: ways are planned by the map alone; what else stands there is waited for, not driven around.
+    ``waits``: paths are planned by the map alone; the robot waits for other obstacles and does not drive around them.
     """
 
     yaw: float | None = None

@@ -1,10 +1,10 @@
-"""How a body on legs is held."""
+"""Postures of a legged body."""
 
 from enum import StrEnum
 
 
 class Posture(StrEnum):
-    """How the body is held."""
+    """Posture of a legged body."""
 
     STANDING = "standing"
     SITTING = "sitting"

@@ -12,7 +12,7 @@ ALIGN_WITH_STAIRS = "align with stairs"  # the name of its actions
 
 
 class StairDirection(StrEnum):
-    """Where the flight leads from where the robot stands."""
+    """Direction of the flight, seen from the robot."""
 
     UP = "up"
     DOWN = "down"

@@ -12,7 +12,7 @@ from roboglot.model.geometry import ORIGIN, Point, Pose
 
 
 class Mark(StrEnum):
-    """What is docked at, and what finds it."""
+    """A mark to dock at, by the sensor that finds it."""
 
     PRINTED = "printed"  # an AprilTag or QR code, which the camera reads
     BOARD = "board"  # a flat board 0.36 m wide that stands free (a dock's front is one), by its shape in the scan
@@ -49,7 +49,7 @@ class TagDocking(Component):
     @property
     @abstractmethod
     def marks(self) -> frozenset[Mark]:
-        """What this robot can dock at."""
+        """Marks that this robot can dock at."""
 
     @abstractmethod
     def dock_at(self, goal: MarkGoal, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:

@@ -59,7 +59,7 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class Mount:
-    """Where a camera sits in base_link, m, and how far it is turned: pitch positive nose down, rad."""
+    """Position of a camera in base_link, m, and its direction, rad: pitch positive nose down."""
 
     x: float
     y: float
@@ -79,7 +79,7 @@ class Camera(Component):
     @property
     @abstractmethod
     def mount(self) -> Mount:
-        """Where it sits now; legs and gimbals move it."""
+        """Current mount; legs and gimbals move it."""
 
     @property
     @abstractmethod

@@ -42,7 +42,7 @@ class DepthImage:
 
     @property
     def points(self) -> NDArray[np.float32]:
-        """What came back (n x 3), as x, y, z in base_link, z above the floor."""
+        """Points measured (n, 3): x, y, z in base_link, m, z above the floor."""
         seen = np.isfinite(self.depths)
         points = self.rays[seen] * self.depths[seen][:, None]
         points += (self.mount.x, self.mount.y, self.mount.z)

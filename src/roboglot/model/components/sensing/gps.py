@@ -10,7 +10,7 @@ from roboglot.model.components.component import Component
 
 
 class GpsFix(IntEnum):
-    """What the receiver knows."""
+    """Kind of a satellite fix."""
 
     NONE = 0
     PLANE = 2  # latitude and longitude

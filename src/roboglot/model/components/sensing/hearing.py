@@ -1,4 +1,4 @@
-"""What the robot understands of the sounds that its microphone hears."""
+"""Hearing: sounds that the robot recognizes with its microphone."""
 
 from __future__ import annotations
 

@@ -42,5 +42,5 @@ class Odometry(Component):
 
     @property
     def noise(self) -> OdometryNoise:
-        """How far it may be wrong, as its body or driver describes it."""
+        """Expected error of the odometry, from the body or the driver."""
         return OdometryNoise()

@@ -11,7 +11,7 @@ from roboglot.model.components.component import Component
 
 
 class SensorKind(StrEnum):
-    """What a maskable sensor is."""
+    """Kind of a sensor that can be masked."""
 
     BUMPER = "bumper"
     CLIFF = "cliff"

@@ -9,7 +9,7 @@ from roboglot.model.components.component import Component
 
 
 class TouchKind(StrEnum):
-    """How it was touched."""
+    """Kind of a touch."""
 
     SINGLE = "single"
     DOUBLE = "double"
@@ -22,4 +22,4 @@ class Touch(Component):
     @property
     @abstractmethod
     def last(self) -> tuple[float, TouchKind] | None:
-        """When (robot time, s) and how it was touched last; None: never yet."""
+        """Time (robot time, s) and kind of the last touch; None before the first."""

@@ -1,4 +1,4 @@
-"""What the robot makes out in its camera's pictures."""
+"""Vision: objects that the robot recognizes in its camera's pictures."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ SCAN_SECONDS_MAX = 60.0
 
 
 class DeviceKind(StrEnum):
-    """What a device says that it is."""
+    """Kind of a Bluetooth device as it reports it."""
 
     UNKNOWN = "unknown"
     BRACELET = "bracelet"  # also a remote control; carries a UWB tag
@@ -57,7 +57,7 @@ class Bluetooth(Component):
     @property
     @abstractmethod
     def found(self) -> Sequence[BluetoothDevice]:
-        """What the last scan heard, strongest first; devices without a name are left out."""
+        """Devices found by the last scan, strongest first; devices without a name are left out."""
 
     @property
     @abstractmethod

@@ -1,4 +1,4 @@
-"""Where the robot keeps maps, programs and recordings."""
+"""Disk space for maps, programs and recordings."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ class Disk(Component):
     @property
     @abstractmethod
     def free(self) -> int:
-        """What is left; 0 when it is full."""
+        """Free bytes; 0 when the disk is full."""
 
     @property
     @abstractmethod
     def uses(self) -> Mapping[str, int]:
-        """Who takes how much of it."""
+        """Bytes taken by each use, by its name."""
 
     @abstractmethod
     def take(self, name: str, size: int) -> None:

@@ -7,7 +7,7 @@ from enum import IntEnum
 
 
 class FaultLevel(IntEnum):
-    """How bad it is."""
+    """Severity of a fault."""
 
     WARNING = 1
     ERROR = 2

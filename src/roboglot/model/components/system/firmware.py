@@ -16,14 +16,14 @@ MODULES_MAX = 64
 
 
 class Module(StrEnum):
-    """What can be restarted while the rest goes on."""
+    """A part of the firmware that can be restarted while the rest goes on."""
 
     SOFTWARE = "software"  # whatever maps and plans
     BASE = "base"  # the drive's controller
 
 
 class FirmwareState(StrEnum):
-    """Where an update stands."""
+    """Stage of a firmware update."""
 
     IDLE = "idle"
     DOWNLOADING = "downloading"
@@ -126,7 +126,7 @@ class Firmware(Component):
     @property
     @abstractmethod
     def restarting(self) -> Module | None:
-        """What restarts now, with the rest up."""
+        """Module that restarts while the rest stays up; None if there is none."""
 
     @abstractmethod
     def restart(self, module: Module, *, source: str = "") -> Action:

@@ -43,7 +43,7 @@ LOG_PERIOD = 1.0  # s
 
 @dataclass(frozen=True, slots=True)
 class Holder:
-    """Who moves the robot: a client's name, ``OTHERS`` or ``ITSELF``; what by; since when, robot s."""
+    """The one who moves the robot: a client's name, ``OTHERS`` or ``ITSELF``; by which action; since when, robot s."""
 
     who: str
     doing: str
@@ -74,7 +74,7 @@ class Lease(Component):
 
     @property
     def holder(self) -> Holder | None:
-        """Who moves it now."""
+        """Current holder; None while the robot is not being moved."""
         if self._outside_since is not None:
             return Holder(OTHERS, "", self._outside_since)
         running = [action for action in self._robot.actions.running() if moves(action)]

@@ -43,7 +43,7 @@ class Link(Component):
 
     @property
     def reason(self) -> str:
-        """Why it is not up, in plain words; empty if it is."""
+        """Reason why the link is not up, in plain words; empty if it is."""
         return self._reason
 
     @property
@@ -53,7 +53,7 @@ class Link(Component):
 
     @property
     def holder(self) -> str:
-        """Who moves the robot: ``US``, ``OTHERS``, or empty."""
+        """The one who moves the robot: ``US``, ``OTHERS``, or empty."""
         return self._holder
 
     def age(self, what: str = "") -> float:
@@ -69,7 +69,7 @@ class Link(Component):
 
     @property
     def refusal(self) -> Unconnected | None:
-        """What a command is refused with now; None: it would reach the robot."""
+        """Error that would refuse a command; None while commands reach the robot."""
         if self._state is LinkState.UP:
             return None
         return Unconnected(f"{self.name} is not connected: {self._reason or self._state}")
@@ -112,7 +112,7 @@ class Link(Component):
         self._publish()
 
     def held_by(self, holder: str) -> None:
-        """Who moves the robot now."""
+        """Set the one who moves the robot, and publish a change."""
         if holder != self._holder:
             self._holder = holder
             self._publish()

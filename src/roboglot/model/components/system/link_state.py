@@ -1,4 +1,4 @@
-"""How the link to a real robot is."""
+"""States of the link to a real robot."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import StrEnum
 
 
 class LinkState(StrEnum):
-    """How it is."""
+    """State of the link to a real robot."""
 
     CONNECTING = "connecting"  # for the first time
     UP = "up"

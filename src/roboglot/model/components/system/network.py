@@ -18,7 +18,7 @@ KNOWN_MAX = 32  # networks that the robot remembers
 
 
 class NetworkMode(StrEnum):
-    """What the Wi-Fi card does."""
+    """Mode of the Wi-Fi card."""
 
     STATION = "station"  # joins a network that it knows
     ACCESS_POINT = "access_point"  # is a network of its own; others join
@@ -43,11 +43,11 @@ class WifiNetwork:
 
 @dataclass(frozen=True, slots=True)
 class NetworkState:
-    """How the card is set and linked now.
+    """Current settings and addresses of the Wi-Fi card and the wired socket.
 
-    ``ssid``: of the network that it is in, or offers; "" without. ``address``: its IPv4 address there, "" without;
-    ``gateway``: the address of the network's gateway, "" without. ``wired``: address and prefix length of the
-    socket on the hull ("" for robots without one). ``internet``: whether the internet is reached, ``route``: by what.
+    ``ssid``: of the network that it has joined, or offers; "" without. ``address``: its IPv4 address there, "" without;
+    ``gateway``: the address of the network's gateway, "" without. ``wired``: address and prefix length of the socket on
+    the hull ("" for robots without one). ``internet``: True if the internet is reached, ``route``: by which uplink.
     """
 
     mode: NetworkMode
@@ -71,7 +71,8 @@ class MobileState:
 
 
 class Network(Component):
-    """What the Wi-Fi card and the modem say. Settings survive restarts. Publishes ``NetworkChanged``.
+    """State and settings of Wi-Fi card and modem. Settings survive restarts. Publishes ``NetworkChanged``. Settings
+    survive restarts. Publishes ``NetworkChanged``.
 
     Setting methods return when the setting is safe on disk; the link follows within seconds of robot time.
     """
@@ -97,7 +98,7 @@ class Network(Component):
     @property
     @abstractmethod
     def networks(self) -> Sequence[WifiNetwork]:
-        """What the card hears now, strongest first; nothing when it is off."""
+        """Networks in range of the card, strongest first; empty while it is off."""
 
     @property
     @abstractmethod
@@ -107,7 +108,7 @@ class Network(Component):
     @property
     @abstractmethod
     def priority(self) -> Uplink:
-        """Which way is taken when there are both."""
+        """Uplink that is preferred when there are both."""
 
     @property
     @abstractmethod
@@ -144,7 +145,7 @@ class Network(Component):
 
     @abstractmethod
     async def set_priority(self, priority: Uplink) -> None:
-        """Which way to take when there are both."""
+        """Set the uplink that is preferred when there are both."""
 
     @abstractmethod
     async def set_apn(self, apn: str) -> None:

@@ -1,4 +1,4 @@
-"""What people set on the robot once and expect to find again."""
+"""Settings of the robot that survive restarts."""
 
 from __future__ import annotations
 

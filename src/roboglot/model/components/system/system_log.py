@@ -1,4 +1,4 @@
-"""What the robot writes down about itself, and hands to its maker when asked."""
+"""The robot's log of itself, and its upload to the maker on request."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LINE_MAX = 300  # characters
 
 @dataclass(frozen=True, slots=True)
 class Upload:
-    """What the maker's server took: robot time, s; size in bytes; SHA-256 in hex of the text."""
+    """Receipt of the maker's server: robot time, s; size in bytes; SHA-256 of the text in hex."""
 
     stamp: float
     size: int
