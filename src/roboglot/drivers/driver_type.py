@@ -1,4 +1,4 @@
-"""What a driver is to the program: a scheme of URLs, their options, and how it is made."""
+"""Driver types: a scheme of URLs, their options, and the function that makes the driver."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """Where a real robot is: the parts of its URL, whose options are among those of its driver."""
+    """Address of a real robot: the parts of its URL, whose options are among those of its driver."""
 
     url: str
     host: str
@@ -32,7 +32,8 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class Workshop:
-    """What the drivers of one program share. Without ``touches`` robots are only observed.
+    """State shared by the drivers of one program. Without ``touches`` robots are only observed. Without ``touches``
+    robots are only observed.
 
     ``own``: addresses of the program's own doors, which discovery ignores.
     """

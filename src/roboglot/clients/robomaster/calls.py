@@ -1,4 +1,4 @@
-"""What every chapter of commands is made of: a way to ask, and how numbers are written and answers read."""
+"""Base of all chapters of commands: sends a command, writes numbers and reads answers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who listens to what a robot says by itself: functions and watchers, each to the kinds it wants."""
+"""Listeners to a robot's pushes and events: functions and watchers, each for the kinds that it wants."""
 
 from __future__ import annotations
 

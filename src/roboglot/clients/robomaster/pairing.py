@@ -1,4 +1,5 @@
-"""Which answer belongs to which command: by ``seq`` where the robot repeats it, else by order. Knows no sockets.
+"""Pairing of answers with commands: by ``seq`` where the robot repeats it, else by order. Knows no sockets. Knows no
+sockets.
 
 A robot answers each command once and in order, but builds differ in what ends an answer, and the oldest end it with
 nothing at all; the next expected number marks the end even there.

@@ -1,4 +1,4 @@
-"""What each protocol consists of: one JSON file of facts per protocol, the yardstick of the coverage page.
+"""Contracts: one JSON file per protocol that lists all of its operations, against which coverage is measured.
 
 A row is ``{"key", "chapter", "name"}``: the wire name under which a handler registers, the vendor's chapter, and the
 vendor's own identifier.

@@ -27,7 +27,7 @@ _ASSET = struct.Struct("<BIBI")
 
 
 class Level(IntEnum):
-    """How bad a status is."""
+    """Severity of a status."""
 
     INFO = 0
     WARNING = 1
@@ -53,7 +53,7 @@ class ClientOpcode(IntEnum):
 
 
 class PlayStatus(IntEnum):
-    """How a recording is being played."""
+    """State of a player."""
 
     PLAYING = 0
     PAUSED = 1
@@ -67,7 +67,7 @@ class Malformed(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What a client sends: the contract's key and the fields."""
+    """Request of a client: the contract's key and the fields."""
 
     key: str
     values: Mapping[str, Any]
@@ -75,7 +75,7 @@ class Request:
 
 @dataclass(frozen=True, slots=True)
 class Playback:
-    """How a server plays: ``time`` in ns since 1970, whose ``request`` it answers, and whether the time has jumped."""
+    """State of a player: ``time`` in ns since 1970, the ``request`` that it answers, and ``sought`` after a seek."""
 
     status: int
     time: int

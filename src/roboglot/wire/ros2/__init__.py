@@ -1,1 +1,1 @@
-"""How ROS 2 goes over Zenoh: names of topics, of nodes and of their ends, and what comes beside a message."""
+"""ROS 2 over Zenoh: names of topics, of nodes and of their endpoints, and the attachment of a message."""

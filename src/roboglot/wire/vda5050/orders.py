@@ -49,7 +49,7 @@ class Action(msgspec.Struct, frozen=True, rename="camel"):
 
 
 class Ellipse(msgspec.Struct, frozen=True):
-    """How far from a node still counts as there (3.0): half axes in m."""
+    """Allowed deviation from a node (3.0): half axes in m."""
 
     a: NotNegative
     b: NotNegative
@@ -57,7 +57,7 @@ class Ellipse(msgspec.Struct, frozen=True):
 
 
 class NodePosition(msgspec.Struct, frozen=True):
-    """Where a node is in the map."""
+    """Position of a node in the map."""
 
     x: Metres
     y: Metres
@@ -82,7 +82,7 @@ Actions = Annotated[tuple[Action, ...], msgspec.Meta(max_length=ACTIONS_MAX)]
 
 
 class Part(msgspec.Struct, frozen=True, rename="camel", kw_only=True):
-    """What nodes and edges have in common: their number in the order, and whether they are of its base."""
+    """Common fields of nodes and edges: their sequence number, and ``released``: part of the order's base."""
 
     sequence_id: Count
     released: bool

@@ -1,4 +1,4 @@
-"""What the two versions of VDA 5050 call the same thing."""
+"""Differences in naming between the two versions of VDA 5050."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from enum import StrEnum
 
 
 class ErrorKind(StrEnum):
-    """Why an order or action is refused, or cannot go on; the value is version 3.0's word."""
+    """Reason for a refused or failed order or action; the value is version 3.0's word."""
 
     MALFORMED = "VALIDATION_FAILURE"
     UNSUPPORTED = "UNSUPPORTED_PARAMETER"
@@ -29,7 +29,7 @@ class ErrorKind(StrEnum):
 
 
 class Level(StrEnum):
-    """How bad an error is; the value is version 3.0's word."""
+    """Severity of an error; the value is version 3.0's word."""
 
     WARNING = "WARNING"
     URGENT = "URGENT"

@@ -7,7 +7,7 @@ from typing import Protocol
 
 
 class FrontEnd(Protocol):
-    """Where frames for front ends (code 2001) go; each kind in its order. The first two must be quick."""
+    """Receiver of frames for front ends (code 2001); each kind in its order. The first two must be quick."""
 
     @property
     def longest(self) -> int:

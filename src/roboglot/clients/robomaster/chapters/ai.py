@@ -11,7 +11,7 @@ class Ai(Chapter):
     async def attribute(
         self, *, line_color: str | None = None, marker_color: str | None = None, marker_dist: float | None = None
     ) -> None:
-        """Which lines and markers count; colours red, green, blue, m (3.2.15.1)."""
+        """Choose the lines and markers that count: colours red, green, blue; distance in m (3.2.15.1)."""
         await self._do("AI attribute", line_color=line_color, marker_color=marker_color, marker_dist=marker_dist)
 
     async def push(

@@ -1,1 +1,1 @@
-"""What goes over the wire, by the groups of chapters as in ``protocols.cyberdog.chapters``."""
+"""Frames and messages on the wire, by the same groups of chapters as ``protocols.cyberdog.chapters``."""

@@ -1,1 +1,1 @@
-"""What goes over the wire, by the chapters of the manual as in ``protocols.slamware.chapters``: schemas and formats."""
+"""Schemas and formats by the same chapters of the manual as ``protocols.slamware.chapters``."""

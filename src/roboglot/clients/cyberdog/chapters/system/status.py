@@ -15,7 +15,7 @@ TOPICS = (
 
 
 class Status(Calls):
-    """What the robot reports about itself."""
+    """Status of the robot as it reports it."""
 
     async def information(self, *topics: str, uid: str = "") -> Mapping[str, Any]:
         """1001: what is asked for of TOPICS (all, if none is named), in the robot's own form."""

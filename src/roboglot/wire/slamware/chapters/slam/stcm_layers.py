@@ -1,7 +1,8 @@
-"""What is in the layers of a composite map, as far as publicly known: grids, lines, poses.
+"""Layers of a composite map, as far as publicly known: grids, lines, poses.
 
-How rectangles and landmarks are written is not known. Areas go into a layer of our own, as JSON, so that they survive;
-a vendor's layer of that kind is left alone. Every reader answers None for a layer that it does not understand wholly.
+The vendor's encoding of rectangles and landmarks is not known. Areas go into a layer of our own, as JSON, so that they
+survive; a vendor's layer of that kind is left alone. Every reader answers None for a layer that it does not understand
+wholly.
 """
 
 from __future__ import annotations
