@@ -1,8 +1,9 @@
-"""Which web pages may talk to a door. Decides by a request's Host, Origin, Referer and Sec-Fetch-* headers.
+"""Protection from foreign web pages. Decides by a request's Host, Origin, Referer and Sec-Fetch-* headers. Decides by a
+request's Host, Origin, Referer and Sec-Fetch-* headers.
 
 The protocols have no authentication of their own, and every page in every browser of this machine reaches loopback. So
-a request is refused when a page of another host sent it (Origin), or when its Host is a name that may have been
-rebound to this machine's address. Programs that are no browsers send no Origin and an address or a known name as Host.
+a request is refused when a page of another host sent it (Origin), or when its Host is a name that may have been rebound
+to this machine's address. Programs that are no browsers send no Origin and an address or a known name as Host.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ _ORIGIN = re.compile(r"[a-z][a-z0-9+.-]*://[^/?#@\s]+")
 
 @dataclass(frozen=True, slots=True)
 class Headers:
-    """What a request says about where it comes from; None and empty for what it does not say."""
+    """Headers that say where a request comes from; None and empty where they are missing."""
 
     host: str | None = None
     origin: str | None = None
@@ -55,7 +56,7 @@ class Browsers:
 
     @property
     def any_origin(self) -> bool:
-        """Whether every page may use the door."""
+        """True if every page may use the door."""
         return ANY in self._origins
 
     def warn_if_open(self) -> None:
@@ -67,7 +68,7 @@ class Browsers:
             )
 
     def refusal(self, headers: Headers) -> str:
-        """Why the request is refused, in words for its sender; empty if it may pass."""
+        """Return why the request is refused, in words for its sender; empty if it may pass."""
         why = self._verdict(headers)
         if why:
             new = why not in self._warned and len(self._warned) < WARNINGS_MAX
@@ -113,7 +114,7 @@ class Browsers:
 
 
 def _is_this_machine(page: str) -> bool:
-    """Whether a page's host is this machine itself; other loopback addresses are robots', and tunnels to strangers'."""
+    """Return whether a page's host is this machine; other loopback addresses belong to robots, tunnels to strangers."""
     return page in ("127.0.0.1", "::1", "localhost") or page.endswith(".localhost")
 
 

@@ -1,4 +1,4 @@
-"""What the paths of a door's WebSocket lead to: a session for each client. Knows no socket."""
+"""Channels of a door's WebSocket: each path opens a session for its client. Knows no socket."""
 
 from __future__ import annotations
 
@@ -50,10 +50,10 @@ class Session(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """What a path of the WebSocket leads to; ``right`` is needed to open it.
+    """Endpoint behind a path of the WebSocket; ``right`` is needed to open it.
 
-    ``open`` makes the session of a client; it may send at once. Raises RuntimeError where there are too many.
-    ``subprotocols``: one of them must be offered, the first that is counts; none: it does not matter.
+    ``open`` makes the session of a client, which may send at once. Raises RuntimeError where there are too many.
+    ``subprotocols``: one of them must be offered, the first in this order is taken; empty: none is needed.
     """
 
     open: Callable[[Carrier], Session]

@@ -1,4 +1,4 @@
-"""What a door is: the value that describes it (``DoorType``), what it is opened with, and what it is while open."""
+"""Doors: the value that describes one (``DoorType``), the site that it is opened at, and the open door."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Door(Protocol):
 
     @property
     def endpoints(self) -> Sequence[Endpoint]:
-        """Where it listens, after ``start``."""
+        """Addresses that the door listens at, after ``start``."""
 
 
 class CloudLink(Protocol):
@@ -73,7 +73,7 @@ class Outbox(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Clouds:
-    """How to reach a cloud: by its address and an account's token; ``outbox`` keeps what could not be sent yet."""
+    """Access to clouds, by address and an account's token; ``outbox`` keeps what could not be sent yet."""
 
     link: Callable[[str, str], CloudLink]
     failures: type[Exception]
@@ -82,7 +82,7 @@ class Clouds:
 
 @dataclass(slots=True)
 class Site:
-    """What a door is opened with: one robot, the address to listen at, and what the doors of a program share.
+    """Arguments for opening a door: one robot, the address to listen at, and the parts that a program's doors share.
 
     ``programs`` makes the service for block programs in a time zone; its flag demands that the kernel filters system
     calls. ``tls``: how ports that can encrypt do so. ``frames`` takes programs' frames; a door that has ``provides``
@@ -133,7 +133,7 @@ class Option:
 
 
 class Implementation(Protocol):
-    """Which rows of a contract the code does; a module that has these functions is one."""
+    """Implemented rows of a contract; a module that has these functions is one."""
 
     def implemented(self) -> set[str]:
         """Return the keys of rows that are wholly there."""
@@ -144,7 +144,7 @@ class Implementation(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Contract:
-    """What the protocol consists of, how much of it is there, and further paragraphs for the coverage page."""
+    """Rows of the protocol, their implementation, and further paragraphs for the coverage page."""
 
     name: str
     rows: Callable[[], Sequence[Row]]

@@ -27,7 +27,7 @@ Factory = Callable[[], asyncio.Protocol]
 
 
 class Port(NamedTuple):
-    """What is listened at: its name in the log, the right that is needed, and who is there."""
+    """Listening port: its name in the log, the right that it needs, and its connections."""
 
     name: str
     right: Right | None

@@ -1,4 +1,4 @@
-"""Where the owner of this machine sees who moves each robot, takes control, gives it, stops robots and resets them.
+"""Control desk of the machine's owner: shows who moves each robot, gives and takes control, stops and resets.
 
 A socket in the data folder that only its owner can open; a line of JSON comes, a line of JSON goes. Knows no door.
 """
@@ -23,7 +23,7 @@ NAME = "lease.sock"  # in the data folder
 
 
 class Request(msgspec.Struct, forbid_unknown_fields=True):
-    """What is wished; ``robot`` is needed but to look, or ``all``; ``who`` is whom control is given to."""
+    """Request to the desk; ``robot``, or ``all``, is needed except to look; ``who`` is given control."""
 
     do: Literal["look", "take", "give", "release", "stop", "reset"] = "look"
     robot: str = ""
@@ -47,7 +47,7 @@ class Control(msgspec.Struct):
 
 
 class Answer(msgspec.Struct):
-    """How all robots are now, and why the wish was not granted (empty: it was)."""
+    """State of all robots, and why the request was refused (empty: it was granted)."""
 
     robots: list[Control]
     error: str = ""

@@ -1,4 +1,4 @@
-"""Where the owner of this machine starts and stops the recording, marks moments in it and asks how it goes."""
+"""Recording desk of the machine's owner: starts and stops recordings, marks moments and reports progress."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ NAME = "record.sock"  # in the data folder
 
 
 class Request(msgspec.Struct, forbid_unknown_fields=True):
-    """What is wished. ``text``: the path to record to, or to save the last minutes to; a mark's words."""
+    """Request to the desk. ``text``: the path to record to, or to save the last minutes to; the words of a mark."""
 
     do: Literal["look", "start", "stop", "mark", "save"] = "look"
     text: str = ""
 
 
 class Answer(msgspec.Struct):
-    """How the recording goes, and why the wish was not granted (empty: it was)."""
+    """State of the recording, and why the request was refused (empty: it was granted)."""
 
     on: bool = False
     path: str = ""

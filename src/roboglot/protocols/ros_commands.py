@@ -1,4 +1,4 @@
-"""What ROS's usual topics have a robot do, for every door that takes them: cmd_vel, goal_pose, initialpose."""
+"""Commands of ROS's usual topics, for every door that takes them: cmd_vel, goal_pose, initialpose."""
 
 from __future__ import annotations
 

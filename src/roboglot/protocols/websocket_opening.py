@@ -30,7 +30,7 @@ HEAD_END = b"\r\n\r\n"
 
 @dataclass(frozen=True, slots=True)
 class Entrance:
-    """Where clients of a door come in: its channels by their paths, and what asks who they are."""
+    """Entrance of a door: its channels by their paths, and the access control for its clients."""
 
     door: str
     channels: Mapping[str, Channel]

@@ -1,4 +1,4 @@
-"""What goes to one client of a WebSocket: written at once, or waited for; who reads nothing is disconnected."""
+"""Output to one client of a WebSocket: written at once, or waited for; a client that never reads is disconnected."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ CLIENT_FILES = (CA_CERT, "client-cert.pem", "client-key.pem")
 
 
 class BadCertificates(OSError):
-    """What lies in the folder is incomplete or expired; the message says what to do."""
+    """Certificates in the folder are incomplete or expired; the message says what to do."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""What this door keeps about one robot while it is open: the app, the motion, the task, the chapters' own states."""
+"""State of this door for one robot while it is open: the app, the motion, the task, the chapters' own states."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ RETRY_SECONDS = 0.2
 
 
 class Delivery(Enum):
-    """What became of one push."""
+    """Result of one push."""
 
     DONE = auto()
     SILENT = auto()

@@ -1,6 +1,6 @@
-"""Where the text and the open-source robot disagree in a way that no answer serves both: which one the door follows.
+"""Profiles: the text or the open-source robot, for points where they disagree and no answer serves both.
 
-What only one of them has is answered in both profiles: clients ignore fields that they do not know.
+Fields that only one of them has are sent in both profiles: clients ignore fields that they do not know.
 """
 
 from __future__ import annotations

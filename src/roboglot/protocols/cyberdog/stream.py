@@ -40,7 +40,7 @@ class Stream:
         return self._reader
 
     def detach(self, reader: Reader) -> None:
-        """Who read from ``reader`` is gone."""
+        """Stop reading for ``reader``, whose client is gone."""
         if self._reader is reader:
             self._reader = None
 

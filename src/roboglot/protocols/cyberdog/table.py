@@ -1,4 +1,4 @@
-"""What this door can do: requests by code, and the pushes that it sends. The chapters fill both tables at import."""
+"""Tables of this door: requests by code, and the pushes that it sends. The chapters fill both at import."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a door offers its clients, live or played: topics with their schemas, and who listens to them."""
+"""Channels of a door, live or played: topics with their schemas, and their listeners."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Channel:
 
     @property
     def row(self) -> Mapping[str, object]:
-        """What ``advertise`` says about it."""
+        """Row of the channel in an ``advertise`` message."""
         binary = self.schema_encoding == "protobuf"
         return {
             "id": self.id,
@@ -37,7 +37,7 @@ class Channel:
 
 @dataclass(frozen=True, slots=True)
 class Wish:
-    """What a client wants of a recording that is played: whether to ``play``, how fast, from where (ns), its name."""
+    """Playback that a client wants: ``play`` or pause, speed, position to ``seek`` (ns), and its request's name."""
 
     play: bool
     speed: float
@@ -65,7 +65,7 @@ class Listener(Protocol):
 
 
 class Source(Protocol):
-    """What is to be seen at a door."""
+    """Source of channels and messages at a door."""
 
     @property
     def channels(self) -> Sequence[Channel]:

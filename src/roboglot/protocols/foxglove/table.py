@@ -1,4 +1,4 @@
-"""What clients may ask for, by the contract's keys, and which of the server's messages are sent. Chapters fill it."""
+"""Requests of clients by the contract's keys, and the server's messages that are sent. The chapters fill it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def partly() -> dict[str, str]:
 
 
 class Messages:
-    """What the robot sends."""
+    """Messages that the robot sends."""
 
     @staticmethod
     def implemented() -> set[str]:

@@ -121,7 +121,7 @@ class ControlConnection(asyncio.Protocol):
                 self.transport.resume_reading()
 
     def _look(self) -> None:
-        """Whether the client that is not read from has hung up; then what it has not been answered is dropped."""
+        """Drop the pending answers of a client that is not being read from, if it has hung up."""
         if hung_up(self.transport):
             self.transport.abort()
         else:

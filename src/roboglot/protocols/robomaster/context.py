@@ -28,7 +28,7 @@ log = logging.getLogger(__name__)
 
 
 class Part(Protocol):
-    """What a chapter keeps between its commands."""
+    """State that a chapter keeps between its commands."""
 
     def __init__(self, context: Context) -> None: ...
 
@@ -47,7 +47,7 @@ def speak_as(name: str, identity: str = "") -> None:
 
 
 class Outlets(Protocol):
-    """Where a session's words go; the server's business."""
+    """Outlets for a session's media and pushes; the server's business."""
 
     video: MediaPort
     audio: MediaPort
@@ -60,7 +60,7 @@ class Outlets(Protocol):
 
 
 class Context:
-    """What the commands of all connections share."""
+    """State that the commands of all connections share."""
 
     robot: Robot
     profile: Profile
@@ -88,7 +88,7 @@ class Context:
 
     @property
     def mode(self) -> FollowMode:
-        """Who follows whom in yaw: the gimbal's mode, if there is one."""
+        """Follow mode of the gimbal in yaw, if there is one."""
         return self.robot[Gimbal].mode if Gimbal in self.robot else self._mode
 
     def set_mode(self, mode: FollowMode) -> None:

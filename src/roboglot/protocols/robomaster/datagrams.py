@@ -1,4 +1,4 @@
-"""What leaves the robot over UDP, all from the robot's own address: clients check where a datagram comes from."""
+"""Outgoing UDP, all from the robot's own address: clients check where a datagram comes from."""
 
 from __future__ import annotations
 

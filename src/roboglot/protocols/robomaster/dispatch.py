@@ -62,7 +62,7 @@ class Answer:
 
 @dataclass(slots=True)
 class _Asked:
-    """What is known of a command so far: its key in the contract, and when it was noted for those who follow."""
+    """Command being answered: its key in the contract, and when it was noted for followers."""
 
     key: str = ""
     began: float | None = None

@@ -1,4 +1,4 @@
-"""Which events go out on the event port (manual 3.2.6.3, 3.2.7.1, 3.2.10.4), and the words for them."""
+"""Switches of the events that go out on the event port (manual 3.2.6.3, 3.2.7.1, 3.2.10.4), and their words."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ def probe_for_life(transport: asyncio.Transport) -> None:
 
 
 def hung_up(transport: asyncio.Transport) -> bool:
-    """Whether the peer has ended its side, read or not. False for what is no connection, and for a closed one."""
+    """Return whether the peer has ended its side, read or not. False without a connection, and for a closed one."""
     connection = transport.get_extra_info("socket")
     if connection is None:
         return bool(transport.get_extra_info("hung_up", False))

@@ -1,4 +1,4 @@
-"""What the robot says about its chassis and gimbal, in the EP's units, signs and order (manual 3.2.3.4 to 3.2.4.9)."""
+"""Readings of chassis and gimbal, in the EP's units, signs and order (manual 3.2.3.4 to 3.2.4.9)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from roboglot.wire.robomaster.replies import Number, Profile
 
 
 class ReadingSource(Protocol):
-    """Which robot is read, and how its answers are given."""
+    """The robot to be read, and the profile of its answers."""
 
     @property
     def robot(self) -> Robot:
@@ -32,7 +32,7 @@ class ReadingSource(Protocol):
 
     @property
     def profile(self) -> Profile:
-        """How robots answer, where the manual differs."""
+        """Profile of the answers, where robots differ from the manual."""
 
 
 def position(source: ReadingSource) -> tuple[float, float, float]:

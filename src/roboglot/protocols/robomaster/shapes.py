@@ -1,4 +1,4 @@
-"""How each command's words become checked parameters, read from its handler's signature once.
+"""Conversion of each command's words into checked parameters, read from its handler's signature once.
 
 A parameter before the ``*`` takes a bare word or its name; those after it must be named. ``OnRobots`` annotations give
 a command a second set of ranges for the profiles of robots' builds.

@@ -1,4 +1,4 @@
-"""What this door can do: commands by their key, and the messages that it sends. The chapters fill the table."""
+"""Table of this door: commands by their key, and the messages that it sends. The chapters fill it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every handler is given: the robot, the settings, and the way to say something on ``/rosout``."""
+"""First argument of every handler: the robot, the settings, and a way to write to ``/rosout``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the robot listens to, by the contract's keys, and what it publishes. The chapter fills the table."""
+"""Subscriptions of the robot by the contract's keys, and the topics that it publishes. The chapter fills it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def partly() -> dict[str, str]:
 
 
 class Messages:
-    """What the robot publishes."""
+    """Messages that the robot publishes."""
 
     @staticmethod
     def implemented() -> set[str]:

@@ -9,7 +9,7 @@ from roboglot.config import Port
 
 @dataclass(frozen=True, slots=True)
 class SlamwareConfig:
-    """Where the REST door listens, how it begins action names, whether events stay after they were read, its cloud.
+    """Settings of the REST door: port, prefix of action names, whether events stay after they were read, cloud.
 
     ``origins``: web pages of other hosts that may use it, such as "https://studio.example"; "*": any page. ``hosts``:
     names of this machine that clients use, beside its addresses, localhost and its own host name.

@@ -1,4 +1,4 @@
-"""What every handler of the REST door is given."""
+"""First argument of every handler of the REST door."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What goes wrong, as HTTP: the one table from RobotError to a status, and the manual's texts for bad requests.
+"""Errors as HTTP: the one table from RobotError to a status, and the manual's texts for bad requests.
 
 The vendor's robots put the text into the reason phrase; we send it there and as a text/plain body.
 """

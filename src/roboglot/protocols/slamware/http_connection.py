@@ -101,7 +101,7 @@ class HttpConnection(HttpToolsProtocol):
             unread, self._unread = [*self._unread, *unread], ()
 
     def send_400_response(self, msg: str) -> None:
-        """What uvicorn does with a request that cannot be parsed, or that ``_measure`` stopped."""
+        """Answer a request that cannot be parsed, or that ``_measure`` stopped; called by uvicorn."""
         if self._parsed_bytes > HEAD_MAX:
             self._refuse_head()
         else:

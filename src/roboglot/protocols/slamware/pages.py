@@ -1,4 +1,4 @@
-"""What the door serves besides the API: its description, and a page to try the operations. Nothing from elsewhere."""
+"""Pages of the door besides the API: its description, and a page to try the operations. Nothing from elsewhere."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which operation of the contract a method and a path mean; literal segments win over ``{parameters}``."""
+"""Routes: the contract's operation for a method and a path; literal segments win over ``{parameters}``."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Template:
 
     @property
     def parameters(self) -> int:
-        """How many of its segments are parameters."""
+        """Number of segments that are parameters."""
         return sum(segment.startswith("{") for segment in self.segments)
 
     def match(self, segments: Sequence[str]) -> dict[str, str] | None:

@@ -59,7 +59,7 @@ def state_of(action: Action) -> ActionState:
 
 
 def reason_of(error: RobotError | None) -> str:
-    """Why an action failed, never empty: an empty reason means success to clients."""
+    """Return why an action failed, never empty: an empty reason means success to clients."""
     if error is None:
         return "failed"
     return next((word for kind, word in REASONS.items() if isinstance(error, kind)), str(error) or "failed")

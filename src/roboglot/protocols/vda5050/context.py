@@ -1,7 +1,7 @@
-"""What this door keeps about one robot: its order, actions and errors; takes messages, and has orders driven.
+"""State of this door for one robot: its order, actions and errors; takes messages, and has orders driven.
 
-Says nothing that is not so: a node is passed when the navigation says that the robot was there, an action is finished
-when it has ended.
+Reports facts only: a node is passed when the navigation says that the robot was there, an action is finished when it
+has ended.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What is wrong: refused messages and actions until they are mended, and the robot's own faults."""
+"""Current errors: refused messages and actions until they are corrected, and the robot's own faults."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class ErrorBook:
         self._errors: list[Error] = []
 
     def __iter__(self) -> Iterator[Error]:
-        """What was reported and stands, then what is wrong with the robot itself."""
+        """Yield the standing reported errors, then the robot's own faults."""
         yield from self._errors
         yield from self.faults()
 

@@ -1,4 +1,4 @@
-"""Which maps fleet control can name: those that the robot keeps, and the one in use."""
+"""Maps that fleet control can name: those stored on the robot, and the one in use."""
 
 from __future__ import annotations
 

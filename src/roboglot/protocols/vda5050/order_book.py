@@ -17,7 +17,7 @@ ACTIONS_KEPT_MAX = 1000  # action states; the oldest ended ones go first
 
 
 class ActionStatus(StrEnum):
-    """How far an action is."""
+    """Status of an action."""
 
     WAITING = "WAITING"
     INITIALIZING = "INITIALIZING"

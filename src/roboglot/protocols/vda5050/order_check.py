@@ -1,4 +1,4 @@
-"""Whether this robot can drive an order and do its actions: asked of each message before anything begins."""
+"""Check of orders: can this robot drive it and do its actions? Asked of each message before anything begins."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ log = logging.getLogger(__name__)
 
 
 class Performing(Protocol):
-    """Whose actions are done: the context of a robot."""
+    """Context of the robot whose actions are performed."""
 
     robot: Robot
     version: Version

@@ -38,7 +38,7 @@ class Leg:
 
     @property
     def options(self) -> NavigationOptions:
-        """How to drive it: the last node's heading, the narrowest deviation."""
+        """Navigation options: the last node's heading, the narrowest deviation."""
         places = [node.node_position for node in self.nodes]
         reach = min(place.reach for place in places if place is not None)
         last = places[-1]
@@ -47,7 +47,7 @@ class Leg:
 
     @property
     def points(self) -> list[Point]:
-        """Where the nodes are."""
+        """Positions of the nodes."""
         return [Point(node.node_position.x, node.node_position.y) for node in self.nodes if node.node_position]
 
 
@@ -74,7 +74,7 @@ class Driven(Protocol):
 
 
 class Route:
-    """What the robot drives now for one context."""
+    """Current drive of the robot for one context."""
 
     def __init__(self, context: Driven) -> None:
         self._context = context

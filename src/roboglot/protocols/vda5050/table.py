@@ -1,4 +1,4 @@
-"""What fleet control may ask for: messages and actions by their names, and which rows of the contract are there."""
+"""Requests of fleet control: messages and actions by their names, and the implemented rows of the contract."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def partly() -> dict[str, str]:
 
 
 class Messages:
-    """What the robot sends, and which optional fields it uses."""
+    """Messages that the robot sends, and the optional fields that it uses."""
 
     @staticmethod
     def implemented() -> set[str]:

@@ -15,7 +15,7 @@ DOOR = "visual"
 
 
 class Outlet(Protocol):
-    """Where answers go: every front end."""
+    """Receiver of answers: every front end."""
 
     def answer(self, text: str) -> None:
         """One frame."""

@@ -1,4 +1,4 @@
-"""What every handler of a frame is given."""
+"""First argument of every handler of a frame."""
 
 from __future__ import annotations
 

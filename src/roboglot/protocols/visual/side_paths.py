@@ -1,6 +1,6 @@
-"""What the WebSocket has beside ``/programs``; it is ours: logs, positions, resources, debugging.
+"""Paths of the WebSocket beside ``/programs``, all our own: logs, positions, resources, debugging.
 
-Its texts are noted with their path as the operation, so that a recorded robot answers here, too.
+Their texts are noted with the path as the operation, so that a recorded robot answers here, too.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What this door can do: the frames by what they ask for, and the manual's three tables of states. Chapters fill it."""
+"""Tables of this door: frames by what they ask for, and the manual's three tables of states. Chapters fill it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What panels publish: velocities, goals and poses in ROS's messages, as JSON."""
+"""Messages that panels publish: velocities, goals and poses in ROS's messages, as JSON."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ LOOKING = 0.04  # s between looks whether a detector has something new; detector
 
 
 class Ai:
-    """Which kinds are pushed, and what of them counts."""
+    """Kinds of recognition that are pushed, and their filters."""
 
     def __init__(self, context: Context) -> None:
         self._context, self._robot = context, context.robot
@@ -147,7 +147,7 @@ async def set_attribute(
     marker_color: MarkerColour | None = None,
     marker_dist: MarkerDistance | None = None,
 ) -> None:
-    """Which lines and markers count: colour, and from how many m on (3.2.15.1)."""
+    """Choose the lines and markers that count: colour, and from how many m on (3.2.15.1)."""
     _ = context.robot[Vision]
     ai = context.part(Ai)
     ai.line_colour = line_color or ai.line_colour

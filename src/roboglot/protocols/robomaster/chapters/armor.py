@@ -14,7 +14,7 @@ SENSITIVITY = 5  # the default, and what it is again when the session ends
 
 @TABLE.on("armor sensitivity", right=Right.DRIVE, needs=(Armor,))
 async def set_sensitivity(context: Context, value: Sensitivity) -> None:
-    """How light a blow is felt: 1 hard ones only, 10 every touch (3.2.6.1)."""
+    """Set the sensitivity to blows: 1 hard ones only, 10 every touch (3.2.6.1)."""
     armor = context.robot[Armor]
     armor.set_sensitivity(value)
     context.at_end("armor sensitivity", lambda: armor.set_sensitivity(SENSITIVITY))

@@ -11,7 +11,7 @@ from roboglot.protocols.robomaster.table import TABLE
 
 @TABLE.on("blaster bead", right=Right.DRIVE, needs=(Blaster,))
 async def set_beads(context: Context, num: Beads) -> None:
-    """How many beads a shot fires (3.2.5.1); 1 again when the session ends."""
+    """Set the number of beads that a shot fires (3.2.5.1); 1 again when the session ends."""
     blaster = context.robot[Blaster]
     blaster.set_beads(num)
     context.at_end("blaster bead", lambda: blaster.set_beads(1))

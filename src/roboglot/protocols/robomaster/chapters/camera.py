@@ -12,7 +12,7 @@ from roboglot.protocols.robomaster.vocabulary import EXPOSURES
 
 @TABLE.on("camera exposure", right=Right.DRIVE, needs=(Camera,))
 async def expose(context: Context, ev_level: Exposure) -> None:
-    """How bright the picture is (3.2.16.1); default again when the session ends."""
+    """Set the picture's exposure (3.2.16.1); default again when the session ends."""
     camera = context.robot[Camera]
     camera.set_exposure(EXPOSURES[ev_level])
     context.at_end("camera exposure", lambda: camera.set_exposure(EXPOSURES["default"]))

@@ -40,5 +40,5 @@ async def stop(context: Context, id: ServoId | None = None) -> None:
 
 @TABLE.on("servo angle ?", right=Right.SEE, needs=(Servos,))
 async def get_angle(context: Context, *, id: ServoId) -> tuple[float, ...]:
-    """Where a servo stands, degrees in [-180, 180] (3.2.12.4)."""
+    """Return the angle of a servo, degrees in [-180, 180] (3.2.12.4)."""
     return (round(math.degrees(context.robot[Servos].angle(id)), 1) + 0.0,)

@@ -17,7 +17,7 @@ log = logging.getLogger(__name__)
 
 
 class Readers:
-    """Who reads; beyond EVENT_CONNECTIONS_MAX of them one is turned away."""
+    """Connected readers; beyond EVENT_CONNECTIONS_MAX of them one is turned away."""
 
     def __init__(self) -> None:
         self._transports: set[asyncio.Transport] = set()

@@ -43,7 +43,7 @@ ACTS: dict[str, Act] = {"press": _press, "release": _release, "click": _click, "
 
 
 class Pilots:
-    """Who is connected; beyond PILOTS_MAX one is turned away."""
+    """Connected pilots; beyond PILOTS_MAX one is turned away."""
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot

@@ -42,7 +42,7 @@ class SerialLine(asyncio.Transport):
             os.write(self._master, data)
 
     def pause_reading(self) -> None:
-        """What comes stays in the terminal's buffer."""
+        """Leave incoming bytes in the terminal's buffer."""
         asyncio.get_running_loop().remove_reader(self._master)
 
     def resume_reading(self) -> None:

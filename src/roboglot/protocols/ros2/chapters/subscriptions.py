@@ -1,4 +1,4 @@
-"""What the robot listens to: velocities, goals and poses."""
+"""Topics that the robot subscribes to: velocities, goals and poses."""
 
 from __future__ import annotations
 

@@ -39,12 +39,12 @@ class CloudFolder:
 
     @property
     def managed(self) -> bool:
-        """Whether a cloud has the robot in its care."""
+        """True if a cloud manages the robot."""
         return self._folder is not None and not self._robot[Settings].get(UNBOUND, False)
 
     @property
     def reached(self) -> bool:
-        """Whether it can be asked now."""
+        """True if the cloud can be reached."""
         return self.managed and (Network not in self._robot or self._robot[Network].state.internet)
 
     async def leave(self) -> None:

@@ -104,7 +104,7 @@ async def get_industry_tasks(
 
 @TABLE.on("POST /api/industry/v1/generate_landing_pose", right=Right.SEE, needs=(Localization,))
 async def generate_landing_pose(context: Context, body: LandingRequest) -> LandingPose:
-    """Where the robot is, and the place ahead of it from which it would come back here: what MoveToTag takes as target.
+    """Return the pose of the robot, and the pose ahead from which it would come back: MoveToTag's target.
 
     Beyond the manual; real robots place it ``distance`` m straight ahead, headed as the robot or, ``reversed``, back.
     """

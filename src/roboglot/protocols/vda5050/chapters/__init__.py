@@ -1,1 +1,1 @@
-"""What fleet control may ask for, a file per chapter of the standard."""
+"""Requests of fleet control, one file per chapter of the standard."""

@@ -68,7 +68,7 @@ class CameraFiles:
 
     @property
     def recording(self) -> bool:
-        """Whether this door is recording."""
+        """True while this door records."""
         return bool(self._recording)
 
     def remove(self, path: Path) -> None:

@@ -18,7 +18,7 @@ from roboglot.model.sensing import LaserScan
 
 @dataclass(frozen=True, slots=True)
 class Extent:
-    """How large a thing is: half its width, and its bottom and top against the camera's height, m."""
+    """Extent of an object: half its width, and its bottom and top relative to the camera's height, m."""
 
     half: float
     bottom: float

@@ -54,7 +54,7 @@ class Transmission:
 
     @property
     def viewers(self) -> int:
-        """How many apps look, or begin to."""
+        """Number of apps that view, or are about to."""
         return sum(peer.offered for peer in self._peers.values())
 
     def take(self, signal: Signal) -> None:

@@ -35,7 +35,7 @@ class WireLabel(msgspec.Struct):
 
     @property
     def valid(self) -> bool:
-        """Whether it can be kept."""
+        """True if the label can be stored."""
         named = 0 < len(self.labelName) <= NAME_MAX
         return named and math.isfinite(self.physicX) and math.isfinite(self.physicY)
 

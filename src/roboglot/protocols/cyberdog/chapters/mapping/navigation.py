@@ -32,7 +32,7 @@ PATH_PERIOD = 1.0  # s between two paths
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """Where to, in m (map), and which way to face there in rad; None for any."""
+    """Goal of a drive in m (map), and the final heading ``theta`` in rad; None for any."""
 
     x: float
     y: float
@@ -72,9 +72,9 @@ async def relocalize(context: Context, task: Task, *, outdoor: bool) -> TaskResu
 
 
 async def _still_there(robot: Robot, task: Task, place: GlobeAnchor | None) -> bool:
-    """Whether what the lidar sees now fits where the robot believes to be; how well it fitted before says nothing.
+    """Return whether the newest scan fits the believed pose; earlier quality proves nothing.
 
-    It may have been carried away a moment ago.
+    The robot may have been carried away a moment ago.
     """
     localization = robot[Localization]
     if localization.quality < GOOD_FIT:

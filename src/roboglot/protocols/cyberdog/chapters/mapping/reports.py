@@ -1,4 +1,4 @@
-"""What the app sees of map and surroundings while it maps or navigates: pushes 6001, 6005, 6006, 6011."""
+"""Reports of map and surroundings to the app during mapping and navigation: pushes 6001, 6005, 6006, 6011."""
 
 from __future__ import annotations
 

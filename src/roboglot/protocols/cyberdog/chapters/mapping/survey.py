@@ -1,4 +1,4 @@
-"""What is known of a map that is being made besides its cells. Knows no task and no message."""
+"""Data about a map being made, besides its cells. Knows no task and no message."""
 
 from __future__ import annotations
 
@@ -27,5 +27,5 @@ class Survey:
 
     @property
     def anchor(self) -> GlobeAnchor | None:
-        """Where on the globe the map lies; None without satellites."""
+        """Anchor of the map on the globe; None without satellites."""
         return anchor(self._samples)

@@ -37,7 +37,7 @@ NOT_LOCALIZED = frozenset({TaskState.IDLE, TaskState.LOCALIZATION_FAILED, TaskSt
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """What is asked for: the kind of task, whether in an outdoor map, and following a thing, not a person."""
+    """Request for a task: its kind, ``outdoor`` for an outdoor map, ``thing`` to follow a thing and not a person."""
 
     kind: TaskType
     outdoor: bool = False
@@ -93,7 +93,7 @@ class Task:
 
 
 class Tasks:
-    """Which task runs, and the state that its end leaves behind."""
+    """The running task, and the state that its end leaves behind."""
 
     def __init__(self) -> None:
         self.state = self._rest = TaskState.IDLE  # now, and when no task runs

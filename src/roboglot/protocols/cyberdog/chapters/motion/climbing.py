@@ -30,7 +30,7 @@ def sees(robot: Robot) -> bool:
 
 
 class WayAhead:
-    """What lies ahead, and what lay there a body's length ago: it may still be under the feet."""
+    """Height of the ground ahead, and a body's length back: that may still be under the feet."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot

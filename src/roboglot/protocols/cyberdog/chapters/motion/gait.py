@@ -50,7 +50,7 @@ MOVING = 0.01  # m/s or rad/s from which the body counts as walking
 
 @dataclass(frozen=True, slots=True)
 class Executed:
-    """What became of a servo frame; ``share`` (0..1) of the way to the commanded motion."""
+    """Result of a servo frame; ``share`` (0..1) of the way to the commanded motion."""
 
     code: MotionCode
     status: SwitchStatus = SwitchStatus.NORMAL
@@ -72,7 +72,7 @@ class Gaits:
 
     @property
     def state(self) -> MachineState:
-        """What charge, power mode and updates allow."""
+        """State of the machine, by charge, power mode and updates."""
         return machine_state(self._robot)
 
     @property
@@ -142,7 +142,7 @@ class Gaits:
 
     @property
     def _risen(self) -> float:
-        """How much of getting up is done; unknown is nothing."""
+        """Progress of standing up, 0..0.99; 0 if unknown."""
         way = self._start.standing - self._low
         return max(0.0, min(0.99, (self._robot[Legs].body_height - self._low) / way)) if way > 0.01 else 0.0
 
@@ -233,7 +233,7 @@ class Gaits:
         return codes_of(action.error).motion if action.error else MotionCode.EXECUTION
 
     def check(self, motion: int, wish: Wish) -> MotionCode | None:
-        """Why ``carry_out`` would refuse; None if it would not."""
+        """Return why ``carry_out`` would refuse; None if it would not."""
         if refusal := refusal_of(self._robot, motion):
             return refusal
         if motion not in KNOWN or (motion in ON_LEGS and Legs not in self._robot):
@@ -254,7 +254,7 @@ class Gaits:
 
     @property
     def busy(self) -> bool:
-        """Whether a motion with a result is under way."""
+        """True while a motion with a result is under way."""
         return under_way(self._performing) or any(not task.done() for task in self._sequences)
 
     def _begin(self, motion: int, wish: Wish) -> Action | None:

@@ -27,7 +27,7 @@ UPRIGHT = BodyPose()
 
 @dataclass(frozen=True, slots=True)
 class Wish:
-    """What a motion is asked for: velocity (base_link), how to hold the body, seconds, how to lift the feet."""
+    """Parameters of a motion: velocity (base_link), body pose, seconds, foot lift."""
 
     velocity: Twist = STILL
     body: BodyPose = UPRIGHT

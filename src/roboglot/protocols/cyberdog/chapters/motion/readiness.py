@@ -1,4 +1,4 @@
-"""What the robot's state lets it do: charge, power, updates, motors, an emergency stop. Knows no motion under way."""
+"""Readiness for motions: charge, power, updates, motors, an emergency stop. Knows no motion under way."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def posture_of(robot: Robot) -> Posture:
 
 
 def refusal_of(robot: Robot, motion: int) -> MotionCode | None:
-    """Why the robot's state does not allow ``motion``; None if it does."""
+    """Return why the robot's state forbids ``motion``; None if it does not."""
     if posture_of(robot) is Posture.LIMP and motion not in ALLOWED_WHEN_STOPPED:
         return MotionCode.EMERGENCY_STOPPED
     if motion in ALLOWED_ON_LOW_BATTERY:
@@ -53,7 +53,7 @@ def refusal_of(robot: Robot, motion: int) -> MotionCode | None:
 
 
 def _unfit(robot: Robot) -> MotionCode | None:
-    """Why the body should not jump and dance now."""
+    """Return why the body should not jump or dance; None if it may."""
     if Battery in robot and robot[Battery].state.supply is Supply.WIRE:
         return MotionCode.CHARGING
     if Motors in robot and robot[Motors].hottest > robot[Motors].hot:

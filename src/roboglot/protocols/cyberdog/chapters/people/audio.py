@@ -28,7 +28,7 @@ LASTS_MAX = 10 * 365 * 86_400  # s
 
 @TABLE.on(Code.AUDIO_IDENTITY, right=Right.SEE, needs=(Hearing,))
 async def audio_identity(call: Call) -> dict[str, str]:
-    """Which device asks for an account: its id (made from the serial number) and its serial number."""
+    """Return the device that asks for an account: its id (made from the serial number) and its serial number."""
     call.context.robot[Hearing]
     serial = call.context.robot.description.serial
     return {"did": str(uuid.uuid5(DEVICES, serial)), "sn": serial}

@@ -48,7 +48,7 @@ class Faces:
 
     @property
     def busy(self) -> bool:
-        """Whether it enters or recognises."""
+        """True while a face is being entered or recognized."""
         return self._looking is not None and not self._looking.done()
 
     def enter(self, name: str) -> None:

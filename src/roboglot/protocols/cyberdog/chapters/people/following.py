@@ -111,7 +111,7 @@ async def follow_tag(context: Context, task: Task, manner: Manner) -> TaskResult
 
 
 async def _tell(context: Context, task: Task, action: Action, followed: Feedback, searched: Feedback | None) -> None:
-    """How ``action`` goes on until it has ended; cancelled if the task is."""
+    """Report the progress of ``action`` until it has ended; cancelled if the task is."""
 
     def watch(event: ActionChanged) -> None:
         if event.action is not action or action.feedback is None:

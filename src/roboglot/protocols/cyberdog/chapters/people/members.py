@@ -71,7 +71,7 @@ async def synchronise_members(call: Call) -> dict[str, object]:
 
 
 def _done(context: Context, code: AccountCode) -> dict[str, int | bool]:
-    """Whether it was done, in the words of the profile."""
+    """Return success or failure in the words of the profile."""
     return {"success": int(code) if context.profile is Profile.ROBOT else code is AccountCode.DONE}
 
 

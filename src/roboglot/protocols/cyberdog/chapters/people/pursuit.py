@@ -1,4 +1,4 @@
-"""Whom the camera sees, and who of them is followed: tracking boxes for the app (push 6007), its choice (6008)."""
+"""Choice of the person or thing to follow: tracking boxes for the app (push 6007), its choice (6008)."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class ThingPursuit:
         self._extent = Extent(0.0, 0.0, 0.0)  # of what was chosen
 
     def choose(self, x: int, y: int, width: int, height: int) -> bool:
-        """What the lidar sees nearest in that region (pixels) is it; False if there is nothing, or one is chosen."""
+        """Choose the lidar's nearest object in that region (pixels); False if there is none, or one is chosen."""
         scan = self._robot[Lidar].scan
         if self.chosen.done() or width <= 0 or height <= 0 or scan is None:
             return False

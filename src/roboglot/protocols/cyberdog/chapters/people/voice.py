@@ -52,12 +52,12 @@ class Voice:
 
     @property
     def microphone(self) -> bool:
-        """Whether it hears anything."""
+        """True if the robot hears."""
         return Hearing in self._robot and bool(kept(self._robot, MICROPHONE, True))
 
     @property
     def controlled(self) -> bool:
-        """Whether it answers to its wake word."""
+        """True if the robot answers to its wake word."""
         return Hearing in self._robot and bool(kept(self._robot, VOICE_CONTROL, False))
 
     def adapt(self) -> None:

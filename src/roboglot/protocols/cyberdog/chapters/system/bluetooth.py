@@ -29,7 +29,7 @@ DONE, RADIO_FAILED, NOT_CONNECTED = 0, 1, 3  # ``result`` of 8002
 
 
 class WireDevice(msgspec.Struct):
-    """What of a device is needed to connect it."""
+    """Address and name of a device to connect."""
 
     mac: str
     addr_type: str
@@ -38,7 +38,7 @@ class WireDevice(msgspec.Struct):
 
 @TABLE.on(Code.SCAN_BLUETOOTH, right=Right.EDIT, needs=(Bluetooth,))
 async def scan(call: Call, *, scan_seconds: float = 0.0) -> dict[str, object]:
-    """What is heard in ``scan_seconds`` and was not connected before; 0: what was connected once.
+    """Return devices heard in ``scan_seconds`` and never connected before; 0: those connected before.
 
     While a device is connected nothing is scanned: the last scan's devices are returned.
     """

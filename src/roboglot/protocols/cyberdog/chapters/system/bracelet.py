@@ -41,7 +41,7 @@ class Bracelet:
 
     @property
     def updating(self) -> bool:
-        """Whether its firmware is being updated by this door."""
+        """True while this door updates the bracelet's firmware."""
         return self._update is not None and not self._update.status.ended
 
     def follow(self, update: Action) -> None:

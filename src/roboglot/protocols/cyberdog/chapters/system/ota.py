@@ -41,7 +41,7 @@ async def update_status(call: Call) -> dict[str, object]:
 
 @TABLE.on(Code.UPDATE_VERSION, right=Right.SEE, needs=(Firmware,))
 async def update_version(call: Call) -> dict[str, object]:
-    """What runs now (not in the text)."""
+    """Return the running firmware version (not in the text)."""
     return {"version": call.context.robot[Firmware].version, "code": GOOD}
 
 

@@ -63,7 +63,7 @@ async def set_volume(call: Call, *, volume: Int32) -> dict[str, bool]:
 
 @TABLE.on(Code.SET_MICROPHONE, right=Right.EDIT)
 async def set_microphone(call: Call, *, enable: bool) -> dict[str, bool]:
-    """Whether the voice board hears anything: voice control and voiceprints need it."""
+    """Switch the voice board's microphone; voice control and voiceprints need it."""
     call.context.robot[Hearing]
     await call.context.robot[Settings].put(MICROPHONE, enable)
     call.context.voice.adapt()
@@ -72,7 +72,7 @@ async def set_microphone(call: Call, *, enable: bool) -> dict[str, bool]:
 
 @TABLE.on(Code.SET_VOICE_CONTROL, right=Right.EDIT)
 async def set_voice_control(call: Call, *, enable: bool) -> dict[str, bool]:
-    """Whether the robot answers to its wake word and does what is then said."""
+    """Switch voice control: the wake word, and doing what is said after it."""
     call.context.robot[Hearing]
     await call.context.robot[Settings].put(VOICE_CONTROL, enable)
     call.context.voice.adapt()

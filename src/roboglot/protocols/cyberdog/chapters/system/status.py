@@ -32,7 +32,7 @@ NO_SERVICE = -255  # a volume of a robot that has no speaker
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """What 10001 and the heartbeat have in common."""
+    """Common fields of 10001 and the heartbeat."""
 
     motion_id: int
     task_status: int

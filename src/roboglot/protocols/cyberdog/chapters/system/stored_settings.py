@@ -1,4 +1,4 @@
-"""What people set on the dog and expect to find again: the keys, and how they read. Knows no message."""
+"""Settings of the dog that survive restarts: their keys and defaults. Knows no message."""
 
 from __future__ import annotations
 

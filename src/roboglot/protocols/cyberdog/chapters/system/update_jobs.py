@@ -46,7 +46,7 @@ CODES: tuple[tuple[type[Exception], int], ...] = (  # the first row whose class 
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """What is wanted: ``data`` says of which update, where that is asked for."""
+    """Request to update a module; ``data`` says which update, where that is asked for."""
 
     operate: str
     id: int | str = ""

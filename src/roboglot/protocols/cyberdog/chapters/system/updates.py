@@ -54,7 +54,7 @@ class WirePackage(msgspec.Struct):
 
 
 class WireLatest(msgspec.Struct):
-    """What is offered for a module."""
+    """Latest version offered for a module."""
 
     version: str
     packages: list[WirePackage]

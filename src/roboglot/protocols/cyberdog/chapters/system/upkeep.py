@@ -39,7 +39,7 @@ async def leave_low_power(call: Call) -> dict[str, object]:
 
 @TABLE.on(Code.AUTOMATIC_LOW_POWER, right=Right.EDIT, needs=(Power,))
 async def switch_automatic_low_power(call: Call, *, data: bool) -> dict[str, bool]:
-    """Whether a robot that lies for half a minute goes to low power."""
+    """Switch the automatic low power of a robot that lies for half a minute."""
     await call.context.robot[Power].set_automatic(data)
     return {"success": True}
 
@@ -86,7 +86,7 @@ async def switch_point_cloud(call: Call, *, data: bool) -> dict[str, object]:
 
 @TABLE.on(Code.POINT_CLOUD, right=Right.SEE, needs=(DepthCamera,))
 async def point_cloud(call: Call) -> dict[str, object]:
-    """Whether it is on (not in the text)."""
+    """Return whether the depth camera is on (not in the text)."""
     return {"success": call.context.robot[DepthCamera].enabled, "message": ""}
 
 

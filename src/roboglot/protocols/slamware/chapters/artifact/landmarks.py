@@ -41,7 +41,7 @@ async def put_laser_landmarks(
 
 @TABLE.on(f"GET {API}/:update", right=Right.SEE, needs=(LaserLandmarks,))
 async def get_laser_landmark_update(context: Context) -> bool:
-    """Whether the robot adds what its lidar finds."""
+    """Return whether the robot adds landmarks that its lidar finds."""
     return context.robot[LaserLandmarks].updating
 
 

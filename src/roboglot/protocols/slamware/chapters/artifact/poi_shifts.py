@@ -1,4 +1,4 @@
-"""Where places belong after loops were closed: the map was straightened, and they stayed where they were put."""
+"""Shifts of points of interest after loop closures: the map was straightened, the points stayed where they were."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ async def _set(context: Context, policy: Policy) -> OperationReply:
 
 @TABLE.on(f"GET {API}/admin/password", right=Right.ADMIN, needs=(Settings,))
 async def get_password(context: Context) -> AdminPassword:
-    """What the robot's screen asks for before it shows its settings; it never expires."""
+    """Return the password of the settings on the robot's screen; it never expires."""
     return AdminPassword(msgspec.convert(context.robot[Settings].get(PASSWORD, {"enable": False}), Password))
 
 
@@ -69,7 +69,7 @@ async def set_password(context: Context, body: Password | None = None) -> Operat
 
 @TABLE.on(f"GET {API}/admin/mode", right=Right.SEE, needs=(Delivery,))
 async def get_work_mode(context: Context) -> WorkModeEntry:
-    """Which tasks may be created at the robot."""
+    """Return which tasks may be created at the robot."""
     return WorkModeEntry(context.robot[Delivery].policy.work_mode.value.upper())  # type: ignore[arg-type]
 
 
@@ -87,7 +87,7 @@ async def get_language(context: Context) -> Language:
 
 @TABLE.on(f"PUT {API}/admin/language", right=Right.EDIT, needs=(Settings,))
 async def set_language(context: Context, body: Language) -> OperationReply:
-    """What the robot says aloud is Chinese or English from now on."""
+    """Set the robot's spoken language, Chinese or English."""
     await context.robot[Settings].put(LANGUAGE, body.language)
     now, robot = context.robot.clock.time(), context.robot
     robot.events.publish(DeliveryReported(stamp=now, news=DeliveryNews.SETTINGS_CHANGED))
@@ -120,7 +120,7 @@ def _clock(seconds: int) -> str:
 
 @TABLE.on(f"GET {API}/admin/move_options", right=Right.SEE, needs=(Delivery,))
 async def get_move_options(context: Context) -> MoveOptions:
-    """How the robot drives for tasks, as it was set."""
+    """Return the settings for driving in tasks."""
     return _effective(msgspec.convert(dict(context.robot[Delivery].policy.words), MoveOptions))
 
 
@@ -202,7 +202,7 @@ async def get_delivery_settings(context: Context) -> WrappedSettings:
 
 @TABLE.on(f"PUT {API}/settings/timeout", right=Right.EDIT, needs=(Delivery,))
 async def set_timeout_settings(context: Context, body: TimeoutChange) -> None:
-    """How long the robot waits for a guest to take the food."""
+    """Set how long the robot waits for a guest to take the food, s."""
     await _set(context, replace(context.robot[Delivery].policy, food_seconds=float(body.food_pickup_timeout)))
 
 

@@ -90,7 +90,7 @@ async def get_operation_result(context: Context, cargo_id: str, box_id: int) -> 
 
 @TABLE.on(f"GET {CARGOS}/assigned", right=Right.SEE, needs=(Delivery, Places))
 async def get_assigned_cargos(context: Context) -> list[AssignedCargo]:
-    """Which boxes belong to takeouts that have not ended."""
+    """Return the boxes that belong to takeouts that have not ended."""
     return [
         AssignedCargo(
             name_of(context.robot, order.request.target).poi_name,

@@ -1,4 +1,4 @@
-"""What a delivery robot says aloud, in the language that its operator set."""
+"""Announcements of a delivery robot, in the language that its operator set."""
 
 from __future__ import annotations
 

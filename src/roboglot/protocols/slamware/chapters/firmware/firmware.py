@@ -38,14 +38,14 @@ IDLE = (FirmwareState.IDLE, FirmwareState.DOWNLOADED, FirmwareState.FAILED)  # a
 
 
 class Outcome(msgspec.Struct):
-    """Whether it has begun, and why not."""
+    """Result of a request to start; ``reason`` if it was refused."""
 
     result: bool
     reason: str
 
 
 class UploadOutcome(msgspec.Struct):
-    """Whether it has begun, and why not; ``data`` tells the version."""
+    """Result of an upload; ``msg`` says why it was refused, ``data`` has the version."""
 
     result: bool
     msg: str
@@ -72,7 +72,7 @@ class InstalledApp(msgspec.Struct):
 
 @TABLE.on(f"GET {API}/newversion", right=Right.SEE, needs=(Firmware,))
 async def get_new_version(context: Context) -> FirmwareInfo:
-    """What the maker offers, if it is newer than what runs."""
+    """Return the version offered by the maker, if it is newer than the running one."""
     plate = context.robot.description
     if (package := context.robot[Firmware].available) is None:
         return FirmwareInfo()
@@ -81,7 +81,7 @@ async def get_new_version(context: Context) -> FirmwareInfo:
 
 @TABLE.on(f"GET {API}/autoupdate/:enable", right=Right.SEE, needs=(Firmware,))
 async def get_enable_auto_update(context: Context) -> bool:
-    """Whether the robot updates itself on its dock."""
+    """Return whether the robot updates itself on its dock."""
     return context.robot[Firmware].automatic
 
 
@@ -123,7 +123,7 @@ async def upload_and_start_update(context: Context, body: Upload) -> UploadOutco
 
 @TABLE.on(f"GET {API}/progress", right=Right.SEE, needs=(Firmware,))
 async def get_firmware_progress(context: Context) -> UpdateProgress:
-    """How far the update is."""
+    """Return the progress of the update."""
     progress = context.robot[Firmware].progress
     step, status = PROGRESS[progress.state]
     if context.updater.failed and status != SUCCESS:

@@ -23,7 +23,7 @@ class Updater:
 
     @property
     def busy(self) -> bool:
-        """Whether one is under way."""
+        """True while an update is under way."""
         return self._task is not None and not self._task.done()
 
     def begin(self, package: FirmwarePackage) -> None:

@@ -105,7 +105,7 @@ async def create_action(context: Context, body: ActionRequest) -> ActionInfo:
 
 @TABLE.on(f"GET {API}/actions/:current", right=Right.SEE)
 async def get_current_action(context: Context) -> ActionInfo:
-    """What the robot does; 404 when it does nothing."""
+    """Return the running action; 404 when there is none."""
     return context.actions.current_info()
 
 
@@ -123,7 +123,7 @@ async def get_action_result(context: Context, action_id: int) -> ActionInfo | Ac
 
 @TABLE.on(f"GET {API}/path", right=Right.SEE)
 async def get_remaining_path(context: Context) -> PathPoints:
-    """What is left to drive; empty when the robot goes nowhere."""
+    """Return the remaining path; empty when the robot has no goal."""
     feedback = _navigation(context)
     return _path_points(feedback.remaining.points if feedback else ())
 
@@ -137,7 +137,7 @@ async def get_remaining_milestones(context: Context) -> PathPoints:
 
 @TABLE.on(f"GET {API}/speed", right=Right.SEE, needs=(Odometry,))
 async def get_current_speed(context: Context) -> Speed:
-    """How the robot moves, by its odometry."""
+    """Return the robot's velocity by its odometry."""
     require_heard(context.robot)
     twist = context.robot[Odometry].reading.twist
     return Speed(twist.x, twist.y, twist.yaw)

@@ -1,4 +1,4 @@
-"""Whether the place where the robot stands is taken, as its map says: a wall, something drawn, a forbidden area."""
+"""Occupancy of the robot's place by its map: a wall, something drawn, a forbidden area."""
 
 from __future__ import annotations
 

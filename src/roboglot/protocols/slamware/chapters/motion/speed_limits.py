@@ -1,4 +1,4 @@
-"""How fast clients let the robot be, until it restarts."""
+"""Speed limits set by clients, until the robot restarts."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SPEED_MIN = 0.01  # m/s and rad/s: slower, it would stand
 
 
 class SpeedLimits:
-    """What the drive can do at most, whatever clients set."""
+    """Speed limits of the drive, within those of its build."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot

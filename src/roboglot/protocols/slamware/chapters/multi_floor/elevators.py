@@ -35,7 +35,7 @@ DISTANCE_MAX = 10.0  # m
 
 
 class DoorType(StrEnum):
-    """Which doors a car has."""
+    """Doors of an elevator car."""
 
     FRONT = "front_door"
     REAR = "rear_door"
@@ -156,5 +156,5 @@ async def get_elevators_by_id(context: Context, elevator_id: Identifier) -> Elev
 
 @TABLE.on(f"GET {API}/{{elevator_id}}/pose_relation", right=Right.SEE, needs=(Localization, MapAnnotations))
 async def get_pose_relation_to_elevator(context: Context, elevator_id: Identifier) -> PoseRelation:
-    """Whether the robot is in it, over its sill or outside; 400 if there is none."""
+    """Return whether the robot is in the elevator, over its sill or outside; 400 if there is none."""
     return elevator_called(context.robot, elevator_id).relation(context.robot)

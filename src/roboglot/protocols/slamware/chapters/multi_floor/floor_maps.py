@@ -1,4 +1,4 @@
-"""What the loaded map's floors are to the robot's other skills: their places, and rides between them."""
+"""Floors of the loaded map for the robot's other skills: their places, and rides between them."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ MAP, LOCALIZATION = "/api/multi-floor/map/v1", "/api/multi-floor/localization/v1
 
 @TABLE.on("GET /api/multi-floor/status", right=Right.SEE, needs=(Mapping, Settings))
 async def get_status(context: Context) -> MultiFloorStatus:
-    """What became of the map on disk."""
+    """Return the status of the map on disk."""
     return MultiFloorStatus(
         context.robot[Mapping].enabled, context.maps.status, is_managed_by_cloud=context.cloud.managed
     )

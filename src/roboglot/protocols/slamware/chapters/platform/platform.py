@@ -19,5 +19,5 @@ async def get_timestamp(context: Context) -> str:
 
 @TABLE.on(f"GET {API}/events", right=Right.SEE)
 async def get_events(context: Context) -> list[RobotEvent]:
-    """What happened since the last call."""
+    """Return the events since the last call."""
     return context.events.read()

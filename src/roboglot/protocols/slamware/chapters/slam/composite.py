@@ -44,7 +44,7 @@ LINE_LAYERS = {stcm_layers.WALLS: LineKind.WALL, stcm_layers.TRACKS: LineKind.TR
 
 @dataclass(frozen=True, slots=True)
 class FloorName:
-    """Which floor a map shows. Maps without a name are of floor "1F"."""
+    """Building and floor that a map shows. Maps without a name are of floor "1F"."""
 
     building: str = ""
     floor: str = "1F"

@@ -42,7 +42,7 @@ def _entered(robot: Robot, entry: PoseEntry) -> PointOfInterest:
 
 @TABLE.on(f"GET {API}/homepose", right=Right.SEE, needs=(Docking,))
 async def get_home_pose(context: Context) -> Pose3D:
-    """Where the robot stands when docked; 404 if it knows no dock."""
+    """Return the robot's pose when docked; 404 if it knows no dock."""
     if (home := context.robot[Docking].home) is None:
         raise DockNotFound("the map has no dock")
     return pose3d(home)

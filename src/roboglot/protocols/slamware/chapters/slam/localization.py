@@ -38,7 +38,7 @@ Bound = Annotated[float, msgspec.Meta(ge=-COORDINATE_MAX, le=COORDINATE_MAX)]
 
 @TABLE.on(f"GET {API}/localization/pose", right=Right.SEE, needs=(Localization,))
 async def get_pose(context: Context) -> Pose3D:
-    """Where the robot is in the map."""
+    """Return the robot's pose in the map."""
     require_heard(context.robot)
     return pose3d(context.robot[Localization].pose)
 
@@ -51,21 +51,21 @@ async def set_pose(context: Context, body: Pose3D) -> None:
 
 @TABLE.on(f"GET {API}/localization/odopose", right=Right.SEE, needs=(Odometry,))
 async def get_odo_pose(context: Context) -> Pose3D:
-    """Where its wheels think that it is, from where it started."""
+    """Return the robot's pose by its wheels, from where it started."""
     require_heard(context.robot)
     return pose3d(context.robot[Odometry].reading.pose)
 
 
 @TABLE.on(f"GET {API}/localization/quality", right=Right.SEE, needs=(Localization,))
 async def get_localization_quality(context: Context) -> int:
-    """How well the lidar fits the map, 0..100."""
+    """Return the fit of the lidar's scans to the map, 0..100."""
     require_heard(context.robot)
     return round(context.robot[Localization].quality * 100)
 
 
 @TABLE.on(f"GET {API}/localization/:enable", right=Right.SEE, needs=(Localization,))
 async def get_map_localization(context: Context) -> bool:
-    """Whether the lidar corrects the pose."""
+    """Return whether the lidar corrects the pose."""
     return context.robot[Localization].enabled
 
 
@@ -90,7 +90,7 @@ async def reset_localization_status(context: Context) -> bool:
 
 @TABLE.on(f"GET {API}/mapping/:enable", right=Right.SEE, needs=(Mapping,))
 async def get_map_update(context: Context) -> bool:
-    """Whether the map grows."""
+    """Return whether the map grows."""
     return context.robot[Mapping].enabled
 
 
@@ -103,7 +103,7 @@ async def set_map_update(context: Context, body: Switch) -> bool:
 
 @TABLE.on(f"GET {API}/loopclosure/:enable", right=Right.SEE, needs=(Mapping,))
 async def get_loop_closure(context: Context) -> bool:
-    """Whether a place known again straightens the map."""
+    """Return whether loop closures straighten the map."""
     return context.robot[Mapping].closes_loops
 
 

@@ -84,7 +84,7 @@ class MapKeeper:
 
     @property
     def ready(self) -> bool:
-        """Whether maps can be used, of one floor or several."""
+        """True if maps can be used, of one floor or several."""
         needed = (Mapping, FileStore, Places, MapAnnotations)
         return all(part in self._robot for part in needed) and self.status is not MapLoadStatus.LOADING
 

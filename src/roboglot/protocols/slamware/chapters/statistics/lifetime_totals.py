@@ -1,4 +1,4 @@
-"""What the robot drove and how long it ran, over its life: kept in the settings every half minute."""
+"""Distance driven and time run over the robot's life: kept in the settings every half minute."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ KEEP_PERIOD = 30.0  # s; what a crash may cost
 
 
 class Totals:
-    """What was before this start, and what came since; kept now and then."""
+    """Totals before this start, and those since; stored every half minute."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot

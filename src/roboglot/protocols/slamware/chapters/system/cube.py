@@ -25,7 +25,7 @@ Speed = Annotated[float, msgspec.Meta(gt=0, le=10)]
 
 
 class CubeConfig(msgspec.Struct, forbid_unknown_fields=True):
-    """What can be configured; what is left out is as the robot was built."""
+    """Configurable values; those left out are as the robot was built."""
 
     max_moving_speed: Speed | None = None
     max_angular_speed: Speed | None = None

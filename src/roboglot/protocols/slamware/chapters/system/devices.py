@@ -35,7 +35,7 @@ class OnOff(StrEnum):
 
 
 class JackCommand(StrEnum):
-    """What the jack is to do. The manual's table has the first four, its example "On"."""
+    """Commands to the jack. The manual's table has the first four, its example "On"."""
 
     UP = "Up"
     DOWN = "Down"
@@ -78,7 +78,7 @@ async def set_jack_req(context: Context, body: JackCommand) -> None:
 
 @TABLE.on(f"GET {SYSTEM}/jack/status", right=Right.SEE, needs=(Jack,))
 async def get_jack_status(context: Context) -> JackStatus:
-    """Where the platform is."""
+    """Return the position and state of the jack's platform."""
     jack = context.robot[Jack]
     counts = LOWEST + round(jack.position / jack.stroke * (HIGHEST - LOWEST))
     return JackStatus(counts, int(bool(jack.alarm)), int(jack.stage is JackStage.MOVING), STAGES[jack.stage])

@@ -56,7 +56,7 @@ def record_of(fault: Fault) -> BaseError:
 
 @TABLE.on(f"GET {API}", right=Right.SEE)
 async def get_robot_health(context: Context) -> BaseHealthInfo:
-    """What is wrong now."""
+    """Return the current faults."""
     robot = context.robot
     records = _records(robot)
     levels = {record.level for record in records}

@@ -37,12 +37,12 @@ class Laser:
 
     @property
     def running(self) -> bool:
-        """Whether the lidar has seen anything yet."""
+        """True once the lidar has sent a scan."""
         return self._last is not None
 
     @property
     def pose(self) -> Pose:
-        """Where the robot was in the map when it took the scan: its pose now, taken back along the odometry."""
+        """Pose of the robot in the map at the time of the scan: its current pose, taken back along the odometry."""
         pose = self._robot[Localization].pose
         if self._last is None:
             return pose

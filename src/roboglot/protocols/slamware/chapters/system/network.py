@@ -25,7 +25,7 @@ BEST, WORST = -50.0, -100.0  # dBm that count as 100 and as 0
 
 @TABLE.on(f"GET {API}/status", right=Right.SEE, needs=(Network,))
 async def get_network_status(context: Context) -> WrappedStatus:
-    """How the Wi-Fi card is linked now; switched off it is a station without a network."""
+    """Return the current link of the Wi-Fi card; switched off it is a station without a network."""
     network = context.robot[Network]
     state = network.state
     share = (network.signal - WORST) / (BEST - WORST) if network.connected else 0.0
@@ -55,7 +55,7 @@ async def set_network_status(context: Context, body: NetworkRequest) -> bool:
 
 @TABLE.on(f"GET {API}/route", right=Right.SEE, needs=(Network,))
 async def get_network_route(context: Context) -> RouteStatus:
-    """Which way to the internet comes first."""
+    """Return the preferred way to the internet."""
     return RouteStatus(PRIORITIES[context.robot[Network].priority])  # type: ignore[arg-type]
 
 

@@ -43,9 +43,9 @@ SLEEP_MODES = {
 
 @TABLE.on(f"GET {API}/capabilities", right=Right.SEE)
 async def get_capabilities(context: Context) -> list[Capability]:
-    """What this robot can do; ``core`` is enabled as soon as it can drive somewhere and its lidar turns.
+    """Return this robot's capabilities; ``core`` is enabled once it can navigate and its lidar turns.
 
-    ``multi_floor`` is while no map is being loaded.
+    ``multi_floor`` is enabled while no map is being loaded.
     """
     robot = context.robot
     version = software_version(robot)
