@@ -21,8 +21,8 @@ Heard = Callable[[bytes], None]
 
 
 class PushPort:
-    """UDP port for the robots' pushes: one per machine, so the clients of one program share it; open while one listens.
-    Open while one listens.
+    """UDP port for the robots' pushes: one per machine, so the clients of one program share it. Open while
+    one listens.
 
     ``host``: our address that the robots know; empty for all. Robots are distinguished by their source address.
     """

@@ -71,7 +71,7 @@ class LegsSection(Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def limits(self) -> LegLimits:
-        """What can be asked of such legs."""
+        """Limits of such legs."""
         return LegLimits(
             lowest=self.lowest, highest=self.highest, angle=self.angle_max, shift=self.shift_max, reach=self.reach
         )

@@ -17,7 +17,7 @@ HOME = 0.01  # m beside its place at which a foot is at home
 
 
 class Feet:
-    """Where the feet of one body are, in the world's frame: numbers, for they are moved at every tick."""
+    """Places of one body's feet in the world's frame, as plain numbers: they are moved at every tick."""
 
     def __init__(self, homes: Sequence[Point], reach: float, pose: Pose) -> None:
         self._below_hips = self._homes = [(home.x, home.y) for home in homes]
@@ -30,7 +30,7 @@ class Feet:
         self.restless = False  # whether one is not at home, or in the air
 
     def states(self, pose: Pose) -> Mapping[Foot, FootState]:
-        """Where they are, seen from base_link at ``pose``."""
+        """Return the state of each foot, seen from base_link at ``pose``."""
         states = {}
         for index, foot in enumerate(Foot):
             grounded = not self._hanging and self._starts[index] is None and self._heights[index] <= 0.0
@@ -117,7 +117,7 @@ class Feet:
         self._heights[index] = height + (end - height) * share + swing.to.lift * swing.rise
 
     def _foothold(self, index: int, swing: Swing, left: float, pose: Pose, twist: Twist) -> tuple[float, float]:
-        """Where it will come down: half of the way of its stand ahead of its place, as the body will be by then."""
+        """Return the landing place (world): half of the stand's way ahead of its place, as the body will be by then."""
         (home_x, home_y), half = self._homes[index], swing.stand / 2
         x = home_x + swing.to.x + (twist.x - twist.yaw * home_y) * half
         y = home_y + swing.to.y + (twist.y + twist.yaw * home_x) * half

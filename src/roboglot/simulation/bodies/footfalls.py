@@ -1,4 +1,4 @@
-"""When each foot is in the air: by the phase of a gait, or by a given order of footfalls. Pure time."""
+"""Footfalls: the feet in the air by the phase of a gait, or by a given order. Pure time."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Swing:
 
     @property
     def rise(self) -> float:
-        """How high it is, of its lift: 0 to 1 to 0."""
+        """Height as a share of the lift: 0 to 1 to 0."""
         if self.left == math.inf:
             return self.share
         up = math.sin(math.pi * self.share)
@@ -67,7 +67,7 @@ def lifted(lift: FootLift) -> tuple[Foothold, ...]:
 
 
 def walking(gait: Gait, strides: float, lift: FootLift) -> Swings:
-    """Who is in the air after so many steps of every leg."""
+    """Return the swing of each foot after so many steps of every leg; None for feet on the floor."""
     rate, duty = GAITS[gait].steps, _DUTIES.get(gait, DUTY)
     swings: list[Swing | None] = []
     for to, rises in zip(lifted(lift), _RISES.get(gait, _TROT), strict=True):
@@ -88,7 +88,7 @@ class Order:
         self._flights = [_flights(footfalls, foot) for foot in Foot]
 
     def swings(self, time: float, feet: Sequence[Foothold], landing: float) -> Swings:
-        """Who is in the air ``time`` s after the start."""
+        """Return the swing of each foot ``time`` s after the start; None for feet on the floor."""
         return tuple(self._swing(flights, time, to, landing) for flights, to in zip(self._flights, feet, strict=True))
 
     def _swing(self, flights: list[tuple[float, float]], time: float, to: Foothold, landing: float) -> Swing | None:
@@ -104,7 +104,7 @@ class Order:
 
 
 def _flights(footfalls: Sequence[Footfall], foot: Foot) -> list[tuple[float, float]]:
-    """When it rises and for how long, s; a flight goes on from the last footfall into the first."""
+    """Return start and length of the foot's flights, s; a flight goes on from the last footfall into the first."""
     flights: list[tuple[float, float]] = []
     start, flying = 0.0, False
     for footfall in footfalls:

@@ -34,7 +34,7 @@ Floats = NDArray[np.float64]
 
 
 class Touch(NamedTuple):
-    """Where something touches a hull (base_link, m), whether it is a person, and whether it gives way too easily."""
+    """Place of a contact on the hull (base_link, m); ``person`` by a person, ``light`` by what gives way too easily."""
 
     x: float
     y: float
@@ -43,7 +43,7 @@ class Touch(NamedTuple):
 
 
 def wheel_places(body: Body) -> list[tuple[float, float]]:
-    """Where the wheels stand, base_link."""
+    """Return the places of the wheels, base_link, m."""
     x, y = body.base.wheel_base / 2, body.base.track / 2
     return [(x, y), (x, -y), (-x, y), (-x, -y)]
 
@@ -309,7 +309,7 @@ class Hull:
 
     @property
     def traction_power(self) -> float:
-        """What the wheels give now, W; slipping wheels work against the floor, braking gives nothing back."""
+        """Current power of the wheels, W; slipping wheels work against the floor, braking gives nothing back."""
         force, speed = self._servos
         return max(0.0, float(force.dot(speed)))
 

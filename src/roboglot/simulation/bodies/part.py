@@ -1,7 +1,7 @@
-"""What a file of ``simulation/components`` declares: one kind of part, how it is fitted to a robot and when it runs.
+"""Declaration of a file of ``simulation/components``: a kind of part, its fitting to a robot and when it runs.
 
-Each such file ends with ``PART = Part(...)``. Bodies then may have its section, and robots fit and run it; nothing
-else has to be edited (docs/components.md).
+Each such file ends with ``PART = Part(...)``. Bodies then may have its section, and robots fit and run it; nothing else
+has to be edited (docs/components.md).
 """
 
 from __future__ import annotations

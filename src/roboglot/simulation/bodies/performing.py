@@ -28,7 +28,7 @@ STRAIGHTEN = 0.6  # s back to standing straight
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """Where the torso is held: belly height above base_link (m), attitude and shift against it."""
+    """Pose of the torso: belly height above base_link (m), attitude and shift against it."""
 
     height: float
     attitude: Orientation = LEVEL
@@ -64,7 +64,7 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class Stance:
-    """What the body looks like: standing straight, the lowest and highest belly, the tick in s."""
+    """Dimensions of the body: its straight stand, the lowest and highest belly, the tick in s."""
 
     straight: Body
     lowest: float

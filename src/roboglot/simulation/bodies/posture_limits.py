@@ -1,4 +1,4 @@
-"""What a body on legs can be asked to hold: poses within its limits; where it walks on a leash. Pure geometry."""
+"""Limits of a legged body: poses that it can hold, and its walk on a leash. Pure geometry."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ TAUT, GIVING = 3.0, 0.05  # N of a pull that it feels, and m/s that it gives way
 
 
 def added(now: Body, by: BodyPose, limits: LegLimits) -> BodyPose:
-    """What is held now and ``by`` on top, cut to the limits."""
+    """Return the current pose with ``by`` on top, cut to the limits."""
 
     def cut(value: float, most: float) -> float:
         return max(-most, min(most, value))
@@ -109,7 +109,7 @@ def _check_balance(footfalls: Sequence[Footfall]) -> None:
 
 
 def led(pull: tuple[float, float], turned: float) -> Twist:
-    """Where a robot that faces ``turned`` (rad) walks that is pulled so (N, both in the world): the harder, the faster.
+    """Return the walk of a robot facing ``turned`` (rad) under a pull (N, both in the world): the harder, the faster.
 
     It turns towards the pull; a leash that hangs leaves it standing.
     """

@@ -1,4 +1,4 @@
-"""How honest a body's sensors are: ``clean`` knows no noise, ``usual`` is as its file says, ``hard`` a bad day.
+"""Realism of a body's sensors: ``clean`` without noise, ``usual`` as in its file, ``hard`` a bad day.
 
 Chosen behind the body's name: ``hermes+hard``.
 """

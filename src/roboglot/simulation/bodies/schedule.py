@@ -1,4 +1,4 @@
-"""Which of a robot's parts are called in a tick: those that are due and have something to do. Knows no part."""
+"""Schedule of a robot's parts: each tick calls those that are due and have something to do. Knows no part."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Entry = tuple[int, Callable[..., None], float]  # rank, what is called, s since 
 
 
 class Duty:
-    """Whether a part has something to do; while it has not, it is not called (``Part.duty``)."""
+    """Switch of a part that has something to do; while off, the part is not called (``Part.duty``)."""
 
     __slots__ = ("changed", "on")
 
@@ -74,7 +74,7 @@ class Schedule:
                 job.duty.changed = _Change(self, rank)
 
     def due(self) -> Iterator[Entry]:
-        """What is to be called in the next tick: rank, call, seconds since its last one."""
+        """Return the calls of the next tick: rank, call, seconds since its last one."""
         self._at = at = self._next
         self._next = at + 1 if at + 1 < self._length else self._start
         self._running = self._rounds[at]

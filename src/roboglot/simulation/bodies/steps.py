@@ -32,7 +32,7 @@ class Steps:
         self.step_over(None)
 
     def step_over(self, lowest: float | None) -> None:
-        """What is lower passes under the body; None: as it walks. A body on wheels has its own clearance."""
+        """Set the height (m) below which things pass under the body; None: the gait's. Wheels keep their clearance."""
         walking = min(self.lift.front, self.lift.rear) if self.gait else self._hull.body.hull.clearance
         self._hull.clearance = self._legs.step_over(walking if lowest is None or not self.gait else lowest)
 

@@ -1,4 +1,4 @@
-"""What a robot may meet where it is: floor and walls cost contacts only near edges and near walls.
+"""Contacts of a robot with its surroundings: floor and walls cost contacts only near edges and near walls.
 
 Far from every edge the level floor is a spring. Contacts with the floor and the search for those with walls were most
 of a step of the physics.
@@ -24,7 +24,7 @@ AGAIN = 0.1  # m that a robot goes near something until it is seen whether it st
 
 
 class Nearness:
-    """Whether something of the building may be near a robot. Looks again only when it has gone as far as that was."""
+    """Distance check between a robot and the building; repeated only once it has gone as far as there was room."""
 
     def __init__(self, radius: float) -> None:
         self._zone = radius + NEAR  # m from the middle
@@ -50,7 +50,7 @@ class Nearness:
         self._room, self._floor = room, -1
 
     def left(self, x: float, y: float, floor: int) -> float:
-        """How far (m) the robot may go from there until ``look`` looks again; below 0: not at all."""
+        """Return how far (m) the robot may go from there until the next ``look``; below 0: not at all."""
         if floor != self._floor or self._room is None:
             return -1.0
         return self._free - abs(x - self._x) - abs(y - self._y)

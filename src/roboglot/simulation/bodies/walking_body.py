@@ -1,4 +1,4 @@
-"""How a walking or jumping body moves: it sways with its steps and comes down from a jump. Starts no action."""
+"""Movement of a walking or jumping body: it sways with its steps and comes down from a jump. Starts no action."""
 
 from __future__ import annotations
 

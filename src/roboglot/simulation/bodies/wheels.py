@@ -40,7 +40,7 @@ class Wheels:
         return replace(wheels, **dict.fromkeys(self.dead, 0.0))
 
     def speeds_of(self, twist: Twist) -> WheelSpeeds:
-        """How the wheels turn while the body moves at ``twist``."""
+        """Return the speeds of the wheels, rad/s, while the body moves at ``twist``."""
         turn = self.lever * twist.yaw
         if not self.mecanum:
             left, right = (twist.x - turn) / self.radius, (twist.x + turn) / self.radius
@@ -53,7 +53,7 @@ class Wheels:
         )
 
     def twist_of(self, wheels: WheelSpeeds) -> Twist:
-        """What four wheels that disagree do to the body: the mean; the rest is slip."""
+        """Return the body's twist by four wheels that disagree: the mean; the rest is slip."""
         fl, fr, rl, rr = four(wheels)
         quarter = self.radius / 4
         if not self.mecanum:

@@ -29,7 +29,7 @@ SHELF_LEG = 0.04
 
 
 class Kind(StrEnum):
-    """What a solid is."""
+    """Kind of a solid."""
 
     WALL = "wall"
     FURNITURE = "furniture"
@@ -101,12 +101,12 @@ def shaft_of(lift: Lift) -> Rectangle:
 
 
 def holes_of(floor: Floor) -> list[Rectangle]:
-    """Where there is no floor."""
+    """Return the rectangles without a floor."""
     return [Rectangle(h.at[0] - h.size[0] / 2, h.at[1] - h.size[1] / 2, *h.size) for h in floor.holes]
 
 
 def _without(slab: Rectangle, gap: Rectangle) -> Iterator[Rectangle]:
-    """What is left and right of the gap, and what is below and above it between."""
+    """Yield the rest of the slab left and right of the gap, and below and above it between them."""
     right, top = slab.x + slab.width, slab.y + slab.depth
     left_end, right_end = (min(max(x, slab.x), right) for x in (gap.x, gap.x + gap.width))
     low, high = (min(max(y, slab.y), top) for y in (gap.y, gap.y + gap.depth))

@@ -1,4 +1,4 @@
-"""What belongs to the building and can move: docks, shelves and the lift. Puts them there and steps them."""
+"""Movable parts of the building: docks, shelves and the lift. Puts them there and steps them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the floor ends: holes, the lift's shaft while the car is elsewhere, the edge of an open floor; where walls are.
+"""Edges of the floor: holes, the shaft while the lift is elsewhere, open ends; and distances to walls.
 
 World frame.
 """
@@ -21,7 +21,7 @@ STEP = 0.03  # m that the car may be lower until that is a drop
 
 
 class Walls:
-    """How far walls and furniture are; what can be moved is none of them."""
+    """Distances to walls and furniture; movable things are left out."""
 
     def __init__(self, world: WorldDescription) -> None:
         self._floors = []

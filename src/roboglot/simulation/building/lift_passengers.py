@@ -1,4 +1,4 @@
-"""Who is in the lift's car or stands in its door, by their places; and the people whom a fault puts into it."""
+"""Passengers in the lift's car or its door, by their places; and the people whom a fault puts into it."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Passengers:
             self._props.put(f"passenger {index}", lift.floor, Solid(Kind.PERSON, pose, PERSON_SIZE, above))
 
     def load(self, lift: Car) -> float:
-        """What the car carries, kg."""
+        """Return the load of the car, kg."""
         deep, wide = lift.section.size
         load = 0.0
         for hull in self._hulls:

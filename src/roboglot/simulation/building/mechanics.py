@@ -1,4 +1,4 @@
-"""What the building asks of the physics."""
+"""Interface of the physics that the building needs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Mechanics(Protocol):
 
     @property
     def props(self) -> Props:
-        """What can be put somewhere."""
+        """Things that can be placed."""
 
     @property
     def hulls(self) -> Mapping[str, Hull]:
@@ -23,11 +23,11 @@ class Mechanics(Protocol):
 
     @property
     def ground(self) -> Ground:
-        """How even the floors are."""
+        """Relief of the floors."""
 
     @property
     def car_lift(self) -> float:
-        """How far the lift's car is above where it was parked, m."""
+        """Height of the lift's car above where it was parked, m."""
 
     def drive_car(self, lift: float) -> None:
         """Have the lift's car driven to this height above where it was parked, m."""

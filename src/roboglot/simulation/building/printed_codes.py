@@ -81,7 +81,7 @@ def _corrections(words: list[int], count: int) -> list[int]:
 
 
 def _frame(version: int) -> Squares:
-    """What is there before the data: finders, timing, alignment and format; the rest is _UNSET."""
+    """Return the code before its data: finders, timing, alignment and format; the rest is _UNSET."""
     n = 17 + 4 * version
     squares = np.full((n, n), _UNSET, dtype=np.uint8)
     squares[6, :] = squares[:, 6] = (np.arange(n) + 1) % 2

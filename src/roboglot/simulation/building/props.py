@@ -74,7 +74,7 @@ class Props:
         return self._elevations[floor]
 
     def on(self, floor: int) -> list[Solid]:
-        """What stands on a floor."""
+        """Return the props that stand on a floor."""
         return [solid for number, solid in self.solids.values() if number == floor]
 
     def _touched(self, floor: int, before: tuple[int, Solid] | None) -> None:

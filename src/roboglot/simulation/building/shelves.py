@@ -60,5 +60,5 @@ class ShelfStand:
 
 
 def shelf_pose(shelf: Shelf) -> Pose:
-    """Where the description has its middle."""
+    """Return the pose of a shelf's middle by the description."""
     return Pose(*shelf.at, math.radians(shelf.facing))

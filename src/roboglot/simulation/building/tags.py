@@ -1,4 +1,4 @@
-"""Where printed codes are: on walls for ever, on docks and shelves wherever those stand, and where hands hung them."""
+"""Poses of printed codes: fixed on walls, moving with docks and shelves, and hung up by hands."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ Corner = tuple[float, float, float]
 
 
 class Ground:
-    """What wheels find under them, per floor."""
+    """Height and slope of the ground under wheels, per floor."""
 
     def __init__(self, world: WorldDescription) -> None:
         self._terrain = [floor.relief for floor in world.floors]
@@ -49,7 +49,7 @@ def pieces_of(terrain: Terrain) -> Iterator[Sequence[Corner]]:
 
 
 def slices_of(terrain: Terrain, height: float) -> Iterator[tuple[Pose, float, float]]:
-    """What a level plane cuts out: rectangles as middle, length along their x and width."""
+    """Yield the rectangles that a level plane cuts out: middle, length along their x, width."""
     frame = Pose(*terrain.at, math.radians(terrain.facing))
     for (a, low), (b, high) in zip(terrain.profile, terrain.profile[1:], strict=False):
         if height >= max(low, high):
@@ -61,7 +61,7 @@ def slices_of(terrain: Terrain, height: float) -> Iterator[tuple[Pose, float, fl
 
 
 def _way(terrain: Terrain, x: float, y: float) -> float | None:
-    """How far along its profile a point lies; None beside it."""
+    """Return how far along its profile a point lies, m; None beside it."""
     seen = Pose(x, y).relative_to(Pose(*terrain.at, math.radians(terrain.facing)))
     inside = abs(seen.y) <= terrain.width / 2 and terrain.profile[0][0] <= seen.x <= terrain.profile[-1][0]
     return seen.x if inside else None

@@ -1,4 +1,4 @@
-"""What a camera's picture shows, worked out from the world's geometry: one function for each kind of thing.
+"""Detectors in a camera's picture, computed from the world's geometry: one function for each kind of thing.
 
-They see what is in the picture, near and large enough, turned the right way and not hidden; and not quite exactly.
+They find what is in the picture, near and large enough, turned the right way and not hidden; and not quite exactly.
 """

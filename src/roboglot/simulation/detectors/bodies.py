@@ -54,7 +54,7 @@ class _Somebody:
 
 
 def see_people(glance: Glance) -> list[PersonSeen]:
-    """Everybody of whom enough is seen."""
+    """Return the people of whom enough is visible."""
     found = []
     for who in _everybody(glance):
         distance, place = glance.estimate(who.middle)

@@ -52,7 +52,7 @@ def see_tags(glance: Glance) -> list[TagSeen]:
 
 
 def _box(card: Card, least: float, glance: Glance) -> Box | None:
-    """Where it appears, if it can be read."""
+    """Return the card's box in the picture, if it can be read."""
     if glance.bearing_from(card.pose) > SLANT:
         return None
     middle, _ = glance.view.project(_middle(card, glance)[None])

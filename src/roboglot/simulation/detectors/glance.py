@@ -62,7 +62,7 @@ class Glance:
 
     @property
     def floor(self) -> int:
-        """Where the robot is."""
+        """Floor of the robot."""
         return self.hull.floor
 
     @property
@@ -71,7 +71,7 @@ class Glance:
         return self.around.world.elevation(self.hull.floor)
 
     def visible(self, places: Floats, of: Hull | Walker | None = None) -> NDArray[np.bool_]:
-        """Which places (n x 3, world) are in the picture with nothing before them; ``of`` does not hide itself."""
+        """Return which places (n, 3; world) are in the picture and unobstructed; ``of`` does not hide itself."""
         appear, _ = self.view.project(places)
         seen = self.view.inside(appear)
         if seen.any():
@@ -82,16 +82,16 @@ class Glance:
         return seen
 
     def overlooked(self) -> bool:
-        """Now and then a detector misses what is there."""
+        """Return True now and then: a detector misses what is there."""
         return bool(self.random.random() < MISSED)
 
     def shaken(self, box: Box) -> Box:
-        """Where the detector thinks it is."""
+        """Return the box with the detector's noise."""
         dx, dy, dw, dh = (self.random.standard_normal(4) * BOX_NOISE).tolist()
         return Box(box.x + dx * box.width, box.y + dy * box.height, box.width * (1.0 + dw), box.height * (1.0 + dh))
 
     def estimate(self, place: Floats) -> tuple[float, Point]:
-        """How far from the camera the detector thinks a place (world) is, m, and where in base_link."""
+        """Return a place's (world) noisy distance from the camera, m, and its noisy place in base_link."""
         off = place - self.view.at
         error, turn = self.random.standard_normal(2).tolist()
         scale = 1.0 + RANGE_NOISE * error
@@ -101,6 +101,6 @@ class Glance:
         return float(np.linalg.norm(off)) * scale, turned.point
 
     def bearing_from(self, pose: Pose) -> float:
-        """How far the camera lies off the direction that ``pose`` (world) looks to, rad, 0 straight ahead."""
+        """Return the angle (rad) at which ``pose`` (world) sees the camera, 0 straight ahead."""
         towards = math.atan2(self.view.at[1] - pose.y, self.view.at[0] - pose.x)
         return abs(math.remainder(towards - pose.yaw, math.tau))

@@ -1,4 +1,4 @@
-"""What can be made to go wrong, one function a kind: it begins the fault and returns what ends it.
+"""Kinds of faults, one function each: it begins the fault and returns what ends it.
 
 The functions' keyword parameters are the fault's options.
 """
@@ -56,7 +56,7 @@ KIDNAP_DISTANCE = 4.0  # m at least
 
 
 class FragileWorld(Protocol):
-    """What faults use of a world."""
+    """Interface of a world that faults need."""
 
     @property
     def description(self) -> WorldDescription:
@@ -68,11 +68,11 @@ class FragileWorld(Protocol):
 
     @property
     def hands(self) -> Stage:
-        """What moves and places things."""
+        """Hands that move and place things."""
 
     @property
     def truth(self) -> Truth:
-        """What really is the case."""
+        """Ground truth of the world."""
 
     @property
     def robots(self) -> Mapping[str, Robot]:

@@ -39,7 +39,7 @@ class Faults:
 
     @property
     def kinds(self) -> list[FaultKind]:
-        """What can go wrong, with the options that each kind takes and their defaults."""
+        """Return the kinds of faults with their options and defaults."""
         return [FaultKind(name, kind.of_robot, _options_of(kind)) for name, kind in sorted(KINDS.items())]
 
     @property
@@ -143,7 +143,7 @@ def _check_options(kind: str, options: Mapping[str, object]) -> None:
 
 
 def problem_of(plan: PlannedFault) -> str | None:
-    """What is wrong with a planned fault as such, in plain words; None if nothing is."""
+    """Return the error in a planned fault as such, in plain words; None if there is none."""
     if plan.kind not in KINDS:
         return f"no fault is called {plan.kind!r}{nearest(plan.kind, KINDS)}"
     try:

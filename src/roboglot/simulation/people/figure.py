@@ -1,4 +1,4 @@
-"""How a person's body is held: the places of its joints while it stands, walks, makes a gesture or does sport.
+"""Joints of a person's body while it stands, walks, makes a gesture or does sport.
 
 In the person's own frame: x ahead, y left, z up from the floor, m. A stick figure; knows no world and no camera.
 """

@@ -79,12 +79,12 @@ class Walker:
 
     @cached_property
     def face(self) -> bytes:
-        """What a recogniser makes of this face."""
+        """Faceprint of the person."""
         return hashlib.sha256(f"face of {self.key}".encode()).digest()
 
     @cached_property
     def voice(self) -> bytes:
-        """What a recogniser makes of this voice."""
+        """Voiceprint of the person."""
         return hashlib.sha256(f"voice of {self.key}".encode()).digest()
 
     @property
@@ -105,7 +105,7 @@ class Walker:
         return (self.doing, self._elapsed) if isinstance(self.doing, Show) else None
 
     def fetch(self) -> Sequence[Say | Clap]:
-        """What they began to say or clap since the last time."""
+        """Return the words and claps begun since the last call."""
         aloud, self.aloud = self.aloud, []
         return aloud
 
@@ -135,7 +135,7 @@ class Walker:
 
     @property
     def follows_script(self) -> bool:
-        """Whether they do what the world's file says, not what they were ordered."""
+        """True while the person follows the world's file and not an order."""
         return self._told is None
 
     # -- time ----------------------------------------------------------------------------------------------------------

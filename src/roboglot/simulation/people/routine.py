@@ -1,4 +1,4 @@
-"""What people do, step by step, as written in a world's file. Metres, degrees, seconds. Knows no person."""
+"""Routines of people, step by step, as written in a world's file. Metres, degrees, seconds. Knows no person."""
 
 from __future__ import annotations
 

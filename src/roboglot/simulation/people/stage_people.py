@@ -50,12 +50,12 @@ class Actor(StagePerson):
 
     @property
     def face(self) -> bytes:
-        """What a recogniser makes of the face, for ``Members.set_face``."""
+        """Faceprint, for ``Members.set_face``."""
         return self._walker.face
 
     @property
     def voice(self) -> bytes:
-        """What a recogniser makes of the voice, for ``Members.set_voice``."""
+        """Voiceprint, for ``Members.set_voice``."""
         return self._walker.voice
 
     def walk_to(self, x: float, y: float, *, speed: float | None = None) -> None:

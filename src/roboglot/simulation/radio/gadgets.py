@@ -38,7 +38,7 @@ class GadgetInWorld:
 
     @property
     def at(self) -> Point:
-        """Where it is, world frame: with the person who wears it."""
+        """Place of the gadget, world frame: with its wearer."""
         return self.wearer.pose.point if self.wearer else self.place
 
     @property

@@ -1,4 +1,4 @@
-"""How radio waves fade in a world: with distance, through walls and through slabs."""
+"""Propagation of radio waves in a world: they fade with distance, through walls and through slabs."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ class Claimant(Protocol):
 
     @property
     def announced(self) -> Announcement | None:
-        """What it announced of itself last."""
+        """Last announcement of the robot."""
 
     @property
     def pose(self) -> Pose:
-        """Where it is, world frame."""
+        """Pose of the robot, world frame."""
 
 
 class Radio:
@@ -77,7 +77,7 @@ class Radio:
         return f"{point.addresses}.{FIRST_HOST + cards.index(mac) % HOSTS_MAX}"
 
     def walls_between(self, a: Point, b: Point, floor: int) -> int:
-        """How many walls of the floor lie between two points."""
+        """Return the number of the floor's walls between two points."""
         return crossed(self._walls[floor], a, b)
 
     def heard(self, point: Point, power: float, point_floor: int, at: Point, floor: int) -> float:
@@ -108,12 +108,12 @@ def walls_of(world: WorldDescription) -> list[NDArray[np.float64]]:
 
 
 def crossed(walls: NDArray[np.float64], a: Point, b: Point) -> int:
-    """How many of the walls, as ``walls_of`` has them, lie between two points."""
+    """Return the number of walls, as ``walls_of`` has them, between two points."""
     return int(crossings(walls, np.array(((a.x, a.y),)), b)[0])
 
 
 def crossings(walls: NDArray[np.float64], ends: NDArray[np.float64], b: Point) -> NDArray[np.intp]:
-    """How many of the walls, as ``walls_of`` has them, lie between each of ``ends`` (n x 2) and one point."""
+    """Return the number of walls, as ``walls_of`` has them, between each of ``ends`` (n, 2) and one point."""
     x1, y1, x2, y2, wall_x, wall_y = walls
     x, y = ends[:, :1], ends[:, 1:]
     way_x, way_y = b.x - x, b.y - y

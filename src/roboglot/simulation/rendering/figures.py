@@ -1,4 +1,4 @@
-"""How people and robots look to a camera: turned shapes around their own origin, +x ahead. Knows no world."""
+"""Figures of people and robots for cameras: turned shapes around their own origin, +x ahead. Knows no world."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def _eyes(joints: Floats, face: Floats, ear: Floats, up: Floats) -> Floats:
 
 @lru_cache(maxsize=64)
 def _look(index: int, count: int) -> tuple[Floats, NDArray[np.float32], NDArray[np.int32], NDArray[np.int32]]:
-    """What does not change when they move: mappings, paints, textures and rooms."""
+    """Return the constant part of a person's look: mappings, paints, textures and rooms."""
     colours = (SHIRTS[index % len(SHIRTS)], TROUSERS[index % len(TROUSERS)], SKIN[index % len(SKIN)],
                HAIRS[index % len(HAIRS)], (28, 26, 26))  # fmt: skip
     rows = [paint_row(Paint(colours[cloth]), 1.0) for cloth in CLOTHS for _ in range(SIDES)]

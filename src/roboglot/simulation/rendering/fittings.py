@@ -1,6 +1,6 @@
-"""What sits on robots, flies about and rides up and down, for cameras: gimbals, arms, jaws, lamps, beads, lift cars.
+"""Moving details for cameras: gimbals, arms, jaws, lamps, beads, lift cars.
 
-Takes what the parts say of themselves; meshes are around a robot's origin on the floor, +x ahead.
+State comes from the parts; meshes are around a robot's origin on the floor, +x ahead.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ Make = Callable[[], Mesh]
 
 
 def fittings(robot: Robot, hull: Hull) -> Iterator[Make]:
-    """How to make what the robot has, as it is held now. Quick: meshes are made later."""
+    """Yield makers of the robot's fittings as it holds them now. Quick: meshes are made later."""
     body, belly = hull.body, hull.belly
     gimbal_colours: tuple[Colour, ...] = ()
     if Light in robot:

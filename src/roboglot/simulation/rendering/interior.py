@@ -1,4 +1,4 @@
-"""How a floor's still things look: walls by room, windows, door frames, furniture, docks, markers, lines."""
+"""Looks of a floor's still things: walls by room, windows, door frames, furniture, docks, markers, lines."""
 
 from __future__ import annotations
 
@@ -181,7 +181,7 @@ def _door_frames(wall: Wall, height: float, plan: Plan) -> Iterator[Mesh]:
 
 
 def furniture(solid: Solid, number: int, room: int) -> Mesh:
-    """What a box or cylinder of that size would be in an office."""
+    """Return the mesh of a box or cylinder as the office furniture of that size."""
     width, depth, height = solid.size
     wood = Paint(WOOD, WOOD_DARK, Texture.WOOD, (1.0, 1.0))
     if solid.round:

@@ -26,9 +26,9 @@ class View:
     aspect: float  # width by height
 
     def project(self, points: Floats) -> tuple[Floats, Floats]:
-        """Where points (n x 3) appear (n x 2, 0..1 within the picture) and how far ahead they lie, m.
+        """Return where points (n, 3) appear (n, 2; 0..1 within the picture) and how far ahead they lie, m.
 
-        What is not ahead of the lens is nowhere (nan).
+        Points behind the lens appear nowhere (nan).
         """
         seen = (points - self.at) @ self.rotation.T
         ahead = np.where(seen[:, 2] > NEAREST, seen[:, 2], np.nan)
@@ -38,12 +38,12 @@ class View:
         return np.stack((x, y), axis=1), seen[:, 2]
 
     def inside(self, places: Floats) -> NDArray[np.bool_]:
-        """Which places (n x 2) lie within the picture."""
+        """Return which places (n, 2) lie within the picture."""
         within: NDArray[np.bool_] = np.all((places >= 0.0) & (places <= 1.0), axis=1)
         return within
 
     def box(self, corners: Floats) -> Box | None:
-        """What a body with these corners (n x 3) covers of the picture; None if it does not stand wholly ahead."""
+        """Return the part of the picture that a body with these corners (n, 3) covers; None if not wholly ahead."""
         places, _ = self.project(corners)
         if np.isnan(places).any():
             return None
@@ -59,7 +59,7 @@ class View:
 
 
 def view_of(camera: Camera, hull: Hull) -> View:
-    """What the camera of a robot sees now."""
+    """Return the current view of a robot's camera."""
     mount = camera.mount
     ahead, left, up = rotation((0.0, mount.pitch), mount.yaw).T
     axes = hull.to_world(np.array((-left, -up, ahead)))

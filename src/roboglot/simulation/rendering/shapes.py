@@ -70,7 +70,7 @@ def colour(rgb: Rgb) -> tuple[float, float, float]:
 
 
 def paint_row(paint: Paint, light: float) -> list[float]:
-    """What the shading kernel takes."""
+    """Return a paint as the shading kernel takes it."""
     first, second = colour(paint.first), colour(paint.second)
     return [*first, *((b - a) / 255 for a, b in zip(first, second, strict=True)), light, 0.0 if paint.glows else 1.0]
 

@@ -1,4 +1,4 @@
-"""What stands where, as a camera's renderer needs it: still meshes per floor, made once, and who moves, made anew.
+"""Scenery for a camera's renderer: still meshes per floor, made once, and moving figures, made anew.
 
 Truth, world frame, z from the ground floor. Knows no sensor.
 """
@@ -51,7 +51,7 @@ SLACK = 0.1  # rad beside what an eye sees: one that nods or leans a little sees
 
 @dataclass(frozen=True, slots=True)
 class Life:
-    """What else there is to see: robots' parts as they hold them, beads in the air, the lift's car."""
+    """Other visible things: robots' parts as they hold them, beads in the air, the lift's car."""
 
     robots: Mapping[str, Robot]
     beads: Beads
@@ -76,7 +76,7 @@ class Stage:
         self._floors: dict[int, tuple[Plan, Mesh, Ground]] = {}
 
     def instant(self, number: int, viewer: Hull, eye: Eye) -> Instant:
-        """Who is before the eye now, the viewer itself left out. Quick: it runs between two physics steps."""
+        """Return the figures before the eye, without the viewer. Quick: it runs between two physics steps."""
         sector = _Sector(eye.x, eye.y, eye.yaw, eye.spread)
         figures = tuple(figure for figure in self._figures(number, viewer, sector) if sector.meets(figure))
         return Instant(number, figures)
@@ -142,7 +142,7 @@ class Stage:
             )
 
     def _furniture(self, number: int) -> Iterator[Figure]:
-        """What moves, and the tags on it."""
+        """Yield movable furniture, and the tags on it."""
         elevation = self._world.elevation(number)
         for solid in self._props.on(number):
             pose, make = solid.pose, partial(movable, replace(solid, pose=ORIGIN))
@@ -163,7 +163,7 @@ def _inside(height: float, elevation: float, storey: float) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class _Sector:
-    """What an eye at (x, y) can have in its picture, from above: ``spread`` rad around ``yaw``, not too far away."""
+    """Sector seen from above by an eye at (x, y): ``spread`` rad around ``yaw``, of limited length."""
 
     x: float
     y: float

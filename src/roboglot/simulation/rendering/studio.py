@@ -1,6 +1,6 @@
-"""Where a world's cameras are drawn: loads kernels when the first one is needed, works in threads in real time.
+"""Renderer of a world's cameras: loads kernels when the first one is needed, works in threads in real time.
 
-In lockstep everything is done in place, so that the same seed gives the same pictures at the same instants.
+In lockstep everything runs in place, so that the same seed gives the same pictures at the same instants.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Studio:
         self._opening = asyncio.Lock()
 
     async def stage(self) -> Scenery:
-        """What can be seen; the first one to ask waits for the kernels (a second; longer if they must be compiled)."""
+        """Return the scenery; the first call waits for the kernels (a second; longer if they must be compiled)."""
         async with self._opening:
             if self._stage is None:
                 self._stage = await self.work(self._open_stage)

@@ -20,7 +20,7 @@ REACH = 0.5  # m that shadows and arms reach beyond the radius
 
 @dataclass(frozen=True, slots=True)
 class Eye:
-    """Where a camera is (world, m) and how it looks: ``rotation``'s rows are right, down and ahead in world.
+    """Pose of a camera (world, m); the rows of ``rotation`` are right, down and ahead in world.
 
     ``fov``: horizontal, rad.
     """
@@ -33,7 +33,7 @@ class Eye:
 
     @property
     def yaw(self) -> float:
-        """Where it looks from above, rad."""
+        """Direction of view from above, rad."""
         return math.atan2(self.rotation[2, 1], self.rotation[2, 0])
 
     @property
@@ -43,7 +43,7 @@ class Eye:
 
     @property
     def spread(self) -> float:
-        """How much of what is around it may be seen, rad: looking steeply, all; else the middle ``fov`` and some."""
+        """Horizontal angle that may be visible, rad: all of it if looking steeply; else the middle ``fov`` and some."""
         return min(math.tau, 1.25 * self.fov) if self.level else math.tau
 
 
@@ -72,7 +72,7 @@ class Figure:
 
 @dataclass(frozen=True, slots=True)
 class Instant:
-    """What moves on a floor, frozen."""
+    """Moving figures of a floor at one instant."""
 
     floor: int
     figures: tuple[Figure, ...]

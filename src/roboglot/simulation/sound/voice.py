@@ -28,7 +28,7 @@ CJK = ("\u3400", "\u9fff")
 
 
 def speaking_time(text: str) -> float:
-    """How long a person would take to say ``text``, s."""
+    """Return the time that a person takes to say ``text``, s."""
     chinese = sum(CJK[0] <= letter <= CJK[1] for letter in text)
     return max(SHORTEST, chinese / SYLLABLES_PER_SECOND + (len(text) - chinese) / LETTERS_PER_SECOND)
 

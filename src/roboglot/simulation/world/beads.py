@@ -39,7 +39,7 @@ class Target(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Landing:
-    """Where a bead burst (world, m), and on what: a solid's name, or robot and plate."""
+    """Place where a bead burst (world, m), and what it hit: a solid's name, or robot and plate."""
 
     x: float
     y: float
@@ -66,12 +66,12 @@ class Beads:
 
     @property
     def flying(self) -> int:
-        """How many are in the air."""
+        """Number of beads in the air."""
         return len(self._flying)
 
     @property
     def places(self) -> list[tuple[float, float, float]]:
-        """Where they are (world, m)."""
+        """Return the places of the beads in the air (world, m)."""
         return [(float(x), float(y), float(z)) for x, y, z in (bead.position for bead in self._flying)]
 
     def launch(self, position: Floats, velocity: Floats, shooter: Hull) -> None:

@@ -94,13 +94,13 @@ def _line_of(text: str, message: str) -> str:
 
 
 def _header(text: str, start: int, key: str, index: int) -> int | None:
-    """Where the ``index``-th ``[[key]]`` (or ``[key]``) after ``start`` stands."""
+    """Return the end of the ``index``-th ``[[key]]`` (or ``[key]``) after ``start``."""
     headers = list(re.compile(rf"^\s*\[\[?(?:[\w.]*\.)?{re.escape(key)}\]\]?", re.M).finditer(text, start))
     return headers[index].end() if index < len(headers) else None
 
 
 def _assignment(text: str, start: int, key: str, index: int) -> int | None:
-    """Where the ``index``-th inline table of ``key = [ ... ]`` after ``start`` stands."""
+    """Return the place of the ``index``-th inline table of ``key = [ ... ]`` after ``start``."""
     assigned = re.compile(rf"\b{re.escape(key)}\s*=\s*").search(text, start)
     if assigned is None:
         return None

@@ -1,7 +1,7 @@
-"""What a world consists of, as written in its TOML file: floors with walls, furniture, docks, people, access points,
-and a lift. Metres; angles in degrees, because people write these files; the robot code sees radians only.
+"""World descriptions as TOML: floors with walls, furniture, docks, people, access points, and a lift.
 
-Knows no physics: ``blueprint`` turns it into solids, ``scene`` into a MuJoCo model.
+Metres; angles in degrees, because people write these files; the robot code sees radians only. Knows no physics:
+``blueprint`` turns it into solids, ``scene`` into a MuJoCo model.
 """
 
 from __future__ import annotations
@@ -150,7 +150,7 @@ class AccessPoint(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Mobile(Struct, frozen=True, forbid_unknown_fields=True):
-    """What a modem hears of the mobile network, dBm, and the access point names that the operator knows."""
+    """Reception of the mobile network, dBm, and the access point names that the operator knows."""
 
     signal: Annotated[float, Meta(ge=-140, le=-40)] = -85.0
     apns: tuple[Annotated[str, Meta(max_length=100)], ...] = ("cmnet", "cmhk")
@@ -174,9 +174,7 @@ class Gadget(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Georeference(Struct, frozen=True, forbid_unknown_fields=True):
-    """Where the world's origin lies on the globe: degrees north and east, m; ``north``: where north is (degrees, 90:
-    along +y).
-    """
+    """Position of the world's origin on the globe: degrees north and east, m; ``north``: its bearing (90: along +y)."""
 
     latitude: Annotated[float, Meta(ge=-89, le=89)]
     longitude: Annotated[float, Meta(ge=-180, le=180)]
@@ -283,7 +281,7 @@ class Thing(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Start(Struct, frozen=True, forbid_unknown_fields=True):
-    """Where the first robot starts if not on a dock."""
+    """Start of the first robot if not on a dock."""
 
     at: Spot
     facing: float = 0.0

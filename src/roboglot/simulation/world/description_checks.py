@@ -1,4 +1,4 @@
-"""What the types of a world's description cannot say: references, places inside floors, sizes that fit together."""
+"""Checks of a world's description beyond its types: references, places inside floors, sizes that fit together."""
 
 from __future__ import annotations
 

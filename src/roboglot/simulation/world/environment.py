@@ -1,4 +1,4 @@
-"""What of a world its robots' parts share: the building, the air, and what can be seen, heard and reached in it."""
+"""Environment that the parts of all robots share: the building, the air, and what is seen, heard and reached."""
 
 from __future__ import annotations
 

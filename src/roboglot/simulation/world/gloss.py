@@ -1,4 +1,4 @@
-"""What a lidar makes of glass and mirrors: one looks through the first, and around a corner in the second.
+"""Reflections of a lidar: it looks through glass, and around a corner in mirrors.
 
 Glass answers rays that meet it nearly square, and lets all others pass; a mirror sends each on, and what it meets there
 seems to stand behind the mirror. Plane geometry on rows of numbers, as in ``sight``; no state.
@@ -24,7 +24,7 @@ def _cross(a: Vectors, b: Vectors) -> NDArray[np.float64]:
 
 
 def met(edges: Rows, origins: Vectors, ways: Vectors) -> tuple[NDArray[np.float64], Vectors]:
-    """How far (m) each ray goes until it meets an edge from outside (inf: never), and that edge's outward normal."""
+    """Return how far (m) each ray goes to an edge met from outside (inf: never), and the edge's outward normal."""
     if not len(edges):
         return np.full(len(ways), np.inf), np.zeros_like(ways)
     start, along = edges[:, :2], edges[:, 2:] - edges[:, :2]

@@ -1,6 +1,6 @@
-"""Whether robots may touch anything in the next steps; while none can, the physics looks for no contacts.
+"""Prediction of contacts between robots; while none is possible, the physics looks for none.
 
-To look for them is half of a step of the physics, wherever everything is.
+The search for contacts is half of a step of the physics, wherever everything is.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class Meetings:
         return hull.support.sprung and not (hull.disturbed or (hull.rests and hull.pulls))
 
     def _is_calm(self) -> bool:
-        """Whether all robots stand on springs and nothing presses on anything; notes which of them rest."""
+        """Return whether all robots stand on springs and nothing is pressed; notes which of them rest."""
         for hull in self._hulls:
             vx, vy, _, _ = hull.motion
             hull.rests = not hull.pulls and abs(vx) < STILL and abs(vy) < STILL
@@ -86,7 +86,7 @@ class Meetings:
         return not self._data.nefc and all(hull.support.sprung and not hull.touches for hull in self._hulls)
 
     def _there(self) -> tuple[NDArray[np.int64], Floats, Floats]:
-        """Which of what is moved by hand is there, how far it reaches around its middle (m), how fast it may be."""
+        """Return the present movable bodies, their radii around the middle (m), and their top speeds (m/s)."""
         there = np.flatnonzero(self._data.mocap_pos[:, 2] > AWAY[2] / 2)
         people, sizes = self._round[there], self._model.geom_size[self._geoms[there]]
         radii = np.where(people, sizes[:, 0], np.hypot(sizes[:, 0], sizes[:, 1]))
@@ -117,7 +117,7 @@ class Meetings:
 
 
 def _soonest(gaps: Floats, speeds: Floats, pulls: Floats) -> float:
-    """When the first of the gaps (m) may be closed, at these speeds (m/s) that grow so fast (m/s2); inf: never."""
+    """Return when the first of the gaps (m) may close, at speeds (m/s) growing so fast (m/s2); inf: never."""
     moving = (speeds > 0.0) | (pulls > 0.0)
     gap, speed, pull = np.clip(gaps[moving], 0.0, FAR), speeds[moving], pulls[moving]
     ways = speed + np.sqrt(speed * speed + 2.0 * pull * gap)

@@ -165,7 +165,7 @@ class Physics:
 
     @property
     def car_lift(self) -> float:
-        """How high the lift's car stands above the floor where it was parked, m."""
+        """Height of the lift's car above the floor where it was parked, m."""
         assert self._car is not None
         return float(self._data.qpos[self._car[0]])
 
@@ -213,7 +213,7 @@ class Physics:
 
 
 class _Standing:
-    """Where the model keeps a person."""
+    """Indices of a person in the model."""
 
     def __init__(self, model: mujoco.MjModel, name: str) -> None:
         body = model.body(name)

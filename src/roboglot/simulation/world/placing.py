@@ -1,4 +1,4 @@
-"""Where robots start: as configured, at the world's start, on docks (facing away from them), or beside the first one.
+"""Start places of robots: as configured, at the world's start, on docks (facing away), or beside the first one.
 
 Beside it means side by side in the same room with room ahead, so that each can drive off; a crowd has to do without.
 """

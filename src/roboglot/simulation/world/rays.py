@@ -76,7 +76,7 @@ class Rays:
         return distances
 
     def meet(self, origin: NDArray[np.float64], way: NDArray[np.float64], viewer: Hull) -> tuple[float, str] | None:
-        """What lies first on the straight ``way`` from ``origin`` (3 each, m): at which share of it, and its name."""
+        """Return the first hit on the straight ``way`` from ``origin`` (3 each, m): its share of it, and its name."""
         found = np.zeros(1, np.int32)
         with self._looking_through(viewer):
             share = self._mujoco.mj_ray(self._model, self._data, origin, way, SEEN, True, -1, found)

@@ -118,7 +118,7 @@ def _add_person(root: mujoco.MjsBody, key: str, person: Person) -> None:
 
 
 class _Placed(TypedDict, total=False):
-    """Where a geom is in its body, and its name."""
+    """Place of a geom in its body, and its name."""
 
     name: str
     pos: list[float]
@@ -319,7 +319,7 @@ def _add_hull(body: mujoco.MjsBody, name: str, shape: Cylinder, mass: float, bit
 
 
 def _add_waist(body: mujoco.MjsBody, name: str, radius: float, gap: float, top: float) -> None:
-    """What rays hit between chassis and torso (wheels, legs, the lidar's own column): it bumps into nothing."""
+    """Add a cylinder that only rays hit, between chassis and torso (wheels, legs, the lidar's own column)."""
     body.add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_CYLINDER,

@@ -1,4 +1,4 @@
-"""What can be seen in a horizontal plane of the world: still solids, people, obstacles, things, the other robots.
+"""Sight in a horizontal plane of the world: still solids, people, obstacles, things, the other robots.
 
 Truth, world frame; knows no sensor. Edges and circles are rows of numbers here: x, y, x, y of two ends, and x, y,
 radius, 0.
@@ -104,7 +104,7 @@ class Sight:
         return self._cast(*kept, _ways(rays), hull.x, hull.y, hull.turned, reach)
 
     def glossy(self, hull: Hull, height: float, rays: int, reach: float, exact: Distances) -> Distances:
-        """What a lidar has of the ``exact`` turn where there is glass, or a mirror."""
+        """Return a lidar's turn with glass and mirrors, from the ``exact`` one without."""
         if not self._glossy[hull.floor]:
             return exact
         circles, ways = self._circles_at(hull.floor, height), _ways(rays)
@@ -198,7 +198,7 @@ class _Still:
 
 
 def _slopes_at(terrain: Terrain, height: float) -> Iterator[Solid]:
-    """What of a ramp is higher than ``height``, as boxes."""
+    """Yield the parts of a ramp above ``height``, as boxes."""
     for middle, length, width in slices_of(terrain, height):
         yield Solid(Kind.FURNITURE, middle, (length, width, math.inf))
 

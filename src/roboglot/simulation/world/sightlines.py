@@ -28,7 +28,7 @@ Row = tuple[float, ...]
 
 @dataclass(frozen=True, slots=True)
 class Obstacles:
-    """What stands on a floor at one moment.
+    """Obstacles on a floor at one moment.
 
     Rows: middle x, y, z from the floor, half extents x, y, z, yaw, and 1 for a cylinder. ``movers``: their row numbers.
     """

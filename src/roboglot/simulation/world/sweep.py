@@ -83,7 +83,7 @@ def _meet_circles(
 def _pairs(
     first: NDArray[np.float64], span: NDArray[np.float64], rays: int
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Which thing meets which ray, for things that cover the angles from ``first`` to ``first + span``."""
+    """Return pairs of things and rays that meet, for things covering the angles ``first`` to ``first + span``."""
     step = math.tau / rays
     begin = np.ceil((first + math.pi) / step).astype(np.intp)
     count = np.floor((first + span + math.pi) / step).astype(np.intp) + 1 - begin

@@ -1,4 +1,4 @@
-"""What really is the case in a world: for tests, recordings and overlays. Changes nothing; no robot may ask it."""
+"""Ground truth of a world: for tests, recordings and overlays. Changes nothing; no robot may ask it."""
 
 from __future__ import annotations
 
@@ -56,5 +56,5 @@ class Truth:
 
     @property
     def bead_landings(self) -> Sequence[Landing]:
-        """Where the last gel beads burst, the newest last."""
+        """Places where the last gel beads burst, the newest last."""
         return tuple(self._environment.beads.landed)

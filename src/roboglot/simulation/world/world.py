@@ -58,7 +58,7 @@ ROBOTS_MAX = 200
 
 @dataclass(frozen=True, slots=True)
 class RobotPlacement:
-    """Which body a robot has and where it starts; by default on the first free dock."""
+    """Body and start of a robot; by default on the first free dock."""
 
     name: str
     body: str = "universal"

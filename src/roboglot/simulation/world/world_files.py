@@ -42,7 +42,7 @@ Cells = NDArray[np.bool_]
 
 
 class RosMap(Struct, frozen=True):
-    """What stands in the ``yaml``; the image's first row is the map's highest y."""
+    """Fields of the ``yaml``; the image's first row is the map's highest y."""
 
     image: str
     resolution: Annotated[float, Meta(gt=0.001, le=1.0)]
@@ -139,7 +139,7 @@ def _pixels(path: Path) -> NDArray[np.float64]:
 
 
 def _cells(ros_map: RosMap, pixels: NDArray[np.float64]) -> tuple[Cells, Cells]:
-    """Which cells are occupied and which are free, by map_server's rules."""
+    """Return which cells are occupied and which are free, by map_server's rules."""
     if ros_map.mode == "raw":
         evidence = np.where(pixels <= 100, pixels / 100, 0.5 * (ros_map.free_thresh + ros_map.occupied_thresh))
     else:
@@ -167,9 +167,9 @@ def _solids(ros_map: RosMap, occupied: Cells, path: Path) -> tuple[tuple[Wall, .
 
 
 def _place_for_dock(ros_map: RosMap, free: Cells, path: Path) -> tuple[Spot, float]:
-    """Where the dock's front goes and where it looks (degrees).
+    """Return the place of the dock's front and its direction (degrees).
 
-    Into the open, from the middle of as much room as can be had, as near to the middle of the map as can be.
+    It faces the open floor, in as much room as can be had, as near to the middle of the map as can be.
     """
     cell = ros_map.resolution
     for room in ROOM:
@@ -201,7 +201,7 @@ def _most_central(free: Cells, side: int) -> tuple[int, int] | None:
 
 
 def _open_way(free: Cells, row: int, column: int, turns: int, half: int) -> int:
-    """How many cells are free in a direction (quarter turns from +x) on a lane of 2 ``half`` + 1 cells."""
+    """Return the number of free cells in a direction (quarter turns from +x) on a lane of 2 ``half`` + 1 cells."""
     if turns % 2:
         free, row, column = free.T, column, row
     lane: Cells = np.logical_and.reduce(free[row - half : row + half + 1], axis=0)

@@ -123,7 +123,7 @@ class SimulatedBattery(Battery):
 
     @property
     def supply(self) -> Supply:
-        """What feeds the robot now."""
+        """Current source of power."""
         if self._wire:
             return Supply.WIRE
         docked = self._dock is not None and self._dock.docked
@@ -179,7 +179,7 @@ class SimulatedBattery(Battery):
             self._events.publish(BatteryChanged(stamp=stamp, percentage=self._charge, charging=self._charging))
 
     def _words(self) -> tuple[int, bool]:
-        """What is worth an event when it changes."""
+        """Values whose change is worth an event: percent and charging."""
         return math.floor(self._charge * 100.0 + 1e-9), self._charging
 
     def _load(self) -> float:

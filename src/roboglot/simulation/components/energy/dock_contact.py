@@ -19,7 +19,7 @@ FASTEST = 5.0  # m/s that a robot may come nearer to a dock
 
 
 class DockContactSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """How near (m) and straight (rad) the rear contacts must be to a dock."""
+    """Tolerances of the rear contacts at a dock: ``distance`` (m) and ``angle`` (rad)."""
 
     distance: Positive
     angle: Positive
@@ -60,7 +60,7 @@ class SimulatedDockContact(DockContact):
         self._far = 0.0
 
     def _touches(self) -> tuple[bool, float]:
-        """Whether it touches a dock, and how far the next one is out of reach at least, m."""
+        """Return whether the robot touches a dock, and how far out of reach the next one is at least, m."""
         hull, away = self._hull, SELDOM * FASTEST
         x, y, radius, near = hull.x, hull.y, hull.body.hull.radius, self._section.distance
         for dock in self._docks[hull.floor]:

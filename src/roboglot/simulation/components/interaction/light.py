@@ -11,7 +11,7 @@ from roboglot.simulation.bodies.quantities import Count
 
 
 class LightSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """How many lamps each zone has."""
+    """Number of lamps of each zone."""
 
     zones: dict[str, Count]
 

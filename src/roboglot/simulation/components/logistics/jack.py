@@ -125,7 +125,7 @@ class SimulatedJack(Jack):
         self._tell()
 
     def _lifted(self, shelf: ShelfStand) -> float:
-        """How high the shelf hangs when the platform is where it is, m; negative: it does not touch."""
+        """Return the height of the shelf at the platform's position, m; negative: not touched."""
         return self._hull.body.hull.height + self._position - shelf.shelf.clearance
 
     def _meet_shelf(self) -> None:

@@ -38,7 +38,7 @@ class SimulatedTrafficRadio(TrafficRadio):
 
     @property
     def pose(self) -> Pose:
-        """Where it is, world frame."""
+        """Pose of the robot, world frame."""
         return self._hull.pose
 
     @property
@@ -55,7 +55,7 @@ class SimulatedTrafficRadio(TrafficRadio):
 
     @property
     def announced(self) -> Announcement | None:
-        """What this robot announced last."""
+        """Last announcement of this robot."""
         return self._announced
 
     def announce(self, announcement: Announcement | None) -> None:

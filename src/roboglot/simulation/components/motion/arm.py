@@ -23,7 +23,7 @@ from roboglot.simulation.bodies.schedule import Duty
 
 
 class ArmSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """Where the shoulder is, and what the end point can reach from there (x forward, z up)."""
+    """Place of the shoulder, and the end point's reach from there (x forward, z up), m."""
 
     forward: Offset
     above_belly: Offset

@@ -20,7 +20,7 @@ class DriveLocks:
         self._brake()
 
     def unlock(self, who: str) -> None:
-        """``who`` has no objection any more; does nothing if it had none."""
+        """Withdraw the objection of ``who``; do nothing if there was none."""
         self._locks.pop(who, None)
 
     def held_by(self, who: str) -> bool:

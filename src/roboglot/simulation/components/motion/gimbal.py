@@ -127,14 +127,14 @@ class SimulatedGimbal(Gimbal):
         return self._move_to(0.0, 0.0, Frame.BODY, speed, speed, source)
 
     def sight_line(self) -> tuple[Floats, Floats]:
-        """Where the axes cross, and the direction in which the gimbal looks, world."""
+        """Crossing of the axes, and the gimbal's direction of view, world."""
         hull = self._hull
         pivot, ahead = hull.to_world(np.array((self.pivot, self.orientation[:, 0])))
         return pivot + hull.position, ahead
 
     @property
     def pivot(self) -> tuple[float, float, float]:
-        """Where the axes cross, base_link."""
+        """Crossing of the axes, base_link, m."""
         return self._section.forward, 0.0, self._hull.belly + self._section.above_belly
 
     @property

@@ -26,7 +26,7 @@ THERE = 0.002  # rad: near enough to a goal
 
 
 class GimbalSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """Where its axes cross, how far up, down and to both sides it turns, speed and acceleration of both axes."""
+    """Crossing of the axes (m), range up, down and sideways (rad), speed and acceleration of both axes."""
 
     forward: Offset
     above_belly: Offset
@@ -114,7 +114,7 @@ class GimbalAxes:
         return self._since_start + wrap_angle(measured - self._since_start)
 
     def _goal(self, index: int) -> float | None:
-        """Where the axis is to be, as a joint's angle; in CHASSIS_LEAD only the chassis aims the yaw."""
+        """Return the goal of an axis as a joint's angle, rad; in CHASSIS_LEAD only the chassis aims the yaw."""
         aim = self._aims[index]
         if aim is None or aim.goal is None or (index and self.mode is FollowMode.CHASSIS_LEAD):
             return None

@@ -116,7 +116,7 @@ class SimulatedGripper(Gripper):
             self._goal = None
 
     def _between(self) -> Thing | None:
-        """What stands between the jaws and is not too wide for them."""
+        """Return the thing between the jaws that is not too wide for them."""
         for thing in self._things:
             x, y, z = self._seen(thing).tolist()
             fits = abs(y) + thing.diameter / 2 <= self._section.opening / 2 + PLAY

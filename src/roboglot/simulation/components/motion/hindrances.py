@@ -1,4 +1,4 @@
-"""What is in a base's way: directions that others have barred, and what its hull touches."""
+"""Hindrances of a base: directions that others have barred, and what its hull touches."""
 
 from __future__ import annotations
 

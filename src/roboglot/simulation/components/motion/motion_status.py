@@ -1,4 +1,4 @@
-"""How the body stands and moves: tilt and blows from the IMU, slip by wheels against motion, lifting by contacts."""
+"""Motion status: tilt and blows from the IMU, slip by wheels against motion, lifting by contacts."""
 
 from __future__ import annotations
 

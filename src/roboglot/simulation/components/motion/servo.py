@@ -17,7 +17,7 @@ from roboglot.simulation.bodies.schedule import Duty
 
 
 class ServosSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """How many, how far to both sides (rad), how fast."""
+    """Number of servos, their range to both sides (rad), speed and acceleration."""
 
     count: Count
     limit: Positive

@@ -15,7 +15,7 @@ from roboglot.simulation.bodies.quantities import Count, Positive
 
 
 class SensorAdaptersSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """How many with how many ports each; full scale and the voltage from which an input counts as high."""
+    """Number of adapters and of ports each; full scale and threshold of a high input, V."""
 
     count: Count
     ports: Count

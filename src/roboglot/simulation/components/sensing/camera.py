@@ -67,7 +67,7 @@ class _Shot:
 
 
 class Shortfall:
-    """What the log says about a camera that takes fewer pictures than it should."""
+    """Log of a camera that takes fewer pictures than it should."""
 
     def __init__(self, robot: str, rate: float) -> None:
         self._robot, self._rate = robot, rate

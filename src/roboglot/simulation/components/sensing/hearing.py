@@ -119,7 +119,7 @@ async def _logged(listening: Coroutine[None, None, None]) -> None:
 
 
 def own_voice(robot: str) -> bytes:
-    """What a recogniser makes of a robot's voice."""
+    """Return the voiceprint of a robot's own voice."""
     return hashlib.sha256(f"voice of robot {robot}".encode()).digest()
 
 

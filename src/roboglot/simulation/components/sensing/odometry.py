@@ -20,7 +20,7 @@ DRAWN = 64  # ticks whose noise is drawn at once
 
 
 class DescribedNoise(Struct, frozen=True, forbid_unknown_fields=True):
-    """What the robot's maker says of it: see ``OdometryNoise``."""
+    """Noise as the robot's maker describes it: see ``OdometryNoise``."""
 
     still: Positive = USUAL.still
     along: NotNegative = USUAL.along
@@ -73,7 +73,7 @@ class SimulatedOdometry(Odometry):
         return Pose(x, y, yaw) if self._reading is None else self._reading.pose
 
     def _disturbed(self, x: float, y: float, yaw: float, seconds: float) -> tuple[float, float]:
-        """What slip and a jump of an encoder add to the way."""
+        """Return the way with the errors of slip and encoder jumps."""
         section, off = self._section, 0.0
         if section.turn_slip:
             off += section.turn_slip * abs(self._imu.rate) * math.copysign(seconds, self._base.velocity.x)

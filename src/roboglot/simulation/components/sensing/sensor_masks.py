@@ -1,4 +1,4 @@
-"""Which bumpers, cliff sensors and depth cameras are switched off."""
+"""Masks of bumpers, cliff sensors and depth cameras: those that are switched off."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ SENSORS_MAX = 16
 
 
 class Eye(Struct, frozen=True, forbid_unknown_fields=True):
-    """Where a sensor sits on the torso: ahead, left, above the belly (m), turned by yaw and pitch (nose down)."""
+    """Mount of a sensor on the torso: ahead, left, above the belly (m), turned by yaw and pitch (nose down), rad."""
 
     name: Annotated[str, Meta(min_length=1, max_length=30)]
     forward: Offset

@@ -141,7 +141,7 @@ class SimulatedBluetooth(Bluetooth):
         return self._robot.actions.start("bluetooth update", run, resources=[BLUETOOTH], source=source)
 
     def sense(self, stamp: float, _seconds: float) -> None:
-        """Now and then: is the device still there, or there again?"""
+        """Check periodically whether the device is still there, or there again."""
         if self._wanted is None or stamp < self._next:
             return
         self._next = stamp + LOOK
@@ -167,7 +167,7 @@ class SimulatedBluetooth(Bluetooth):
         return self._gadgets.signal(gadget, self._hull.pose.point, self._hull.floor)
 
     def _advertised(self, gadget: GadgetInWorld) -> BluetoothDevice:
-        """What everybody hears of it; more if it is known."""
+        """Return what the gadget advertises; more if it is known."""
         heard = BluetoothDevice(
             gadget.gadget.address, gadget.gadget.name, gadget.gadget.random, round(self._signal(gadget), 1)
         )

@@ -57,7 +57,7 @@ class FirmwareSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedFirmware(Firmware):
-    """What runs is in the record; the offer is the body's description's."""
+    """Firmware of a simulated robot: the record has what runs, the body's description has the offer."""
 
     def __init__(self, section: FirmwareSection, robot: Robot, base: SimulatedBase) -> None:
         self._section, self._robot, self._base = section, robot, base
@@ -243,7 +243,7 @@ class SimulatedFirmware(Firmware):
         )
 
     def sense(self, stamp: float, _seconds: float) -> None:
-        """Now and then: a robot that updates itself, on its dock and with nothing to do, begins to."""
+        """Begin a due update now and then: of a robot that updates itself, docked and idle."""
         if stamp < self._next_look:
             return
         self._next_look = stamp + LOOK_EVERY

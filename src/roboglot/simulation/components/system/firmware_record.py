@@ -1,4 +1,4 @@
-"""What a robot keeps of its firmware over reboots and crashes: in its settings, where it has some."""
+"""Record of a robot's firmware over reboots and crashes: in its settings, where it has some."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ Versions = tuple[str, Mapping[str, str]]
 
 
 class FirmwareRecord:
-    """What is installed, what waits for a reboot, what was downloaded; ``version`` and ``modules`` are the factory's.
+    """Installed, pending and downloaded versions; ``version`` and ``modules`` are the factory's.
 
-    What is put here is safe on disk when the call returns.
+    Values put here are safe on disk when the call returns.
     """
 
     def __init__(self, robot: Robot, version: str, modules: Mapping[str, str]) -> None:

@@ -13,7 +13,7 @@ from roboglot.simulation.bodies.quantities import Count, Positive
 
 
 class PwmPortsSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """How many; duty (0..1) and frequency (Hz) at power-on."""
+    """Number of ports; duty (0..1) and frequency (Hz) at power-on."""
 
     count: Count
     duty: Annotated[float, Meta(ge=0, le=1)]
