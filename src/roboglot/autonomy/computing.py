@@ -1,4 +1,4 @@
-"""Where long computations run: in place in lockstep, so that the same happens every time; otherwise in a thread."""
+"""Long computations: in place in lockstep, so that runs repeat exactly; otherwise in a thread."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ T = TypeVar("T")
 
 
 async def computed(clock: Clock, work: Callable[[], T]) -> T:
-    """What ``work`` returns or raises."""
+    """Return or raise the result of ``work``."""
     if isinstance(clock, LockstepClock):
         return work()
     return await asyncio.to_thread(work)

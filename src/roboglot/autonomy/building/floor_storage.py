@@ -1,4 +1,4 @@
-"""What belongs to one floor of a building, and keeping it on disk while the robot is on another one."""
+"""Storage of one floor's state: kept on disk while the robot is on another one."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(slots=True)
 class Storey:
-    """What belongs to one floor; poses in its map."""
+    """State of one floor; poses in its map."""
 
     map: EvidenceGrid
     home: Pose | None

@@ -52,7 +52,7 @@ class Courier:
 
     @property
     def delivers(self) -> bool:
-        """Whether there ever was an order."""
+        """True once there has been an order."""
         return self._worker is not None
 
     def wake(self) -> None:

@@ -50,7 +50,7 @@ class Round:
                 raise Failed(result.failure)
 
     def _wait(self, number: int) -> float:
-        """How long to wait at a stop, s; 0: until a person ends it."""
+        """Return how long to wait at a stop, s; 0: until a person ends it."""
         waits = self._order.request.waits
         return waits[number] if number < len(waits) else 0.0
 

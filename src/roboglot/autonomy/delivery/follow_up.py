@@ -1,4 +1,4 @@
-"""What follows on an order that failed: who is notified, and how what is left in boxes gets back to the reception."""
+"""Follow-up of failed orders: notifies people, and brings what is left in boxes back to the reception."""
 
 from __future__ import annotations
 

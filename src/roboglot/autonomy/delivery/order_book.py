@@ -31,7 +31,7 @@ OPEN_MAX, ENDED_MAX = 100, 100  # orders
 
 
 class OrderChanges(TypedDict, total=False):
-    """What may change of an order."""
+    """Fields of an order that may change."""
 
     request: OrderRequest
     status: OrderStatus

@@ -1,4 +1,4 @@
-"""Whether a delivering robot may work now: charged, within its hours, and sure of where it is."""
+"""Readiness of a delivering robot: charged, within its hours, and localized."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ RECOVERED = 80  # percent from which the robot works again after it was low
 
 
 class Service(Protocol):
-    """What readiness needs of the service that it belongs to."""
+    """Interface of the delivery service that readiness needs."""
 
     @property
     def policy(self) -> Policy: ...
 
     @property
     def delivers(self) -> bool:
-        """Whether there ever was an order."""
+        """True once there has been an order."""
 
     def wake(self) -> None:
         """Look again at what is to be done."""
@@ -60,28 +60,28 @@ class Readiness:
 
     @property
     def works(self) -> bool:
-        """Whether an order may begin now."""
+        """True if an order may begin."""
         hours = at_work(self._service.policy, self._robot.clock.epoch())
         return hours and not self._low and not self._lost
 
     @property
     def lost(self) -> bool:
-        """Whether it does not know where it is."""
+        """True while the robot has lost its pose in the map."""
         return self._lost
 
     @property
     def parks(self) -> bool:
-        """Whether it rests at its parking place; off work and with a low battery on the dock."""
+        """True if it rests at its parking place; off work and with a low battery it rests on the dock."""
         return not self._low and not self._off_work
 
     @property
     def docked(self) -> bool:
-        """Whether it stands on a dock."""
+        """True while it stands on a dock."""
         return DockContact in self._robot and self._robot[DockContact].docked
 
     @property
     def has_home(self) -> bool:
-        """Whether there is a dock to go to, on this floor or another."""
+        """True if there is a dock to go to, on this floor or another."""
         if Docking not in self._robot:
             return False
         maps = self._robot[Storeys].maps if Storeys in self._robot else None

@@ -151,7 +151,7 @@ class RearDocking(Docking):
         await self._navigation.drive(action, Goal((staging.point,), NavigationOptions(yaw=home.yaw)), _unheard)
 
     async def _look(self, home: Pose) -> Pose | None:
-        """Where base_link would stand docked, by what the lidar sees near ``home``; None if it sees no dock."""
+        """Return base_link's docked pose by the lidar's scans near ``home``; None if they show no dock."""
         radius, scans = self._robot.description.radius, await self._scans()
         front, pose = home.compose(Pose(-radius)), self._robot[Localization].pose
         sightings = [find_dock(points, front.relative_to(pose)) for points in scans]

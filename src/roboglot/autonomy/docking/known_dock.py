@@ -1,7 +1,7 @@
-"""Where the dock is on the map, and what its contacts say of where the robot is. Moves nothing.
+"""Known pose of the dock on the map, and the robot's pose by the dock's contacts. Moves nothing.
 
-A dock whose place is known says where a robot is that has lost its place on it; a pose that someone gives says nothing
-of where the dock is until the map confirms it.
+A dock with a known pose localizes a robot that has lost its own; a pose given by hand moves no dock until the map
+confirms it.
 """
 
 from __future__ import annotations

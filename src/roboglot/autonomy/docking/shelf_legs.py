@@ -35,14 +35,14 @@ SHELVES_MAX = 32  # places where shelves were taken away that are remembered
 
 @dataclass(slots=True)
 class Load:
-    """What is on the jack now, and where things were taken away from (map, m) that the map still shows."""
+    """Load on the jack, and the former places (map, m) of things taken away that the map still shows."""
 
     radius: float = 0.0  # m around base_link that it takes up
     gone: list[NDArray[np.float64]] = field(default_factory=list)  # (n, 2) legs of each
     grid: EvidenceGrid | None = None  # the map that ``gone`` is on
 
     def gone_from(self, grid: EvidenceGrid) -> NDArray[np.float64]:
-        """Where the legs (n, 2) stood that ``grid`` may show and that are no more."""
+        """Return the former places (n, 2) of legs that ``grid`` may still show."""
         return np.concatenate(self.gone) if self.gone and grid is self.grid else np.empty((0, 2))
 
 

@@ -142,7 +142,7 @@ class MarkDocking(TagDocking):
         return self._robot[Odometry].reading.pose
 
     def _end(self, watch: MarkWatch, goal: MarkGoal) -> Pose:
-        """Where base_link is to be in odom, looking at the mark."""
+        """Return base_link's final pose in odom, looking at the mark."""
         assert watch.place is not None
         radius = self._robot.description.radius
         if goal.mark is Mark.SHELF:

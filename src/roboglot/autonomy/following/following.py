@@ -46,7 +46,7 @@ GAP, BRAKING = 0.15, 0.8  # m kept before the hull; m/s2 to brake with
 
 @dataclass(slots=True)
 class _Quarry:
-    """Who is followed, and where they were seen last (odom frame, m; robot time)."""
+    """The person or thing followed, and where it was seen last (odom frame, m; robot time)."""
 
     number: int | None
     place: Point | None = None
@@ -155,7 +155,7 @@ class SightFollowing(Following):
         return start_on_base(self._robot, "follow thing", run, goal=goal, source=source, on_busy=on_busy)
 
     def _see(self, quarry: _Quarry, scan: LaserScan | None) -> None:
-        """Where it is now, by a scan that was not looked at yet."""
+        """Update the place of the thing followed by a new scan."""
         if scan is None or scan.stamp <= quarry.ranged_at or quarry.place is None:
             return
         quarry.ranged_at = scan.stamp

@@ -24,7 +24,7 @@ Points = NDArray[np.float64]
 
 
 class Trail:
-    """Where they walked (odom), the oldest first: nothing stands there."""
+    """Points where they walked (odom), the oldest first: nothing stands there."""
 
     def __init__(self) -> None:
         self._points: list[Point] = []

@@ -1,4 +1,4 @@
-"""Which pose makes the strips that the lidar sees known landmarks. Knows no robot; m and rad."""
+"""Pose by landmarks: the one that lays the strips seen by the lidar on known landmarks. Knows no robot; m and rad."""
 
 from __future__ import annotations
 

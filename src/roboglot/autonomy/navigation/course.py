@@ -1,4 +1,4 @@
-"""What all drives of one robot share: the planner, once it is loaded, and how it is called."""
+"""State shared by all drives of one robot: the planner, once it is loaded, and the calls to it."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ READY_MAX = 180.0  # s that a drive waits for the planner and the first map
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """Where to, and how; ``straight``: in straight lines from goal to goal wherever the hull fits through."""
+    """Goals of a drive and its options; ``straight``: in straight lines between them wherever the hull fits through."""
 
     points: tuple[Point, ...]
     options: NavigationOptions
@@ -72,7 +72,7 @@ class Course:
 
     @property
     def drawn(self) -> Annotations:
-        """What people drew on the map."""
+        """Annotations that people drew on the map."""
         return self.robot[MapAnnotations].current if MapAnnotations in self.robot else Annotations()
 
     def top_speed(self, options: NavigationOptions) -> float:
@@ -123,7 +123,7 @@ class Course:
         return await computed(self.robot.clock, task.lengths)
 
     async def open_floor(self, around: Point) -> tuple[NDArray[np.bool_], Frame]:
-        """Where the hull may stand on known floor, by the map, what is drawn on it and what was seen lately."""
+        """Return the known floor that the hull may stand on, by the map, its annotations and recent sightings."""
         planner = await self.ready()
         task = planner.task(around, (around,), self._slowly(0.0))
         return await computed(self.robot.clock, task.floor)

@@ -38,7 +38,7 @@ CORRECTIONS_MAX = 3
 
 @dataclass(slots=True)
 class _Command:
-    """What the driving action keeps doing, and until when (robot time; inf: for ever)."""
+    """Command that the driving action repeats, and its end (robot time; inf: none)."""
 
     velocity: Twist | WheelSpeeds
     until: float

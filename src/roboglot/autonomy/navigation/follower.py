@@ -66,7 +66,7 @@ class Follower:
 
     @property
     def end(self) -> Point:
-        """Where the route ends."""
+        """End of the route."""
         return self.route.point_at(self.route.length)
 
     def locate(self, pose: Pose) -> None:
@@ -149,5 +149,5 @@ def _nearest(start: Point, end: Point, goal: Point) -> float:
 
 
 def _towards(now: float, goal: float, by: float) -> float:
-    """``now``, brought ``by`` at most closer to ``goal``; slowing down is not limited, the base does that itself."""
+    """Return ``now`` brought closer to ``goal`` by at most ``by``; slowing down is unlimited, the base limits that."""
     return goal if abs(goal) < abs(now) else now + max(-by, min(by, goal - now))

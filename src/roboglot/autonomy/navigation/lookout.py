@@ -1,4 +1,4 @@
-"""What scans say of the way ahead: where something stands in it, what is passed closely, how wide the gap is."""
+"""Lookout along the path ahead by the newest scans: obstacles, close passages, width of gaps."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Lookout:
 
     @property
     def squeeze(self) -> str:
-        """What is to be said of a gap that the hull does not fit through; "" if there is none."""
+        """Message about a gap too narrow for the hull; "" if there is none."""
         needed = 2.0 * (self._planner.radius + self._tuning.touch_margin)
         return f": a gap is {self.gap:.2f} m wide, {needed:.2f} m are needed" if self.gap < needed else ""
 

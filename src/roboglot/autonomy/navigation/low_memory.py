@@ -38,5 +38,5 @@ class LowMemory:
         )
 
     def seen(self, grid: EvidenceGrid) -> NDArray[np.float32]:
-        """When something was seen last in each of the map's cells (s); 0: never."""
+        """Return the time (s) of the last sighting in each of the map's cells; 0: never."""
         return self._seen.of(grid)

@@ -1,4 +1,4 @@
-"""What stands around below or above the lidar's plane, as depth camera and time-of-flight sensors see it.
+"""Obstacles below or above the lidar's plane, by depth camera and time-of-flight sensors.
 
 Floors and ramps are no obstacles: only what rises more steeply than a wheel could climb, and higher than a foot steps.
 """
@@ -57,7 +57,7 @@ class LowSight:
         return LowView(obstacles, np.concatenate([floor for _, floor in views]))
 
     def _in_image(self, image: DepthImage) -> tuple[Points, Points]:
-        """What stands and what is floor in the picture of a depth camera, which may be slower than who looks."""
+        """Return obstacle and floor points of a depth image; a slow camera's image is sorted only once."""
         if self._last is None or self._last[0] is not image:
             mount, depths = np.array((image.mount.x, image.mount.y, image.mount.z)), image.depths.astype(np.float64)
             self._last = image, self._sort_out(image.rays, depths, mount, self._height, self._radius)

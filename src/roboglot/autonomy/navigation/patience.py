@@ -1,4 +1,4 @@
-"""When a drive gives up: it gets no closer, its wheels turn in vain, or it does not know where it is."""
+"""Patience of a drive: it gives up without progress, with wheels that turn in vain, or when lost."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ CRUISE_SHARE = 0.7  # of the top speed that is driven on the whole
 
 
 class State(Enum):
-    """What the pilot does; each leads to the next, ARRIVING back to FOLLOWING while it stands too far off."""
+    """State of the pilot; each leads to the next, ARRIVING back to FOLLOWING while it stands too far off."""
 
     FOLLOWING = auto()
     GIVING_WAY = auto()

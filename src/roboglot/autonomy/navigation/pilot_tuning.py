@@ -10,7 +10,7 @@ from roboglot.model.components.motion.navigation import Tracks
 
 @dataclass(frozen=True, slots=True)
 class PilotTuning:
-    """How patient, how careful and how exact a drive is. The defaults suit bodies of 0.2 to 0.35 m radius."""
+    """Thresholds of patience, caution and precision of a drive. The defaults suit bodies of 0.2 to 0.35 m radius."""
 
     # Patience
     patience: float = 30.0  # without getting closer before it gives up
@@ -69,5 +69,5 @@ class PilotTuning:
         return self.there if holonomic else max(self.there, min(self.there_ahead, 0.6 * tolerance))
 
     def corrections_for(self, *, holonomic: bool) -> int:
-        """How often it drives to the end anew: one that cannot correct sideways tries more often."""
+        """Return how often it drives to the end anew: a base that cannot correct sideways tries more often."""
         return self.corrections_max if holonomic else self.corrections_ahead_max

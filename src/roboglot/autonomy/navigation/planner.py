@@ -53,7 +53,7 @@ ROUGH_CELLS = 16_000  # of the rough grid on which many ways are measured at onc
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What to plan, on copies of the arrays, so that it can be done in a thread; positions from the grid's corner."""
+    """Planning task on copies of the arrays, so that a thread can solve it; positions from the grid's corner."""
 
     evidence: NDArray[np.int16]
     seen: NDArray[np.float32]
@@ -102,7 +102,7 @@ class Task:
         return route
 
     def _are_known(self, goals: tuple[Point, ...]) -> bool:
-        """Whether all of them lie on floor that the map knows."""
+        """Return whether all of them lie on floor that the map knows."""
         return all(bool(self.evidence[self._cell(goal)] < 0) for goal in goals)
 
     def _check_near(self) -> None:
@@ -149,7 +149,7 @@ class Task:
         return np.isfinite(cost) & (self.evidence < 0), frame
 
     def cost(self, rules: Layers | None) -> NDArray[np.float32]:
-        """What each cell costs the hull, inf where it must not be."""
+        """Return each cell's cost for the hull, inf where it must not be."""
         if rules:
             self.seen[rules.closed] = np.inf  # what must not be entered stands there for ever
         cost: NDArray[np.float32] = inflated_cost(
@@ -218,7 +218,7 @@ class Task:
         return path
 
     def _too_narrow(self, first: tuple[int, int], last: tuple[int, int]) -> str:
-        """How wide the gap is that keeps this hull from a way that a thinner one would have; "" if there is none."""
+        """Return a message on the gap that stops this hull but not a thinner one; "" if there is none."""
         reach = self.radius + REACH
         cost = inflated_cost(self.evidence, self.seen, self.since, RESOLUTION, THIN, reach, NEAR_COST, UNKNOWN_COST)
         path = shortest_path(cost, *first, *last)
@@ -278,7 +278,7 @@ class Planner:
         return self._scans.observe(grid, evidence, scan, pose, now)
 
     def forget_soon(self, places: Sequence[Point], now: float) -> None:
-        """What was seen around ``places`` is about to be elsewhere: remember it for a moment only."""
+        """Shorten the memory of obstacles around ``places``, which are about to move."""
         grid, until = self._belief.map, max(now - OBSTACLE_SECONDS + MOVING_SECONDS, 1e-3)
         seen, frame = self._scans.seen(grid), Frame(grid.corner, grid.evidence.shape)
         for place in places:
@@ -317,7 +317,7 @@ class Planner:
         return float(free_way(path, points, pose.x, pose.y, self.radius + margin))
 
     def task(self, start: Point, goals: Sequence[Point], terms: Terms) -> Task:
-        """What is to be solved, on copies of the map and of what was seen."""
+        """Return the planning task, on copies of the map and of the obstacles seen."""
         evidence, seen, trodden, corner = self._window(start, *goals)
         if not (terms.obstacles and terms.things):
             evidence = without_things(evidence, THING_CELLS)

@@ -1,4 +1,4 @@
-"""Where to go: the first route of a drive, and new ones when the way is blocked, distrusted or left."""
+"""Routes of a drive: the first one, and new ones when the path is blocked, distrusted or left."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Replanner:
         self.distrust()
 
     def passed(self, follower: Follower) -> int:
-        """How many goals of the drive have been passed."""
+        """Return the number of the drive's goals that have been passed."""
         return self._first + follower.passed
 
     def begin_again(self, follower: Follower) -> None:

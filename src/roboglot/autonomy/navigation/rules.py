@@ -1,4 +1,4 @@
-"""What people drew on the map, as layers of a planning grid: closed cells, cost beside the tracks, speeds in areas.
+"""Annotations of the map as layers of a planning grid: closed cells, cost beside the tracks, speeds in areas.
 
 Knows no robot and no kernel.
 """
@@ -39,7 +39,7 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """Where a grid lies: ``corner`` of cell (0, 0) in map, rows and columns."""
+    """Frame of a grid: ``corner`` of cell (0, 0) in map, rows and columns."""
 
     corner: Point
     shape: tuple[int, int]
@@ -117,7 +117,7 @@ class Layers:
 
 
 def layers(drawn: Annotations, frame: Frame, tracks: Tracks, start: Point, goals: tuple[Point, ...]) -> Layers | None:
-    """What holds for one drive; None if nothing does."""
+    """Return the layers that hold for one drive; None if there are none."""
     lines = drawn.lines_of(LineKind.TRACK) if tracks is not Tracks.FREE else ()
     if not (drawn.areas or drawn.lines_of(LineKind.WALL) or lines):
         return None

@@ -49,7 +49,7 @@ class ScanMemory:
         self._noted, self._count = np.empty((NOTED_MAX, 2), np.int32), 0
 
     def seen(self, grid: EvidenceGrid) -> NDArray[np.float32]:
-        """When something was seen last in each of the map's cells (s); 0: never, or rays have passed since."""
+        """Return the time (s) of the last sighting in each of the map's cells; 0: never, or rays have passed since."""
         return self._seen.of(grid)
 
     def observe(

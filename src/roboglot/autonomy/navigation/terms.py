@@ -16,10 +16,10 @@ Shunned = Sequence[tuple[NDArray[np.float64], float]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Terms:
-    """How to plan: the time, the robot's limits (m/s, m/s2), how near a goal counts (m), and what is heeded.
+    """Terms of a plan: the time, the robot's limits (m/s, m/s2), the goal's tolerance (m), and what is heeded.
 
-    ``obstacles`` False: the map, and what is ``drawn`` on it, alone. ``things`` False as well: what stands alone on the
-    map does not count either. It may be a person whom a robot that woke up beside them took for a pillar. ``shunned``:
+    ``obstacles`` False: the map, and what is ``drawn`` on it, alone. ``things`` False as well: single things on the map
+    do not count either; one may be a person whom a robot that woke up beside them took for a pillar. ``shunned``:
     points (n, 2; map) and the metres around them where others are about to drive.
     """
 

@@ -1,4 +1,4 @@
-"""When a scan is worth adding to the map, and adding it."""
+"""Adding of scans to the map, of those that are worth it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Adding:
         self._added_at = -math.inf
 
     def is_due(self, pose: Pose, stamp: float) -> bool:
-        """Whether a scan taken at ``pose`` adds something new."""
+        """Return whether a scan taken at ``pose`` adds something new."""
         if not self._belief.map.scans or self._added is None:
             return True
         return _is_apart(pose, self._added, ADD_AFTER, ADD_AFTER_YAW) or stamp - self._added_at >= ADD_PERIOD - 1e-6
@@ -52,7 +52,7 @@ class Adding:
         self._added = self._filled = pose
 
     def _is_new_ground(self, pose: Pose) -> bool:
-        """Whether the gaps between rays are worth clearing here: they need not be at every step."""
+        """Return whether the gaps between rays are worth clearing here: not at every step."""
         last = self._filled if self._belief.map.scans > 1 else None
         if last and not _is_apart(pose, last, FILL_AFTER, FILL_AFTER_YAW):
             return False

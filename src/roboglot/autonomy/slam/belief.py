@@ -1,4 +1,4 @@
-"""Where the robot believes to be, and in what map: the state that localization, mapping and their estimator share."""
+"""The robot's believed pose and its map: the state that localization, mapping and their estimator share."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""What the map says of a scan, point by point, and whether that makes a place sure. Needs the kernels.
+"""Certainty of a pose: a scan is compared with the map point by point. Needs the kernels.
 
-People and other things that the map does not have hide some of its walls, but no ray of theirs passes through one: the
-points that hang together in the midst of free floor are set aside, and the rest has to fit all the closer.
+People and other things that the map lacks hide some of its walls, but no ray of theirs passes through one: points that
+hang together in the midst of free floor are set aside, and the rest has to fit all the closer.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ class Look:
     crossing: float
 
     def is_sure(self, sigma: float) -> bool:
-        """Whether it is the place, not one that looks like another which the map does not have.
+        """Return whether this is the pose, and not a similar-looking place that the map lacks.
 
         ``sigma``: m, of the match in its worst direction.
         """
@@ -93,21 +93,21 @@ class Look:
 
     @property
     def is_undisputed(self) -> bool:
-        """Whether not one ray speaks against the place, which makes up for a map that was seen only for a moment."""
+        """Return whether no ray contradicts the pose, which makes up for a map that was seen only for a moment."""
         return self.aside + self.hidden + self.floating == 0.0 and self.close >= CROWDED_CLOSE
 
     @property
     def is_exact(self) -> bool:
-        """Whether nothing at all speaks against the place."""
+        """Return whether nothing at all contradicts the pose."""
         return self.exact >= EXACT and self.hidden <= EXACT_HIDDEN and self.crossing <= SURE_CROSSING
 
     def is_outdone_by(self, other: Look) -> bool:
-        """Whether ``other`` is exact and this place is not nearly so."""
+        """Return whether ``other`` is exact and this place is not nearly so."""
         return other.is_exact and self.exact < other.exact - OUTDONE
 
 
 def supported(grid: EvidenceGrid, scan: ScanPoints, pose: Pose) -> Support:
-    """What the map says of ``scan`` if it was taken with base_link at ``pose``."""
+    """Return the map's support for ``scan`` taken with base_link at ``pose``."""
     said = _said(grid, scan, pose, scan.nearby(JUDGED_POINTS_MAX))
     fitting, floating = (int(np.count_nonzero(said == kind)) for kind in (FITTING, FLOATING))
     hidden = int(np.count_nonzero((said == HIDDEN) | (said == CROSSING)))
@@ -115,7 +115,7 @@ def supported(grid: EvidenceGrid, scan: ScanPoints, pose: Pose) -> Support:
 
 
 def look_at(grid: EvidenceGrid, scan: ScanPoints, pose: Pose) -> Look:
-    """What all points of ``scan`` say of ``pose``."""
+    """Return the agreement of all points of ``scan`` with ``pose``."""
     points, corner = scan.nearby(ALL_POINTS), grid.corner
     said = _said(grid, scan, pose, points)
     sensor = np.array((scan.sensor.x, scan.sensor.y))
@@ -143,7 +143,7 @@ def look_at(grid: EvidenceGrid, scan: ScanPoints, pose: Pose) -> Look:
 
 
 def is_well_painted(grid: EvidenceGrid, scan: ScanPoints, pose: Pose) -> bool:
-    """Whether nearly all of ``scan`` lies on surfaces that many scans have shown, not on what may drive along."""
+    """Return whether nearly all of ``scan`` lies on surfaces shown by many scans, not on what may drive along."""
     points, corner = np.ascontiguousarray(scan.points[:: max(1, len(scan.points) // PAINTED_POINTS)]), grid.corner
     sensor = np.array((scan.sensor.x, scan.sensor.y))
     x, y = pose.x - corner.x, pose.y - corner.y
@@ -161,7 +161,7 @@ def _said(grid: EvidenceGrid, scan: ScanPoints, pose: Pose, points: NDArray[np.f
 
 
 def _things(points: NDArray[np.float64], floating: NDArray[np.intp]) -> list[list[int]]:
-    """Which of the ``floating`` points (numbers) hang together as things of a person's size."""
+    """Return groups of ``floating`` points (numbers) that hang together as things of a person's size."""
     groups: list[list[int]] = []
     for number in floating.tolist():
         last = groups[-1][-1] if groups else -1

@@ -53,9 +53,9 @@ class WheelWitness:
     def contest(
         self, grid: EvidenceGrid, scan: ScanPoints, before: Pose, best: Match, prior: NDArray[np.float64], step: Pose
     ) -> Match | None:
-        """Where the wheels put the robot, if they are believed rather than the ``best`` match; else None.
+        """Return the pose by the wheels, if they are believed rather than the ``best`` match; else None.
 
-        They say ``before`` (``prior``: its covariance) after the newest ``step`` (base_link before it).
+        Odometry says ``before`` (``prior``: its covariance) after the newest ``step`` (base_link before it).
         """
         way = math.hypot(step.x, step.y)
         if way > WAY_MAX or abs(step.yaw) > TURN_MAX:
@@ -77,7 +77,7 @@ class WheelWitness:
 def contested(
     grid: EvidenceGrid, scan: ScanPoints, before: Pose, best: Match, prior: NDArray[np.float64], way: float
 ) -> Match | None:
-    """Where odometry puts the robot, if the scan's points do not clearly speak for the ``best`` match; else None.
+    """Return the pose by odometry, if the scan's points do not clearly speak for the ``best`` match; else None.
 
     Odometry says ``before`` (``prior``: its covariance) after ``way`` m.
     """
@@ -103,7 +103,7 @@ def contested(
 
 
 def _off(grid: EvidenceGrid, scan: ScanPoints, points: NDArray[np.float64], pose: Pose) -> NDArray[np.float64]:
-    """How far (m) each of ``points`` lies off the map's surfaces with base_link at ``pose``."""
+    """Return each point's distance (m) from the map's surfaces with base_link at ``pose``."""
     corner, sensor = grid.corner, np.array((scan.sensor.x, scan.sensor.y))
     x, y = pose.x - corner.x, pose.y - corner.y
     off: NDArray[np.float64] = gaps(grid.surface, grid.evidence, points, x, y, pose.yaw, sensor, RESOLUTION)[:, 0]

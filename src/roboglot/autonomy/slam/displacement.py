@@ -33,7 +33,7 @@ class DisplacementWatch:
         self._quiet_until = stamp + QUIET
 
     def check(self, stamp: float, before: Pose, seen: Pose, prior: NDArray[np.float64], way: float) -> float | None:
-        """How far (m) it was displaced lately, once; None if it was not.
+        """Return once how far (m) the robot was displaced lately; None if it was not.
 
         Odometry says ``before``, the scan says ``seen``; ``prior``: variances before the match; ``way``: m driven since
         the last one.

@@ -29,7 +29,7 @@ PER_STEP = 8  # evidence that makes one step of the int8 map
 
 
 class EvidenceGrid:
-    """What the lidar saw, cell by cell; see ``roboglot.kernels.occupancy`` for the arrays' meaning."""
+    """Map of the lidar's evidence by cells; see ``roboglot.kernels.occupancy`` for the arrays' meaning."""
 
     def __init__(self) -> None:
         self.evidence: NDArray[np.int16] = np.zeros((0, 0), np.int16)
@@ -55,7 +55,7 @@ class EvidenceGrid:
         return hashlib.blake2b(place.tobytes() + self.evidence.tobytes(), digest_size=8).hexdigest()
 
     def kept(self, name: str, made: Callable[[], T]) -> T:
-        """What ``made`` makes of the map, kept until the map changes."""
+        """Return the result of ``made``, cached until the map changes."""
         scans, value = self._kept.get(name, (-1, None))
         if scans != self.scans:
             value = made()
@@ -141,12 +141,12 @@ def _holds(interval: tuple[int, int], begin: int, end: int) -> bool:
 
 
 def is_too_large(height: int, width: int) -> bool:
-    """Whether a map cannot have so many cells."""
+    """Return whether a map cannot have so many cells."""
     return max(height, width) > GRID_MAX or height * width > CELLS_MAX
 
 
 def _side(other: int) -> int:
-    """How many cells one side may have beside the ``other``."""
+    """Return the number of cells that one side may have beside the ``other``."""
     return min(GRID_MAX, CELLS_MAX // max(1, other))
 
 

@@ -1,4 +1,4 @@
-"""What a robot sees while its place in the map is not known: a map of its own, joined when the place is known again."""
+"""Excursions: a map of its own while the pose in the old one is lost, joined when it is found again."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class Excursions:
         self._map = belief.map
 
     def forget(self) -> None:
-        """What comes next hangs together with nothing before: there were no scans for a while."""
+        """Start anew, unconnected with anything before: there were no scans for a while."""
         self._now = None
 
     def take(self, scan: ScanPoints, odometry: Pose, step: Pose, turn: float, *, sure: bool) -> None:

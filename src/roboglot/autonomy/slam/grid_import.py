@@ -68,7 +68,7 @@ def _resampled(grid: OccupancyGrid) -> tuple[NDArray[np.int8], int, int]:
 
 
 def _surfaces(cells: NDArray[np.int8]) -> NDArray[np.float32]:
-    """Where the surfaces are, and towards which side, as ``kernels.occupancy`` has it."""
+    """Return the surfaces and the sides that they face, as ``kernels.occupancy`` has it."""
     height, width = cells.shape
     free = np.pad(cells < 0, 1).astype(np.float32)
     towards_x, towards_y = np.zeros((2, height, width), np.float32)

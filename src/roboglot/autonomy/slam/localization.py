@@ -122,7 +122,7 @@ class LidarLocalization(Localization):
         raise NotLocalized(f"{why} after {AROUND_SECONDS:g} s of looking around")
 
     async def _look(self, region: Region | None) -> tuple[list[Match], Pose]:
-        """Where the newest scan may have been taken, and odometry then."""
+        """Return candidate poses of the newest scan, and odometry at its time."""
         if self.estimator is None or (search := self.estimator.placing(region)) is None:
             return [], ORIGIN
         odometry, work = search

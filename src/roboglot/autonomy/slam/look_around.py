@@ -59,7 +59,7 @@ async def settle(clock: Clock, estimator: Slam, belief: Belief) -> bool:
 
 
 def _matched(belief: Belief, newest: ScanTaken) -> Match | None:
-    """Where the scan fits around the believed place; None if it does not."""
+    """Return the scan's match around the believed pose; None if it does not fit."""
     scan, expected = belief.reader.read(newest.scan), belief.map_to_odom.compose(newest.odometry)
     start = search(belief.map, scan, expected, WIDE)
     found = max((fit(belief.map, scan, pose, FREE) for pose in (expected, start)), key=lambda match: match.fit)
@@ -118,7 +118,7 @@ async def _watched(robot: Robot, move: Action, goes: Callable[[LaserScan], bool]
 
 
 def room(scan: ScanPoints, yaw: float, radius: float) -> float:
-    """How far (m) the hull can go towards ``yaw`` (base_link) before what ``scan`` shows; inf if nothing is there."""
+    """Return how far (m) the hull can go towards ``yaw`` (base_link) by ``scan``; inf if nothing is there."""
     along = scan.points @ np.array([math.cos(yaw), math.sin(yaw)])
     aside = np.abs(scan.points @ np.array([-math.sin(yaw), math.cos(yaw)]))
     ahead = along[(aside < radius + BESIDE) & (along > 0.0)]

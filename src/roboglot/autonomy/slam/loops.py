@@ -93,7 +93,7 @@ class LoopCloser:
 
     @property
     def keyframes(self) -> list[Pose]:
-        """Where all keyframes are now, in map."""
+        """Current poses of all keyframes, in map."""
         return [frame.pose for frame in self._frames]
 
     @property
@@ -143,7 +143,7 @@ class LoopCloser:
 
     @property
     def straightening(self) -> bool:
-        """Whether a closed loop's work is not done yet."""
+        """True while the work on a closed loop goes on."""
         return self._work is not None and self._belief.map is self._map
 
     def _keep(self, frame: Keyframe) -> int:
@@ -155,7 +155,7 @@ class LoopCloser:
         return number
 
     def _is_new(self, pose: Pose) -> bool:
-        """Whether a keyframe is needed here; goes over to an old one that will do."""
+        """Return whether a keyframe is needed here; goes over to an old one that will do."""
         if not self._frames:
             return True
         last = self._frames[self._last].pose
@@ -223,7 +223,7 @@ class LoopCloser:
         return None if found is None else self._sighting(near, number, found)
 
     def _found(self, grid: EvidenceGrid, frame: Keyframe, reach: float) -> Pose | None:
-        """Where ``frame`` was taken as ``grid`` has it, within ``reach`` m of the belief, if that is certain."""
+        """Return the pose of ``frame`` in ``grid``, within ``reach`` m of the belief, if it is certain."""
         x, y = frame.pose.x, frame.pose.y
         found = place(grid, frame.scan, Region(x - reach, y - reach, x + reach, y + reach))
         return found.pose if found is not None and _is_certain(found, frame.pose) else None
@@ -233,7 +233,7 @@ class LoopCloser:
         return Sighting(first, second, between, found.compose(self._frames[second].pose.inverse()))
 
     def _local_map(self, middle: int) -> EvidenceGrid:
-        """What was seen from around keyframe ``middle``, in map."""
+        """Return a map of the scans around keyframe ``middle``, in map."""
         grid, centre = EvidenceGrid(), self._frames[middle].pose
         for frame in self._frames[max(0, middle - AROUND) : middle + AROUND + 1]:
             if frame.pose.distance_to(centre) < LOCAL_REACH:
@@ -241,7 +241,7 @@ class LoopCloser:
         return grid
 
     def _agree(self, one: Sighting, other: Sighting) -> bool:
-        """Whether both move the place where the robot is now to the same."""
+        """Return whether both corrections move the robot's place to the same one."""
         here = self._frames[other.second].pose
         a, b = one.correction.compose(here), other.correction.compose(here)
         return a.distance_to(b) < AGREED and abs(wrap_angle(a.yaw - b.yaw)) < AGREED_YAW
@@ -262,12 +262,12 @@ class LoopCloser:
 
 
 def _size(correction: Pose, here: Pose) -> tuple[float, float]:
-    """How far the correction moves ``here``: m, rad."""
+    """Return how far the correction moves ``here``: m, rad."""
     return correction.compose(here).distance_to(here), abs(correction.yaw)
 
 
 def _is_certain(found: Match, believed: Pose) -> bool:
-    """Whether there is but one place where the scan fits, and well."""
+    """Return whether the scan fits in only one place, and well."""
     return (
         found.agreement >= AGREEMENT
         and found.known >= KNOWN_SHARE * found.points

@@ -87,7 +87,7 @@ class Candidate:
 
     @property
     def is_place(self) -> bool:
-        """Whether it fits well enough to be compared with others, people in the way or not."""
+        """True if it fits well enough to be compared with others, people in the way or not."""
         match, said, look = self.match, self.said, self.look
         if match.fit < POINTS_MIN or said.hidden > PLACE_HIDDEN * said.points:
             return False
@@ -147,7 +147,7 @@ def search(grid: EvidenceGrid, scan: ScanPoints, centre: Pose, window: tuple[flo
 
 
 def place(grid: EvidenceGrid, scan: ScanPoints, region: Region | None) -> Match | None:
-    """Where in the whole map (or in ``region`` of it) the scan fits, from the scan alone; None if nowhere.
+    """Return where in the whole map (or in ``region``) the scan fits, from the scan alone; None if nowhere.
 
     The best of the ``places``, whether or not others look like it.
     """

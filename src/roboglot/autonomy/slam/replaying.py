@@ -21,7 +21,7 @@ RADIUS = 0.3  # m, of a robot whose hull is not known
 
 @dataclass(frozen=True, slots=True)
 class MappedDrive:
-    """What came of it; ``seconds``: processor time of each scan, ``qualities``: 0..1 of each, ``news``: what happened.
+    """Result of a replay; ``seconds`` of processor time and ``qualities`` (0..1) of each scan, ``news``: its events.
 
     ``noise``: odometry's learnt noise of way and yaw, as multiples of what was assumed.
     """
@@ -34,7 +34,7 @@ class MappedDrive:
     noise: tuple[float, float]
 
     def count(self, kind: type[Event]) -> int:
-        """How many events of one kind there were."""
+        """Return the number of events of one kind."""
         return sum(isinstance(event, kind) for event in self.news)
 
 

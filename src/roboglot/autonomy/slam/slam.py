@@ -135,7 +135,7 @@ class Slam:
             self._straighten(self._newest.odometry, self._newest.stamp)
 
     def trajectory(self) -> list[TrajectoryPoint]:
-        """Where the scans were taken since the map was begun, as the map is now."""
+        """Poses of the scans since the map was begun, corrected as the map is."""
         return self._trajectory.points(self._loops.keyframes)
 
     def _jumped(self, event: PoseJumped) -> None:
@@ -147,7 +147,7 @@ class Slam:
 
     @property
     def started(self) -> bool:
-        """Whether a scan has been compared with the map."""
+        """True once a scan has been compared with the map."""
         return self._matched_odometry is not None
 
     def believe(self, found: Match, odometry: Pose, means: RecoveryMeans = RecoveryMeans.WHOLE_MAP) -> None:
@@ -202,7 +202,7 @@ class Slam:
         return self._belief.search or self._belief.lost is not None or not self.whereabouts.sure
 
     def _is_held(self, scan: LaserScan, odometry: Pose) -> bool:
-        """Whether the wheels turn in vain; the belief stays where it was then."""
+        """Return whether the wheels turn in vain; the belief stays where it was then."""
         belief, last = self._belief, self._matched_odometry or odometry
         before = belief.map_to_odom.compose(last)
         stayed = self._slip.check(scan, odometry, belief.map_to_odom.compose(odometry))
@@ -252,7 +252,7 @@ class Slam:
             self._robot.events.publish(PoseJumped(stamp=stamp, pose=best.pose))
 
     def _contested(self, best: Match, scan: ScanPoints, before: Pose, prior: NDArray[np.float64]) -> Match | None:
-        """Where odometry puts the robot while things that move around it would mislead the match."""
+        """Return the pose by odometry while things that move around would mislead the match."""
         if self._belief.search or self._belief.in_doubt:  # scans that only fit badly are no reason to ask it less
             self._witness.forget()
             return None
@@ -262,7 +262,7 @@ class Slam:
         return driven
 
     def _check_displaced(self, before: Pose, best: Match, prior: NDArray[np.float64], stamp: float) -> float | None:
-        """How far something else than its wheels has moved the robot; None if nothing did, as far as scans tell."""
+        """Return how far (m) something other than its wheels moved the robot; None if scans show nothing."""
         if self._belief.in_doubt or not _is_sure(best):
             self._displacement.forget(stamp)
             return None
@@ -310,7 +310,7 @@ class Slam:
         self._search = compute_soon(self._robot.clock, lambda: places(grid, scan, None), then)
 
     def _coarse(self, scan: ScanPoints, before: Pose, stamp: float) -> Pose:
-        """Where to begin to match: found by a search when odometry may be wronger than a match can mend."""
+        """Return the pose to begin the match at: found by a search when odometry may be too far off."""
         if self._belief.lost is not None and stamp - self._looked_at < LOST_PERIOD:
             return before
         x, y, yaw = (math.sqrt(self._belief.covariance[k, k]) for k in range(3))
@@ -338,7 +338,7 @@ class Slam:
 
     @property
     def _may_add(self) -> bool:
-        """Whether the newest scan may be added to the map."""
+        """Return whether the newest scan may be added to the map."""
         if not self._belief.map.scans or not self._belief.localizing:
             return True
         fits = self._agreement >= AGREEMENT_TO_MAP or self._known <= NEW_GROUND
@@ -359,5 +359,5 @@ class Slam:
 
 
 def _is_sure(best: Match) -> bool:
-    """Whether an error there is odometry's: otherwise, what is wrong may be the match."""
+    """Return whether an error there is odometry's: otherwise, the match may be wrong."""
     return best.agreement >= TRUSTED and best.known >= KNOWN_SURE * best.points

@@ -1,4 +1,4 @@
-"""Where each scan was taken, kept relative to keyframes: when the map is straightened, the whole way is with it."""
+"""Poses of all scans, kept relative to keyframes: when the map is straightened, the whole way is with it."""
 
 from __future__ import annotations
 

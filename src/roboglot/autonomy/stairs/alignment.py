@@ -124,14 +124,14 @@ class _Approach:
         return True
 
     def _place_before(self, edge: StepEdge) -> Pose:
-        """Where to stand, base_link: straight before the edge, with enough of it to both sides as far as it is seen."""
+        """Return the pose to stand at, base_link: straight before the edge, amid as much of it as is seen."""
         aside = (min(edge.left, SIDE) - min(edge.right, SIDE)) / 2
         if abs(edge.foot.yaw) > SQUARE or abs(aside) < ASIDE:
             aside = 0.0
         return edge.foot.compose(Pose(-self._robot.description.radius - BEFORE, aside))
 
     def _left(self) -> Pose:
-        """What is left to go, base_link."""
+        """Return the rest of the way, base_link."""
         left = self._goal.relative_to(self._odometry.reading.pose)
         return Pose(left.x, left.y, wrap_angle(left.yaw))
 

@@ -124,7 +124,7 @@ def _fit(points: Points) -> Pose:
 
 
 def _across(points: Points, line: Pose) -> tuple[Points, Points]:
-    """How far behind the line, and how far to the left of its foot, each point lies."""
+    """Return each point's distance behind the line, and to the left of its foot, m."""
     c, s = math.cos(line.yaw), math.sin(line.yaw)
     x, y = points[:, 0] - line.x, points[:, 1] - line.y
     return c * x + s * y, c * y - s * x
@@ -160,14 +160,14 @@ def _parting(floor: Points, beyond: Points) -> Pose | None:
 
 
 def _wrong_sides(floor: Points, beyond: Points) -> NDArray[np.int64]:
-    """How many points lie on the wrong side of each line, by TURNS and AWAY."""
+    """Return the number of points on the wrong side of each line, by TURNS and AWAY."""
     floor_before = np.cumsum(_counts(floor), axis=1)
     beyond_before = np.cumsum(_counts(beyond), axis=1)
     return len(floor) - floor_before + beyond_before
 
 
 def _counts(points: Points) -> NDArray[np.int64]:
-    """How many points lie how far away along each of TURNS, in steps of AWAY."""
+    """Return the number of points by distance along each of TURNS, in steps of AWAY."""
     along = points @ np.stack((_COS, _SIN))
     cells = np.clip(np.ceil((along - AWAY[0]) / _CELL), 0, len(AWAY) - 1).astype(np.int64)
     cells += len(AWAY) * np.arange(len(TURNS))

@@ -1,4 +1,4 @@
-"""What a robot's eyes see of the ground ahead, gathered over some looks while it moves. Knows no stairs."""
+"""View of the ground ahead, gathered from several looks of the robot's eyes while it moves. Knows no stairs."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ class StairSight:
 
 
 def _through_zones(robot: Robot) -> tuple[float, Points, Points] | None:
-    """What the time-of-flight sensors that look ahead see: when, points, and where rays passed the floor's plane."""
+    """Return time, points and crossings with the floor's plane of the time-of-flight sensors that look ahead."""
     stamp, points, passed = math.inf, [], []
     eyes = robot[TimeOfFlight]
     for name in eyes.names:

@@ -1,4 +1,4 @@
-"""What a robot tells others by radio of where it is and goes next, and what it hears from them."""
+"""Announcements by radio: the robot's pose and next metres to others, and theirs to it."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Announcer:
         return self._belief.frame if speaks else ""
 
     def heard(self, stamp: float) -> list[Announcement]:
-        """What others tell that is new, near, and of the same map."""
+        """Return others' announcements that are new, near, and of the same map."""
         frame = self.frame
         if not frame:
             return []
@@ -53,7 +53,7 @@ class Announcer:
         ]
 
     def announcement(self, stamp: float) -> Announcement:
-        """What it tells now."""
+        """Return the robot's current announcement."""
         robot, belief = self._robot, self._belief
         return Announcement(
             robot=robot.id,

@@ -1,4 +1,4 @@
-"""What moves around the robot, by its own lidar: echoes that the map does not explain, followed from scan to scan.
+"""Moving things around the robot, by its own lidar: echoes that the map does not explain, tracked over scans.
 
 Knows no robot and no radio; needs the kernels. All positions are in map, m.
 """
@@ -94,7 +94,7 @@ class MoverTracker:
 
 
 def _expected(movers: Sequence[Mover], x: float, y: float, stamp: float) -> Mover | None:
-    """Which of them has come here."""
+    """Return the mover that is expected to be here."""
     best, found = SAME, None
     for mover in movers:
         seconds = stamp - mover.stamp

@@ -1,4 +1,4 @@
-"""Where two robots cannot pass each other, by the map: doors, corridors, gaps. Needs the kernels."""
+"""Narrow places of the map, in which two robots cannot pass each other: doors, corridors, gaps. Needs the kernels."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class NarrowPlaces:
         self._first, self._narrow = (0, 0), np.zeros((0, 0), bool)
 
     def at(self, grid: EvidenceGrid, points: NDArray[np.float64], now: float) -> NDArray[np.bool_]:
-        """Which of ``points`` (n, 2; map; the first is where the robot is) lie in one.
+        """Return which of ``points`` (n, 2; map; the first is the robot's) lie in a narrow place.
 
         No disc as wide as two robots fits there into the free floor.
         """

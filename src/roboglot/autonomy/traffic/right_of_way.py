@@ -1,7 +1,7 @@
-"""Who goes first where robots meet: by what they announce, where they use the same map; else by what the lidar sees.
+"""Right of way where robots meet: by their announcements, if they use the same map; else by what the lidar sees.
 
-First goes one that is where two cannot pass each other, then who has more priority, then the name decides. All
-positions are in map, m.
+A robot inside a narrow place goes first, then one of higher priority, then the name decides. All positions are in map,
+m.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ Points = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Way:
-    """Where another one goes next: ``points`` (n, 2) every STEP or so, from where it is; ``radius`` of its hull."""
+    """Next metres of another robot: ``points`` (n, 2) every STEP or so, from where it is; ``radius`` of its hull."""
 
     points: Points
     speed: float
@@ -47,7 +47,7 @@ class Way:
 
     @property
     def seconds(self) -> Points:
-        """When it comes to each point, from now on."""
+        """Times from now at which it comes to each point, s."""
         steps = np.hypot(*np.diff(self.points, axis=0, prepend=self.points[:1]).T)
         times: Points = np.cumsum(steps) / max(self.speed, SLOW)
         return times
@@ -79,7 +79,7 @@ class Meeting:
 
 
 def rank(announcement: Announcement) -> tuple[bool, int, str]:
-    """Who has the smaller one goes first."""
+    """Return the rank of a robot; the smaller one goes first."""
     return not announcement.inside, -announcement.priority, announcement.robot
 
 
@@ -109,7 +109,7 @@ def shifted(way: Way) -> Points:
 
 
 def meetings(path: Points, speed: float, radius: float, ways: Sequence[Way]) -> Iterator[Meeting]:
-    """Where the hull would meet others if it went on along ``path`` (dense) at ``speed`` m/s."""
+    """Yield the meetings with others if the hull went on along ``path`` (dense) at ``speed`` m/s."""
     mine = path[:: round(STEP / SPACING)]
     if len(mine) < 2:
         return

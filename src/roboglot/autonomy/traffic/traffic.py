@@ -83,7 +83,7 @@ class Traffic:
 
     @property
     def moving(self) -> list[Point]:
-        """Where those are now that go somewhere."""
+        """Return the current places of robots that have a goal."""
         return [Point(*way.points[0].tolist()) for way in self._ways if len(way.points) >= 2]
 
     def is_among_others(self, pose: Pose) -> bool:
@@ -105,7 +105,7 @@ class Traffic:
         return free
 
     def _before_narrow(self, path: Points, along: float) -> float:
-        """Where to wait for a meeting ``along`` metres ahead: not inside what is narrow."""
+        """Return where to wait for a meeting ``along`` metres ahead: outside of narrow places."""
         narrow = self._narrow_at(path)
         last = min(int(along / SPACING), len(narrow) - 1)
         if narrow[0] or not narrow[last]:
@@ -148,7 +148,7 @@ class Traffic:
         return any(way.is_within(reach, pose) for way in self._ways)
 
     def face_to_face(self, pose: Pose) -> list[tuple[Points, float]]:
-        """What would have to be free for those that stand close: they may want to go where the robot came from."""
+        """Return what would have to be free for robots close by: they may want to go where this one came from."""
         mine, trail = self._robot.description.radius, [(point.x, point.y) for point in self._trail]
         near = [tuple(way.points[0].tolist()) for way in self._ways if way.is_within(mine + FACING, pose)]
         return [(np.array([*trail, (pose.x, pose.y), *near]), 2 * mine + CLEAR)]

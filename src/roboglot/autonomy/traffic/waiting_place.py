@@ -1,4 +1,4 @@
-"""Where to let others pass: the nearest place beside their ways. Needs the kernels."""
+"""Waiting places: the nearest place beside the others' ways to let them pass. Needs the kernels."""
 
 from __future__ import annotations
 

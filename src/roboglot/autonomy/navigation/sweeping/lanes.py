@@ -71,7 +71,7 @@ def parts(area: Area, floor: NDArray[np.bool_], frame: Frame, width: float) -> l
 
 
 def open_stretches(lane: Stretch, floor: NDArray[np.bool_], frame: Frame) -> list[Stretch]:
-    """What is open of ``lane``."""
+    """Return the open stretches of ``lane``."""
     count = math.ceil(lane.length / (RESOLUTION / 2)) + 1
     x, y = (np.linspace(a, b, count) for a, b in ((lane.start.x, lane.end.x), (lane.start.y, lane.end.y)))
     runs = _runs(_sampled(floor, frame, x, y))

@@ -1,4 +1,4 @@
-"""How much of the lanes a robot has swept: by the way that it drove, not by the goals that it set out for."""
+"""Swept share of the lanes: by the path that the robot drove, not by the goals that it set out for."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Swept:
         return float(self._metres[self._swept].sum())
 
     def left(self) -> list[Stretch]:
-        """What was not driven along, but for crumbs."""
+        """Return the stretches not driven along yet, without crumbs."""
         found: list[Stretch] = []
         for begin, end in pairwise(self._ends):
             edges = np.flatnonzero(np.diff(np.concatenate([[True], self._swept[begin:end], [True]])))

@@ -1,1 +1,1 @@
-"""What a robot learns of its own odometry: how far it may be wrong, and what it gets wrong all the time."""
+"""Learning of a robot's odometry: its noise, and its systematic errors."""

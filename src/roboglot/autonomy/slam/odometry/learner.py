@@ -41,7 +41,7 @@ class OdometryLearner:
 
     @property
     def kept(self) -> dict[str, float]:
-        """What is known of this robot's odometry, to be kept for its next start."""
+        """Values to store for this robot's next start."""
         return self.noise.kept | self.bias.kept
 
     def restore(self, kept: Mapping[str, object]) -> None:
@@ -60,11 +60,11 @@ class OdometryLearner:
         self._learns_from = driven + LEARNS_AFTER
 
     def learns(self, driven: float) -> bool:
-        """Whether corrections say all of odometry (again) after ``driven`` m."""
+        """Return whether corrections fully measure odometry (again) after ``driven`` m."""
         return driven >= self._learns_from
 
     def learn(self, correction: Correction, driven: float, still: Callable[[], bool]) -> None:
-        """What a correction at ``driven`` m says of odometry; only if all around is ``still``, how bad it is."""
+        """Learn from a correction at ``driven`` m; the noise only if all around is ``still``."""
         before, here, after, prior = (
             correction.before,
             correction.best.pose,

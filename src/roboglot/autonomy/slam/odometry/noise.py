@@ -1,4 +1,4 @@
-"""How far odometry may be wrong: a description of the wheels, and how much worse they turn out to be while driving."""
+"""Noise of odometry: a description of the wheels, and how much worse they turn out to be while driving."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ LEARNT_WAY_MIN = 0.03  # m driven from which a correction says something of the 
 
 @dataclass(frozen=True, slots=True)
 class Doubt:
-    """How far a correction may be wrong for other reasons than a bias: variances of way (m^2) and yaw (rad^2)."""
+    """Uncertainty of a correction besides a bias: variances of way (m^2) and yaw (rad^2)."""
 
     way: float
     yaw: float
@@ -81,12 +81,12 @@ class LearntNoise:
 
     @property
     def newest(self) -> Doubt:
-        """What was spread last."""
+        """Variances that were spread last."""
         return Doubt(self._described[0] * self.way_factor, self._described[1] * self.yaw_factor)
 
     @property
     def kept(self) -> dict[str, float]:
-        """What to keep for the next start."""
+        """Values to store for the next start."""
         return {"way_factor": self.way_factor, "yaw_factor": self.yaw_factor}
 
     def restore(self, kept: Mapping[str, object]) -> None:
@@ -121,7 +121,7 @@ def _followed(factor: float, ratio: float) -> float:
 
 
 class LearntBias:
-    """What odometry gets wrong all the time: wheels of another size, a gyro that turns by itself.
+    """Systematic errors of odometry: wheels of another size, a gyro that drifts.
 
     Learnt fast at first, when little is known of it, as a Kalman filter does; slowly ever after.
     """
@@ -133,7 +133,7 @@ class LearntBias:
 
     @property
     def kept(self) -> dict[str, float]:
-        """What to keep for the next start."""
+        """Values to store for the next start."""
         return {"turn": self.turn, "scale_x": self.scale_x, "scale_y": self.scale_y}
 
     def restore(self, kept: Mapping[str, object]) -> None:
@@ -152,7 +152,7 @@ class LearntBias:
         return wider
 
     def missing(self, moved: Pose, seconds: float) -> Pose:
-        """What to add, in base_link, to odometry that ``moved`` (base_link before) in ``seconds``."""
+        """Return the correction, in base_link, of odometry that ``moved`` (base_link before) in ``seconds``."""
         back = Pose(yaw=-moved.yaw).compose(Pose(self.scale_x * moved.x, self.scale_y * moved.y))
         return Pose(back.x, back.y, self.turn * seconds)
 
