@@ -1,4 +1,4 @@
-"""Why an operation on a task or a module was not done. Doors map these types to their protocol's own numbers."""
+"""Errors of operations on a task or a module. Doors map these types to their protocol's own numbers."""
 
 from __future__ import annotations
 

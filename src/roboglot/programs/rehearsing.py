@@ -1,4 +1,4 @@
-"""What a rehearsal of a program is given and what comes of it: plain data. Who plays it is ``roboglot.rehearsal``."""
+"""Input and result of a program's rehearsal: plain data. ``roboglot.rehearsal`` plays it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from roboglot.model.geometry import Point, Pose, Twist
 
 @dataclass(frozen=True, slots=True)
 class Act:
-    """What happens ``at`` so many seconds: ``who`` does ``kind`` (say, gesture, walk; touch and box need no one)."""
+    """Event ``at`` so many seconds: ``who`` does ``kind`` (say, gesture, walk; touch and box need no one)."""
 
     at: float
     kind: str
@@ -36,7 +36,7 @@ class Scene:
 
 @dataclass(frozen=True, slots=True)
 class Spot:
-    """Where the robot really was: seconds since the start, m, rad."""
+    """True pose of the robot: seconds since the start, m, rad."""
 
     at: float
     x: float
@@ -46,7 +46,8 @@ class Spot:
 
 @dataclass(slots=True)
 class Played:
-    """What a program did. ``error`` is empty if it came to its end; ``late``: it was ended for taking too long.
+    """Record of a program. ``error`` is empty if it came to its end; ``late``: it was ended for taking too long.
+    ``error`` is empty if it came to its end; ``late``: it was ended for taking too long.
 
     ``outlines``: of walls and furniture on its floor. ``colours``: zone and red, green, blue of every look of the
     lights. ``said``: texts and names of sounds.
@@ -87,7 +88,7 @@ class Hit:
 
 @dataclass(slots=True)
 class Tried:
-    """What a plan would do: how each step ended (the first that fails is the last), and what the robot touched."""
+    """Result of a plan: the end of each step (the first that fails is the last), and what the robot touched."""
 
     steps: list[tuple[str, str]] = field(default_factory=list)  # SUCCEEDED or ABORTED, and why
     hits: list[Hit] = field(default_factory=list)

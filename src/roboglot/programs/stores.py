@@ -1,4 +1,5 @@
-"""What programs need of their stores, and the records kept there. `roboglot.storage` implements them.
+"""Interfaces of the programs' stores, and the records kept there. `roboglot.storage` implements them.
+`roboglot.storage` implements them.
 
 When a write returns, it survives a crash. Every method raises StoreError (`roboglot.programs.errors`) where the store
 fails; methods that end in ``_now`` block and are for start-up.

@@ -107,7 +107,7 @@ class Engine:
 
     @property
     def running(self) -> int:
-        """How many programs run now."""
+        """Number of running programs."""
         return len(self._runs)
 
     def open_soon(self) -> None:
@@ -295,7 +295,7 @@ class Engine:
         return worker
 
     async def _in_time(self, work: Coroutine[object, None, T]) -> T:
-        """What ``work`` gives, or EngineSilent: who waits for a worker that is never born does not wait for ever."""
+        """Return the result of ``work``, or raise EngineSilent: no one waits for ever for a worker that is never born."""
         task = asyncio.ensure_future(work)
         self._asked.add(task)
         task.add_done_callback(self._asked.discard)

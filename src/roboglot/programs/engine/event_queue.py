@@ -30,7 +30,7 @@ class Inbox:
 
     @property
     def full(self) -> bool:
-        """Whether the writer should wait."""
+        """True if the writer should wait."""
         return len(self._events) >= EVENTS_MAX or self._unread >= OUTPUT_MAX
 
     def write(self, text: str) -> None:

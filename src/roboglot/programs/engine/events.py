@@ -1,4 +1,4 @@
-"""What a run may use, what it reports, and why it ends: plain data. Knows no process and no robot."""
+"""Limits, reports and ends of a run: plain data. Knows no process and no robot."""
 
 from __future__ import annotations
 
@@ -10,10 +10,12 @@ import msgspec
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What one run may use. ``memory`` counts bytes beyond an empty program's, ``cpu`` seconds of processor in its
-    whole life (waiting costs nothing), ``output`` characters printed in its whole life, ``recursion`` calls inside
-    calls. A program that calls the robot more often than ``call_rate`` times a second is slowed down to it, not
-    ended. ``wall`` counts seconds of the machine's clock since the start, suspended ones excepted; 0 is no limit.
+    """Limits of one run.
+
+    ``memory`` counts bytes beyond an empty program's, ``cpu`` seconds of processor in its whole life (waiting costs
+    nothing), ``output`` characters printed in its whole life, ``recursion`` calls inside calls. A program that calls
+    the robot more often than ``call_rate`` times a second is slowed down to it, not ended. ``wall`` counts seconds of
+    the machine's clock since the start, suspended ones excepted; 0 is no limit.
     """
 
     memory: int = 64 * 1024 * 1024
@@ -32,10 +34,10 @@ class Limits:
 
 @dataclass(frozen=True, slots=True)
 class Stops:
-    """Where a watched program halts: at ``lines`` (of a module, or of the program itself, ""), at the begin of
-    ``blocks`` (the host sees to these), and before its ``first`` statement.
+    """Stops of a watched program: ``lines`` of a module or of the program (""), ``blocks``, its ``first`` statement.
 
-    ``first_block``: at the begin of its next block. ``watched`` alone: nowhere, but it can be stepped through.
+    The host sees to blocks, whose begin it knows. ``first_block``: at the begin of its next block. ``watched`` alone:
+    nowhere, but it can be stepped through.
     """
 
     lines: frozenset[tuple[str, int]] = frozenset()
@@ -46,7 +48,7 @@ class Stops:
 
 
 class ExitReason(StrEnum):
-    """Why a run is over."""
+    """Reason for the end of a run."""
 
     FINISHED = "finished"
     ERROR = "error"
@@ -115,7 +117,7 @@ class Replayed:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """How a call of an earlier life of a run was answered: its name and the frame's body, None if it was cut off."""
+    """Answer to a call of an earlier life of a run: the call's name and the frame's body, None if it was cut off."""
 
     name: str
     body: bytes | None

@@ -30,7 +30,7 @@ _READING = (
 
 
 class Header(msgspec.Struct, frozen=True):
-    """What a run was started with; nothing else than its answers makes it do what it does.
+    """Start conditions of a run; they and its answers determine all that it does.
 
     ``watched``: it could be stepped through, and can be again.
     """

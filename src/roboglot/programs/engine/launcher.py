@@ -69,7 +69,7 @@ _decode = msgspec.json.Decoder(_Message).decode
 
 @dataclass(frozen=True, slots=True)
 class Death:
-    """How a worker ended: exit code, or minus the signal; None if unknown. ``cpu`` in seconds."""
+    """End of a worker: exit code, or minus the signal; None if unknown. ``cpu`` in seconds."""
 
     status: int | None
     cpu: float = 0.0

@@ -1,4 +1,4 @@
-"""What a worker may say, checked: the host's end of the frame contents.
+"""Messages of a worker, checked: the host's end of the frame contents.
 
 Every byte is hostile. Knows the shapes and the small limits; what follows from a message is the run's business.
 """
@@ -67,7 +67,7 @@ class CallMessage(msgspec.Struct, tag_field="t", tag="call", forbid_unknown_fiel
 
 
 class VariablesMessage(msgspec.Struct, tag_field="t", tag="variables", forbid_unknown_fields=True):
-    """What a watched program's variables hold, as text."""
+    """Values of a watched program's variables, as text."""
 
     variables: Annotated[dict[VariableName, VariableText], msgspec.Meta(max_length=VARIABLES_MAX)]
 

@@ -1,4 +1,4 @@
-"""Where a run's program is, and where it is to halt: the places of its shared memory by module and line."""
+"""Position and stops of a run's program: the places of its shared memory by module and line."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Position:
 
     @property
     def at_stop(self) -> bool:
-        """Whether it halts at this line each time."""
+        """True if it halts at this line each time."""
         return self._page.stops(*self._page.place)
 
     def stop_at(self, lines: Iterable[tuple[str, int]]) -> None:

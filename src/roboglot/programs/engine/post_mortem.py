@@ -1,4 +1,4 @@
-"""Why a worker's process ended that did not say so itself."""
+"""Causes of death of a worker's process that did not report its end itself."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ class ProcessorGroup:
 
     @property
     def there(self) -> bool:
-        """Whether programs can be moved into it."""
+        """True if programs can be moved into it."""
         return self._folder is not None
 
     def open(self) -> list[str]:

@@ -115,7 +115,7 @@ class Run:
 
     @property
     def exit_reason(self) -> ExitReason | None:
-        """Why the run is over; None before that."""
+        """Reason for the end of the run; None before that."""
         match self._ending:
             case Finished():
                 return ExitReason.FINISHED

@@ -65,7 +65,7 @@ class Share:
 
 
 class Account:
-    """What one program has taken: ``charge`` it, and ``go_on`` with more when it is allowed to."""
+    """Account of one program's time: ``charge`` it, and ``go_on`` with more when it is allowed to."""
 
     __slots__ = ("_loop", "_paid_until", "_share")
 
@@ -82,7 +82,7 @@ class Account:
 
     @property
     def spent(self) -> bool:
-        """Whether it has to wait for its turn."""
+        """True if it has to wait for its turn."""
         return self._paid_until > self._loop.time()
 
     def go_on(self, work: Callable[[], None]) -> None:
@@ -119,7 +119,7 @@ class Meter:
 
     @property
     def over(self) -> bool:
-        """Whether a step's worth of time has passed."""
+        """True once a step's worth of time has passed."""
         return time.perf_counter() > self._until
 
     async def turn(self) -> None:

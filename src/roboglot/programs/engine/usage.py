@@ -1,4 +1,4 @@
-"""What a worker takes of the machine, as the kernel counts it. Blocks for some microseconds a process."""
+"""Resource use of a worker, as the kernel counts it. Blocks for some microseconds a process."""
 
 from __future__ import annotations
 

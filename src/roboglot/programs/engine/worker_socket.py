@@ -17,14 +17,14 @@ _BURST = 0.1
 
 
 class Listener(Protocol):
-    """What a wire talks to."""
+    """Receiver of a wire's frames."""
 
     def take(self, body: bytes) -> bool:
         """One frame; False when no more frames matter. Raises ProtocolViolation."""
 
     @property
     def full(self) -> bool:
-        """Whether reading should pause until ``read_on``."""
+        """True while reading should pause until ``read_on``."""
 
     def broken(self, error: Exception) -> None:
         """The worker broke the protocol."""
@@ -108,7 +108,7 @@ class Wire(asyncio.Protocol):
         return taken
 
     def _take_all(self) -> None:
-        """What came before the end."""
+        """Take the frames that came before the end."""
         while self._bodies:
             self._take_some()
 

@@ -1,4 +1,7 @@
-"""What programs can call: one file per group of the manual's ability set (chapter 4.4). Knows robots, no process."""
+"""Functions that programs can call: one file per group of the manual's ability set (chapter 4.4).
+
+Knows robots, no process.
+"""
 
 from roboglot.programs.functions.prelude import ability_set, implemented
 

@@ -1,4 +1,4 @@
-"""What every group has: ``state`` and ``set_log`` (4.4.x), and ``cyberdog`` itself (4.4.01)."""
+"""Functions of every group: ``state`` and ``set_log`` (4.4.x), and ``cyberdog`` itself (4.4.01)."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def state_of(session: Session, group: str) -> Record:
 def _declare(group: str) -> None:
     @ABILITIES.on(f"cyberdog.{group}.state")
     async def read_state(session: Session) -> Record:
-        """How the group is (attribute)."""
+        """Return the state of the group (attribute)."""
         return state_of(session, group)
 
     @ABILITIES.on(f"cyberdog.{group}.set_log")

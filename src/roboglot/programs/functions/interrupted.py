@@ -1,7 +1,7 @@
-"""What a call returns that the end of the server cut off. It is not made again: its robot is out of reach.
+"""Results of calls that the end of the server cut off. They are not repeated: their robot is out of reach.
 
-Each function reports a failure in its own result; here that becomes a failure of which it is unknown how far
-the robot came. Knows no process and no journal.
+Each function reports a failure in its own result; here that becomes a failure that leaves open how far the robot came.
+Knows no process and no journal.
 """
 
 from __future__ import annotations

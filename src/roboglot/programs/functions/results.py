@@ -12,7 +12,7 @@ SHORT_MAX = 300
 
 
 class StateCode(IntEnum):
-    """How an ability's last call went (4.2, StateCode); the shipped firmware's 79xx numbers are not used."""
+    """Result of an ability's last call (4.2, StateCode); the shipped firmware's 79xx numbers are not used."""
 
     INVALID = -1
     SUCCESS = 0

@@ -1,4 +1,4 @@
-"""What a function sees of the run that calls it: the robot, time and actions that can be paused, blocks and the log.
+"""View of a function on the run that calls it: the robot, time and actions that pause, blocks and the log.
 
 Knows no process and no store: its ``host`` does.
 """

@@ -47,7 +47,7 @@ def check(source: str, names: Names | None = None) -> list[Problem]:
 
 
 def uses(source: str, functions: frozenset[str]) -> list[str]:
-    """Which of ``functions`` a program reads without defining them itself, sorted; none if it cannot be parsed."""
+    """Return which of ``functions`` a program reads without defining them, sorted; none if it cannot be parsed."""
     tree, _ = _parse(source)
     return [] if tree is None else sorted(free_names(tree) & functions)
 

@@ -1,4 +1,4 @@
-"""Which names a program may use: the built-in ones, its own, and those the host offers.
+"""Names that a program may use: the built-in ones, its own, and those the host offers.
 
 Knows only the names' spelling. Finds unknown ones in a syntax tree and guesses what was meant.
 """
@@ -44,7 +44,7 @@ _STAR_NAMES = {"math": frozenset(name for name in dir(math) if not name.startswi
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """What the host offers.
+    """Names that the host offers.
 
     ``plain`` names (types, enums, module functions) and ``dotted`` ones such as ``cyberdog.motion.turn``.
     """

@@ -1,4 +1,4 @@
-"""Where a program is, and where it is to halt: a place is a line of a unit (0 is the program, 1... its modules).
+"""Places of a program and its stops: a place is a line of a unit (0 is the program, 1... its modules). its modules).
 
 Both ends of the shared memory number all places of a run in one row, from the same texts. Pure arithmetic.
 """
@@ -15,7 +15,7 @@ WORD = 8
 
 
 class Step(IntEnum):
-    """Where a program halts that goes on by a step: before which statement."""
+    """Kind of a step: the statement before which the program halts next."""
 
     INTO = 1
     """The next one, in whichever function."""
@@ -57,8 +57,11 @@ class Places:
 
     @property
     def stops(self) -> int:
-        """Where the bytes begin: not 0 where a watched program is to halt. The first has the order of a step: a
-        ``Step`` in its lowest two bits, and above them a number that differs from the last order's."""
+        """Offset of the bytes of stops: not 0 where a watched program is to halt.
+
+        The first has the order of a step: a ``Step`` in its lowest two bits, and above them a number that differs from
+        the last order's.
+        """
         return WORD * (1 + self.count)
 
     def next_marked(self, number: int, marked: Callable[[int], bool]) -> int:

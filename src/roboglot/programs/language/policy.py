@@ -1,7 +1,7 @@
-"""Which parts of Python belong to the robot language: an allow-list over the syntax tree.
+"""Syntax of the robot language: an allow-list over Python's syntax tree.
 
-Everything not listed is refused, so a construct of a future Python is refused until someone has looked at it. It
-makes for clear messages and a second wall; a program that slips past it is still in the worker's jail.
+Anything not listed is refused, so a construct of a future Python is refused until someone has looked at it. It makes
+for clear messages and a second wall; a program that slips past it is still in the worker's jail.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What is wrong with a program, said so that a pupil understands it, in English and in Chinese.
+"""Problems of a program in words that a pupil understands, in English and in Chinese.
 
 Knows CPython's syntax messages (a table turns them into sentences) and nothing about running programs.
 """
@@ -11,7 +11,7 @@ from enum import StrEnum
 
 
 class ProblemKind(StrEnum):
-    """Which rule a program broke."""
+    """Kind of a problem: the rule that a program broke."""
 
     SYNTAX = "syntax"
     """Not Python."""

@@ -18,7 +18,7 @@ INDENT = 4
 
 
 class ModuleState(StrEnum):
-    """Where a module stands; one in ``ERROR`` is kept, but cannot be called."""
+    """State of a module; one in ``ERROR`` is kept, but cannot be called."""
 
     NULL = "null"
     ERROR = "error"
@@ -26,7 +26,7 @@ class ModuleState(StrEnum):
 
 
 class ModuleOperation(StrEnum):
-    """What users ask for."""
+    """Operation of a user on a module."""
 
     INQUIRY = "inquiry"
     SAVE = "save"

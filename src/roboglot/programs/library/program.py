@@ -9,7 +9,7 @@ from roboglot.programs.language.places import Places
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """What a run executes: unit 0 is the program, the others its modules.
+    """Texts that a run executes: unit 0 is the program, the others its modules.
 
     ``names`` are the modules' ("" for the program).
     """

@@ -1,4 +1,4 @@
-"""When a condition comes true: arithmetic on the calendar of one time zone. Reads no clock and waits for nothing."""
+"""Due times of conditions: arithmetic on the calendar of one time zone. Reads no clock and waits for nothing."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _PLAIN = {"minutes", "hours", "days", "weeks"}
 
 
 def due_of(mode: str, condition: str, now: float, zone: tzinfo) -> float | None:
-    """When a task runs next; None: never, or at the next start. Raises BadCondition for no condition of its mode."""
+    """Return a task's next start; None: never, or at the next start. Raises BadCondition for no condition of its mode."""
     if mode == "cycle":
         return due_next(parse_cycle(condition), now, zone)
     return due_once(parse_moment(condition), now, zone)

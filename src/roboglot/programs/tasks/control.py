@@ -27,7 +27,7 @@ class ControlWatch:
 
     @property
     def summary(self) -> str:
-        """How many motions were refused or ended, and why; empty: none."""
+        """Number of motions refused or ended, and why; empty without any."""
         if not self._count:
             return ""
         motions = "1 motion was" if self._count == 1 else f"{self._count} motions were"

@@ -1,4 +1,4 @@
-"""When a program's process works by itself. Lockstep time stands still meanwhile: how fast it is counts for nothing."""
+"""Computing time of a program's process. Lockstep time stands still meanwhile: its speed changes nothing."""
 
 from __future__ import annotations
 

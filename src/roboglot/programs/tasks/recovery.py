@@ -1,4 +1,4 @@
-"""What becomes of the tasks that were under way when the server ended. Starts nothing."""
+"""Recovery of the tasks that were under way when the server ended. Starts nothing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the program service publishes: changes of tasks, their position, and the use of the machine. Plain data."""
+"""Reports of the program service: changes of tasks, their position, and the use of the machine. Plain data."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Whereabouts:
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """What a function answered a task at a line (of ``module``, or of its own text), as short text."""
+    """Result of a function at a line of a task (of ``module``, or of its own text), as short text."""
 
     task: str
     line: int
@@ -56,7 +56,7 @@ class Reading:
 
 @dataclass(frozen=True, slots=True)
 class Variables:
-    """What the variables of a watched task hold, as short text."""
+    """Values of a watched task's variables, as short text."""
 
     task: str
     variables: dict[str, str]
@@ -104,7 +104,7 @@ class Audience(Generic[P]):
 
     @property
     def listening(self) -> bool:
-        """Whether anybody listens: what is only made for them need not be made."""
+        """True if there are listeners: without them their reports need not be made."""
         return bool(self._listeners)
 
     def publish(self, *args: P.args, **kwargs: P.kwargs) -> None:
@@ -126,7 +126,7 @@ class Pace:
 
     @property
     def joined(self) -> bool:
-        """Whether there is anything to wait for."""
+        """True if there is anything to wait for."""
         return bool(self._waits)
 
     async def wait(self) -> None:

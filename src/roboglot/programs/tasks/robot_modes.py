@@ -1,4 +1,4 @@
-"""Which operations the robot allows in which of its modes: the manual's table (0.2.2.3), and the mode a robot is in.
+"""Operations that the robot allows in each of its modes: the manual's table (0.2.2.3), and the current mode.
 
 Knows the battery, the power mode and the firmware. No client can reach a robot that boots (Uninitialized); self-tests
 happen while it works (SelfCheck); one with a fault still does what it can (Error): these are in the table only.
@@ -21,7 +21,7 @@ LOW_POWER_BELOW = 0.05
 
 
 class RobotMode(StrEnum):
-    """What the robot as a whole is up to. The manual spells the self-test "SekfCheck"."""
+    """Mode of the robot as a whole. The manual spells the self-test "SekfCheck"."""
 
     UNINITIALIZED = "Uninitialized"
     SET_UP = "SetUp"

@@ -1,4 +1,4 @@
-"""What functions may do to the run that calls them: its blocks, its breakpoints and its log."""
+"""Host of a run's functions: its blocks, its breakpoints and its log."""
 
 from __future__ import annotations
 

@@ -63,7 +63,7 @@ class Background:
 
 @dataclass(frozen=True, slots=True)
 class RunTerms:
-    """What holds for every program: its limits, and the time zone that its ``time.localtime`` shows."""
+    """Terms of every program: its limits, and the time zone that its ``time.localtime`` shows."""
 
     limits: Limits
     zone: tzinfo

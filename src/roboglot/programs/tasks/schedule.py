@@ -1,4 +1,4 @@
-"""Which tasks wait for which instant of the robot's clock: one timer, always for the earliest. Knows ids and times."""
+"""Schedule of tasks by the robot's clock: one timer, always for the earliest. Knows ids and times."""
 
 from __future__ import annotations
 

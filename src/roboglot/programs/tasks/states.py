@@ -1,4 +1,4 @@
-"""What may happen to a task: its seven states, the ten operations, and the manual's table of both (0.2.2.1).
+"""State machine of a task: its seven states, the ten operations, and the manual's table of both (0.2.2.1).
 
 Pure data and one look-up; knows no program and no store.
 """
@@ -12,7 +12,7 @@ DEBUG = "debug"
 
 
 class TaskState(StrEnum):
-    """Where a task stands. ``WAIT_RUN``: saved, waits for the user; ``RUN_WAIT``: registered, waits for its time."""
+    """State of a task. ``WAIT_RUN``: saved, waits for the user; ``RUN_WAIT``: registered, waits for its time."""
 
     NULL = "null"
     ERROR = "error"
@@ -24,12 +24,12 @@ class TaskState(StrEnum):
 
     @property
     def alive(self) -> bool:
-        """Whether a program of this task exists."""
+        """True while a program of this task exists."""
         return self in (TaskState.RUN, TaskState.SUSPEND)
 
 
 class TaskOperation(StrEnum):
-    """What users ask for; ``START`` and ``STOP`` happen by themselves."""
+    """Operation on a task by users; ``START`` and ``STOP`` happen by themselves."""
 
     INQUIRY = "inquiry"
     SAVE = "save"

@@ -59,7 +59,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """How a run ended; ``error`` is empty if the program came to its end or ended itself."""
+    """End of a run; ``error`` is empty if the program came to its end or ended itself."""
 
     reason: ExitReason
     error: str = ""
@@ -67,7 +67,7 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class RunListeners:
-    """Who hears of a run: of its state and blocks, of each log entry, and that it halts at a breakpoint.
+    """Listeners to a run: to its state and blocks, to each log entry, and to halts at a breakpoint.
 
     The program waits for those in ``pace`` after each block, for those in ``log_pace`` after each line of its log.
     """
@@ -119,7 +119,7 @@ class TaskRun:
 
     @property
     def line(self) -> int:
-        """Where the program is, in its own text or in that of the module ``module``."""
+        """Current line of the program, in its own text or in that of the module ``module``."""
         return self._run.position.line - HEADER_LINES if self._run.position.unit else self._run.position.line
 
     @property
@@ -129,7 +129,7 @@ class TaskRun:
 
     @property
     def watched(self) -> bool:
-        """Whether it can be stepped through, and halts at lines."""
+        """True if it can be stepped through, and halts at lines."""
         return self._run.position.watched
 
     def figures(self) -> RunFigures:

@@ -1,4 +1,4 @@
-"""When each task runs next: its condition on the calendar of one time zone."""
+"""Next start of each task: its condition on the calendar of one time zone."""
 
 from __future__ import annotations
 

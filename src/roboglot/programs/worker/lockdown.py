@@ -29,7 +29,7 @@ CPU_GRACE = 1
 
 @dataclass(frozen=True, slots=True)
 class Quota:
-    """What the kernel counts for one program: bytes on top of an empty program's, and seconds of CPU."""
+    """Kernel limits of one program: bytes on top of an empty program's, and seconds of CPU."""
 
     memory: int
     cpu: int

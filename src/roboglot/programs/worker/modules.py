@@ -1,4 +1,4 @@
-"""What ``import`` finds in a program: time, math, random and numbers.
+"""Modules that a program can import: time, math, random and numbers.
 
 ``time`` runs on the robot's clock, so what reads or waits is a host call; ``random`` starts from the run's seed. Only
 public functions are copied: the real modules stay out of reach.

@@ -1,4 +1,4 @@
-"""What the host offers a program: pure data, sent when a run starts.
+"""Names that the host offers a program: pure data, sent when a run starts.
 
 Knows names and shapes only; what a call does is the host's business.
 """

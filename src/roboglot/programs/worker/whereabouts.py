@@ -104,7 +104,7 @@ class Watched:
             self._halt()
 
     def _stepped(self, order: int, here: FrameType) -> bool:
-        """Whether the step is done: over a call, none of those running was called from where the order was given."""
+        """Return whether the step is done: over a call, no running one was called from where the order was given."""
         if order != self._order:
             self._order, self._origin = order, self._frame
         step = order & max(Step)

@@ -188,7 +188,7 @@ def _keep_only(connection: int) -> None:
 
 
 def _import_ahead() -> None:
-    """What programs make CPython import by itself; in the jail it can open no file."""
+    """Import what programs make CPython import by itself; in the jail it can open no file."""
     for codec in _CODECS:
         codecs.lookup(codec)
     for module in ("_strptime", "unicodedata", "_pylong"):

@@ -1,1 +1,1 @@
-"""What programs call to move the dog: motions, walking, navigation, following, choreography."""
+"""Functions that move the dog: motions, walking, navigation, following, choreography."""

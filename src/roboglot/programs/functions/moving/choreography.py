@@ -30,7 +30,7 @@ DEPTH = 0.08  # m that a push-up goes down
 
 
 class Choreography:
-    """What the program prepared last; heights are offsets from how the robot stands."""
+    """Steps and footfalls that the program prepared last; heights are offsets from the robot's stand."""
 
     def __init__(self, _session: Session) -> None:
         self.steps: list[Step] = []

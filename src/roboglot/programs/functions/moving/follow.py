@@ -22,7 +22,7 @@ LOST = 15.0  # s of these for which the skill itself goes on searching where the
 
 
 class FollowedMember:
-    """Whom the program may follow, and whom it does. Faces identify people, the robot's skill stays near them."""
+    """The person followed, of those allowed. Faces identify people, the robot's skill stays near them."""
 
     def __init__(self, session: Session) -> None:
         self.people: set[str] = set()
@@ -75,7 +75,7 @@ class FollowedMember:
         self._task, self.name = None, ""
 
     async def _ended(self, walk: Action) -> tuple[str, bool]:
-        """Why the whole is over (empty: it is not), and whether the person was lost."""
+        """Return why all of it is over (empty: it is not), and whether the person was lost."""
         match walk.error:
             case NotFound():
                 return "", True

@@ -1,4 +1,4 @@
-"""What motions may be asked for: the manual's table 4.1. Numbers only; outside of them nothing moves."""
+"""Limits of motions: the manual's table 4.1. Numbers only; outside of them nothing moves."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ WALK_DURATION = Range(0.0, 1.0, WALK_DURATION_MAX, "s")
 
 
 def outside(**values: float) -> str:
-    """Which of the named values leaves its range, in plain words; empty if none does. NaN is outside of everything."""
+    """Return which value leaves its range, in plain words; empty if none does. NaN is outside of everything."""
     ranges = LIMITS | OTHERS | {"angle": TURN_ANGLE, "walk_duration": WALK_DURATION}
     for name, value in values.items():
         if value not in ranges[name]:

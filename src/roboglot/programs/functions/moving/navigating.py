@@ -42,7 +42,7 @@ class NavigationMode:
         self.map: str | None = None
 
     def close(self) -> None:
-        """What the program drives is called off with it."""
+        """Forget the map; the program's end calls off its drive."""
         self.map = None
 
 

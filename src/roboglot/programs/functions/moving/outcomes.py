@@ -1,4 +1,4 @@
-"""How a motion went, in the manual's two shapes of answers and its numbers of errors (4.2, 4.4.04)."""
+"""Outcomes of motions, in the manual's two shapes of answers and its numbers of errors (4.2, 4.4.04)."""
 
 from __future__ import annotations
 

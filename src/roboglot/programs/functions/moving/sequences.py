@@ -93,7 +93,7 @@ def _footfall(gait: Record) -> Footfall:
 
 @dataclass(frozen=True, slots=True)
 class _Pace:
-    """What is to be done, with the height as an offset, and the axes that are followed (x y z roll pitch yaw)."""
+    """Step with the height as an offset, and the axes that are followed (x y z roll pitch yaw)."""
 
     step: Step
     followed: tuple[bool, ...]

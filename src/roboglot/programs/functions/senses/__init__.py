@@ -1,1 +1,1 @@
-"""What programs call to learn about dog and surroundings: sensors, gestures, people, touch."""
+"""Functions that sense dog and surroundings: sensors, gestures, people, touch."""

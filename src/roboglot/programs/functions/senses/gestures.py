@@ -42,7 +42,7 @@ class GestureWatch:
 
     @property
     def on(self) -> bool:
-        """Whether it still looks."""
+        """True while it looks."""
         return self._viewer is not None and self._session.robot.clock.time() < self._until
 
     def open(self, seconds: float) -> None:

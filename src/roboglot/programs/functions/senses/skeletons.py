@@ -113,7 +113,7 @@ async def turn_off_recognition(session: Session) -> Record:
 
 @ABILITIES.on("cyberdog.skeleton.instant_recognized")
 async def instant_recognized(session: Session) -> Record:
-    """What is counted by now."""
+    """Return the current count."""
     return _message(session, state())
 
 
