@@ -186,7 +186,7 @@ class Api:
                 raise _nothing_here()
 
     def _made_of(self) -> dict[str, object]:
-        """What a copy of the world is made from."""
+        """Return what a copy of the world is made from."""
         world = self._desk.world
         return {"world": world.name, "seed": world.seed, "bodies": dict(world.bodies)}
 

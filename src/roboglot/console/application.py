@@ -166,7 +166,7 @@ class Application:
         await answer(send, 200, asset.content_type.encode(), body, more)
 
     async def _knows(self, scope: Scope) -> bool:
-        """Whether the client may come in; else the log-in page comes first."""
+        """Return whether the client may come in; else the log-in page comes first."""
         try:
             await enter(self._desk, self._login, scope)
         except Unknown:

@@ -1,4 +1,4 @@
-"""What the robot sees, hears and makes out, for pages: photos, motion JPEG, WAV, video with sound by WebRTC."""
+"""Media and detections of a robot for pages: photos, motion JPEG, WAV, video with sound by WebRTC."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ class Calls:
 
 
 class Sightings:
-    """What a robot makes out in its camera's picture, while a page shows it."""
+    """Detections in the camera's picture of a robot, while a page shows it."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot

@@ -1,4 +1,4 @@
-"""What the console is given, and what every request of a page or a script goes through."""
+"""Desk: the parts that the console is given, and the way of every request of a page or a script."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ assert map_verbs  # registers its verbs
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """What the robots are in: name, version of roboglot, clock, the seed that it was built with, their bodies."""
+    """World of the robots: name, version of roboglot, clock, the seed that it was built with, their bodies."""
 
     name: str
     version: str
@@ -76,12 +76,12 @@ class Desk:
 
     @property
     def may_teach(self) -> bool:
-        """Whether the client who is asked for may do everything with every robot, and is no pupil."""
+        """True if the current client may do everything with every robot, and is no pupil."""
         return identity() not in self.pupils and self.may_change_world
 
     @property
     def may_change_world(self) -> bool:
-        """Whether the client who is asked for may do everything with every robot."""
+        """True if the current client may do everything with every robot."""
         return all(robot.admission.may(Right.ADMIN) for robot in self.robots.values())
 
     def check(self, robot: Robot, verb: str, right: Right | None) -> None:
@@ -92,14 +92,14 @@ class Desk:
 
     @property
     def pace(self) -> dict[str, object]:
-        """How time passes: ``speed``, ``paused``, ``lockstep`` if a program moves the clock; the chances' ``seed``."""
+        """Pace of time: ``speed``, ``paused``, ``lockstep`` if a program moves the clock; the world's ``seed``."""
         clock, seed = self.world.clock, self.stage.seed
         if not isinstance(clock, RealClock):
             return {"lockstep": True, "speed": 1.0, "paused": False, "seed": seed}
         return {"lockstep": False, "speed": clock.speed, "paused": clock.paused, "seed": seed}
 
     def hello(self) -> dict[str, object]:
-        """What a page needs before anything else."""
+        """First message to a page."""
         visible = self.visible
         simulated = {placed.name for placed in self.stage.robots}
         return {

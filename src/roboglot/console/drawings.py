@@ -1,4 +1,4 @@
-"""What is drawn on a robot's map and where things really stand, as plain values."""
+"""Annotations of a robot's map, and the true places of things, as plain values."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def drawings_of(robot: Robot) -> dict[str, object]:
 
 
 def name_of(id: str, metadata: dict[str, str]) -> str:
-    """How people call a place; its id if it has no name."""
+    """Return people's name for a place; its id if it has none."""
     return next((metadata[key] for key in NAMES if metadata.get(key)), id)
 
 
@@ -44,7 +44,7 @@ def plans_of(stage: Stage) -> list[dict[str, object]]:
 
 
 def truth_of(stage: Stage) -> dict[str, object]:
-    """Where everything really is, in the world's frame, and what is broken on purpose."""
+    """Return the true places of everything, in the world's frame, and the injected faults."""
     return {
         "robots": {r.name: [*words.pose(r.pose), r.floor] for r in stage.robots},
         "people": {p.name: [*words.pose(p.pose), p.floor] for p in stage.people},
@@ -59,7 +59,7 @@ def truth_of(stage: Stage) -> dict[str, object]:
 
 
 def anchor_of(robot: Robot, stage: Stage) -> Pose | None:
-    """Where the robot's map lies in the world, if it stands where it believes to stand; None for real robots."""
+    """Return the map's pose in the world, if the robot stands where it believes; None for real robots."""
     true = next((r.pose for r in stage.robots if r.name == robot.id), None)
     if true is None or Localization not in robot:
         return None

@@ -43,7 +43,7 @@ def scan_frame(robot: str, scan: LaserScan, base: Pose) -> bytes:
 
 
 def path_frame(robot: str, path: Path) -> bytes:
-    """What is left to drive. Payload: x, y in m, f32, in map."""
+    """Return a frame of the remaining path. Payload: x, y in m, f32, in map."""
     coordinates = np.array([(p.x, p.y) for p in path.points], dtype="<f4")
     return framed({"kind": "path", "robot": robot}, coordinates.tobytes())
 

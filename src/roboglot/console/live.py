@@ -35,13 +35,13 @@ _numbers = itertools.count(1)
 
 
 class Hello(msgspec.Struct, tag="hello", tag_field="type"):
-    """Who sits there."""
+    """Name of the person at the page."""
 
     name: str = ""
 
 
 class Watch(msgspec.Struct, tag="watch", tag_field="type"):
-    """Which robot is shown; whether with its wire, with the truth, and with what its camera makes out."""
+    """Robot that the page shows; with its wire, with the truth, and with its camera's detections."""
 
     robot: str
     wire: bool = False

@@ -104,7 +104,7 @@ class Metrics:
 
 
 class _Now(Collector):
-    """What is the case when someone scrapes."""
+    """Collector of current values at every scrape."""
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk

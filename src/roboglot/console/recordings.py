@@ -17,7 +17,7 @@ FOLDER = "recordings"  # in the data folder
 
 
 class RecordingWish(msgspec.Struct, forbid_unknown_fields=True):
-    """What a person wants; ``text``: a mark's words."""
+    """Request of a person; ``text``: a mark's words."""
 
     do: Literal["start", "stop", "mark"]
     text: Annotated[str, msgspec.Meta(max_length=500)] = ""
@@ -31,11 +31,11 @@ class Recordings:
 
     @property
     def on(self) -> bool:
-        """Whether all that robots say, hear, see and do is being written to a file."""
+        """True while everything that robots say, hear, see and do is being written to a file."""
         return self._recorder().status.on
 
     def look(self) -> dict[str, object]:
-        """How it goes; files by their names, not by where they are."""
+        """Return the progress; files by their names, not by where they are."""
         status = self._recorder().status
         return {
             "on": status.on,

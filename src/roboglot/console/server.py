@@ -46,7 +46,7 @@ class Console:
 
     @property
     def address(self) -> str:
-        """What to open in a browser."""
+        """URL to open in a browser."""
         host = f"[{self._config.address}]" if ":" in self._config.address else self._config.address
         return f"{'https' if self._tls else 'http'}://{host}:{self.port}"
 

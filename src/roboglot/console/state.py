@@ -1,4 +1,4 @@
-"""What a page shows of a robot, as plain values: read from the components at one moment."""
+"""State of a robot for pages, as plain values: read from the components at one moment."""
 
 from __future__ import annotations
 
@@ -144,7 +144,7 @@ def _safety(robot: Robot) -> dict[str, object]:
 
 
 def _body(robot: Robot) -> dict[str, object]:
-    """How the parts stand that only some bodies have."""
+    """Return the state of parts that only some bodies have."""
     body: dict[str, object] = {}
     if Legs in robot:
         body["posture"] = str(robot[Legs].posture)

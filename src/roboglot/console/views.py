@@ -1,4 +1,4 @@
-"""What all pages see of one robot, made once however many look: state, scan, map, path, drawings."""
+"""View of one robot for all pages, made once however many look: state, scan, map, path, drawings."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class RobotView:
 
     @property
     def watched(self) -> bool:
-        """Whether a page shows this robot."""
+        """True if a page shows this robot."""
         return self._viewers > 0
 
     @property

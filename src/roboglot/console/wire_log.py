@@ -1,4 +1,4 @@
-"""What went over a robot's doors in the last ten minutes. Costs nothing until a page looks, and ends after a while."""
+"""Log of a robot's exchanges over the last ten minutes. Costs nothing until a page looks, and ends after a while."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the reference cloud keeps: accounts, the programs their robots saved, favourites, and records.
+"""Store of the reference cloud: accounts, the programs their robots saved, favourites, and records.
 
 Tokens are kept as hashes. Knows no HTTP, no frame, and not which database it is in.
 """

@@ -21,7 +21,7 @@ GAP_MAX = 2.0  # s without a look, after which silence is counted anew
 
 @dataclass(frozen=True, slots=True)
 class _Sight:
-    """How often a program had renewed when it was first seen so, and when that was."""
+    """First sighting of a program at its current number of renewals, with its time."""
 
     renewals: int
     since: float

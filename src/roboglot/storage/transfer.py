@@ -1,4 +1,4 @@
-"""What is stored of one robot goes from one database to another, when the robot moves to another process."""
+"""Transfer of one robot's data from one database to another, when the robot moves to another process."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where robots are, by the registry of their homes: for clients that follow a robot from program to program."""
+"""Whereabouts of robots, by the registry of their homes: for clients that follow one from program to program."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Who sits at a page: signing in and out, and classes whose pupils join by a code."""
+"""People at the pages: signing in and out, and classes whose pupils join by a code."""

@@ -29,7 +29,7 @@ Name = Annotated[str, msgspec.Meta(max_length=class_wishes.NAME_MAX)]
 
 
 class Wish(msgspec.Struct, forbid_unknown_fields=True):
-    """What a teacher wants; ``pupil`` empty: of all."""
+    """Request of a teacher; ``pupil`` empty: for all."""
 
     do: Literal["open", "lock", "unlock", "reset", "give_back", "close"]
     name: Name = ""
@@ -50,7 +50,7 @@ class Seat:
 
 @dataclass(frozen=True, slots=True)
 class Elsewhere:
-    """Where a pupil is to sign in: the console of the world that is theirs."""
+    """Console of the pupil's own world, where to sign in."""
 
     page: str
     code: str

@@ -1,4 +1,4 @@
-"""Who asks: where access is configured, a browser or a script shows who it is; else this machine's programs come in."""
+"""Entry of clients: a browser or a script authenticates where access is configured; else local programs come in."""
 
 from __future__ import annotations
 

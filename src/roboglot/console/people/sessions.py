@@ -24,7 +24,7 @@ TOKEN_BYTES = 32
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """What a cookie stands for. ``name``: who signed in. ``robot``: the one that a pupil was given."""
+    """Session behind a cookie. ``name``: the person signed in. ``robot``: the one that a pupil was given."""
 
     proof: Proof
     name: str

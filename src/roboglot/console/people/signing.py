@@ -23,7 +23,7 @@ MINUTE = 60.0
 
 
 class Shown(msgspec.Struct, forbid_unknown_fields=True):
-    """What a person shows: ``name`` and ``password``, or a ``token``, or a ``name`` and a class's ``code``."""
+    """Credentials of a person: ``name`` and ``password``, or a ``token``, or a ``name`` and a class's ``code``."""
 
     name: Annotated[str, msgspec.Meta(max_length=64)] = ""
     password: Secret = ""

@@ -94,7 +94,7 @@ def _about(operation: Operation[str], labels: Mapping[str, Mapping[str, str]]) -
 
 
 def _member(name: str, words: dict[str, dict[str, str]]) -> dict[str, str]:
-    """What a drop-down shows: a colour and an effect, or a name of its own."""
+    """Return the words of a drop-down's entry: a colour and an effect, or a name of its own."""
     found = re.sub("^(system_)?effect_(line_)?", "", name)
     colour, _, effect = found.partition("_")
     if found in words:

@@ -50,7 +50,7 @@ Id = Annotated[str, msgspec.Meta(max_length=ID_MAX)]
 
 
 class Open(msgspec.Struct, tag="open", tag_field="type"):
-    """Which robot the page programs from now on, and what it shows: of other programs it hears only begin and end."""
+    """Robot that the page programs from now on, and the program shown: of others it hears only begin and end."""
 
     robot: str
     program: Id = ""  # of all

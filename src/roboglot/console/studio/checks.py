@@ -1,4 +1,4 @@
-"""What a mission asks of a program, and why it is not met, in one sentence in two languages.
+"""Checks of a mission on a program, and why one is not met, in one sentence in two languages.
 
 A check looks at what the robot did (``Played``) or at the program's text (``uses``, ``calls``, ``short``).
 """
@@ -44,7 +44,7 @@ CONSTRUCTS: dict[str, tuple[tuple[type[ast.AST], ...], str, str]] = {
 
 
 class Why(msgspec.Struct, frozen=True):
-    """Why a check is not met."""
+    """Reason why a check is not met, in two languages."""
 
     en: str
     zh: str
@@ -52,7 +52,7 @@ class Why(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """What is judged: what was played, the program's syntax tree, closed outlines of what must not be touched."""
+    """Work to judge: what was played, the program's syntax tree, closed outlines of what must not be touched."""
 
     played: Played
     tree: ast.Module
@@ -88,7 +88,7 @@ class Check(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
 
 def failure(check: Check, work: Work) -> Why | None:
-    """Why the check is not met, None if it is."""
+    """Return why the check is not met, None if it is."""
     return _JUDGES[check.kind](check, work)
 
 
@@ -212,7 +212,7 @@ def _uses(check: Check, work: Work) -> Why | None:
 
 
 def _header(node: ast.AST) -> bool:
-    """Whether it is a line that the editor writes for each variable: ``x = None`` at the beginning."""
+    """Return whether it is a line that the editor writes for each variable: ``x = None`` at the beginning."""
     return isinstance(node, ast.Assign) and isinstance(node.value, ast.Constant) and node.value.value is None
 
 

@@ -18,7 +18,7 @@ CLASSES_MAX, BAGS_MAX, FILE_MAX = 20, 60, 4_000_000  # folders, files of one, by
 
 
 class Bag(msgspec.Struct):
-    """What is kept of a pupil: the program as it was last seen and as it was handed in, and in which world."""
+    """Stored work of a pupil: the program as last seen and as handed in, and its world."""
 
     name: str = ""
     world: str = "-"

@@ -1,4 +1,4 @@
-"""What a page wishes of its class, as it says so."""
+"""Requests of a page to its class."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Words = Annotated[str, msgspec.Meta(max_length=WORDS_MAX)]
 
 
 class Doing(msgspec.Struct, frozen=True):
-    """What a pupil's page shows."""
+    """State of a pupil's page."""
 
     phase: Words = "idle"
     lit: Words = ""
@@ -22,7 +22,7 @@ class Doing(msgspec.Struct, frozen=True):
 
 
 class Member(msgspec.Struct, tag="class", tag_field="type"):
-    """What a page wishes of its class."""
+    """Request of a page to its class."""
 
     do: Literal["open", "join", "leave", "doing", "hand_in", "stop_all", "look", "close"]
     id: int = 0

@@ -41,7 +41,7 @@ class World:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a pupil is to be: ``page`` is another world's, empty for the one that asked; for how long (s)."""
+    """Place of a pupil: ``page`` is another world's, empty for the one that asked; for how long (s)."""
 
     code: str
     page: str
@@ -72,7 +72,7 @@ class Class:
 
     @property
     def is_empty(self) -> bool:
-        """Whether no page is in it."""
+        """True if no page is in it."""
         return not self.teachers and all(pupil.seat is None for pupil in self.pupils.values())
 
     def enrol(self, name: str) -> Pupil:

@@ -31,7 +31,7 @@ class Words(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Happening(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What people do meanwhile, as ``Act``."""
+    """Event during a lesson, as ``Act``."""
 
     at: float
     kind: str
@@ -71,7 +71,7 @@ class Lesson(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def scene(self) -> Scene:
-        """What its programs are played in."""
+        """Scene in which its programs are played."""
         x, y, degrees = self.start
         return Scene(
             world=self.world,
@@ -101,7 +101,7 @@ class Grade(msgspec.Struct, frozen=True):
 
     @property
     def passed(self) -> bool:
-        """Whether everything that is needed was done."""
+        """True if everything that is needed was done."""
         return self.stars > 0
 
 
@@ -156,7 +156,7 @@ def load(folders: Sequence[Path]) -> dict[str, Lesson]:
 
 
 def shown(lessons: Mapping[str, Lesson]) -> list[dict[str, object]]:
-    """What pages may know of them: not the solutions."""
+    """Return the lessons for pages, without the solutions."""
     hidden = {"solution", "wrong"}
     return [
         {"id": id, **{key: value for key, value in msgspec.to_builtins(lesson).items() if key not in hidden}}

@@ -36,7 +36,7 @@ class Drive(msgspec.Struct, tag="drive", tag_field="do", forbid_unknown_fields=T
 
 
 class Plan(msgspec.Struct):
-    """What is to be tried."""
+    """Plan to try."""
 
     steps: Annotated[list[GoTo | Drive], msgspec.Meta(min_length=1, max_length=STEPS_MAX)]
 

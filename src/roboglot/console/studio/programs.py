@@ -1,4 +1,4 @@
-"""What the studio is given from outside: programs of robots, a copy of the world to rehearse in, missions."""
+"""Parts that the studio is given: programs of robots, a copy of the world to rehearse in, missions."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Programs:
 
 @dataclass(frozen=True, slots=True)
 class ClassHome:
-    """Where the classroom listens that several worlds share, and the name of this world there."""
+    """Socket of the classroom that several worlds share, and the name of this world there."""
 
     path: Path
     world: str

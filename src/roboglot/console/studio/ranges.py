@@ -1,4 +1,4 @@
-"""Which values a block's fields may hold: from table 4.1 where it says, otherwise the functions' own limits.
+"""Ranges of a block's fields: from table 4.1 where it says, otherwise the functions' own limits.
 
 Numbers only, for editors: what a program asks beyond them is refused by the functions themselves.
 """
@@ -20,7 +20,7 @@ STRIDE_MAX, DANCES_MAX = 0.065, 10  # of the choreographer, which cuts what is b
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """What a number may be; ``start`` is what a new block shows where the function has no default."""
+    """Range of a number; ``start`` is what a new block shows where the function has no default."""
 
     minimum: float
     maximum: float
@@ -79,7 +79,7 @@ SOUNDS = tuple(str(number) for number in sorted([*BARKS, *PIECES]))
 
 
 def limit_of(function: str, parameter: str) -> Limit | None:
-    """What a number may be, None where any will do; ``function`` without its group."""
+    """Return the range of a number, None where any will do; ``function`` without its group."""
     if (function, parameter) in OWN:
         return OWN[function, parameter]
     return WALK if parameter == "duration" else ANY.get(parameter)

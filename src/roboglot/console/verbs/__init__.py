@@ -1,1 +1,1 @@
-"""What a page or a script may do, by name: verbs of a robot, its map, the simulated world and its clock."""
+"""Verbs of pages and scripts, by name: of a robot, its map, the simulated world and its clock."""

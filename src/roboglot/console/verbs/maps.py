@@ -39,7 +39,7 @@ from roboglot.operations import Right
 
 
 class Placed(msgspec.Struct):
-    """Where the origin of a map lies in another, m, rad."""
+    """Pose of a map's origin in another map, m, rad."""
 
     x: float
     y: float

@@ -1,4 +1,5 @@
-"""What a page or a script may have a robot do, by name. Each verb goes through the model like any client's wish.
+"""Verbs of a robot for pages and scripts. Each goes through the model like any client's request. Each verb goes through
+the model like any client's wish.
 
 The handlers' first parameter is the robot; the others come from JSON by name, in SI units and the map frame.
 """

@@ -295,7 +295,7 @@ class Engine:
         return worker
 
     async def _in_time(self, work: Coroutine[object, None, T]) -> T:
-        """Return the result of ``work``, or raise EngineSilent: no one waits for ever for a worker that is never born."""
+        """Return the result of ``work``, or raise EngineSilent: no one waits for ever for a worker never born."""
         task = asyncio.ensure_future(work)
         self._asked.add(task)
         task.add_done_callback(self._asked.discard)

@@ -13,7 +13,7 @@ _PLAIN = {"minutes", "hours", "days", "weeks"}
 
 
 def due_of(mode: str, condition: str, now: float, zone: tzinfo) -> float | None:
-    """Return a task's next start; None: never, or at the next start. Raises BadCondition for no condition of its mode."""
+    """Return a task's next start; None: never, or at the next start. Raises BadCondition if the mode has none such."""
     if mode == "cycle":
         return due_next(parse_cycle(condition), now, zone)
     return due_once(parse_moment(condition), now, zone)
