@@ -1,4 +1,4 @@
-"""What waits to be written: values as they were handed over, and how each kind of them becomes bytes."""
+"""Entries that wait to be written: values as they were handed over, and their encoding by kind."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Entry(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """How one kind of value is written."""
+    """Encoding of one kind of value."""
 
     schema: str
     encode: Callable[[int, Any], bytes]
@@ -43,7 +43,7 @@ class Kind:
 
     @property
     def schema_data(self) -> bytes:
-        """What the file says about the schema."""
+        """Schema as the file has it."""
         return foxglove.schema(self.schema) if self.is_protobuf else messages.SCHEMAS[self.schema]
 
 

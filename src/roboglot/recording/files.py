@@ -31,7 +31,7 @@ class Attachment:
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """Where a recording comes from: facts by name, and the files that made the world and the bodies."""
+    """Origin of a recording: facts by name, and the files that made the world and the bodies."""
 
     facts: Mapping[str, str] = field(default_factory=dict)
     attachments: Sequence[Attachment] = ()

@@ -38,7 +38,7 @@ _time = re.compile(rb"(?<![\w.])1[5-9]\d{8}(?:\d{3}){0,3}(?![\w])")
 
 @dataclass(slots=True)
 class _Door:
-    """What one door was asked, and how far the session is."""
+    """Session of one door: the requests so far, and its progress."""
 
     timeline: Timeline
     asked: list[tuple[Asked, Normal]] = field(default_factory=list)

@@ -63,7 +63,7 @@ class Recording:
 
     @property
     def seconds(self) -> float:
-        """How long it is, robot time."""
+        """Duration in robot time, s."""
         return (self.last - self.first) / 1e9
 
     def session(self, robot: str = "", door: str = "") -> list[Exchange]:

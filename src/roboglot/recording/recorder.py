@@ -38,7 +38,7 @@ class NotRecording(RobotError):
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """What a recording has done so far. ``path`` is empty while only the ring is kept."""
+    """Progress of a recording. ``path`` is empty while only the ring is kept."""
 
     on: bool
     path: str = ""
@@ -75,7 +75,7 @@ class Recorder:
 
     @property
     def status(self) -> Status:
-        """How it goes."""
+        """Current progress."""
         files, thread = self._files, self._thread
         if files is None or thread is None:
             return Status(False, ring=self._ring is not None)

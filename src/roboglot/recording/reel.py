@@ -56,7 +56,7 @@ class _Part:
 
 @dataclass(frozen=True, slots=True)
 class _Chunk:
-    """Where messages from ``first`` to ``last`` stand, and of which topics there are some."""
+    """Chunk of the file with messages from ``first`` to ``last``, and the topics in it."""
 
     first: int
     last: int
@@ -178,7 +178,7 @@ def _time(shot: Shot) -> int:
 
 
 def _before(shots: Sequence[Shot], until: int) -> int:
-    """How many of them, which are in order, come before that time."""
+    """Return how many of them, which are in order, come before that time."""
     return bisect_right(shots, until - 1, key=_time)
 
 

@@ -189,7 +189,7 @@ class Ros2Words:
         )
 
     def _mount(self, at: int, frame: FrameTransform, transform: Msg) -> Iterator[RosMessage]:
-        """Where the laser is mounted, when that is new."""
+        """Yield the laser's mount, when it is new."""
         place = (frame.translation.x, frame.translation.y, frame.rotation.z, frame.rotation.w)
         if self._mounts.get(frame.child_frame_id) != place:
             self._mounts[frame.child_frame_id] = place

@@ -176,7 +176,7 @@ class Sampler:
 
 
 def _action(event: ActionChanged) -> dict[str, object]:
-    """What is known of an action now; it changes later."""
+    """Return the current state of an action, which changes later."""
     action: Any = event.action
     return {
         "id": action.id,

@@ -17,7 +17,7 @@ PERIOD = 0.5  # s between two looks; then what has come is written and flushed
 
 
 class Sink(Protocol):
-    """Where entries go; called in the thread alone."""
+    """Receiver of entries; called in the thread alone."""
 
     def write(self, entry: Entry) -> None:
         """Add one. Raises OSError."""

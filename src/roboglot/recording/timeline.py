@@ -24,7 +24,7 @@ class _Item:
 
 
 class Timeline:
-    """What is still to be sent, by its time, then by its number in the recording."""
+    """Pending messages, by their time, then by their number in the recording."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock

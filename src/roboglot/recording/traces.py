@@ -30,7 +30,7 @@ class Difference:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """How many messages agreed, and the first that did not; None: the traces are identical."""
+    """Number of messages that agreed, and the first that did not; None: the traces are identical."""
 
     agreed: int
     difference: Difference | None
@@ -66,7 +66,7 @@ def _is_heartbeat(record: Record) -> bool:
 
 
 def _stream(record: Record) -> tuple[str, str]:
-    """What a message has an order in: its topic, and the direction of an exchange."""
+    """Return the stream in which a message has its order: its topic, and the direction of an exchange."""
     return record.topic, record.json()["direction"] if record.schema == "roboglot.Exchange" else ""
 
 

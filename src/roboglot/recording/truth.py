@@ -1,4 +1,4 @@
-"""What really is the case in a simulated world, for a recording: topics under ``/truth``, in the frame ``world``."""
+"""Ground truth of a simulated world for a recording: topics under ``/truth``, in the frame ``world``."""
 
 from __future__ import annotations
 

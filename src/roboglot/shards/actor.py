@@ -27,9 +27,9 @@ RUN_BITS = 53  # of the number of a run, which JSON keeps whole
 
 
 class Condition(msgspec.Struct):
-    """How a shard is: what it reported last, and where it runs. ``lines`` are those logged since the last look.
+    """State of a shard: its last report, and where it runs. ``lines`` are those logged since the last look.
 
-    ``ready`` is left out where the asker has it already: a hundred robots' endpoints are long. ``run`` is another
+    ``ready`` is left out where the client has it already: a hundred robots' endpoints are long. ``run`` is another
     number in every process: those of two machines may have the same pid.
     """
 

@@ -84,7 +84,7 @@ def joined(where: str) -> Iterator[None]:
 
 
 class Reference(Protocol):
-    """What Ray returns for a call."""
+    """Ray's result of a call."""
 
     def future(self) -> Future[bytes]:
         """Return the answer to come."""

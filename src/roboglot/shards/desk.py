@@ -1,4 +1,4 @@
-"""Where the owner of this machine sees a fleet and changes it: the socket behind ``roboglot fleet list|stop|…``."""
+"""Fleet desk of this machine's owner: the socket behind ``roboglot fleet list|stop|…``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the socket behind ``roboglot fleet`` asks of a fleet, wherever its shards run."""
+"""Interface of a fleet to the socket behind ``roboglot fleet``, wherever its shards run."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Keeper(Protocol):
 
     @property
     def stores_here(self) -> bool:
-        """Whether what robots store is in folders of this machine."""
+        """True if robots' data is stored in folders of this machine."""
 
     async def start(self) -> float:
         """Start all; returns s until the first could start."""

@@ -34,7 +34,7 @@ LOG_MAX = 10 << 20  # bytes kept of a shard's log when it starts
 
 
 class State(StrEnum):
-    """What a shard is doing."""
+    """State of a shard."""
 
     WAITING = "waiting"  # for its turn
     STARTING = "starting"
@@ -87,7 +87,7 @@ class Supervisor:
 
     @property
     def stores_here(self) -> bool:
-        """What robots store is in the shards' folders."""
+        """True: robots' data is stored in the shards' folders."""
         return True
 
     async def start(self) -> float:

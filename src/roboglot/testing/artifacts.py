@@ -1,4 +1,4 @@
-"""What is kept of a failed test: its recording, a picture of the map, a page of the last exchanges."""
+"""Artifacts of a failed test: its recording, a picture of the map, a page of the last exchanges."""
 
 from __future__ import annotations
 

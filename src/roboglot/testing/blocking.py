@@ -93,7 +93,7 @@ class Blocking:
 
 
 def _is_kept(value: object) -> bool:
-    """Whether it is an object with methods to await, not a value."""
+    """Return whether it is an object with methods to await, not a value."""
     if inspect.isasyncgen(value):
         return True
     kind = type(value)

@@ -84,7 +84,7 @@ class ProgramClient:
         raise LinkLost("the robot went away")
 
     async def _printed(self, task: str) -> list[str]:
-        """What has come over the log since the program was run."""
+        """Return the lines printed since the program was run."""
         log, lines = self._of(self._log), list[str]()
         await log.send("")  # answered behind all that was printed before
         async for text in log:

@@ -34,7 +34,7 @@ START_SECONDS_MAX = 240.0  # kernels may have to be compiled
 
 
 class NotInTime(AssertionError):
-    """What the test waited for has not come true."""
+    """Condition that a test waited for in vain."""
 
 
 class RobotServer:
@@ -139,7 +139,7 @@ class RobotServer:
 
     @property
     def loop(self) -> Loop:
-        """Where it runs."""
+        """Event loop of the server."""
         if self._loop is None:
             raise RuntimeError("the robot is not up")
         return self._loop
@@ -177,7 +177,7 @@ class RobotServer:
 
     @property
     def truth(self) -> _There:
-        """What really is the case (``roboglot.simulation.world.truth``)."""
+        """Ground truth of the world (``roboglot.simulation.world.truth``)."""
         return _There(self.runtime.fleet.world.truth, self.loop)
 
     @property

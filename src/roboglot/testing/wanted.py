@@ -1,4 +1,4 @@
-"""What a test wants: world, robots, faults, clock. Read from pytest markers or a class's attributes."""
+"""Requirements of a test: world, robots, faults, clock. Read from pytest markers or a class's attributes."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Wanted:
 
     @property
     def place(self) -> Wanted:
-        """What a server that is there already must have been started with."""
+        """Requirements that a running server must have been started with."""
         return replace(self, faults=())
 
 

@@ -1,4 +1,4 @@
-"""Where the robots of a test began, and the ways that they really went."""
+"""Starts of a test's robots, and the ways that they really went."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ class Field:
 
 @dataclass(slots=True)
 class Profile:
-    """What was seen of one operation."""
+    """Observations of one operation."""
 
     count: int = 0
     statuses: set[str] = field(default_factory=set)
@@ -155,7 +155,7 @@ def _compare_numbers(row: Row, path: str, one: Field, other: Field) -> None:
 
 
 def _in_empty(path: str, fields: dict[str, Field]) -> bool:
-    """Whether an enclosing list or object was only ever empty, or not there at all in place of null."""
+    """Return whether an enclosing list or object was only ever empty, or not there at all in place of null."""
     for end in range(len(path) - 1, 0, -1):
         if path[end] in ".[":
             found = fields.get(path[:end])

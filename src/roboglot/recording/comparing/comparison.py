@@ -20,7 +20,7 @@ MISSING = "(not there)"
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """What does not agree: where, and both values in words."""
+    """Disagreement of two recordings: its place, and both values in words."""
 
     what: str
     one: str

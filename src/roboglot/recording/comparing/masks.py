@@ -1,4 +1,4 @@
-"""How two values are compared: exactly, as numbers within a tolerance, by their type alone, or not at all."""
+"""Comparison of two values: exactly, as numbers within a tolerance, by their type alone, or not at all."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _volatile = re.compile(
 
 
 class How(StrEnum):
-    """How two values are compared."""
+    """Way to compare two values."""
 
     EXACT = "exact"
     NUMBER = "number"

@@ -30,7 +30,7 @@ EVENTS, PUSHES = 40925, 40924
 
 
 class Book:
-    """Where exchanges are written, with the time of this machine."""
+    """Book of exchanges, with the time of this machine."""
 
     def __init__(self, path: Path, target: Target, version: str, robot: str = "a") -> None:
         """Raises OSError where the file cannot be written."""

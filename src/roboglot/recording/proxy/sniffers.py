@@ -75,7 +75,7 @@ class TextSniffer(Sniffer):
 
 
 class _Message:
-    """What httptools finds of one HTTP message."""
+    """Contents of one HTTP message, collected by httptools."""
 
     def __init__(self, done: Callable[[_Message], None]) -> None:
         self._done = done

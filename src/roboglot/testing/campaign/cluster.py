@@ -33,7 +33,7 @@ class TooLarge(ValueError):
 
 
 class Reference(Protocol):
-    """What Ray returns for a task."""
+    """Ray's result of a task."""
 
     def future(self) -> Future[tuple[bytes, Files]]:
         """Return the answer to come."""
@@ -105,7 +105,7 @@ def _play(trial: Trial, files: Files, seconds_max: float, *, keep: bool) -> tupl
 
 
 def _as_here(files: Files, folder: Path) -> bool:
-    """Whether this machine has the same files at the same place: then what they refer to is there as well."""
+    """Return whether this machine has the same files at the same place, and so what they refer to."""
     places = ((folder / name, content) for name, content in files.items())
     return all(place.is_file() and place.read_bytes() == content for place, content in places)
 

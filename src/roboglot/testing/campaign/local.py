@@ -95,7 +95,7 @@ def _now() -> float:
 
 
 def _result(one: _Running, seconds_max: float) -> Result:
-    """What its process said before it ended; ends one that is late."""
+    """Return what its process reported before it ended; ends one that is late."""
     try:
         if not one.ear.poll():
             return Result(Outcome.LATE, f"it was ended after {seconds_max:.0f} s", seconds_max)

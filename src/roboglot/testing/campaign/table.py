@@ -57,7 +57,7 @@ class Table:
             self._write(HEAD)
 
     def done(self, trial: Trial) -> bool:
-        """Whether the trial is in the table and need not be played again. Raises OtherCampaign."""
+        """Return whether the trial is in the table and need not be played again. Raises OtherCampaign."""
         row = self._found.get((trial.scenario, trial.seed))
         if row is not None and row.fingerprint != trial.fingerprint:
             raise OtherCampaign(

@@ -18,7 +18,7 @@ WHY_MAX = 500  # characters of a reason that are kept
 
 
 class Outcome(StrEnum):
-    """How a trial ended."""
+    """Outcome of a trial."""
 
     PASSED = "passed"
     FAILED = "failed"  # something that should be true was not
@@ -42,7 +42,7 @@ class Trial:
 
 
 class Result(msgspec.Struct, frozen=True):
-    """How one went; ``seconds`` are real ones."""
+    """Result of a trial; ``seconds`` are real ones."""
 
     outcome: Outcome
     why: str = ""

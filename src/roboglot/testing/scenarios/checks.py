@@ -1,4 +1,4 @@
-"""What must be true of the world at the end of a scenario: each check says what is wrong, or nothing."""
+"""Checks of the world at the end of a scenario: each says what is wrong, or nothing."""
 
 from __future__ import annotations
 

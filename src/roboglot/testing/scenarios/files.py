@@ -48,7 +48,7 @@ class Given(_Strict, frozen=True, forbid_unknown_fields=True):
 
 
 class Placing(_Strict, frozen=True, forbid_unknown_fields=True):
-    """Where a robot is put by hand: m and degrees of the world."""
+    """Place to put a robot by hand: m and degrees of the world."""
 
     x: Meters
     y: Meters
@@ -67,7 +67,7 @@ class Box(_Strict, frozen=True, forbid_unknown_fields=True):
 
 
 class Place(_Strict, frozen=True, forbid_unknown_fields=True):
-    """Where a robot should be: in the world (``pose``) or from where it started (``moved``); m and degrees."""
+    """Expected place of a robot: in the world (``pose``) or from its start (``moved``); m and degrees."""
 
     x: Meters | None = None
     y: Meters | None = None
@@ -94,7 +94,7 @@ class Range(_Strict, frozen=True, forbid_unknown_fields=True):
 
 
 class Exchanged(_Strict, frozen=True, forbid_unknown_fields=True):
-    """How many requests there must have been: at a door, of an operation, with that status; empty: any."""
+    """Expected number of requests: at a door, of an operation, with that status; empty: any."""
 
     door: str = ""
     operation: str = ""

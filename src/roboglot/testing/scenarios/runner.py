@@ -17,7 +17,7 @@ from roboglot.testing.server import RobotServer
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """How a scenario went: ``failures`` in plain words (none: it passed), real seconds, and what it left."""
+    """Outcome of a scenario: ``failures`` in plain words (none: it passed), real seconds, and its artifacts."""
 
     found: Found
     failures: Sequence[str]

@@ -1,4 +1,4 @@
-"""What happens in a scenario: each step does one thing, and raises StepFailed where it does not go as written."""
+"""Steps of a scenario: each does one thing, and raises StepFailed where it does not go as written."""
 
 from __future__ import annotations
 
@@ -168,7 +168,7 @@ def _end_group(process: subprocess.Popen[str]) -> None:
 
 
 def _has(have: object, wanted: object) -> bool:
-    """Whether an answer has all that is wanted, and maybe more."""
+    """Return whether an answer has all that is wanted, and maybe more."""
     if isinstance(wanted, dict):
         return isinstance(have, dict) and all(key in have and _has(have[key], value) for key, value in wanted.items())
     if isinstance(wanted, list):
