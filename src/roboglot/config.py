@@ -28,7 +28,7 @@ Port = Annotated[int, msgspec.Meta(ge=0, le=65535)]  # 0: any that is free
 
 @dataclass(frozen=True, slots=True)
 class StartConfig:
-    """Where a simulated robot stands at first: m and rad of the world's plan, and its floor from 0 on."""
+    """Start of a simulated robot: m and rad of the world's plan, and its floor from 0 on."""
 
     x: float
     y: float

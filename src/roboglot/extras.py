@@ -1,4 +1,4 @@
-"""What is installed beyond the core: which extra brings which module, and what to say when one is missing.
+"""Extras beyond the core: the modules that each brings, and the message when one is missing.
 
 The core (``pip install roboglot``) holds the clients and the commands that need no robot of our own; everything else
 comes with an extra. Imports nothing outside the standard library.

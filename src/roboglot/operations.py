@@ -20,7 +20,7 @@ Handler = TypeVar("Handler", bound=Callable[..., Awaitable[object]])
 
 
 class Right(StrEnum):
-    """What a client may do with a robot; each operation needs one of them.
+    """Right of a client on a robot; each operation needs one of them.
 
     SEE: read values, hear, watch. DRIVE: have it move, act and speak. PROGRAM: keep and run programs. EDIT: change
     maps, places and settings. ADMIN: power, network, firmware, people.

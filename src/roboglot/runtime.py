@@ -79,7 +79,7 @@ class RobotDoors:
 
     @property
     def endpoints(self) -> Sequence[Endpoint]:
-        """Where they listen."""
+        """Addresses that the doors listen at."""
         return [endpoint for door in self._doors for endpoint in door.endpoints]
 
     async def open(self) -> None:

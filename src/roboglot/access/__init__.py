@@ -1,1 +1,1 @@
-"""Who may do what with which robot: people, machines, addresses, their rights, and a record of what they did."""
+"""Access control: people, machines, addresses, their rights on robots, and an audit of their actions."""

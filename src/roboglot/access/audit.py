@@ -1,4 +1,4 @@
-"""Who changed what, and what was refused, on its way to the audit's table.
+"""Audit of changes and refusals, on its way to the audit's table.
 
 A thread writes what is noted, at once and many rows together, so that no request waits for the disk; a row that is
 written survives ``kill -9``. Rows hold names of operations and reasons, and never what was sent. While the table cannot

@@ -21,7 +21,7 @@ class Book:
         self._tokens = {entry.token: entry.name for entry in self._identities.values() if entry.token}
 
     def by_token(self, kept: str) -> str | None:
-        """Whose token has this hash."""
+        """Return the owner of the token with this hash."""
         return self._tokens.get(kept)
 
     def password_of(self, name: str) -> str:
@@ -52,7 +52,7 @@ class Book:
         return min((end for end in ends if end is not None and end > now), default=float("inf"))
 
     def replaced(self, older: Book) -> set[str]:
-        """Who has another password or token than in ``older``, or is gone: what was shown then counts no more."""
+        """Return those with another password or token than in ``older``, or gone: their old proofs count no more."""
         return {
             name
             for name, before in older._identities.items()

@@ -1,4 +1,4 @@
-"""What a client shows of itself, taken apart: its address, and the header with its name. Knows no rights."""
+"""Parsing of a client's address, and of the header with its name. Knows no rights."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ BURST_SECONDS = 2.0  # of bytes that may come at once
 
 
 class Tunnelled(NamedTuple):
-    """Who is at the other end of a tunnel, and the host that it came from.
+    """Identity at the other end of a tunnel, and the host that it came from.
 
     ``calls``: the tunnel's open connections by their local port. Other programs on this machine may call from the same
     loopback address, but not from one of these ports.
@@ -320,7 +320,7 @@ class RobotAdmission(Admission):
             listener(who)
 
     def _note_reply(self, exchange: Exchange) -> None:
-        """What changed something, or was refused by the robot; what ``check`` refused is noted already."""
+        """Note a reply that changed something, or was refused by the robot; ``check`` has noted its own refusals."""
         right = self._needs.get(exchange.operation)
         if exchange.door.startswith(DRIVER) or exchange.direction is not Direction.REPLY or right in (None, Right.SEE):
             return

@@ -1,4 +1,4 @@
-"""Whose password, token or certificate a client shows. What is wrong counts against its host, and the name it gives."""
+"""Verification of passwords, tokens and certificates. Failures count against the host, and the name that it gives."""
 
 from __future__ import annotations
 
@@ -56,12 +56,12 @@ class Proofs:
         return found
 
     def _certified(self, proof: Proof) -> str | None:
-        """Whose certificate it is; TLS has verified it."""
+        """Return the owner of the certificate, which TLS has verified."""
         certificate = proof.kind is ProofKind.CERTIFICATE
         return proof.value if certificate and self._book.has(proof.value, Kind.APP) else None
 
     def _by_token(self, proof: Proof) -> str | None:
-        """Who shows this certificate or token. No one guesses one, so it counts anyone else who was wrong before."""
+        """Return the owner of the certificate or token. They cannot be guessed, so earlier failures do not count."""
         if proof.kind is not HTTP:
             return self._certified(proof)
         scheme, _, rest = proof.value.partition(" ")

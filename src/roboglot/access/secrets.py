@@ -32,7 +32,7 @@ def password_hash(password: str) -> str:
 
 
 def password_fits(password: str, kept: str) -> bool:
-    """Whether it is the one that was kept; takes as long if none was (``kept`` empty): timing reveals nothing."""
+    """Return whether it is the stored one; takes as long if ``kept`` is empty: timing reveals nothing."""
     kind, _, rest = kept.partition("$")
     salt, _, key = rest.partition("$")
     derived = _derived(password[: PASSWORD_MAX + 1], base64.b64decode(salt) or bytes(_SALT_BYTES))

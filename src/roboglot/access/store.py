@@ -25,7 +25,7 @@ IDENTITIES_MAX = 10_000
 
 
 class Kind(StrEnum):
-    """What an identity is, and so how it shows itself."""
+    """Kind of an identity, and so its means of authentication."""
 
     PERSON = "person"  # by a password
     MACHINE = "machine"  # by a token

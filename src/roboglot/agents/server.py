@@ -66,7 +66,7 @@ class _Faults(msgspec.Struct):
 
 
 class _State(msgspec.Struct):
-    """What is read of a robot's state; no place of the pose is a number before it is known."""
+    """State read of a robot; no place of the pose is a number before it is known."""
 
     pose: list[float | None]
     actions: list[dict[str, object]]
@@ -95,7 +95,7 @@ def make_server(console: ConsoleClient) -> MCPServer:
 
 
 async def _asked(answer: Awaitable[T]) -> T:
-    """What the console answers; its refusal as the tool's error."""
+    """Return the console's answer; its refusal becomes the tool's error."""
     try:
         return await answer
     except Refused as refused:
@@ -114,7 +114,7 @@ class Tools:
         return found
 
     async def where_am_i(self, robot: Robot = DEFAULT) -> dict[str, object]:
-        """Where a robot is, what it does, its battery, faults, and who controls it."""
+        """Return a robot's pose, actions, battery and faults, and who controls it."""
         state: dict[str, object] = await _asked(self._console.get(dict, "robots", robot))
         keys = ("name", "pose", "velocity", "actions", "control", "faults", "battery", "place", "safety")
         return {key: state[key] for key in keys if key in state}

@@ -1,4 +1,4 @@
-"""What ``roboglot --version`` says: the version, the extras that are there, kernels, and the layers of the jail."""
+"""Output of ``roboglot --version``: the version, the installed extras, kernels, and the layers of the jail."""
 
 from __future__ import annotations
 

@@ -101,7 +101,7 @@ def rotate(name: Name, data: Data = None, database: Database = "") -> None:
 
 @app.command(name="list")
 def list_all(data: Data = None, database: Database = "") -> None:
-    """Who may do what."""
+    """List identities and their rights."""
     from rich.console import Console
     from rich.table import Table
 

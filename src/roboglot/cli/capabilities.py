@@ -48,7 +48,7 @@ class Kind:
 
 
 def command(write: Annotated[bool, typer.Option("--write", help="Write docs/capabilities.md.")] = False) -> None:
-    """What each protocol can do on each kind of robot."""
+    """Show what each protocol can do on each kind of robot."""
     text = page(_tell)
     if write:
         PAGE.write_text(text, encoding="utf-8")

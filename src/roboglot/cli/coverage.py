@@ -46,7 +46,7 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
     write: Annotated[bool, typer.Option("--write", help="Write docs/coverage.md.")] = False,
 ) -> None:
-    """How much of each protocol is there."""
+    """Show how much of each protocol is there."""
     measured = {name: measure(contract) for name, contract in CONTRACTS.items()}
     if write:
         Path("docs/coverage.md").write_text(page(measured), encoding="utf-8")

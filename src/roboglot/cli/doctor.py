@@ -97,7 +97,7 @@ def _port(name: str, address: str, port: int) -> Finding:
 
 
 def examine_sandbox() -> Finding:
-    """Whether users' programs can be confined."""
+    """Examine whether users' programs can be confined."""
     from roboglot.programs.engine.engine import Engine, SandboxUnavailable
 
     async def layers() -> str:

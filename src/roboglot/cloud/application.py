@@ -91,7 +91,7 @@ class BackEnd:
         return account
 
     async def _program(self, account: str, robot: str, frame: dict[str, object]) -> None:
-        """What a robot posts: a frame of its front end, an inquiry of its own, or a feedback."""
+        """Handle a robot's post: a frame of its front end, an inquiry of its own, or a feedback."""
         if "feedback" in frame:
             await self._store.record(account, robot, json.dumps(frame))
             return

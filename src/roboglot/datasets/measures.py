@@ -1,4 +1,4 @@
-"""How far an estimated trajectory is from a reference: absolute error after alignment, and errors of relations.
+"""Errors of an estimated trajectory against a reference: absolute after alignment, and of relations.
 
 Relations (Kümmerle et al. 2009) say where the robot was at one time as seen from where it was at another; they do not
 punish a small error early in the drive for all that comes after it.

@@ -84,7 +84,7 @@ class ScanMessage(Protocol):
 
 
 def is_bag(path: Path, head: bytes) -> bool:
-    """Whether this is a bag: a folder of rosbag2, a ROS 1 bag; a lone file of rosbag2 has its folder beside it."""
+    """Return whether this is a bag: a folder of rosbag2, a ROS 1 bag, or a file of rosbag2 in its folder."""
     if path.is_dir():
         return (path / "metadata.yaml").is_file()
     return head.startswith(b"#ROSBAG V2.0") or (path.suffix in (".db3", ".mcap") and _folder(path) is not None)
@@ -150,7 +150,7 @@ def _assembled(name: str, messages: Iterator[tuple[str, int, Any]]) -> DriveLog:
 
 
 def _take(transform: TransformStamped, fixed: dict[str, tuple[str, Pose]], wheels: Track) -> None:
-    """What tf says: where the base is in odom, and where parts are on the robot."""
+    """Take a transform of tf: the base in odom, or a part on the robot."""
     above, frame = (name.strip("/") for name in (transform.header.frame_id, transform.child_frame_id))
     pose = _pose(transform.transform.translation, transform.transform.rotation)
     if above in ODOM_FRAMES and frame in BASE_FRAMES:

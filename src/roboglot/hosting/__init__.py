@@ -1,1 +1,1 @@
-"""What a process needs that hosts robots: a heap that gives back, open files, an end in any case."""
+"""Tools for processes that host robots: a heap that gives back, open files, an end in any case."""

@@ -1,1 +1,1 @@
-"""What stands between a socket and a protocol: TLS, and limits of bytes and connections. Knows no protocol."""
+"""Layer between a socket and a protocol: TLS, and limits of bytes and connections. Knows no protocol."""

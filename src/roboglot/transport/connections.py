@@ -1,4 +1,4 @@
-"""How many connections one port has, and how many of them one host may have."""
+"""Limits on the connections of a port, in all and from one host."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Connections:
 
     @property
     def count(self) -> int:
-        """How many are open."""
+        """Number of open connections."""
         return self._hosts.total()
 
     def of(self, host: str) -> int:

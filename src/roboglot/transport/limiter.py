@@ -1,4 +1,4 @@
-"""How much one client may ask: buckets that fill with time. Bounded, however many clients there are."""
+"""Rate limits of clients: buckets that fill with time. Bounded, however many clients there are."""
 
 from __future__ import annotations
 

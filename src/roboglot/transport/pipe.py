@@ -101,7 +101,7 @@ class PipeEnd(asyncio.Transport):
         return self._low, self._high
 
     def set_write_buffer_limits(self, high: int | None = None, low: int | None = None) -> None:
-        """When the writer is asked to pause, and when to go on."""
+        """Set when the writer is asked to pause, and when to go on, in bytes."""
         self._high = high if high is not None else (4 * low if low is not None else HIGH)
         self._low = low if low is not None else self._high // 4
 
@@ -112,7 +112,7 @@ class PipeEnd(asyncio.Transport):
         return self._reading
 
     def pause_reading(self) -> None:
-        """What comes waits here."""
+        """Keep incoming bytes here."""
         self._reading = False
 
     def resume_reading(self) -> None:

@@ -32,7 +32,7 @@ Factory = Callable[[], asyncio.Protocol]
 
 @dataclass(frozen=True, slots=True)
 class Tls:
-    """How a port encrypts. ``plain``: it also takes connections that are not encrypted."""
+    """Encryption of a port. ``plain``: it also takes connections that are not encrypted."""
 
     context: ssl.SSLContext
     plain: bool = True

@@ -30,7 +30,7 @@ ROBOT_IP = b"robot ip "
 
 
 class Welcome(TypedDict):
-    """What the gateway answers to a greeting: its ports, and the key of a second connection."""
+    """Answer of the gateway to a greeting: its ports, and the key of a second connection."""
 
     tcp: list[int]
     callbacks: list[int]

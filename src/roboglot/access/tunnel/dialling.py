@@ -139,7 +139,7 @@ class Dialling:
 
 
 def _unusable(error: BaseException, address: str) -> str:
-    """Why this address cannot be listened at, and what to do; empty: that is not what went wrong."""
+    """Return why this address cannot be listened at, and what to do; empty: that is not what went wrong."""
     match getattr(error, "errno", None):
         case errno.EADDRNOTAVAIL:
             network = IPv4Network(f"{address}/24", strict=False)

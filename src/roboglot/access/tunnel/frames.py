@@ -1,4 +1,4 @@
-"""What passes through a tunnel: a kind, a stream's number, and at most FRAME_MAX bytes."""
+"""Frames of a tunnel: a kind, a stream's number, and at most FRAME_MAX bytes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ CREDIT = struct.Struct("!I")
 
 
 class Kind(IntEnum):
-    """What a frame is."""
+    """Kind of a frame."""
 
     HELLO = 1  # the client: who it is, and which robot it wants; JSON
     WELCOME = 2  # the gateway: the ports that there are; JSON
@@ -37,7 +37,7 @@ class Frame(NamedTuple):
 
 
 class BadFrame(ValueError):
-    """What came is no frame; the tunnel ends."""
+    """Bytes received are no frame; the tunnel ends."""
 
 
 def encode(kind: Kind, stream: int = 0, payload: bytes = b"") -> bytes:

@@ -65,7 +65,7 @@ class Ports:
 
 
 class Hello(msgspec.Struct, frozen=True):
-    """What a client wants: a robot, or to beat over a second connection of a tunnel (``beats``: its key)."""
+    """Greeting of a client: wants a robot, or to beat over a second connection of a tunnel (``beats``: its key)."""
 
     robot: str = ""
     token: str = ""
@@ -73,7 +73,7 @@ class Hello(msgspec.Struct, frozen=True):
 
 
 class Welcome(msgspec.Struct, frozen=True):
-    """What a client is let in to: ports, and the key of its second connection."""
+    """Ports that a client is let in to, and the key of its second connection."""
 
     tcp: tuple[int, ...]
     callbacks: tuple[int, ...]
@@ -232,7 +232,7 @@ class _Entry(asyncio.Protocol):
 
 
 def _driven(robot: Robot, own: str) -> Iterator[Action]:
-    """What a client of the tunnel drives by hand: it would stop if its connection were lost."""
+    """Yield the actions that a client of the tunnel drives by hand: losing its connection would stop them."""
     for action in robot.actions.running():
         if action.connection.rpartition(":")[0] == own and action.source.endswith(action.connection):
             yield action
@@ -309,7 +309,7 @@ def _is_free(address: str, ports: tuple[int, ...]) -> bool:
 
 @contextlib.asynccontextmanager
 async def _listening(tunnel: Tunnel, robot: Robot, ports: Ports, own: str) -> AsyncIterator[None]:
-    """What the robot sends to the tunnel's address, and its calls there, go through the tunnel.
+    """Send the robot's datagrams and calls to the tunnel's address through the tunnel.
 
     Datagrams are taken from the tap: clients on this machine may hold the same ports on every address.
     """

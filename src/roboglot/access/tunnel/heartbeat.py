@@ -1,4 +1,4 @@
-"""When an end of a tunnel shows that it is there, and what the other's silence means. Knows no clock and no socket."""
+"""Heartbeat of a tunnel: when an end beats, and what the other's silence means. Knows no clock and no socket."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LOST_AFTER = 5.0  # s of silence that the tunnel and its connections bear: lines
 
 
 class Look(NamedTuple):
-    """What is to be done now, and the seconds until the next look."""
+    """Decision for this moment, and the seconds until the next look."""
 
     beat: bool
     quiet: bool

@@ -1,1 +1,1 @@
-"""What `roboglot doctor` examines besides packages: who listens where, and what is open to whom."""
+"""Checks of `roboglot doctor` besides packages: listening ports, and what is open to whom."""

@@ -125,7 +125,7 @@ def _identities(config: Config) -> list[Identity]:
 
 
 def _identity_findings(config: Config, identities: list[Identity]) -> Iterator[Finding]:
-    """Who may do what, and what about it is weak."""
+    """Yield the rights of each identity, and their weaknesses."""
     now = time.time()
     for identity in identities:
         grants = [grant for grant in identity.grants if grant.until is None or grant.until > now]

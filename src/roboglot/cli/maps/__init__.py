@@ -1,1 +1,1 @@
-"""What `roboglot map` does with ROS maps and recorded drives. Knows no robot."""
+"""Commands of `roboglot map` on ROS maps and recorded drives. Knows no robot."""

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class By(StrEnum):
-    """What is compared."""
+    """Basis of a comparison."""
 
     VALUES = "values"
     BEHAVIOUR = "behaviour"

@@ -14,7 +14,7 @@ from roboglot.hosting.visible import visible
 
 
 class Storage(StrEnum):
-    """How a bag of ROS 2 is stored."""
+    """Storage format of a bag of ROS 2."""
 
     MCAP = "mcap"
     SQLITE = "sqlite3"

@@ -1,4 +1,4 @@
-"""Which operations of each protocol change nothing, by the doors' own tables: for comparing robots by their URLs."""
+"""Read-only operations of each protocol, by the doors' own tables: for comparing robots by their URLs."""
 
 from __future__ import annotations
 
