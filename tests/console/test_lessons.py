@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 from collections.abc import AsyncIterator
 from pathlib import Path
 
@@ -25,6 +26,11 @@ async def rehearsals() -> AsyncIterator[Rehearsals]:
     await made.close()
 
 
+def _own(words: str) -> str:
+    """The words without what they quote of the mission."""
+    return re.sub("“[^”]*”", "“”", words)
+
+
 async def graded(rehearsals: Rehearsals, lesson: Lesson, program: str) -> Grade:
     return grade(lesson, program, await rehearsals.play(program, lesson.scene, speed=0))
 
@@ -45,8 +51,9 @@ async def test_the_solution_passes_and_mistakes_fail(rehearsals: Rehearsals, nam
         assert not found.passed, mistake.program
         failed = {row.kind: row for row in found.rows if not row.passed and not row.star}
         assert mistake.fails in failed, (mistake.program, found.rows)
-        assert failed[mistake.fails].en
-        assert failed[mistake.fails].zh
+        for row in failed.values():
+            assert re.fullmatch(r"(?:[^.]|\.\d)*\.", _own(row.en)), row.en  # one sentence
+            assert re.fullmatch("[^a-zA-Z。]*。", _own(row.zh)), row.zh
 
 
 TEN_LINES = """

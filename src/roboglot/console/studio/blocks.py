@@ -68,6 +68,13 @@ def _labels() -> dict[str, Any]:
     return tomllib.loads(text)
 
 
+def label_of(key: str) -> dict[str, str]:
+    """The words of the block of a function, the first whose key ends so; those of the key where there is none."""
+    name = key.rpartition(".")[2].replace("_", " ")
+    chinese = next((words for known, words in _labels()["chinese"].items() if known.endswith(f".{key}")), name)
+    return {"en": name, "zh": chinese}
+
+
 def _function(operation: Operation[str], labels: dict[str, Any]) -> dict[str, Any]:
     key = operation.key
     name = key.rpartition(".")[2]

@@ -15,6 +15,8 @@ from typing import Annotated, Literal
 
 import msgspec
 
+from roboglot.console.studio.blocks import label_of
+from roboglot.console.studio.mistakes import explain
 from roboglot.model.geometry import Point
 from roboglot.programs.rehearsing import Played, Spot
 
@@ -33,6 +35,8 @@ COLOURS = {
     "white": (1, 1, 1),
     "any": None,
 }
+COLOURS_ZH = {"red": "红色", "green": "绿色", "blue": "蓝色", "yellow": "黄色", "white": "白色"}
+POSTURES_ZH = {"standing": "站立", "sitting": "坐着", "lying": "趴着", "limp": "放松", "changing": "变换姿势"}
 CONSTRUCTS: dict[str, tuple[tuple[type[ast.AST], ...], str, str]] = {
     "loop": ((ast.For, ast.While), "a loop", "循环"),
     "if": ((ast.If, ast.IfExp), "a condition", "条件判断"),
@@ -160,13 +164,16 @@ def _light(check: Check, work: Work) -> Why | None:
         return None
     if not shown:
         return Why("No light was switched on.", "没有点亮任何灯。")
-    return Why(f"No light was {check.text}.", f"没有点亮所要求颜色（{check.text}）的灯。")
+    return Why(f"No light was {check.text}.", f"没有点亮{COLOURS_ZH[check.text]}的灯。")
 
 
 def _posture(check: Check, work: Work) -> Why | None:
     if work.played.posture.casefold() == check.text.casefold():
         return None
-    return Why(f"At the end the dog is {work.played.posture}, not {check.text}.", "程序结束时机器狗的姿势不对。")
+    now, wanted = (POSTURES_ZH.get(name.casefold(), name) for name in (work.played.posture, check.text))
+    return Why(
+        f"At the end the dog is {work.played.posture}, not {check.text}.", f"结束时机器狗是{now}，应当是{wanted}。"
+    )
 
 
 def _turn(check: Check, work: Work) -> Why | None:
@@ -190,8 +197,8 @@ def _move(check: Check, work: Work) -> Why | None:
     if way >= check.metres:
         return None
     return Why(
-        f"The dog walked {way:.1f} m; it should be {check.metres:g}.",
-        f"机器狗走了 {way:.1f} 米，应当走 {check.metres:g} 米。",
+        f"The dog walked {way:.2f} m; it should be {check.metres:g}.",
+        f"机器狗走了 {way:.2f} 米，应当走 {check.metres:g} 米。",
     )
 
 
@@ -220,10 +227,10 @@ def _calls(check: Check, work: Work) -> Why | None:
     found = sum(1 for name, _ in work.played.calls if name.endswith(check.text))
     if found >= check.times:
         return None
-    name = check.text.rpartition(".")[2].replace("_", " ")
+    names = label_of(check.text)
     return Why(
-        f"“{name}” was done {found} times instead of {check.times}.",
-        f"“{name}”执行了 {found} 次，应当执行 {check.times} 次。",
+        f"“{names['en']}” was done {found} times instead of {check.times}.",
+        f"“{names['zh']}”执行了 {found} 次，应当执行 {check.times} 次。",
     )
 
 
@@ -242,7 +249,8 @@ def _mark(node: ast.stmt) -> bool:
 
 def _ends(_check: Check, work: Work) -> Why | None:
     if work.played.error:
-        return Why(f"The program ended with an error: {work.played.error}", f"程序出错：{work.played.error}")
+        why = explain(work.played.error)
+        return Why(f"The program ended with an error: {why['en']}", f"程序出错：{why['zh']}")
     return Why("The program did not come to its end.", "程序没有结束。") if work.played.late else None
 
 

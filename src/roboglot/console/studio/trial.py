@@ -13,6 +13,7 @@ import msgspec
 
 from roboglot.console.studio.checks import HULL, distance
 from roboglot.console.studio.lessons import Lesson, grade, no_program
+from roboglot.console.studio.mistakes import explain
 from roboglot.console.studio.programs import Programs, Studio
 from roboglot.model.errors import Busy, NotFound
 from roboglot.programs.errors import ProgramError
@@ -85,12 +86,14 @@ class Trial:
         answer: dict[str, object] = {"type": "tried", "id": wish.id, "lesson": wish.lesson}
         if played is not None:
             answer |= {"printed": played.printed, "error": played.error, "line": played.line, "seconds": played.seconds}
+            answer |= {"why": explain(played.error)} if played.error else {}
             answer |= {"late": played.late, "touched": _touched(played)}
         if lesson is not None:
             found = no_program(problems or []) if played is None else grade(lesson, wish.body, played)
             answer |= {"grade": msgspec.to_builtins(found)}
         elif problems:
-            answer |= {"error": problems[0].english, "line": problems[0].line}
+            first = problems[0]
+            answer |= {"error": first.english, "line": first.line, "why": {"en": first.english, "zh": first.chinese}}
         self._tell(answer)
 
     def close(self) -> None:

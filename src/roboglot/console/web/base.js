@@ -53,16 +53,55 @@ export async function loadWords(...from) {
 /** The words of the language chosen; those before it until they are there. */
 const spoken = () => words.value[language.value] ?? Object.values(words.value)[0] ?? {};
 
-/** The sentence under a key, with {names} filled in. @param {string} key @param {Record<string, unknown>} [values] */
+/** The sentence under a key, with {names} filled in; ``why`` is the server's. @param {string} key @param {Record<string, unknown>} [values] */
 export function t(key, values = {}) {
   const text = spoken()[key] ?? key;
-  return text.replace(/\{(\w+)\}/g, (_, name) => String(values[name] ?? ""));
+  return text.replace(/\{(\w+)\}/g, (_, name) => (name === "why" ? translated(String(values.why ?? "")) : String(values[name] ?? "")));
 }
 
-/** A word of the robot's own (a status, a stage, a fault) where we know it in this language; else as it came.
- * @param {string} word */
+/** What the server may say, in Chinese: pieces of the English between what is filled in, most words first. */
+const sentences = signal(/** @type {[string[], string][]} */ ([]));
+const SOON = 1500; // ms after the page
+effect(() => { if (language.value === "zh") setTimeout(learn, SOON); });
+
+async function learn() {
+  if (sentences.peek().length) return;
+  const known = /** @type {[string, string][]} */ (Object.entries(await fetch("/words/server.zh.json").then((r) => r.json(), () => ({}))));
+  sentences.value = known.map(([en, zh]) => /** @type {[string[], string]} */ ([en.split("{}"), zh])).sort(([a], [b]) => b.join("").length - a.join("").length);
+}
+
+/** What fills the gaps between pieces of a sentence; null if it is another one. @param {string[]} pieces @param {string} text */
+function gaps([first, ...rest], text) {
+  if (!rest.length) return text === first ? [] : null;
+  const last = /** @type {string} */ (rest.pop()), found = [];
+  let at = first.length;
+  if (!text.startsWith(first) || !text.endsWith(last)) return null;
+  for (const piece of rest) {
+    const next = text.indexOf(piece, at);
+    if (next < 0) return null;
+    found.push(text.slice(at, next));
+    at = next + piece.length;
+  }
+  if (text.length - last.length < at) return null;
+  found.push(text.slice(at, text.length - last.length));
+  return found.some((gap) => /[.!?] [A-Z]/.test(gap)) ? null : found;
+}
+
+/** A sentence of the server's in the language chosen, as it came where it is not known. @param {string} text @returns {string} */
+export function translated(text) {
+  if (language.value !== "zh" || !/[a-z]{2}/.test(text)) return text;
+  for (const [pieces, zh] of sentences.value) {
+    const found = gaps(pieces, text);
+    if (found) return zh.replace(/\{(\d)\}/g, (_, i) => robotWord(found[i]));
+  }
+  const parts = text.split(/(?<=[.!?;]) (?=\w)/);
+  return parts.length > 1 ? parts.map(translated).join("") : text;
+}
+
+/** A word of the robot's own (a status, a stage, a fault) where we know it in this language; else what is known of the server.
+ * @param {string} word @returns {string} */
 export function robotWord(word) {
-  return spoken()[`robot.${word}`] ?? word;
+  return spoken()[`robot.${word}`] ?? spoken()[`studio.state.${word}`] ?? translated(word);
 }
 
 effect(() => {
@@ -128,7 +167,7 @@ let fading = 0;
 
 /** Say something at the foot of the page for a while. @param {string} text @param {boolean} [bad] */
 export function say(text, bad = false) {
-  notice.value = { text, bad };
+  notice.value = { text: translated(text), bad };
   clearTimeout(fading);
   fading = window.setTimeout(() => { notice.value = { text: "", bad: false }; }, bad ? 8000 : 3500);
 }

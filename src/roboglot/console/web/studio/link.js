@@ -1,5 +1,6 @@
 // The studio's socket: frames of block programs, debugging, checks, the log; opens again whenever it is lost.
 import { signal } from "@preact/signals";
+import { t } from "../base.js";
 import { current } from "../link.js";
 
 export const online = signal(/** @type {"opening" | "open" | "lost"} */ ("opening"));
@@ -25,7 +26,7 @@ export function connect() {
     online.value = "lost";
     opened.value = null;
     clearTimeout(retry);
-    for (const { reject } of waiting.values()) reject(new Error("lost"));
+    for (const { reject } of waiting.values()) reject(new Error(t("link.lost")));
     waiting.clear();
     setTimeout(connect, RETRY);
   };
@@ -48,7 +49,7 @@ export function send(message) {
 function asked(key, message) {
   return new Promise((resolve, reject) => {
     waiting.set(key, { resolve, reject });
-    if (!send(message)) { waiting.delete(key); reject(new Error("lost")); }
+    if (!send(message)) { waiting.delete(key); reject(new Error(t("link.lost"))); }
   });
 }
 

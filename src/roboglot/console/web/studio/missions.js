@@ -87,7 +87,7 @@ function paint(canvas, scene, path) {
 
 function Verdict({ found }) {
   if (!found) return null;
-  if (!found.grade) return html`<div class=${`failure ${found.error || found.touched !== null ? "" : "fine"}`} role="status"><b>${found.error ? t("studio.try.failed") : found.touched !== null && found.touched !== undefined ? t("studio.try.touched", { s: found.touched.toFixed(0) }) : t("studio.try.fine", { s: (found.seconds ?? 0).toFixed(0) })}</b>${found.error && html`<small>${found.error}</small>`}</div>`;
+  if (!found.grade) return html`<div class=${`failure ${found.error || found.touched !== null ? "" : "fine"}`} role="status"><b>${found.error ? t("studio.try.failed") : found.touched !== null && found.touched !== undefined ? t("studio.try.touched", { s: found.touched.toFixed(0) }) : t("studio.try.fine", { s: (found.seconds ?? 0).toFixed(0) })}</b>${found.why && html`<small>${said(found.why)}</small>`}${found.error && found.printed !== undefined && html`<small>${found.error}</small>`}</div>`;
   const { stars: count, rows } = found.grade;
   return html`<div class=${`failure ${count ? "fine" : ""}`} role="status"><b>${count ? t("studio.passed") : t("studio.not.passed")} <${Stars} count=${count} /></b>
     <ul>${rows.filter((r) => !r.passed).map((r) => html`<li>${r.star ? "☆ " : "✗ "}${said(r)}</li>`)}</ul></div>`;

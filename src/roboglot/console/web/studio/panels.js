@@ -1,7 +1,7 @@
 // What stands beside the blocks: Python, output, variables and readings, the robot.
 import { useEffect, useRef } from "preact/hooks";
 import { signal } from "@preact/signals";
-import { Button, html, language, t } from "../base.js";
+import { Button, html, language, robotWord, t } from "../base.js";
 import { MapView } from "../map.js";
 import { command, current, state } from "../link.js";
 import { blocksOfLines } from "./blocks.js";
@@ -95,6 +95,6 @@ export function RobotPanel() {
   return html`<${Simulate} /><div class="world"><${MapView} tool=${null} overlay=${null} /></div>
     ${has && html`<div class="buttons"><${Button} on=${film.value} label=${t(film.value ? "camera.close" : "camera.open")} onClick=${() => { film.value = !film.value; }} /></div>`}
     ${has && film.value && html`<figure class="film"><img src=${`/api/robots/${encodeURIComponent(current.value)}/camera.mjpeg`} alt=${t("camera.alt")} /></figure>`}
-    ${state.value?.faults?.length > 0 && html`<ul class="faults">${state.value.faults.map((f) => html`<li class=${f.level.toLowerCase()}>${f.message}</li>`)}</ul>`}
+    ${state.value?.faults?.length > 0 && html`<ul class="faults">${state.value.faults.map((f) => html`<li class=${f.level.toLowerCase()}>${robotWord(f.message)}</li>`)}</ul>`}
     <div class="buttons"><${Button} kind="danger" icon="stop" label=${t("stop")} onClick=${() => command("stop")} /></div>`;
 }

@@ -1,6 +1,6 @@
 // Running a program on the robot: run, pause, step, stop; which block is lit, what was printed, read, and went wrong.
 import { computed, signal } from "@preact/signals";
-import { language, say, t } from "../base.js";
+import { language, say, t, translated } from "../base.js";
 import { blocksOfLines } from "./blocks.js";
 import * as bubbles from "./bubbles.js";
 import * as editor from "./editor.js";
@@ -24,7 +24,7 @@ export const lights = { count: 0, late: 0 }; // for the benchmark
 let began = 0, next = 1, frameDue = false;
 
 export const mine = (id) => id === program.value.id;
-const words = (/** @type {any} */ found) => found[language.value] || found.en || found.text;
+const words = (/** @type {any} */ found) => found[language.value] || found.en || translated(found.text);
 export const failureWords = computed(() => failure.value && words(failure.value));
 
 function stops(step = "") {

@@ -1,7 +1,7 @@
 // Driving by hand: a pad that must be held, keys, a gamepad; and panels for what else this body has.
 import { useEffect, useRef } from "preact/hooks";
 import { signal } from "@preact/signals";
-import { Button, html, lacks, robotWord, t } from "../base.js";
+import { Button, html, lacks, robotWord, t, translated } from "../base.js";
 import { command, drive, padRefused, state } from "../link.js";
 import { Camera } from "./camera.js";
 
@@ -129,7 +129,7 @@ export function Drive() {
   useGamepad();
   const { parts, body, about } = state.value;
   return html`${parts.includes("driving") && html`<div class="card"><h3>${t("pad.title")}</h3><${Pad} />
-      ${(lacks("drive") || padRefused.value) && html`<p class="warned">${lacks("drive") || padRefused.value}</p>`}
+      ${(lacks("drive") || padRefused.value) && html`<p class="warned">${lacks("drive") || translated(padRefused.value)}</p>`}
       <${Slider} name=${t("pad.speed", { speed: (about.speed * share.value).toFixed(1) })} min="0.05" max="1" step="0.05" value=${share.value} onChange=${(v) => { share.value = v; }} />
       <p class="muted">${t("pad.hint")}</p></div>`}
     ${parts.includes("camera") && html`<${Camera} />`}

@@ -51,7 +51,7 @@ function Faults() {
   const faults = state.value.faults;
   if (!faults.length) return html`<p class="allwell">${t("faults.none")}</p>`;
   return html`<ul class="faults">${faults.map((f) => html`<li class=${f.level.toLowerCase()}><${Icon} name="alert" size=${18} />
-    <span><b>${robotWord(f.name)}</b><small>${f.message}</small></span></li>`)}</ul>`;
+    <span><b>${robotWord(f.name)}</b><small>${robotWord(f.message)}</small></span></li>`)}</ul>`;
 }
 
 function Control() {
@@ -115,7 +115,7 @@ function Actions() {
       ${refused && html`<p class="warned">${t("actions.refused", { who: refused.client, doing: robotWord(refused.doing), why: refused.reason })}</p>`}</div>
     <div class="card"><h3>${t("actions.before")}</h3>
       ${history.length ? html`<ol class="actions">${history.map((a) => html`<li key=${a.id}><b>${robotWord(a.name)}</b><span class=${`badge ${a.status.toLowerCase()}`}>${robotWord(a.status)}</span>
-        <small>${a.client || t("itself")} · ${duration(a.seconds)}</small>${a.reason && html`<em>${a.reason}</em>`}</li>`)}</ol>` : html`<p class="muted">${t("actions.nothing")}</p>`}</div><${Recording} />`;
+        <small>${a.client || t("itself")} · ${duration(a.seconds)}</small>${a.reason && html`<em>${robotWord(a.reason)}</em>`}</li>`)}</ol>` : html`<p class="muted">${t("actions.nothing")}</p>`}</div><${Recording} />`;
 }
 
 const plots = () => import("./plots.js").then((m) => m.Plots);

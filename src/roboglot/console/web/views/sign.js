@@ -1,7 +1,7 @@
 // The log-in page: a name and a password, a token, or a name and the code of a class.
 import { useEffect } from "preact/hooks";
 import { signal } from "@preact/signals";
-import { Button, elsewhere, html, person, t } from "../base.js";
+import { Button, elsewhere, html, person, t, translated } from "../base.js";
 import { chosen, connect, hello, me, status } from "../link.js";
 
 const WAYS = { password: ["name", "password"], token: ["token"], code: ["name", "code"] };
@@ -38,7 +38,7 @@ export function SignIn() {
       <${Button} label=${t(`sign.by.${name}`)} on=${way.value === name} onClick=${() => { way.value = /** @type {keyof typeof WAYS} */ (name); wrong.value = ""; }} />`)}</div>
     ${WAYS[way.value].map((name) => html`<label class="field" key=${`${way.value}-${name}`}><span>${t(`sign.${name}`)}</span>
       <input name=${name} type=${KINDS[name][0]} autocomplete=${KINDS[name][1]} defaultValue=${way.value === "code" ? shown[name] : ""} autocapitalize="off" spellcheck=${false} required /></label>`)}
-    ${wrong.value && html`<p class="warned" role="alert">${wrong.value}</p>`}
+    ${wrong.value && html`<p class="warned" role="alert">${translated(wrong.value)}</p>`}
     <div class="buttons"><${Button} type="submit" kind="main" label=${t(busy.value ? "sign.busy" : "sign.in")} disabled=${busy.value} />
       ${hello.value && !me.value.name && html`<${Button} label=${t("cancel")} onClick=${() => { status.value = "open"; }} />`}</div></form>`;
 }

@@ -1,0 +1,62 @@
+"""Chinese pages say in Chinese what the server refuses; English ones as it came."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import pytest
+
+from roboglot.console.assets import FOLDER
+from tests.browser.served import OpenConsole, until
+from tests.browser.test_studio import Open, studio
+
+__all__ = ["studio"]  # the fixture
+pytestmark = pytest.mark.asyncio(loop_scope="session")
+KNOWN: dict[str, str] = json.loads((FOLDER / "words" / "server.zh.json").read_text("utf-8"))
+TRANSLATED = "async (texts) => { const base = await import('/base.js'); return texts.map(base.translated); }"
+LEARNT = """async () => {
+    const base = await import('/base.js');
+    const known = () => base.translated('no class is open') !== 'no class is open';
+    while (!known()) await new Promise((after) => setTimeout(after, 50));
+}"""
+
+
+def filled(text: str, marks: list[str]) -> str:
+    """The sentence with these in its gaps."""
+    left = iter(marks)
+    return re.sub(r"\{\d?\}", lambda gap: marks[int(gap[0][1:-1])] if gap[0] != "{}" else next(left), text)
+
+
+async def test_every_sentence_is_shown_in_chinese(open_console: OpenConsole) -> None:
+    page = await open_console(language="zh")
+    await page.evaluate(LEARNT)
+    marks = [f"<{number}>" for number in range(9)]
+    texts = {filled(en, marks): filled(zh, marks) for en, zh in KNOWN.items() if "{}{}" not in en}
+    found = await page.evaluate(TRANSLATED, list(texts))
+    assert dict(zip(texts, found, strict=True)) == texts
+    twice = "The current operation(run) is illegal: 7 is in 8. Recover it to go on, or shut it down first."
+    nested = "not stopped: the robot is off"
+    long = "x" * 200_000 + " is no name"
+    assert await page.evaluate(TRANSLATED, [twice, nested, "what is unknown", long]) == [
+        "现在不能进行操作（run）：7 处于 8。先恢复它再继续，或先结束它。",
+        "没有停下：机器人已关机",
+        "what is unknown",
+        "x" * 200_000 + " 不能作名称",
+    ]
+    english = await open_console(language="en")
+    assert await english.evaluate(TRANSLATED, ["no class is open"]) == ["no class is open"]
+
+
+@pytest.mark.parametrize(
+    ("language", "said"), [("zh", "被拒绝：没有课堂 'NO'"), ("en", "Refused: there is no class 'NO'")]
+)
+async def test_refusals_are_in_the_language_of_the_page(studio: Open, language: str, said: str) -> None:
+    page = await studio(language=language)
+    if language == "zh":
+        await page.evaluate(LEARNT)
+    await page.click("#tab-group")
+    await page.fill("input[name=code]", "NO")
+    await page.fill("form:nth-of-type(1) input[name=name]", "Anna")
+    await page.click("form:nth-of-type(1) button")
+    await until(page, f"document.querySelector('.notice').textContent === {json.dumps(said)}")

@@ -1,0 +1,84 @@
+"""Reads the sources for the sentences that pages may show: why something was refused, why it ended, what is wrong."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator, Mapping
+from functools import cache
+from pathlib import Path
+
+import roboglot
+
+ROOT = Path(roboglot.__file__).parent
+PLACES = (
+    "access/", "autonomy/", "conditions.py", "console/", "drivers/", "media/", "model/", "operations.py", "programs/",
+    "protocols/visual/", "recording/", "rehearsal.py", "simulation/", "storage/", "wire/visual/",
+)  # fmt: skip
+KINDS = {"RobotError", "ProgramError", "BadParameters", "BadCondition", "Problem"}
+OUTSIDE = ("console/", "model/", "rehearsal.py", "simulation/")  # whose ValueError and RuntimeError pages show, too
+NAMED = {"why", "reason", "words", "wrong"}  # of variables and arguments that hold such a sentence
+LATER = {"set": 4, "_Watch": 4, "refuse": 1, "Problem": 1}  # which argument it is, where it is not the first
+HOLE = "{}"
+
+
+@cache
+def sentences(root: Path = ROOT) -> dict[str, str]:
+    """Return each sentence, with ``{}`` for what is filled in, and the first place where it is said."""
+    trees = {path.relative_to(root): ast.parse(path.read_text("utf-8")) for path in sorted(root.rglob("*.py"))}
+    errors = _errors(trees)
+    found: dict[str, str] = {}
+    for path, tree in trees.items():
+        if path.as_posix().startswith(PLACES):
+            for text, line in _said(tree, errors, path.as_posix().startswith(OUTSIDE)):
+                if re.search("[a-z]{2}", text.replace(HOLE, "")):
+                    found.setdefault(text.strip(), f"{path}:{line}")
+    return found
+
+
+def _errors(trees: Mapping[Path, ast.Module]) -> set[str]:
+    """The names of the classes below ``KINDS``."""
+    bases: dict[str, set[str]] = {}
+    for tree in trees.values():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ClassDef):
+                bases.setdefault(node.name, set()).update(ast.unparse(base).rpartition(".")[2] for base in node.bases)
+    known = set(KINDS)
+    while new := {name for name, above in bases.items() if above & known} - known:
+        known |= new
+    return known
+
+
+def _said(tree: ast.Module, errors: set[str], outside: bool) -> Iterator[tuple[str, int]]:
+    first = errors | {"cancel", "Failed", "__init__"} | ({"ValueError", "RuntimeError"} if outside else set())
+    for node in ast.walk(tree):
+        values: list[ast.expr] = []
+        line = getattr(node, "lineno", 0)
+        match node:
+            case ast.Call():
+                name = ast.unparse(node.func).rpartition(".")[2]
+                place = LATER.get(name, 0 if name in first else len(node.args))
+                values = node.args[place : place + 1]
+                values += [keyword.value for keyword in node.keywords if keyword.arg in NAMED]
+            case ast.Assign(targets=[ast.Name(id=name)]) | ast.AugAssign(target=ast.Name(id=name)) if name in NAMED:
+                values = [node.value]
+        for value in values:
+            yield from ((text, line) for text in _texts(value))
+
+
+def _texts(node: ast.expr) -> list[str]:
+    """What an expression may be, as far as it is written down."""
+    match node:
+        case ast.Constant(value=str(text)):
+            return [text]
+        case ast.JoinedStr(values=parts):
+            return ["".join(str(part.value) if isinstance(part, ast.Constant) else HOLE for part in parts)]
+        case ast.IfExp(body=one, orelse=other):
+            return _texts(one) + _texts(other)
+        case ast.BoolOp(values=choices):
+            return [text for choice in choices for text in _texts(choice)]
+        case ast.BinOp(left=left, right=right, op=ast.Add()):
+            return [one + other for one in _texts(left) or [HOLE] for other in _texts(right) or [HOLE]]
+        case ast.Tuple(elts=[last, *rest]):
+            return [text for choice in [last, *rest] for text in _texts(choice)]
+    return []

@@ -1,0 +1,53 @@
+"""What the server says on pages: every sentence of the sources has its Chinese, and none is kept for nothing."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from roboglot.console.assets import FOLDER
+from tests.console.server_sentences import sentences
+
+KNOWN: dict[str, str] = json.loads((FOLDER / "words" / "server.zh.json").read_text("utf-8"))
+SMALL = {"ahead", "behind", "in", "out "}  # words that fill a gap
+LIBRARY = {key for key in KNOWN if re.match("Expected `|Object |Invalid ", key)}  # msgspec's, of values that do not fit
+
+
+def test_each_sentence_of_the_server_has_its_chinese() -> None:
+    missing = {text: place for text, place in sentences().items() if text not in KNOWN}
+    assert missing == {}, "add their Chinese to console/web/words/server.zh.json, sorted"
+
+
+def test_no_sentence_that_is_gone_is_kept() -> None:
+    assert sorted(set(KNOWN) - set(sentences()) - SMALL - LIBRARY) == []
+
+
+def test_chinese_sentences_fill_in_the_same() -> None:
+    assert list(KNOWN) == sorted(KNOWN)
+    gaps = {text: {int(number) for number in re.findall(r"\{(\d)\}", chinese)} for text, chinese in KNOWN.items()}
+    used = {text for text, numbers in gaps.items() if numbers - set(range(text.count("{}")))}
+    assert used == set()
+    lost = {text for text, numbers in gaps.items() if set(range(text.count("{}"))) - numbers and text not in LIBRARY}
+    assert lost == set()
+    assert [text for text in KNOWN if not re.search("[一-鿿]", KNOWN[text])] == []
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        'raise Refused(f"a new {name} sentence")',
+        'raise NotFound("a new " + name + " sentence")',
+        'action.cancel("a new {} sentence")',
+        'why = f"a new {1} sentence" if it else ""',
+        'health.set(NAME, True, "lidar", ERROR, f"a new {x} sentence")',
+    ],
+)
+def test_a_new_sentence_is_found(tmp_path: Path, source: str) -> None:
+    (tmp_path / "console").mkdir()
+    (tmp_path / "console" / "new.py").write_text(
+        f"class RobotError(Exception): ...\nclass Refused(RobotError): ...\nclass NotFound(RobotError): ...\n{source}\n"
+    )
+    assert list(sentences(tmp_path)) == ["a new {} sentence"]
