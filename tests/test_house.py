@@ -2,6 +2,8 @@
 
 import ast
 import re
+import shutil
+import subprocess
 import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -25,6 +27,8 @@ WIDE = {  # classes with more, and why
 }
 GENERATED = ("_pb2.py", "_pb2_grpc.py")
 WORDS_MAX = 5  # in 10,000 lines
+RIDDLES = set(re.findall(r"\w+", "how if nobody now what when where whether which who whoever whom whose why"))
+SUBJECT = re.compile(r"(?=.{1,60}$)[a-z][\w ,./-]*: [a-z].*[^.]")  # of a commit
 COLUMNS_MAX = 120  # of a line of docs; table rows, code and what is generated may be longer
 CHAPTERLESS = {  # modules of a vendor's package that belong to no chapter of its manual
     "wire": "annexb channel cloud codes commands geometry lines messages orders proto relay replies requests telemetry "
@@ -122,6 +126,37 @@ def test_plain_words(texts: list[Path]) -> None:
     read = [path.read_text() for path in texts]
     found = sum(len(pattern.findall(text)) for text in read)
     assert found / sum(text.count("\n") for text in read) * 10_000 < WORDS_MAX
+
+
+def docstrings(path: Path) -> Iterator[tuple[int, str]]:
+    """Line and text of each docstring of a file."""
+    for node in ast.walk(tree_of(path)):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            text = ast.get_docstring(node)
+            yield from [(node.body[0].lineno, text)] if text else []
+
+
+@pytest.mark.parametrize("files", [SOURCES], ids=["src"])
+def test_docstrings_begin_with_verb_or_noun(files: list[Path]) -> None:
+    """They name a thing or say what is done; a question or a subordinate clause has to be read twice."""
+    found = [
+        f"{path.relative_to(ROOT)}:{line}"
+        for path in files
+        for line, text in docstrings(path)
+        if "kernels" not in path.parts and re.split(r"\W+", text.lstrip("`"), maxsplit=1)[0].lower() in RIDDLES
+    ]
+    assert found == []
+
+
+def test_commit_subjects_have_an_area_and_fit() -> None:
+    """`area: imperative`, 60 characters at most; asked of the last 20, or of what a shallow checkout has of them."""
+    git = shutil.which("git")
+    if git is None or not (ROOT / ".git").exists():
+        pytest.skip("there is no history here")
+    log = subprocess.run([git, "log", "-20", "--no-merges", "--format=%s"], cwd=ROOT, capture_output=True, text=True)
+    if log.returncode:
+        pytest.skip("git does not read this checkout")
+    assert [line for line in log.stdout.splitlines() if not SUBJECT.fullmatch(line)] == []
 
 
 def test_docs_are_not_wide() -> None:
