@@ -21,7 +21,7 @@ from roboglot.model.components.motion.driving import BASE, Driving
 from roboglot.model.components.system.health import Health
 from roboglot.model.components.system.lease import TAKEN, Lease
 from roboglot.model.components.system.settings import Settings
-from roboglot.model.errors import Busy
+from roboglot.model.errors import Busy, Refused
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Description, Robot
 from roboglot.protocols.lease_desk import NAME, Answer, Control, LeaseDesk, Request
@@ -217,6 +217,24 @@ async def test_all_stop_and_all_are_taken_and_released(desk: Path, world: World,
     assert all(row["taken_by"] for row in taken["robots"])
     freed = await say(desk, b'{"do": "release", "all": true}\n')
     assert not any(row["taken_by"] for row in freed["robots"])
+
+
+@pytest.mark.world("empty", robots=("a", "b", "c"))
+async def test_one_that_refuses_holds_up_no_other(
+    desk: Path, world: World, forward: Forward, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def refuse(reason: str) -> None:
+        raise Refused("its link is gone")
+
+    monkeypatch.setattr(world.robot("a").actions, "cancel", refuse)
+    for name in ("b", "c"):
+        world.robot(name)[Driving].drive(Twist(0.3, 0.0, 0.0), source="test")
+    await forward(seconds=1.0)
+    stopping = asyncio.create_task(say(desk, b'{"do": "stop", "all": true}\n'))
+    while not stopping.done():
+        await forward(seconds=0.1)
+    assert (await stopping)["error"] == "robot a: its link is gone"
+    assert max(abs(world.robot(name)[Base].velocity.x) for name in ("b", "c")) < 0.02
 
 
 @pytest.mark.world("empty", robots=("a", "b"))

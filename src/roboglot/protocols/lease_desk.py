@@ -80,7 +80,11 @@ class LeaseDesk:
 
     async def _grant(self, request: Request) -> None:
         if request.all:
-            await asyncio.gather(*(self._do(request, robot) for robot in self._robots.values()))
+            wishes = (self._do(request, robot) for robot in self._robots.values())
+            ends = await asyncio.gather(*wishes, return_exceptions=True)  # one that refuses holds up no other
+            for name, end in zip(self._robots, ends, strict=True):
+                if isinstance(end, BaseException):
+                    raise LookupError(f"robot {name}: {end}") from end
             return
         robot = self._robots.get(request.robot)
         if robot is None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
+from roboglot.config import parse_robot
 from roboglot.model.geometry import Pose
 from roboglot.simulation.bodies.files import load_body
 from roboglot.simulation.world.placing import AHEAD, Places
@@ -50,3 +52,21 @@ def test_first_robot_of_bare_world_stands_in_middle(tmp_path: Path) -> None:
     places = Places(load_world(bare))
     assert places.next(None, 0, 0.25) == (Pose(3.0, 2.0), 0)
     assert places.next(None, 0, 0.25) == (Pose(3.0, 1.2), 0)
+
+
+def test_refusal_names_a_place_nearby_that_is_free(places: Places) -> None:
+    with pytest.raises(ValueError, match="cannot stand at") as refused:
+        places.next(Pose(3.0, 2.0), 0, 0.3)
+    x, y = map(float, str(refused.value).rpartition(" ")[2].split(","))
+    assert Pose(3.0, 2.0).distance_to(Pose(x, y)) < 1.0
+    assert places.next(Pose(x, y), 0, 0.3) == (Pose(x, y), 0)
+
+
+def test_example_of_the_documents_starts(places: Places) -> None:
+    text = (Path(__file__).parents[3] / "docs" / "scale.md").read_text()
+    shown = [parse_robot(robot) for robot in re.findall(r"--robot (\w+=\S+)", text)]
+    assert len(shown) >= 2
+    for robot in shown:
+        assert robot.start is not None
+        start = Pose(robot.start.x, robot.start.y, robot.start.yaw)
+        assert places.next(start, robot.start.floor, load_body(robot.body).hull.radius)[0] == start

@@ -19,6 +19,7 @@ SEARCH = 40.0  # m around the first robot
 SAME_ROOM = 5.0  # m around it that are looked through for a good place
 CLEAR = 0.3, 0.05  # m around a robot in a crowd, as long as there are such places
 AHEAD = 0.6  # m that a good place leaves free
+NEAR, NEAR_STEP = 3.0, 0.1  # m around a taken place that are looked through for one to name, and between two looks
 
 
 def docks_of(world: WorldDescription) -> list[list[Pose]]:
@@ -50,7 +51,9 @@ class Places:
         if not 0 <= floor < len(self.world.floors):
             raise ValueError(f"there is no floor {floor}; the world has {len(self.world.floors)}")
         if wanted is not None and not self.free(wanted, floor, radius):
-            raise ValueError(f"a robot cannot stand at ({wanted.x:g}, {wanted.y:g}) on floor {floor}")
+            free = self._near(wanted, floor, radius)
+            instead = f"; it can at {free.x:.2f},{free.y:.2f}" if free is not None else ""
+            raise ValueError(f"a robot cannot stand at ({wanted.x:g}, {wanted.y:g}) on floor {floor}{instead}")
         for pose, number in [(wanted, floor)] if wanted is not None else self._candidates(floor, radius):
             if self.free(pose, number, radius) and (wanted is not None or not self._reserved(pose, number, radius)):
                 self._taken.append((pose, number, radius))
@@ -75,6 +78,14 @@ class Places:
             self._crowded.add(floor)
         for place in search.rest:
             yield place
+
+    def _near(self, wanted: Pose, floor: int, radius: float) -> Pose | None:
+        """Return a free place within ``NEAR`` of one that is taken, the nearest of a grid."""
+        steps = range(-round(NEAR / NEAR_STEP), round(NEAR / NEAR_STEP) + 1)
+        cells = sorted((math.hypot(i, j), i, j) for i in steps for j in steps)
+        x, y = round(wanted.x, 1), round(wanted.y, 1)
+        places = (Pose(x + i * NEAR_STEP, y + j * NEAR_STEP, wanted.yaw) for _, i, j in cells)
+        return next((place for place in places if self.free(place, floor, radius)), None)
 
     def _reserved(self, pose: Pose, floor: int, radius: float) -> bool:
         return any(number == floor and pose.distance_to(other) < radius + r for other, number, r in self.reserved)

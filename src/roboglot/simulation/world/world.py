@@ -100,7 +100,10 @@ class World:
         radii = {name: body.hull.radius for name, body in bodies.items()}
         places = Places(description, [(p.start, p.floor, radii[p.name]) for p in robots if p.start is not None])
         for placement in robots:
-            start = places.next(placement.start, placement.floor, radii[placement.name])
+            try:
+                start = places.next(placement.start, placement.floor, radii[placement.name])
+            except ValueError as error:
+                raise ValueError(f"robot {placement.name}: {error}") from None
             self._population.starts[placement.name] = start
             self._population.hull(placement.name).place(*start)
         self._loading: asyncio.Task[None] | None = None
