@@ -41,12 +41,16 @@ class Hello(msgspec.Struct, tag="hello", tag_field="type"):
 
 
 class Watch(msgspec.Struct, tag="watch", tag_field="type"):
-    """Robot that the page shows; with its wire, with the truth, and with its camera's detections."""
+    """Robot that the page shows; with its wire, with the truth, and with its camera's detections.
+
+    ``moving``: the page draws the robot: it gets scan, path and map, and poses at each beat instead of each second.
+    """
 
     robot: str
     wire: bool = False
     truth: bool = False
     seen: bool = False
+    moving: bool = True
 
 
 class Wish(msgspec.Struct, tag="do", tag_field="type"):
@@ -104,19 +108,46 @@ class Page:
             self._due.clear()
             while not self._replies.empty():
                 await self._tell(self._replies.get_nowait())
-            if self._beat >= 0:
-                beat, self._beat = self._beat, -1
-                await self._show(beat)
+            if self._beat > self._shown:
+                before, self._shown = self._shown, self._beat
+                await self._show(before, self._beat)
 
-    _beat = -1
+    _beat = _shown = -1
+
+    @property
+    def moving(self) -> bool:
+        """Draws a robot that moves: it is to look again as often as possible."""
+        return self._watch.moving
 
     def beat(self, number: int) -> None:
         """It is time to look again; a page that still sends skips this one."""
         self._beat = number
         self._due.set()
 
-    async def _show(self, beat: int) -> None:
+    async def _show(self, before: int, beat: int) -> None:
+        """Send what changed; ``before``: the beat that was shown last."""
+
+        def due(beats: int) -> bool:
+            return before // beats != beat // beats
+
         visible = self._desk.visible
+        if self._watch.moving or due(OTHERS_BEATS):
+            await self._show_moment(visible)
+        for name, view in visible.items():
+            watched = view is self._watched
+            if name not in self._sent or due(STATE_BEATS if watched else OTHERS_BEATS):
+                await self._show_state(name, view.state_at(beat))
+        if self._watched in visible.values():
+            assert self._watched is not None
+            if self._watch.moving:
+                await self._show_frames(self._watched)
+            if self._watch.seen and (boxes := self._watched.sightings.boxes) != self._boxes:
+                self._boxes = boxes
+                await self._tell({"type": "seen", "robot": self._watched.robot.id, "boxes": boxes})
+            if self._watch.wire and due(STATE_BEATS):
+                await self._show_wire(self._watched)
+
+    async def _show_moment(self, visible: Mapping[str, RobotView]) -> None:
         motion = {name: view.motion for name, view in visible.items()}
         moment: dict[str, object] = {"type": "moment", "now": milliseconds(), "time": self._desk.world.clock.time()}
         moment["pace"] = self._desk.pace
@@ -126,21 +157,9 @@ class Page:
         if self._watch.truth and whole and (truth := drawings.truth_of(self._desk.stage)) != self._truth:
             self._truth = moment["truth"] = truth
         await self._tell(moment)
-        for name, view in visible.items():
-            watched = view is self._watched
-            if name not in self._sent or beat % (STATE_BEATS if watched else OTHERS_BEATS) == 0:
-                await self._show_state(name, view)
-        if self._watched in visible.values():
-            assert self._watched is not None
-            await self._show_frames(self._watched)
-            if self._watch.seen and (boxes := self._watched.sightings.boxes) != self._boxes:
-                self._boxes = boxes
-                await self._tell({"type": "seen", "robot": self._watched.robot.id, "boxes": boxes})
-            if self._watch.wire and beat % STATE_BEATS == 0:
-                await self._show_wire(self._watched)
 
-    async def _show_state(self, name: str, view: RobotView) -> None:
-        state, before = view.state(), self._sent.get(name, {})
+    async def _show_state(self, name: str, state: dict[str, object]) -> None:
+        before = self._sent.get(name, {})
         changed = {key: value for key, value in state.items() if key not in before or before[key] != value}
         if changed:
             self._sent[name] = state

@@ -7,13 +7,15 @@ import contextlib
 import errno
 import importlib
 import logging
+import math
 import socket
 import time
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from roboglot.config import ConsoleConfig
 from roboglot.console.desk import Desk
-from roboglot.console.settings import BEAT, PORTS_TRIED_MAX
+from roboglot.console.settings import BEAT, BEAT_PAGES, PORTS_TRIED_MAX
 from roboglot.extras import MissingExtra, in_words, is_there
 from roboglot.model.admission import Admission
 from roboglot.model.background import load
@@ -23,6 +25,7 @@ from roboglot.transport.tls import Tls
 
 if TYPE_CHECKING:
     from roboglot.console.application import Application
+    from roboglot.console.live import Page
     from roboglot.console.studio.classroom import Classroom
 
 log = logging.getLogger(__name__)
@@ -119,7 +122,7 @@ class Console:
         await otlp.Pusher(await application.metrics(), self._config.otlp, self._config.otlp_period).run()
 
     async def _beat(self, application: Application) -> None:
-        """Have every page look again; robots are read only while a page is open."""
+        """Have the pages look again, many in turns; robots are read only while a page is open."""
         number = 0
         while True:
             await asyncio.sleep(BEAT)
@@ -128,7 +131,7 @@ class Console:
                 for view in self._desk.views.values():
                     if view.watched:
                         view.look(time.monotonic())
-                for page in application.pages:
+                for page in those_due(list(application.pages), number):
                     page.beat(number)
 
     async def close(self) -> None:
@@ -152,6 +155,14 @@ class Console:
             if (transport := getattr(connection, "transport", None)) is not None:
                 transport.abort()
         self.port = 0
+
+
+def those_due(pages: Sequence[Page], number: int) -> list[Page]:
+    """Pages that look again at a beat: of those that draw a moving robot at most BEAT_PAGES, in turns."""
+    drawing = [page for page in pages if page.moving]
+    turns = math.ceil(len(drawing) / BEAT_PAGES)
+    taken = [page for place, page in enumerate(drawing) if (number + place) % turns == 0]
+    return taken + [page for page in pages if not page.moving]
 
 
 def _load() -> None:

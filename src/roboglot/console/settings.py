@@ -18,6 +18,7 @@ THUMBNAIL_SIDE = 96  # pixels of the longer side of a map in the grid of robots
 PORTS_TRIED_MAX = 20  # ports after the first that are tried when it is taken
 
 BEAT = 0.1  # s between two poses and scans
+BEAT_PAGES = 10  # pages that draw a moving robot at each beat; more take turns
 STATE_BEATS = 2  # beats between two looks at the state of the robot that a page shows
 OTHERS_BEATS = 10  # of all other robots
 MAP_SECONDS = 1.0  # between two maps at least

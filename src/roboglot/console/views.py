@@ -42,6 +42,8 @@ class RobotView:
         self._packing: asyncio.Task[None] | None = None
         self._viewers = 0
         self._leaving: list[Callable[[], None]] = []
+        self._state: dict[str, object] = {}
+        self._state_beat = -1
         self._replaced = robot.events.listen(MapReplaced, lambda _: self.settle())
 
     def settle(self) -> None:
@@ -107,6 +109,12 @@ class RobotView:
             "anchor": words.pose(self.anchor) if self.anchor else None,
             "refused": self.refusals[-1] if self.refusals else None,
         }
+
+    def state_at(self, beat: int) -> dict[str, object]:
+        """The state, looked up once for all pages that are shown it at one beat."""
+        if self._state_beat != beat:
+            self._state_beat, self._state = beat, self.state()
+        return self._state
 
     def look(self, now: float) -> None:
         """Renew path and map where they changed; ``now``: the machine's time, s."""

@@ -32,7 +32,7 @@ effect(() => {
   const robot = hello.value?.robots.find((r) => r.name === current.value);
   rights.value = { mine: robot ? [...robot.rights, ...(hello.value.all ? ["all"] : [])] : null, needs: hello.value?.needs ?? {} };
 });
-export const wanted = signal({ wire: false, truth: false, seen: false });
+export const wanted = signal({ wire: false, truth: false, seen: false, moving: true }); // moving: at the rate of a map that is drawn
 
 const KEPT_MAX = 20_000; // exchanges
 const RETRY = 1000; // ms
@@ -91,7 +91,7 @@ export function choose(name) {
   watch();
 }
 
-/** @param {Partial<{wire: boolean, truth: boolean, seen: boolean}>} change */
+/** @param {Partial<typeof wanted.value>} change */
 export function want(change) {
   const now = { ...wanted.value, ...change };
   if (JSON.stringify(now) !== JSON.stringify(wanted.value)) { wanted.value = now; watch(); }

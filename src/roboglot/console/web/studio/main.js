@@ -3,7 +3,7 @@ import { render } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 import { computed, effect, signal } from "@preact/signals";
 import { Button, Icon, html, kept, language, loadWords, notice, say, t, theme } from "../base.js";
-import { choose, command, connect as connectRobot, current, hello, status } from "../link.js";
+import { choose, command, connect as connectRobot, current, hello, status, want } from "../link.js";
 import { loadTable } from "./blocks.js";
 import { Group } from "./class.js";
 import { Help, Keys, Library, Schedule, shown } from "./dialogs.js";
@@ -122,6 +122,7 @@ function App() {
 
 const AWAY_AFTER = 2000; // ms until files are kept for the time without a server: the page itself comes first
 await Promise.all([loadWords("/words", "/studio/words"), loadTable()]);
+want({ moving: false }); // until a map is shown
 render(html`<${App} />`, document.getElementById("app"));
 connectRobot();
 connect();

@@ -3,7 +3,7 @@ import { useEffect, useRef } from "preact/hooks";
 import { signal } from "@preact/signals";
 import { Button, html, language, robotWord, t } from "../base.js";
 import { MapView } from "../map.js";
-import { command, current, state } from "../link.js";
+import { command, current, state, want } from "../link.js";
 import { blocksOfLines } from "./blocks.js";
 import { inWords } from "./bubbles.js";
 import * as editor from "./editor.js";
@@ -92,6 +92,7 @@ export function Values() {
 const film = signal(false);
 export function RobotPanel() {
   const has = state.value?.parts?.includes("camera");
+  useEffect(() => { want({ moving: true }); return () => want({ moving: false }); }, []);
   return html`<${Simulate} /><div class="world"><${MapView} tool=${null} overlay=${null} /></div>
     ${has && html`<div class="buttons"><${Button} on=${film.value} label=${t(film.value ? "camera.close" : "camera.open")} onClick=${() => { film.value = !film.value; }} /></div>`}
     ${has && film.value && html`<figure class="film"><img src=${`/api/robots/${encodeURIComponent(current.value)}/camera.mjpeg`} alt=${t("camera.alt")} /></figure>`}

@@ -1,0 +1,55 @@
+"""What the live socket sends to pages, and how often."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from types import SimpleNamespace
+from typing import cast
+
+from hypothesis import given
+from hypothesis import strategies as st
+from websockets.asyncio.client import ClientConnection, connect
+
+from roboglot.console.live import Page
+from roboglot.console.server import those_due
+from roboglot.console.settings import BEAT_PAGES
+from tests.console.conftest import Shown
+
+
+async def test_page_without_map_gets_poses_each_second(shown: Shown) -> None:
+    """A studio with its Python beside the blocks draws no robot: 25 of them would take a core for nothing."""
+    counts = {"drawing": 0, "reading": 0}
+    frames = {"drawing": 0, "reading": 0}
+
+    async def count(name: str, page: ClientConnection) -> None:
+        async for text in page:
+            if isinstance(text, bytes):
+                frames[name] += 1
+            elif json.loads(text)["type"] == "moment":
+                counts[name] += 1
+            if counts["drawing"] >= 40:
+                return
+
+    live = shown.url.replace("http", "ws") + "/live"
+    async with connect(live) as drawing, connect(live) as reading, asyncio.timeout(60):
+        await drawing.send(json.dumps({"type": "watch", "robot": "a"}))
+        await reading.send(json.dumps({"type": "watch", "robot": "a", "moving": False}))
+        await asyncio.gather(count("drawing", drawing), count("reading", reading))
+        assert 1 <= counts["reading"] <= counts["drawing"] / 3
+        assert frames["drawing"] > 0
+        assert frames["reading"] == 0
+        await reading.send(json.dumps({"type": "watch", "robot": "a", "moving": True}))
+        while not isinstance(await reading.recv(), bytes):  # the map is shown now
+            pass
+
+
+@given(drawing=st.integers(0, 32), reading=st.integers(0, 32), number=st.integers(0, 10_000))
+def test_many_pages_take_turns(drawing: int, reading: int, number: int) -> None:
+    pages = [cast("Page", SimpleNamespace(moving=place < drawing)) for place in range(drawing + reading)]
+    turns = -(-drawing // BEAT_PAGES)
+    looked = [those_due(pages, beat) for beat in range(number, number + max(turns, 1))]
+    assert all(sum(page.moving for page in beat) <= BEAT_PAGES for beat in looked)
+    assert all(
+        sum(page is one for beat in looked for one in beat) == (1 if page.moving else len(looked)) for page in pages
+    )
