@@ -1,4 +1,4 @@
-"""Results of perception in pictures, scans and sounds. Values only; knows no sensor. Values only; knows no sensor.
+"""Results of perception in pictures, scans and sounds. Values only; knows no sensor.
 
 In a picture, x runs from 0 (left edge) to 1 (right edge) and y from 0 (top) to 1 (bottom). Places are in base_link, m.
 """

@@ -1,4 +1,4 @@
-"""Detection of single things among the lidar's points, and of where one has moved. Knows no robot. Knows no robot.
+"""Detection of single things among the lidar's points, and of where one has moved. Knows no robot.
 
 Points are (n, 2) in base_link, m.
 """

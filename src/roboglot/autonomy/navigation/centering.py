@@ -1,4 +1,4 @@
-"""Centring of a hull between what it passes: its offset from the planned path. Knows no robot. Knows no robot.
+"""Centring of a hull between what it passes: its offset from the planned path. Knows no robot.
 
 Maps have cells; a door that leaves a hull less than a cell's room is met by what the lidar sees of it.
 """
