@@ -96,7 +96,7 @@ def test_examples_run_in_a_users_project(tmp_path: Path) -> None:
         for code in blocks(page, "python"):
             if re.search(r"^(async )?def test_", code, re.MULTILINE):
                 count += 1
-                (tmp_path / f"test_{page.stem.lower()}_{count}.py").write_text(code)
+                (tmp_path / f"test_{page.stem.lower().replace('.', '_')}_{count}.py").write_text(code)
     assert count >= 3
     command = [
         sys.executable,
