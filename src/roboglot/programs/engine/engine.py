@@ -153,9 +153,9 @@ class Engine:
             "seed": secrets.randbits(63) if seed is None else seed,
         }
         body = _body(request)
-        memory = _shared_memory(program.places.memory())
-        page = Page(memory, program.places)
+        memory, page = _shared_memory(program.places.memory()), None
         try:
+            page = Page(memory, program.places)
             run = Run(
                 program,
                 prelude.callable_names(),
@@ -171,7 +171,8 @@ class Engine:
                     run.position.step()
             worker = await self._in_time(self._launch(run.wire, body, memory, limits.memory, limits.cpu))
         except BaseException:
-            page.close()
+            if page is not None:
+                page.close()
             raise
         finally:
             os.close(memory)
@@ -276,9 +277,9 @@ class Engine:
     ) -> Worker:
         if self._busy >= RUNS_MAX:
             raise EngineError(f"{RUNS_MAX} programs are running already")
+        ours, theirs = socket.socketpair()
         self._busy += 1
         worker = None
-        ours, theirs = socket.socketpair()
         try:
             with theirs:
                 launcher = await self._zygote()

@@ -6,12 +6,11 @@ Its caller decides what may happen when, and holds the lock meanwhile.
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Callable, Collection, Coroutine, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, tzinfo
 from zlib import crc32
-
-import msgspec
 
 from roboglot.model.robot import Robot
 from roboglot.programs.engine.engine import (
@@ -27,7 +26,7 @@ from roboglot.programs.engine.events import (
     Stops,
 )
 from roboglot.programs.engine.journal import Header, Journal, header_of
-from roboglot.programs.errors import CannotExecute, EngineTimeout, ProgramError
+from roboglot.programs.errors import CannotExecute, EngineTimeout, ProgramError, StoreError
 from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.library.library import ModuleLibrary
 from roboglot.programs.stores import LogEntry, StoredProgram, Stores
@@ -41,6 +40,8 @@ from roboglot.programs.tasks.reports import (
 from roboglot.programs.tasks.states import DEBUG, TaskOperation, TaskState, state_after
 from roboglot.programs.tasks.task_run import Outcome, RunListeners, TaskRun, in_units
 
+log = logging.getLogger(__name__)
+EXPECTED = (SandboxUnavailable, EngineError, ValueError, LookupError, ProgramError, StoreError)
 RUNS_MAX = 100  # tasks running or suspended at once
 
 
@@ -117,24 +118,20 @@ class Runner:
         here = datetime.fromtimestamp(self._robot.clock.epoch(), self._terms.zone).utcoffset()
         journal = Journal(self._journals, task.id)
         clock = self._robot.clock
-        clock.hold(journal)
-        try:
-            modules = await self._library.sources(uses)
-            stops = self.stops.get(task.id, Stops() if task.id == DEBUG else None)
-            offset = int(here.total_seconds()) if here else 0
-            seed = crc32(f"{task.id} {clock.time()}".encode()) if clock.repeats else None
-            header = header_of(task.body, modules, offset, watched=stops is not None, seed=seed)
-            living = await self._begin(task, header, journal, stops)
-        except (SandboxUnavailable, EngineError, ValueError, LookupError, ProgramError) as error:
-            note = LogEntry(self._robot.clock.epoch(), "error", str(error))
-            state = TaskState.RUN_WAIT if task.mode == "cycle" else TaskState.SHUTDOWN
-            await self._store.set_state(task.id, state, [note])
-            await journal.close()
-            clock.release(journal)
-            late = isinstance(error, EngineSilent)
-            raise (EngineTimeout if late else CannotExecute)(str(error)) from None
-        living.time.begin()
-        clock.release(journal)
+        with clock.holding():
+            try:
+                modules = await self._library.sources(uses)
+                stops = self.stops.get(task.id, Stops() if task.id == DEBUG else None)
+                offset = int(here.total_seconds()) if here else 0
+                seed = crc32(f"{task.id} {clock.time()}".encode()) if clock.repeats else None
+                header = header_of(task.body, modules, offset, watched=stops is not None, seed=seed)
+                living = await self._begin(task, header, journal, stops)
+            except Exception as error:  # noqa: BLE001 - whatever fails, the task is as if it had ended
+                state = TaskState.RUN_WAIT if task.mode == "cycle" else TaskState.SHUTDOWN
+                words = _reason(error)
+                await self._give_back(task.id, state, words, journal)
+                raise (EngineTimeout if isinstance(error, EngineSilent) else CannotExecute)(words) from None
+            living.time.begin()
         self._supervisors.add(self._supervise(living), f"task {task.id}")
 
     async def _begin(self, task: StoredProgram, header: Header, journal: Journal, stops: Stops | None) -> TaskRun:
@@ -153,19 +150,26 @@ class Runner:
             raise
         return living
 
+    async def _give_back(self, id: str, state: TaskState, words: str, journal: Journal) -> None:
+        """Write down that a program did not come to life; a store that fails, too, is no reason to keep anything."""
+        note = LogEntry(self._robot.clock.epoch(), "error", words)
+        for step in (self._store.set_state(id, state, [note]), journal.close()):
+            try:
+                await step
+            except StoreError as error:
+                log.warning("cannot write down that task %s did not start: %s", id, error)
+
     async def revive(self, task: StoredProgram, header: str) -> None:
         """Bring a task back that ran or was suspended when the server was killed: suspended, where it was."""
         journal = Journal(self._journals, task.id)
-        now = self._robot.clock.epoch()
         try:
             history = await journal.reopen(header)
             stops = Stops(watched=True) if history.header.watched else None
             living = await self._living(task, history.header, journal, history.answers, stops)
-        except (SandboxUnavailable, EngineError, ValueError, msgspec.MsgspecError) as error:
-            words = f"the server ended while the task was under way; it cannot go on: {error}"
+        except Exception as error:  # noqa: BLE001 - as above
+            words = f"the server ended while the task was under way; it cannot go on: {_reason(error)}"
             state = state_after(TaskState.SUSPEND, TaskOperation.SHUTDOWN, task.mode)
-            await self._store.set_state(task.id, state, [LogEntry(now, "error", words)])
-            await journal.close()
+            await self._give_back(task.id, state, words, journal)
             return
         await living.revive()
         if history.interrupted:
@@ -189,22 +193,22 @@ class Runner:
             history=answers,
             stops=in_units(stops) if stops else None,
         )
-        living = TaskRun(
-            task,
-            run,
-            self._robot,
-            listeners=RunListeners(
-                report=self.reports.publish,
-                logged=self.log_entries.publish,
-                at_breakpoint=lambda: self._at_breakpoint(living),
-                insights=self.insights,
-                pace=self.pace,
-                log_pace=self.log_pace,
-            ),
-            journal=journal,
-            replaying=len(answers),
-            stops=stops,
+        listeners = RunListeners(
+            report=self.reports.publish,
+            logged=self.log_entries.publish,
+            at_breakpoint=lambda: self._at_breakpoint(living),
+            insights=self.insights,
+            pace=self.pace,
+            log_pace=self.log_pace,
         )
+        try:
+            replaying = len(answers)
+            living = TaskRun(
+                task, run, self._robot, listeners=listeners, journal=journal, replaying=replaying, stops=stops
+            )
+        except BaseException:
+            await run.kill()  # no one would ever hear of it
+            raise
         self.runs[task.id] = living
         return living
 
@@ -242,7 +246,10 @@ class Runner:
         async with self._lock:
             if self.runs.get(id) is run and run.state is TaskState.RUN_WAIT:
                 run.state = TaskState.RUN
-                await self._store.set_state(id, run.state)
+                try:
+                    await self._store.set_state(id, run.state)
+                except StoreError as error:
+                    log.warning("cannot write down that task %s runs: %s", id, error)
                 self.reports.publish(TaskReport(id, TaskOperation.START, "start task"))
         try:
             outcome = await run.execute()
@@ -257,7 +264,10 @@ class Runner:
         id = run.task.id
         for words in filter(None, (outcome.error, run.control.summary)):
             run.log.write("error", words)
-        await self._put_away(run, TaskState.RUN, TaskOperation.STOP)
+        try:
+            await self._put_away(run, TaskState.RUN, TaskOperation.STOP)
+        except StoreError as error:
+            log.warning("cannot write down the end of task %s: %s", id, error)
         if outcome.reason is not ExitReason.FINISHED:
             self.reports.publish(TaskReport(id, TaskOperation.RUN, outcome.error, CannotExecute(outcome.error)))
         elif words := run.control.summary:
@@ -271,12 +281,21 @@ class Runner:
         self.runs.pop(id, None)
         task = await self._store.get(id) or run.task
         state = state_after(before, operation, task.mode)
-        await self._store.set_state(id, state, run.log.take())
-        await run.close_journal()
-        self._ended(task, state)
+        try:
+            await self._store.set_state(id, state, run.log.take())
+        finally:
+            self._ended(task, state)
+            await run.close_journal()
         return state
 
     async def _at_breakpoint(self, run: TaskRun) -> None:
         async with self._lock:
             if self.runs.get(run.task.id) is run and run.state is TaskState.RUN:
                 await self.suspend(run)
+
+
+def _reason(error: Exception) -> str:
+    """Return why a program did not start; what is no one's refusal goes to the server's log, too."""
+    if not isinstance(error, EXPECTED):
+        log.error("a program could not be started", exc_info=error)
+    return str(error) or type(error).__name__
