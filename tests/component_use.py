@@ -86,7 +86,7 @@ def _package_of(function: FunctionType) -> str:
 
 
 def _is_of_component(value: ast.expr, function: FunctionType) -> bool:
-    """Whether it is something that a component gave: ``robot[Odometry].reading``."""
+    """Return whether it is something that a component gave: ``robot[Odometry].reading``."""
     while True:
         match value:
             case ast.Attribute(value=inner) | ast.Call(func=inner):
@@ -98,7 +98,7 @@ def _is_of_component(value: ast.expr, function: FunctionType) -> bool:
 
 
 def _is_of_package(value: ast.expr, function: FunctionType, package: str) -> bool:
-    """Whether it is ``self``, or a part of a parameter whose class says that the part is one of the package's."""
+    """Return whether it is ``self``, or a part of a parameter whose class takes it from the package."""
     match value:
         case ast.Name(id="self"):
             return True

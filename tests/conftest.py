@@ -97,7 +97,7 @@ def _fixtures(item: pytest.Item) -> set[Callable[..., object]]:
 
 @functools.cache
 def _file_traits(path: Path) -> set[str]:
-    """What a file of tests and the helpers that it imports are marked with."""
+    """Return the marks of a file of tests, by itself and the helpers that it imports."""
     text = _text(path)
     helpers = [TESTS.parent / f"{name.replace('.', '/')}.py" for name in HELPERS.findall(text)]
     texts = [text, *(_text(helper) for helper in helpers if helper.name != "conftest.py" and helper.is_file())]

@@ -70,7 +70,7 @@ class Walker:
 
 @dataclass
 class Outcome:
-    """What became of one crowd."""
+    """Outcome of one crowd."""
 
     seed: int
     shoved: float = 0.0  # m, the farthest that one which stood was displaced

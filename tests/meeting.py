@@ -46,7 +46,7 @@ SURVEYED = 1.5  # m between two places of the survey
 
 @dataclass(frozen=True)
 class Scenario:
-    """Who starts where and is sent where, world frame."""
+    """Starts and goals of robots that meet, world frame."""
 
     seed: int
     world: str
@@ -78,7 +78,7 @@ class Drive:
 
 @dataclass
 class Outcome:
-    """What became of one scenario."""
+    """Outcome of one scenario."""
 
     seed: int
     touches: list[Touch] = field(default_factory=list)
@@ -213,7 +213,7 @@ def _touching(fleet: Fleet) -> list[tuple[str, str]]:
 
 
 def _account(fleet: Fleet, pair: tuple[str, str]) -> str:
-    """Where both are, and how fast (base_link)."""
+    """Return the places of both, and their speeds (base_link)."""
     lines = []
     for name in pair:
         robot, pose = fleet.robots[name], fleet.world.truth.pose_of(name)

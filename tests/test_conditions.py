@@ -1,4 +1,4 @@
-"""What the manual's conditions mean, and what is none."""
+"""Meaning of the manual's conditions, and refusals of what is none."""
 
 from __future__ import annotations
 

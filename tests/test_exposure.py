@@ -1,4 +1,4 @@
-"""What others than this machine can reach: nothing, unless it is asked for by name and said in red."""
+"""Exposure to other machines: none, unless it is asked for by name and said in red."""
 
 from __future__ import annotations
 

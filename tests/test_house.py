@@ -73,7 +73,7 @@ def modules_in(folder: Path) -> set[str]:
 
 @pytest.mark.parametrize("package", CHAPTERLESS)
 def test_chapters_have_the_names_of_the_door(package: str) -> None:
-    """Who knows a chapter of a vendor's manual finds it in every package of the vendor."""
+    """A chapter of a vendor's manual has the same name in every package of the vendor."""
     sources = ROOT / "src" / "roboglot"
     doors = {door.name: modules_in(door / "chapters") for door in (sources / "protocols").iterdir() if door.is_dir()}
     vendors = [folder for folder in (sources / package).iterdir() if folder.name in doors.keys() - {"__pycache__"}]
@@ -136,7 +136,7 @@ def docstrings(path: Path) -> Iterator[tuple[int, str]]:
             yield from [(node.body[0].lineno, text)] if text else []
 
 
-@pytest.mark.parametrize("files", [SOURCES], ids=["src"])
+@pytest.mark.parametrize("files", [SOURCES, TESTS], ids=["src", "tests"])
 def test_docstrings_begin_with_verb_or_noun(files: list[Path]) -> None:
     """They name a thing or say what is done; a question or a subordinate clause has to be read twice."""
     found = [
@@ -180,7 +180,7 @@ def walks() -> dict[str, list[tuple[str, str]]]:
 
 
 def names_in(node: ast.AST) -> set[str]:
-    """What is called or mentioned there."""
+    """Return the names called or mentioned there."""
     return {found.attr if isinstance(found, ast.Attribute) else getattr(found, "id", "") for found in ast.walk(node)}
 
 
@@ -245,7 +245,7 @@ def _reach(graph: Mapping[str, set[str]], begin: set[str]) -> set[str]:
 
 
 def means_any(value: ast.expr | None, known: set[str]) -> bool:
-    """Whether an expression is ``Any``, another name of it, or a union with it."""
+    """Return whether an expression is ``Any``, another name of it, or a union with it."""
     match value:
         case ast.Name(id=name) | ast.Attribute(attr=name):
             return name == "Any" or name in known

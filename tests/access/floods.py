@@ -1,4 +1,4 @@
-"""What hostile clients do to the doors, each from one address, for tests and for ``benchmarks/doors/floods.py``."""
+"""Floods of hostile clients on the doors, each from one address, for tests and ``benchmarks/doors/floods.py``."""
 
 from __future__ import annotations
 

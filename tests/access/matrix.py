@@ -31,7 +31,7 @@ SUBPROTOCOL = Subprotocol("foxglove.websocket.v1")
 
 @dataclass(frozen=True, slots=True)
 class Caller:
-    """Who calls, from which loopback address, and what they may do with robot a."""
+    """Client with its loopback address, and its rights on robot a."""
 
     name: str
     address: str
@@ -47,7 +47,7 @@ CALLERS = (
 
 
 async def rest_status(client: httpx.AsyncClient, key: str) -> int:
-    """What an operation is answered; braces of its path are filled in."""
+    """Return the status that an operation is answered; braces of its path are filled in."""
     method, path = key.split(" ", 1)
     filled = "/".join("1" if part.startswith("{") else part for part in path.split("/"))
     reply = await client.request(method, filled, content=b"{}" if method in ("POST", "PUT") else None)
@@ -77,7 +77,7 @@ class TextCaller:
 
 
 async def dog_answers(folder: Path, name: str, codes: list[int]) -> dict[int, list[dict[str, object]]]:
-    """What the codes are answered to the app with the certificate of ``name``."""
+    """Return the answers to the codes for the app with the certificate of ``name``."""
     files = [path.read_bytes() for path in export_app(folder, name, folder / f"app-{name}")]
     ca, certificate, key = files
     credentials = grpc.ssl_channel_credentials(ca, key, certificate)
@@ -129,7 +129,7 @@ async def frame_states(link: TextLink, frames: list[dict[str, object]]) -> list[
 
 
 async def viewer_refusals(address: str, keys: list[str]) -> int | None:
-    """How many of these messages of a viewer (Foxglove) are refused for want of a right; None: it was not let in."""
+    """Return how many of a viewer's messages are refused for want of a right (Foxglove); None: not let in."""
     try:
         link = await connect(
             f"ws://{ADDRESS}:8765/", compression=None, local_addr=(address, 0), subprotocols=[SUBPROTOCOL]

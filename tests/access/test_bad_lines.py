@@ -73,7 +73,7 @@ def made_line() -> BadLine | None:
 
 @contextlib.asynccontextmanager
 async def led_to(port: int, line: BadLine | None) -> AsyncIterator[tuple[str, int]]:
-    """Where to call so that the bad line lies between here and ``port``."""
+    """Yield the address at which the bad line lies between here and ``port``."""
     if line is None:
         async with bad_line(port) as relayed:
             yield "127.0.0.1", relayed

@@ -1,4 +1,4 @@
-"""Who comes in and by what, and what happens when a right ends: through real doors."""
+"""Access by known proofs only, and its end when a right ends: through real doors."""
 
 from __future__ import annotations
 

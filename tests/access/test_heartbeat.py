@@ -1,4 +1,4 @@
-"""What an end of a tunnel makes of the other's silence, on counted beats: no clock, no socket, no waiting."""
+"""Reactions of a tunnel's end to the other's silence, on counted beats: no clock, no socket, no waiting."""
 
 from __future__ import annotations
 

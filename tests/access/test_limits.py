@@ -1,4 +1,4 @@
-"""What one client or address may take, and TLS on the doors that can: through real sockets."""
+"""Limits of one client or address, and TLS on the doors that can: through real sockets."""
 
 from __future__ import annotations
 

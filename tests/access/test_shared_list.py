@@ -56,7 +56,7 @@ def server(running: PostgreSQLServer) -> PostgreSQLServer:
 
 @pytest.fixture(params=["file", pytest.param("server", marks=needs_postgresql)])
 def url(request: pytest.FixtureRequest) -> str:
-    """Where list and audit are; empty: in the data folder."""
+    """Return the database of list and audit; empty: in the data folder."""
     return str(request.getfixturevalue("server").url) if request.param == "server" else ""
 
 

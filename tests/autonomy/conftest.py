@@ -36,7 +36,7 @@ class Tour:
 
     @property
     def error(self) -> tuple[float, float]:
-        """How far localization is from the truth: m, degrees."""
+        """Distance of localization from the truth: m, degrees."""
         pose = self.start.compose(self.robot[Localization].pose)
         return pose.distance_to(self.truth), abs(math.degrees(wrap_angle(pose.yaw - self.truth.yaw)))
 

@@ -58,7 +58,7 @@ async def running(file: Path) -> AsyncIterator[tuple[Robot, LockstepClock]]:
 
 
 def crash(file: Path, image: Path) -> None:
-    """What is on the disk at this moment, as kill -9 leaves it."""
+    """Copy the database as kill -9 would leave it on the disk."""
     for part in file.parent.glob(f"{file.name}*"):
         shutil.copy(part, image.parent / part.name.replace(file.name, image.name))
 

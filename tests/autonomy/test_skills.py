@@ -1,4 +1,4 @@
-"""What skills a robot gets from its parts, and that no one waits for a compiler."""
+"""Skills that follow from a robot's parts, without waiting for a compiler."""
 
 from __future__ import annotations
 

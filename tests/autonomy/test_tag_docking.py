@@ -19,7 +19,7 @@ def start(tour, x, y, degrees):
 
 
 def off(tour, wanted):
-    """How far the robot stands from there: m, degrees."""
+    """Return the robot's distance from there: m, degrees."""
     return tour.truth.distance_to(wanted), abs(math.degrees(wrap_angle(tour.truth.yaw - wanted.yaw)))
 
 

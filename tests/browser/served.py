@@ -1,4 +1,4 @@
-"""Where the robot of these tests is, and the hosts whose pages a browser shows there."""
+"""Robot of these tests, and the hosts whose pages a browser shows there."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a web page can do to a robot on the same machine, in a real browser: nothing, unless it is let in."""
+"""Attacks of a web page on a robot on the same machine, in a real browser: none works, unless it is let in."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ async def open_page(browser: Any, site: int) -> AsyncIterator[Open]:
 
 @pytest.fixture
 def happened(served: Served) -> list[Event]:
-    """What happened on the robot since."""
+    """Return a list that fills with the robot's events from now on."""
     seen: list[Event] = []
     served.robot.events.listen(Event, seen.append)
     return seen

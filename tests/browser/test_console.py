@@ -44,7 +44,7 @@ async def until(condition: Callable[[], bool]) -> None:
 
 
 def heard_in(film: Path) -> bool:
-    """Whether a film has pictures, and somewhere the tone."""
+    """Return whether a film has pictures, and somewhere the tone."""
     with av.open(str(film)) as file:
         assert next(file.decode(video=0)).width > 0
     with av.open(str(film)) as file:

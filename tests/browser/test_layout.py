@@ -1,4 +1,4 @@
-"""How the console looks: all of it can be seen, touched and read aloud, on a phone as on a big screen."""
+"""Layout of the console: all of it can be seen, touched and read aloud, on a phone as on a big screen."""
 
 from __future__ import annotations
 

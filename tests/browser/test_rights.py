@@ -123,7 +123,7 @@ async def sign_in(page: Page, name: str, password: str = PASSWORD) -> None:
 
 
 async def offered(page: Page, what: str) -> bool:
-    """Whether a button is on; one that is off must say why."""
+    """Return whether a button is on; one that is off must say why."""
     view, tab, button = BUTTONS[what]
     await page.evaluate(f"location.hash = '#/{view}'")
     if tab:

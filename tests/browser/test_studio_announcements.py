@@ -1,4 +1,4 @@
-"""What a screen reader hears of the studio, and what a phone shows of it."""
+"""Announcements of the studio to a screen reader, and its view on a phone."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ EMPTY = {
 
 @pytest_asyncio.fixture(scope="module", loop_scope="session")
 async def played(opened: Served, browser: Any) -> AsyncIterator[dict[str, Any]]:
-    """What the page makes of every block."""
+    """Yield the page's programs for every block."""
     console = opened.runtime.console
     assert console is not None
     await console.ready()
@@ -107,7 +107,7 @@ async def _ending(engine: Engine, code: str, wall: float = 0.0) -> Finished | Fa
 
 
 def _is_mark(call: tuple[str, dict[str, Any]]) -> bool:
-    """Whether the call is the mark before a block: its id is one of the editor's."""
+    """Return whether the call is the mark before a block: its id is one of the editor's."""
     name, values = call
     return name == "cyberdog.task.block" and len(values["id"]) == 20 and values["id"].isalnum()
 

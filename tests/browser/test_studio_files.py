@@ -1,4 +1,4 @@
-"""What opens: examples and the language guide's programs as text, unchanged; files and the app's style as blocks."""
+"""Files of the studio: examples and the guide's programs open as text, unchanged; others and the app's as blocks."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ def same_people(old: Path, new: Path) -> None:
 
 
 class Client:
-    """What `roboglot connect` does for robot a, and what it says."""
+    """`roboglot connect` for robot a, and its output."""
 
     def __init__(self) -> None:
         self.said: asyncio.Queue[str] = asyncio.Queue()

@@ -25,7 +25,7 @@ OUTSIDE = (RobotConfig("a", "universal", "192.0.2.5"),)
 
 
 def weak(config: Config) -> dict[str, str]:
-    """What is not well, with what to do."""
+    """Return the weaknesses found, with their remedies."""
     return {finding.name: finding.remedy for finding in examine_security(config) if not finding.well}
 
 

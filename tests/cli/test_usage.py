@@ -1,4 +1,4 @@
-"""What the command says of itself, however it is called, and to readers that go."""
+"""Usage of the command, however it is called, and readers of its output that go."""
 
 import subprocess
 import sys

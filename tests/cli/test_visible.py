@@ -1,4 +1,4 @@
-"""What a terminal is shown of texts that others wrote."""
+"""Texts of others on a terminal."""
 
 from __future__ import annotations
 

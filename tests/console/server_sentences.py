@@ -67,7 +67,7 @@ def _said(tree: ast.Module, errors: set[str], outside: bool) -> Iterator[tuple[s
 
 
 def _texts(node: ast.expr) -> list[str]:
-    """What an expression may be, as far as it is written down."""
+    """Return the possible values of an expression, as far as they are written down."""
     match node:
         case ast.Constant(value=str(text)):
             return [text]

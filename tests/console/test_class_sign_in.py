@@ -27,7 +27,7 @@ PASSWORD = "a long enough secret"
 
 
 def post(url: str, shows: dict[str, str]) -> tuple[int, dict[str, Any], str]:
-    """What a log-in page is answered, and the cookie."""
+    """Return the answer to a log-in page, and the cookie."""
     try:
         with urlopen(Request(f"{url}/api/sign_in", data=json.dumps(shows).encode()), timeout=30) as reply:
             return reply.status, json.loads(reply.read()), str(reply.headers["set-cookie"] or "").partition(";")[0]

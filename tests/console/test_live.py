@@ -1,4 +1,4 @@
-"""What the live socket sends to pages, and how often."""
+"""Messages of the live socket to pages, and their rates."""
 
 from __future__ import annotations
 

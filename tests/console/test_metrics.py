@@ -1,4 +1,4 @@
-"""What Prometheus reads, by its own parser."""
+"""Metrics as Prometheus reads them, by its own parser."""
 
 import asyncio
 import contextlib

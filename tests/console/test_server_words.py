@@ -1,4 +1,4 @@
-"""What the server says on pages: every sentence of the sources has its Chinese, and none is kept for nothing."""
+"""Sentences of the server on pages: each of the sources has its Chinese, and none is kept for nothing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What ``roboglot up --record`` wrote becomes a map with one command."""
+"""Recordings of ``roboglot up --record`` become a map with one command."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ T = TypeVar("T")
 
 @dataclass
 class Ended:
-    """What a command came to."""
+    """Result of a command."""
 
     line: str
     status: int
@@ -65,7 +65,7 @@ class Terminal:
 
     @property
     def moved(self) -> Pose:
-        """Where the robot is in truth, seen from where it woke up."""
+        """True pose of the robot, seen from its start."""
         return self.runtime.fleet.world.truth.pose_of("a").relative_to(self.start)
 
     async def meanwhile(self, awaitable: Awaitable[T]) -> T:

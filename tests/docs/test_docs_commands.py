@@ -35,7 +35,7 @@ def shown(page: Path) -> Iterator[tuple[str, bool]]:
 
 
 def refusal(arguments: str, full: bool = True) -> str:
-    """Why the command line does not take this; "" if it does."""
+    """Return why the command line does not take this; "" if it does."""
     name, *rest = shlex.split(re.sub(r"[…\[\]]", "", arguments))
     if name not in COMMANDS:
         return "" if name in ("--help", "--version") else f"there is no command {name!r}"

@@ -1,4 +1,4 @@
-"""What the tests of bad links do to a robot behind one, and see of it."""
+"""Steps of the tests of bad links: what they do to a robot behind one, and see of it."""
 
 import asyncio
 from collections.abc import Callable
@@ -69,7 +69,7 @@ async def succeeds(driven: Robot, patience: float = 20.0, speed: float | None = 
 
 
 async def succeeds_slowly(driven: Robot, world: World, tries: int = 3) -> Pose:
-    """Where the move of 0.2 m at 0.1 m/s began; again where this machine paused for longer than the link delays."""
+    """Return the start of the move of 0.2 m at 0.1 m/s; again where this machine paused for longer than the link."""
     for left in reversed(range(tries)):
         start = world.truth.pose_of("a")
         try:

@@ -1,4 +1,4 @@
-"""What the tests of drivers talk with: a tiny text client, and types of fixtures."""
+"""Tools of the tests of drivers: a tiny text client, and types of fixtures."""
 
 from __future__ import annotations
 

@@ -104,7 +104,7 @@ async def text_door() -> AsyncIterator[Open]:
 
 @pytest.fixture
 def profile() -> str:
-    """How the text protocol speaks: as the manual does."""
+    """Return the profile of the text protocol: the manual's."""
     return "spec"
 
 

@@ -12,7 +12,7 @@ LOST = 8  # one piece in so many
 
 
 class Fault:
-    """What is wrong with all relays that share it; the attributes act at once."""
+    """Fault of all relays that share it; the attributes act at once."""
 
     def __init__(self) -> None:
         self.delay = 0.0  # robot s, each way

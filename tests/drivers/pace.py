@@ -35,7 +35,7 @@ async def settle(patience: float = SETTLE_MAX) -> None:
 
 
 def _working() -> bool:
-    """Whether another thread of this process runs, or would if a processor were free."""
+    """Return whether another thread of this process runs, or would if a processor were free."""
     own = threading.get_native_id()
     return any(_is_running(name) for name in os.listdir("/proc/self/task") if int(name) != own)
 

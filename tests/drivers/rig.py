@@ -84,7 +84,7 @@ class Rig:
             self._door = None
 
     def hand_out_certificates(self) -> None:
-        """What the dog's authority has made, to the driver."""
+        """Give the certificates of the dog's authority to the driver."""
         shutil.rmtree(self._folder / "driver", ignore_errors=True)
         export_client(self._folder / "cyberdog", self._folder / "driver")
 

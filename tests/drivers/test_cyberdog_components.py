@@ -1,4 +1,4 @@
-"""What a dog has besides legs and lidar, through a driver: a simulated dog behind its gRPC door, real time beside."""
+"""Components of a dog besides legs and lidar, through a driver: a simulated dog behind its gRPC door, in real time."""
 
 import asyncio
 from collections.abc import AsyncIterator

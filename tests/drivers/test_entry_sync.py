@@ -1,4 +1,4 @@
-"""What a Slamware robot has on its map and what is kept here are the same, also after a lost link or another map."""
+"""Sync of a Slamware robot's map entries with those kept here, also after a lost link or another map."""
 
 from __future__ import annotations
 

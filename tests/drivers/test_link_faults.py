@@ -1,4 +1,4 @@
-"""What a bad link does to each driver: the robot stops in time, the state is true, nothing hangs, it comes back."""
+"""Bad links of each driver: the robot stops in time, the state is true, nothing hangs, it comes back."""
 
 import asyncio
 import math

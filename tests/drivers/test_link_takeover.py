@@ -1,4 +1,4 @@
-"""Who moves a robot once its link is back, or when someone else comes: what is ours ends, what is theirs goes on."""
+"""Takeover of a robot whose link is back, or by someone else: our motion ends, theirs goes on."""
 
 import math
 

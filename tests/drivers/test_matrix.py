@@ -41,7 +41,7 @@ LEFT = 0.5  # m
 
 
 async def agree(client: Front, reported_start: Pose, real: Pose) -> None:
-    """What the client receives agrees with what is, to 5 cm and 2 degrees."""
+    """Assert that the client's pose agrees with the true one, to 5 cm and 2 degrees."""
     reported = await client.pose()
     assert reported
     reported = reported.relative_to(reported_start)

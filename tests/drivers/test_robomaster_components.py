@@ -1,4 +1,4 @@
-"""What an EP carries, through a driver: a simulated EP behind its door in two builds, the text protocol in front."""
+"""Components of an EP through a driver: a simulated EP behind its door in two builds, the text protocol in front."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an EP sees, hears and measures for its users, through a driver: a simulated EP behind its door in two builds."""
+"""Senses of an EP through a driver: a simulated EP behind its door in two builds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a Slamware robot has besides wheels and lidar, through a driver: a simulated robot behind its REST door."""
+"""Components of a Slamware robot besides wheels and lidar, through a driver: one behind its REST door."""
 
 from __future__ import annotations
 

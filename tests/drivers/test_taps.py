@@ -1,4 +1,4 @@
-"""Who follows a real robot's tap hears what its driver asks and is answered, byte for byte as the robot hears it."""
+"""Tap of a real robot: requests and answers of its driver, byte for byte as the robot hears them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a real robot's URL may be, and what is said of others."""
+"""URLs of real robots, and the refusals of others."""
 
 import asyncio
 from collections.abc import Collection

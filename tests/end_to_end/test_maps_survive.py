@@ -1,4 +1,4 @@
-"""What was saved or drawn on the map is there again after kill -9, and so is the place of the robot in it."""
+"""Maps, annotations and the robot's pose outlive kill -9."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a grid of depths shows, against the same rule written for whole arrays."""
+"""Obstacles and floor in a grid of depths, against the same rule written for whole arrays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What loading kernels has used is given back, and everything still works."""
+"""Memory used for loading kernels is given back, and everything still works."""
 
 from __future__ import annotations
 

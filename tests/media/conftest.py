@@ -23,7 +23,7 @@ def picture(number: int, stamp: float = 0.0) -> Frame:
 
 
 def number_of(luma: np.ndarray) -> int:
-    """Which picture that is."""
+    """Return the number of that picture."""
     return int(luma[: HEIGHT // 2].astype(int).sum(0).argmax()) // 8
 
 

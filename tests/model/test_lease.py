@@ -1,4 +1,4 @@
-"""Who moves a robot, who alone may, and what everyone else learns."""
+"""Control of a robot: its holder, exclusive control, and what everyone else learns."""
 
 import asyncio
 

@@ -1,4 +1,4 @@
-"""What passes the tap is kept by recordings and shown by the console: passwords are not."""
+"""Secrets at the tap: recordings keep and the console shows what passes it, but no passwords."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ Answer = Callable[[Run, Call], None]
 
 @dataclass
 class Played:
-    """What a program did."""
+    """Record of a program."""
 
     output: str = ""
     calls: list[Call] = field(default_factory=list)
@@ -87,7 +87,7 @@ async def started(engine: Engine, source: str, limits: Limits | None = None) -> 
 
 
 async def last(run: Run) -> Finished | Failed:
-    """How it ended."""
+    """Return the end of the run."""
     async for event in run:
         if isinstance(event, (Finished, Failed)):
             return event

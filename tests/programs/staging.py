@@ -34,7 +34,7 @@ Act = tuple[float, Callable[[], object]]  # seconds after the program's start, a
 
 @dataclass
 class Performance:
-    """What a program did: what it printed, its calls, blocks and log, its end, how long it took (robot time, s).
+    """Record of a program: its output, calls, blocks and log, its end, how long it took (robot time, s).
 
     ``said`` are the texts and sounds that the robot's loudspeaker played, ``colours`` those its lights showed.
     """

@@ -67,7 +67,7 @@ REASONS = {
 
 @dataclass
 class World:
-    """What must stay as it is."""
+    """Things that must stay as they are."""
 
     folder: Path
     secret: str

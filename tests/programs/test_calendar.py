@@ -1,4 +1,4 @@
-"""When conditions come true, on calendars of several zones."""
+"""Due times of conditions, on calendars of several zones."""
 
 from __future__ import annotations
 

@@ -129,7 +129,7 @@ async def a_map(scene: Scene) -> list[Act]:
 
 @dataclass(frozen=True)
 class Case:
-    """What happens around a program, what it prints, says and shows, where the robot is afterwards, what else holds."""
+    """Surroundings of a program, its output, words and lights, the robot's final pose, and further conditions."""
 
     prints: str
     prepare: Prepare = nothing

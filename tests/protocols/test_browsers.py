@@ -1,4 +1,4 @@
-"""Which requests of web pages pass: decided by what a browser says, and by nothing that a page could forge."""
+"""Requests of web pages: passed or refused by what a browser says, and by nothing that a page could forge."""
 
 from __future__ import annotations
 

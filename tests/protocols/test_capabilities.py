@@ -123,7 +123,7 @@ async def dog(kind: Kind, robot: Robot, forward: Forward, data: Path) -> dict[st
 
 
 def unavailable(code: int, answers: list[str]) -> bool:
-    """Whether the answer is that of a robot without the part."""
+    """Return whether the answer is that of a robot without the part."""
     if code in SILENT_WITHOUT_SERVICE:
         return not answers
     reported = [json.loads(answer) for answer in answers if answer]

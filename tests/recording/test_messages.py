@@ -1,4 +1,4 @@
-"""What goes into a recording can be had back, byte for byte, except what must not be disclosed."""
+"""Contents of recordings: they come back byte for byte, except what must not be disclosed."""
 
 from __future__ import annotations
 

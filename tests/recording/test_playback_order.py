@@ -109,7 +109,7 @@ REQUESTS = {
 
 
 async def played(door: str, directions: Sequence[Direction], gaps: Sequence[float], busy: Sequence[float]) -> list[str]:
-    """What goes out, in order: the request is asked once, then time passes in the steps of ``busy``."""
+    """Return the output in order: the request is asked once, then time passes in the steps of ``busy``."""
     rest, (operation, payload) = ("a", door, "127.0.0.1:5"), REQUESTS[door]
     exchanges, now = [Exchange(0.0, *rest, "x", Direction.REQUEST, operation, payload)], 0.0
     for index, (direction, gap) in enumerate(zip(directions, gaps, strict=True)):

@@ -22,7 +22,7 @@ async def ended(script: Script, folder: Path, body: str, record: str) -> list[tu
 
 
 def shown(script: Script, ended: list[tuple[int, str]]) -> list[str]:
-    """What must be the same, line by line."""
+    """Return the lines that must be the same."""
     texts = [f"{status} {re.sub(script.random or '$^', '', said)}" for status, said in ended]
     lines = "\n".join(texts).splitlines()
     two = script.two_lines or any("program run" in line for line in script.lines)  # blocks, and what is printed

@@ -39,7 +39,7 @@ STEPS = st.tuples(
 
 
 def session(door: str, steps: list[tuple[str, int, list[int], int]]) -> list[Exchange]:
-    """What a robot could have done: answers before the next request, pushes whenever they come."""
+    """Return a possible session: answers before the next request, pushes at any time."""
     found: list[tuple[int, int, Exchange]] = []
     now = serial = 0
     rest = ("a", door, "front ends", "x")

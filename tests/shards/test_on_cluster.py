@@ -1,4 +1,4 @@
-"""What a cluster needs from outside of it: the extra, and Kubernetes' manifests in deploy/kuberay."""
+"""Requirements of a cluster from outside: the extra, and Kubernetes' manifests in deploy/kuberay."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the supervisor does about shards that refuse, die, grow, or wait for their turn; without processes."""
+"""Supervisor of shards that refuse, die, grow, or wait for their turn; without processes."""
 
 from __future__ import annotations
 

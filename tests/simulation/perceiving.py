@@ -36,7 +36,7 @@ class Lab:
         return self.robots["a"]
 
     async def see(self, kind: str, seconds: float = 0.3, robot: str = "a") -> list[Any]:
-        """What a detector last reported after so long."""
+        """Return a detector's last report after so long."""
         detector: Detector[Any] = getattr(self.robots[robot][Vision], kind)
         with detector.subscribe() as viewer:
             await self.clock.advance(seconds)
@@ -63,7 +63,7 @@ def lab(
 
 
 def appears(x: float, y: float, z: float, robot: Pose = START) -> tuple[float, float]:
-    """Where a place of the world is in the universal body's picture, worked out once more by hand."""
+    """Return where the universal body's picture shows a place of the world, worked out once more by hand."""
     ahead, above, up, fov, aspect = EYE
     seen = Pose(x, y).relative_to(robot)
     forward, rise = seen.x - ahead, z - above

@@ -21,7 +21,7 @@ from roboglot.storage.database import Database
 
 
 async def circled(body: str) -> tuple[float, float, list[tuple[float, float]]]:
-    """How far odometry was off after a bent drive (m), the share of rays that said nothing, and where scans were."""
+    """Return odometry's error after a bent drive (m), the share of silent rays, and where scans were taken."""
     clock, database = LockstepClock(), Database(":memory:")
     fleet = build_fleet("empty", [RobotConfig(body=body)], clock=clock, seed=4, database=database)
     fleet.world.hands.place("a", Pose(5.0, 3.0))

@@ -1,4 +1,4 @@
-"""Which parts of a robot are called when."""
+"""Schedule of a robot's parts."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ BINARIES = Path("/usr/lib/postgresql")
 
 
 def binary_folder() -> Path | None:
-    """Where initdb and postgres are; the newest of several."""
+    """Return the folder of initdb and postgres; the newest of several."""
     if found := shutil.which("initdb"):
         return Path(found).resolve().parent
     versions = sorted(BINARIES.glob("*/bin/initdb"), key=lambda path: float(path.parts[-3]))

@@ -1,4 +1,4 @@
-"""What was acknowledged is there again, also after kill -9."""
+"""Acknowledged data is there again, also after kill -9."""
 
 from __future__ import annotations
 

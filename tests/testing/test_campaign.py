@@ -29,7 +29,7 @@ HANGS = f"name: it hangs\nwhen: [{{run: sleep {SLEEP}}}]\n{FINE}"
 
 
 def still_sleeping() -> bool:
-    """Whether a hanging scenario's command is there."""
+    """Return whether a hanging scenario's command is there."""
     for path in Path("/proc").glob("[0-9]*/cmdline"):
         with contextlib.suppress(OSError):
             if path.read_bytes().split(b"\0")[:2] == [b"sleep", SLEEP.encode()]:

@@ -51,7 +51,7 @@ async def port(folder: Path, *, plain: bool = True, admit: bool = True) -> Async
 
 
 async def echoed(number: int, data: bytes, context: ssl.SSLContext | None) -> bytes:
-    """What comes back of ``data``; empty: it was hung up."""
+    """Return what comes back of ``data``; empty: it was hung up."""
     try:
         reader, writer = await asyncio.open_connection("127.0.0.1", number, ssl=context)
     except (ConnectionError, ssl.SSLError):

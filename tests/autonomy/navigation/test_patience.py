@@ -1,4 +1,4 @@
-"""When a drive gives up: new plans alone are no progress, and ways are not tried for ever."""
+"""Patience of a drive: new plans alone are no progress, and ways are not tried for ever."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What people drew on the map is minded: by the world's truth."""
+"""Annotations of the map that drives obey: by the world's truth."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def area(kind: AreaKind, x: float, y: float, half: float, **more: float) -> Area
 
 
 async def watched(tour: Tour, action: Action) -> list[Pose]:
-    """Where the robot was, to the end of the action."""
+    """Return the robot's true poses to the end of the action."""
     seen = []
     while not action.status.ended:
         await tour.clock.advance(0.1)

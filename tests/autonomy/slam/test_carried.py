@@ -1,4 +1,4 @@
-"""What the robot carries is left out of its scans, and nothing else; it needs room; where it stood is free."""
+"""Carried things: left out of scans, and nothing else; they need room; their former place is free."""
 
 import math
 

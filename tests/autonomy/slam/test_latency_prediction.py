@@ -1,4 +1,4 @@
-"""Where a late robot will be: what it was sent while odometry could not know of it is added."""
+"""Predicted pose of a late robot: commands that odometry could not know of yet are added."""
 
 import math
 

@@ -81,7 +81,7 @@ def _moved(pose: Pose, moved: Sequence[tuple[Pose, Pose]]) -> Pose:
 
 
 def corridor_scan(pose: Pose, walls: NDArray[np.float64]) -> ScanPoints:
-    """What a lidar that sees 4 m far sees of ``walls`` (n, 4: from, to)."""
+    """Return the scan of ``walls`` (n, 4: from, to) by a lidar that sees 4 m far."""
     angles = np.arange(240) * math.tau / 240
     rays = np.stack([np.cos(angles + pose.yaw), np.sin(angles + pose.yaw)], 1)[:, None]
     along, to = walls[:, 2:] - walls[:, :2], walls[:, :2] - (pose.x, pose.y)

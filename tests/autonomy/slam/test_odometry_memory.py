@@ -1,4 +1,4 @@
-"""What a robot learnt of its wheels is there after a restart, and what its body says of them is believed."""
+"""Memory of odometry: what was learnt of wheels outlives a restart, and the body's description is believed."""
 
 from __future__ import annotations
 

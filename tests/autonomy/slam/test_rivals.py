@@ -1,4 +1,4 @@
-"""Which places are rivals, when the map explains only a part of the scan at the best of them."""
+"""Rival places, when the map explains only a part of the scan at the best of them."""
 
 from __future__ import annotations
 

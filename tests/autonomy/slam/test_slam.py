@@ -51,7 +51,7 @@ def _assert_map_agrees(tour: Tour) -> None:
 
 
 def _near(grid: OccupancyGrid, point: Point) -> bool:
-    """Whether a cell at ``point`` or beside it is occupied."""
+    """Return whether a cell at ``point`` or beside it is occupied."""
     row, column = grid.cell_of(point)
     return bool((grid.log_odds[row - 1 : row + 2, column - 1 : column + 2] > 0).any())
 

@@ -1,4 +1,4 @@
-"""Who goes first where two ways meet, and where the other one stops: by what is announced and by what is seen."""
+"""Right of way where two ways meet, by announcements and by sight, and where the other one stops."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the robot says by itself, through the client: pushes, events, pictures, sound, where it is."""
+"""Pushes of the robot through the client: readings, events, pictures, sound, its announced address."""
 
 import asyncio
 import contextlib

@@ -73,7 +73,7 @@ asyncio.run(main())
 
 
 def first_life(path: Path, program: str, until: str, under_way: str = "") -> list[str]:
-    """What the task wrote, up to the text at which its server was killed, or until a call is ``under_way``."""
+    """Return the task's output up to the text at which its server was killed, or until a call is ``under_way``."""
     written = []
     with child(SERVER, str(path), program) as server:
         assert server.stdout

@@ -72,7 +72,7 @@ async def test_a_halt_is_written_before_it_is_reported(service: ProgramService, 
 async def test_the_log_holds_lines_of_this_moment(
     service: ProgramService, stores: Stores, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Who asks for it has heard of them already, and must not lose them again."""
+    """Pushed lines are in the log that a client fetches, so that it does not lose them again."""
     stores.journals.ready.set()  # type: ignore[attr-defined]
     await service.run("t")
     run = service._runs["t"]

@@ -1,4 +1,4 @@
-"""What a run may use, and what happens when it uses more."""
+"""Limits of a run, and what happens beyond them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What crosses between a program and its host: values, errors, time, names, modules."""
+"""Values between a program and its host: errors, time, names and modules too."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ MACHINES = sorted(ARCHITECTURE)
 
 
 def verdict(machine: str, number: int, *arguments: int, architecture: int | None = None) -> int:
-    """What the filter answers to a system call."""
+    """Return the filter's verdict on a system call."""
     six = (*arguments, *[0] * 6)[:6]
     known = ARCHITECTURE[machine] if architecture is None else architecture
     data = struct.pack("<iIQ6Q", number, known, 0, *six)

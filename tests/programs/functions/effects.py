@@ -1,4 +1,4 @@
-"""What the examples of the reference page do to the world, besides what they print, by the function's name."""
+"""Effects of the reference page's examples on the world, besides their output, by the function's name."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ class Seen:
     played: Performance
 
     def went(self, x: float, y: float, degrees: float = 0.0, *, within: float = NEAR) -> bool:
-        """Whether it stands there now."""
+        """Return whether it stands there now."""
         turned = abs(wrap_angle(self.way.yaw - math.radians(degrees)))
         return math.hypot(self.way.x - x, self.way.y - y) < within and turned < ABOUT
 
     def holds(self, height: float | None = None, *, pitch: float = 0.0, roll: float = 0.0, yaw: float = 0.0) -> bool:
-        """Whether the body is held so (m, degrees)."""
+        """Return whether the body is held so (m, degrees)."""
         legs = self.robot[Legs]
         angles = (legs.attitude.roll, legs.attitude.pitch, legs.attitude.yaw)
         wanted = (math.radians(roll), math.radians(pitch), math.radians(yaw))
@@ -44,7 +44,7 @@ class Seen:
         return level and all(abs(have - want) < ABOUT for have, want in zip(angles, wanted, strict=True))
 
     def at(self, x: float, y: float) -> bool:
-        """Whether it thinks that it is there on its map."""
+        """Return whether it believes to be there on its map."""
         return self.robot[Localization].pose.point.distance_to(Pose(x, y).point) < 0.3
 
 

@@ -1,4 +1,4 @@
-"""How calls find their functions: names, arguments, states, logs, tasks and time."""
+"""Lookup of functions: names, arguments, states, logs, tasks and time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What calls return that the end of the server cut off: a failure in the function's own words, and nothing moves."""
+"""Calls cut off by the end of the server: a failure in the function's own words, and nothing moves."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ async def cut_off(caller: Caller, name: str) -> None:
 
 
 def succeeded(result: Record) -> bool:
-    """Whether the result's own field says that it went well."""
+    """Return whether the result's own field says that it went well."""
     match getattr(result.fields.get("response"), "fields", {}):
         case {"result": bool(well)} | {"success": bool(well)}:
             return well
@@ -97,7 +97,7 @@ async def test_motions_keep_their_number(caller: Caller) -> None:
 
 
 async def test_the_robots_own_calls_are_not_touched(caller: Caller) -> None:
-    """What the program holds from before is there, and what comes after works."""
+    """Earlier results are still there, and later calls work."""
     await call_cut_off(caller.session, "cyberdog.motion.turn", [90], {})
     assert field(await caller("cyberdog.motion.turn", 10), "state.code") == StateCode.SUCCESS
     assert ability_set().calls >= WITHOUT_STATE

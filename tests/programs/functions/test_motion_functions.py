@@ -22,7 +22,7 @@ REFUSED = {"result": False, "code": 3010}
 
 
 async def moved(caller: Caller, world: World, name: str, *args: object, **kwargs: object) -> Pose:
-    """Where the call took base_link, seen from where it was."""
+    """Return where the call took base_link, seen from where it was."""
     before = world.truth.pose_of("a")
     result = await caller(f"cyberdog.motion.{name}", *args, **kwargs)
     assert field(result, "state.code") == 0, result

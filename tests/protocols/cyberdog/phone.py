@@ -142,7 +142,7 @@ class App:
         yield self.messages.RecResponse(nameCode=request.nameCode, data="{}")
 
     def of(self, code: int) -> list[Any]:
-        """What was pushed under ``code``."""
+        """Return the pushes under ``code``."""
         return [json.loads(text) for name, text in self.pushed if name == code]
 
 
@@ -166,7 +166,7 @@ async def answered(client: Client, code: int, params: Any, forward: Forward, sec
 
 @dataclass(frozen=True)
 class Pems:
-    """What a client was given."""
+    """Certificates of a client."""
 
     ca: bytes
     certificate: bytes

@@ -1,4 +1,4 @@
-"""What a hostile or broken app sends is refused in the protocol's form, and costs bounded memory."""
+"""Hostile or broken apps are refused in the protocol's form, and cost bounded memory."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def dog_of_no_robot() -> Any:
             """To no one."""
 
         def forget(self) -> None:
-            """Whom?"""
+            """Do nothing: no robot is known."""
 
     class Context:
         robot = Robot("a", plate, LockstepClock())

@@ -1,4 +1,4 @@
-"""What 10001 tells of charging and of what has failed."""
+"""Status 10001: charging and failures."""
 
 from __future__ import annotations
 

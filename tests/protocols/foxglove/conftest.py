@@ -27,7 +27,7 @@ PATIENCE = 20.0  # real s
 
 
 class Viewer:
-    """What Foxglove's app does: reads what the server has, subscribes, publishes."""
+    """Client like Foxglove's app: reads what the server has, subscribes, publishes."""
 
     def __init__(self, socket: ClientConnection, clock: LockstepClock) -> None:
         self.socket, self.clock = socket, clock

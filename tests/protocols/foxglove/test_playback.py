@@ -30,7 +30,7 @@ SECONDS = 20.0  # of the recording
 
 
 class State(NamedTuple):
-    """What the server says about how it plays."""
+    """State of playback as the server reports it."""
 
     status: int
     time: int
@@ -121,7 +121,7 @@ async def ask(viewer: Viewer, command: int, speed: float = 1.0, seek: int | None
 
 
 def recorded(film: Path, topic: str, which: Callable[[int], bool] = lambda _: True) -> list[tuple[int, bytes]]:
-    """What the file has of a topic."""
+    """Return the file's messages of a topic."""
     return [(record.at, record.data) for record in read_messages(film, topic) if which(record.at)]
 
 

@@ -1,4 +1,4 @@
-"""What viewers see: topics with schemas that describe them, data as in recordings, the last state for newcomers."""
+"""Topics of viewers: schemas that describe them, data as in recordings, the last state for newcomers."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ def inbox_at() -> Iterator[Callable[[str, int], Inbox]]:
 
 @pytest.fixture
 def pushes() -> Iterator[Inbox]:
-    """Where the client listens for pushes."""
+    """Yield the client's inbox for pushes."""
     inbox = Inbox("127.0.0.1")
     yield inbox
     inbox.socket.close()
@@ -37,7 +37,7 @@ def pushes() -> Iterator[Inbox]:
 
 @pytest.fixture
 def broadcasts() -> Iterator[Inbox]:
-    """Where someone listens for robots on the network."""
+    """Yield an inbox for robots' broadcasts."""
     inbox = Inbox("")
     yield inbox
     inbox.socket.close()

@@ -36,7 +36,7 @@ def run(*words: str) -> None:
 
 
 async def until(reached, seconds: float) -> float:
-    """How long it took."""
+    """Return the seconds until ``reached``."""
     began = time.monotonic()
     while not reached():
         if time.monotonic() - began > seconds:

@@ -1,4 +1,4 @@
-"""What a pressed bumper does to motion, as clients of the text protocol see it."""
+"""Bumpers during motion, as clients of the text protocol see them."""
 
 import asyncio
 

@@ -42,7 +42,7 @@ class Port:
 
 
 class Outlets:
-    """Where nothing is heard."""
+    """Outlets without listeners."""
 
     def __init__(self, robot: Robot) -> None:
         self.video, self.audio = Port(robot, VideoStream), Port(robot, AudioStream)

@@ -1,4 +1,4 @@
-"""What the chapters beyond the chassis do to the robot and its world, and what it tells of them."""
+"""Effects of the chapters beyond the chassis on the robot and its world, and their reports."""
 
 import asyncio
 import math

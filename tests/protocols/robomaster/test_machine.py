@@ -42,7 +42,7 @@ switches = st.sampled_from(["on", "off"])
 
 @dataclass
 class Modes:
-    """What the manual says about a session, and nothing about how it is done."""
+    """Modes of a session by the manual, without their implementation."""
 
     mode: str = "chassis_lead"
     beads: int = 1
@@ -258,7 +258,7 @@ class Machine(RuleBasedStateMachine):
 
     @rule()
     def two_seconds(self) -> None:
-        """What comes in them is what was asked for, each at its own rate."""
+        """Assert that the pushes of two seconds are those asked for, each at its own rate."""
         self.inbox.drain()
         self.run(self.lab.clock.advance(2.0))
         got = re.findall(r"chassis push (\w+)", " ".join(self.inbox.texts()))

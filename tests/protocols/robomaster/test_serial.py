@@ -12,7 +12,7 @@ from roboglot.protocols.robomaster.server import RoboMasterDoor
 
 
 async def heard(line: int) -> str:
-    """What has come, after a moment."""
+    """Return the output after a moment."""
     for _ in range(100):
         await asyncio.sleep(0.005)
         try:

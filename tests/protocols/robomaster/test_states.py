@@ -64,7 +64,7 @@ async def finish(lab: Lab, context: Context) -> None:
 
 
 class Model:
-    """What the manual says that each command answers, as far as modes go."""
+    """Model of the manual's answers to each command, as far as modes go."""
 
     def __init__(self) -> None:
         self.active = False

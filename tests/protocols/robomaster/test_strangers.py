@@ -58,7 +58,7 @@ async def test_text_without_its_end_is_run_at_once(client) -> None:
 
 
 def hear(greeting: Greeting, sent: bytes, cuts: list[int]) -> bytes:
-    """What may be read of ``sent``, which comes in pieces; a stranger's is refused before any of it may."""
+    """Return the readable part of ``sent``, which comes in pieces; a stranger's is refused before any of it is read."""
     ends, read = [*sorted(set(cuts)), len(sent)], b""
     for start, end in zip([0, *ends], ends, strict=False):
         if piece := sent[start:end]:

@@ -32,7 +32,7 @@ class TextClient:
         return [float(word) for word in (await self.ask(text)).rstrip(";").split()]
 
     async def ended(self) -> bool:
-        """Whether the robot closes the connection."""
+        """Return whether the robot closes the connection."""
         async with asyncio.timeout(PATIENCE):
             try:
                 return await self.reader.read(1) == b""

@@ -68,7 +68,7 @@ class Peer:
         self.session.put(self.key(topic, type), data)
 
     def graph(self) -> list[list[str]]:
-        """What is known by tokens, each cut at its slashes."""
+        """Return the known tokens, each cut at its slashes."""
         return [str(reply.ok.key_expr).split("/") for reply in self.session.liveliness().get("@ros2_lv/0/**")]  # type: ignore[union-attr]
 
     async def until(self, true: Callable[[], object], seconds: float = 0.0) -> None:

@@ -1,4 +1,4 @@
-"""What tests draw on a map: a place, a wall, an area."""
+"""Annotations that tests draw on a map: a place, a wall, an area."""
 
 from __future__ import annotations
 

@@ -198,7 +198,7 @@ class Generator:
         return schema
 
     def problem(self, request: Request, reply: httpx.Response) -> str:
-        """What is wrong with an answer; empty if nothing is."""
+        """Return the error in an answer; empty if there is none."""
         if reply.status_code >= 500 and reply.status_code != 501:
             return "a server's fault"
         if reply.status_code >= 400:
@@ -221,7 +221,7 @@ class Generator:
         return self.misfit(answer, contents[kind]["schema"])
 
     def misfit(self, value: Any, schema: Schema, path: str = "$", *, more: bool = False) -> str:
-        """Where and why ``value`` is not what ``schema`` says; empty if it is. ``more``: objects may have more."""
+        """Return where and why ``value`` breaks ``schema``; empty if it does not. ``more``: objects may have more."""
         schema = self.resolve(schema)
         if options := schema.get("anyOf") or schema.get("oneOf"):
             misfits = [self.misfit(value, option, path, more=more) for option in options]

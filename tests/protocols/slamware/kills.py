@@ -113,7 +113,7 @@ class Writer:
     refused: list[str] = field(default_factory=list)
 
     def read(self, ask: Client) -> State:
-        """What the robot has."""
+        """Return the robot's values."""
         raise NotImplementedError
 
     def write(self, ask: Client, key: str, value: int) -> None:
@@ -121,7 +121,7 @@ class Writer:
         raise NotImplementedError
 
     def choose(self, chance: random.Random) -> tuple[str, int]:
-        """What to write next."""
+        """Return what to write next."""
         key = chance.choice(self.keys)
         return key, 0 if self.known.get(key) and chance.random() < 0.4 else chance.randrange(1, 1 << 30)
 
@@ -146,7 +146,7 @@ class Writer:
         return True
 
     def check(self, ask: Client) -> list[str]:
-        """What is not as it was answered; afterwards the robot is believed."""
+        """Return deviations from the acknowledged state; afterwards the robot is believed."""
         found, problems = self.read(ask), []
         for key in self.known.keys() | found.keys():
             was, now = self.known.get(key, 0), found.get(key, 0)
@@ -260,7 +260,7 @@ class Tasks(Writer):
 
 
 class Settings(Writer):
-    """How long a meal waits, s; and the strategy."""
+    """Waiting time of a meal, s; and the strategy."""
 
     def read(self, ask: Client) -> State:
         careful = ask("GET", "/api/core/motion/v1/strategies/:current") == "careful"

@@ -1,4 +1,4 @@
-"""What the app on a delivery robot's screen does: creates tasks, watches the stage, operates boxes."""
+"""App on a delivery robot's screen: creates tasks, watches the stage, operates boxes."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Screen:
 
     @property
     def pose(self) -> Pose:
-        """Where the robot truly is, in the map."""
+        """True pose of the robot, in the map."""
         return self._world.truth.pose_of("a").relative_to(self.origin)
 
     def request(self, target: str, kind: str = "TAKEOUT", *boxes: int, stops: list[str] | None = None) -> Any:

@@ -1,4 +1,4 @@
-"""What HTTP clients and the manual's own examples expect of the door, whatever the chapter."""
+"""Expectations of HTTP clients and the manual's own examples of the door, whatever the chapter."""
 
 from __future__ import annotations
 

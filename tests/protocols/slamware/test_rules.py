@@ -1,4 +1,4 @@
-"""What is drawn on the map through the API changes how the robot goes: a real socket, the simulated robot."""
+"""Annotations drawn through the API change how the robot goes: a real socket, the simulated robot."""
 
 from __future__ import annotations
 

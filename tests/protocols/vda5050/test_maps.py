@@ -32,7 +32,7 @@ async def keeping(yard: Yard, name: str, *, known: bool = True) -> None:
 
 
 async def asked(yard: Yard, kind: str, id: str, **parameters: Any) -> tuple[str, str]:
-    """How an instant action ended."""
+    """Return how an instant action ended."""
     yard.control.send("instantActions", instant(action(kind, id, **parameters)))
     await yard.until(lambda: states(yard).get(id, ("", ""))[0] in ("FINISHED", "FAILED"))
     return states(yard)[id]

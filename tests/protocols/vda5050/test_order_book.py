@@ -1,4 +1,4 @@
-"""What the robot takes and what it refuses, by chapter 6.1; and that whatever comes, it stays consistent."""
+"""Orders accepted and refused by chapter 6.1; the book stays consistent, whatever comes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is sent and read fits the standard's JSON schemas: 2.1's as the vda5050-sdk carries them, ours of 3.0.
+"""Messages fit the standard's JSON schemas: 2.1's as the vda5050-sdk carries them, ours of 3.0.
 
 `schemas/` holds the messages of 3.0, written from the standard's tables: names, required fields, types, words.
 """
@@ -32,7 +32,7 @@ def validators() -> tuple[Any, dict[str, Any]]:
 
 
 def complaints(version: str, name: str, message: dict[str, Any]) -> list[str]:
-    """What the schema has against a message."""
+    """Return the schema's complaints about a message."""
     official, ours = validators()
     if version == "2.1":
         found: list[str] = official.errors(name, message)

@@ -18,7 +18,7 @@ PATIENCE = 10.0  # s of the machine's time for what a worker process does
 
 
 class FrontEnd:
-    """What the app is: ``ask`` sends one frame and gives what was answered to it."""
+    """Stand-in for the app: ``ask`` sends one frame and returns its answer."""
 
     def __init__(self, door: VisualDoor, service: ProgramService, clock: LockstepClock) -> None:
         self.door = door
@@ -80,5 +80,5 @@ class FrontEnd:
 
 
 def alive(pid: int) -> bool:
-    """Whether there is such a process."""
+    """Return whether there is such a process."""
     return Path(f"/proc/{pid}").exists()

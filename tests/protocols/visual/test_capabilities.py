@@ -37,14 +37,14 @@ PATIENCE = 10  # times 0.1 s that a call may take here
 
 @dataclass
 class Answer:
-    """What a call came to."""
+    """Answer to a call."""
 
     words: str
     failed: bool
 
     @property
     def names_a_missing_part(self) -> bool:
-        """Whether it says that the robot lacks a part."""
+        """True if it says that the robot lacks a part."""
         return "this robot has no" in self.words
 
 

@@ -1,4 +1,4 @@
-"""What a front end is sent when the robot's disk or its program engine fails."""
+"""Feedback to a front end when the robot's disk or its program engine fails."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ PATIENCE = 60.0  # s of the machine's time
 
 
 async def life(database: Path, words: Path, seconds: float | None) -> Counter[tuple[str, ...]]:
-    """What one life of the server reported: killed after some seconds of its work, or until nothing is under way."""
+    """Return the reports of one life of the server, killed after ``seconds`` of its work; None: it ends its work."""
     arguments = [str(database), str(words), str(TASKS), "0" if seconds is None else "1"]
     script = Path(__file__).with_name("killed_robot.py")
     pipe = asyncio.subprocess.PIPE

@@ -78,7 +78,7 @@ class Server:
 
 
 class Ledger:
-    """What must be in the database, going by what was acknowledged."""
+    """Expected contents of the database, by what was acknowledged."""
 
     def __init__(self, chance: random.Random) -> None:
         self.chance = chance
@@ -117,7 +117,7 @@ class Ledger:
         return frame
 
     def acknowledge(self, frame: Frame, answer: Frame) -> bool:
-        """Whether the answer says that it counts; a wrong body (23) is kept, too."""
+        """Return whether the answer says that it counts; a wrong body (23) is kept, too."""
         key = (frame["type"], frame["target_id"][0])
         if answer["state"] and (frame["operate"], answer["state"]) != ("save", 23):
             return False
@@ -131,7 +131,7 @@ class Ledger:
         return True
 
     def compare(self, database: Path, in_flight: Frame | None) -> dict[str, str]:
-        """What is there after a kill is what was acknowledged, but for what was in flight; the states of tasks."""
+        """Assert that a kill left what was acknowledged, but for what was in flight; return the states of tasks."""
         connection = sqlite3.connect(f"file:{database}?mode=ro", uri=True)
         assert connection.execute("PRAGMA integrity_check").fetchone() == ("ok",)
         rows = connection.execute("SELECT kind, id, body, state FROM program").fetchall()
@@ -216,7 +216,7 @@ async def settled(server: Server, ledger: Ledger, frame: Frame) -> None:
 
 
 def of(server: Server, id: str) -> list[Frame]:
-    """What the task reported by itself, in order."""
+    """Return the task's own reports, in order."""
     return [
         frame
         for frame in server.frames

@@ -1,4 +1,4 @@
-"""What is left of tasks when clients, workers or the server end."""
+"""Tasks after the end of clients, workers or the server."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How the body is held, how it walks, what its feet step over."""
+"""Body poses, gaits, and steps over obstacles."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ def dog(simulate):
 
 
 def placed(dog, foot: Foot) -> Pose:
-    """Where a foot is in the world."""
+    """Return the place of a foot in the world."""
     position = dog.robot[Legs].feet[foot].position
     return dog.pose.compose(Pose(position.x, position.y))
 

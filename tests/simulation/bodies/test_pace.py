@@ -1,4 +1,4 @@
-"""What the log says of a machine that is too slow."""
+"""Log of a machine that is too slow."""
 
 from __future__ import annotations
 

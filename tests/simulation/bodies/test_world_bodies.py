@@ -25,7 +25,7 @@ def without(*sections):
 
 
 def everything():
-    """What the universal robot has, as names."""
+    """Return the names of the universal robot's interfaces."""
     clock = LockstepClock()
     world = World(load_world("empty"), [RobotPlacement("a")], clock=clock)
     robot = Robot("a", world.description_of("a"), clock)

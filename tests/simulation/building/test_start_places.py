@@ -1,4 +1,4 @@
-"""Where robots stand that no one placed."""
+"""Start places of robots that no one placed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the body tells on ramps, bumps, steps and ice, in hands, and upside down."""
+"""Motion status on ramps, bumps, steps and ice, in hands, and upside down."""
 
 import math
 

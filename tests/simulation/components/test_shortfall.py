@@ -1,4 +1,4 @@
-"""What the log says of a camera whose pictures the machine cannot draw."""
+"""Log of a camera whose pictures the machine cannot draw."""
 
 from __future__ import annotations
 

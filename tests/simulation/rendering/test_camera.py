@@ -1,4 +1,4 @@
-"""What the camera sees, against geometry done by hand; when it works, and that it does not when no one looks."""
+"""Pictures of the camera, against geometry done by hand; it works only while someone looks."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ async def lab(world, *, start=START, clock=None, seed=1, others=(), body="univer
 
 
 def pixel(robot, pose, x, y, z):
-    """Where a point of the world appears, by a pinhole's rules: column and row."""
+    """Return where a point of the world appears, by a pinhole's rules: column and row."""
     camera = robot[Camera]
     mount, focal = camera.mount, camera.width / 2 / math.tan(camera.fov / 2)
     dx, dy = x - pose.x, y - pose.y
@@ -65,7 +65,7 @@ def pixel(robot, pose, x, y, z):
 
 
 def reds(frame):
-    """Where a picture is decidedly red (half size)."""
+    """Return where a picture is decidedly red (half size)."""
     return frame.chroma[1] > 165
 
 

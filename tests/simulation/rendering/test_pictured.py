@@ -1,4 +1,4 @@
-"""What detectors tell is in the picture: OpenCV finds the same codes at the same places in what the camera draws."""
+"""Detections agree with the picture: OpenCV finds the same codes at the same places in what the camera draws."""
 
 import numpy as np
 import pytest

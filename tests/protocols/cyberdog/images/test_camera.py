@@ -27,7 +27,7 @@ pytestmark = pytest.mark.world("playground", body="cyberdog2")
 
 @pytest.fixture(autouse=True)
 def folder(data: Path):
-    """Where the robot keeps its files; empty before and after."""
+    """Yield the robot's folder for its files; empty before and after."""
     kept = data / "cyberdog" / "camera" / "a"
     _clear(kept)
     yield kept

@@ -1,4 +1,4 @@
-"""What touching something does to motion, as an app sees it."""
+"""Contacts during motion, as an app sees them."""
 
 from __future__ import annotations
 

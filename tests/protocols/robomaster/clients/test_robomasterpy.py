@@ -18,7 +18,7 @@ TOUR = Path(__file__).with_name("robomasterpy_tour.py")
 
 
 async def listen(tour: asyncio.subprocess.Process, said: list[str], touch: Callable[[], None]) -> bytes:
-    """What it prints, line by line; it says when it waits for someone to touch the robot. Its errors at the end."""
+    """Collect its output line by line, and touch the robot when it asks; return its errors at the end."""
     assert tour.stdout
     assert tour.stderr
     while line := (await tour.stdout.readline()).decode().strip():

@@ -1,4 +1,4 @@
-"""What only a cloud gives: maps, voice packages, tasks of cabinets and rounds. A folder plays it."""
+"""Gifts of a cloud: maps, voice packages, tasks of cabinets and rounds. A folder plays it."""
 
 from __future__ import annotations
 

@@ -77,7 +77,7 @@ class Day(Screen):
         raise AssertionError(f"{name} has not ended within {within} s")
 
     async def reported_pose(self) -> Pose:
-        """Where the robot says that it is."""
+        """Return the pose that the robot reports."""
         pose = (await self.client.get(f"{SLAM}/localization/pose")).json()
         return Pose(pose["x"], pose["y"], pose["yaw"])
 
@@ -128,7 +128,7 @@ async def draw(day: Day) -> None:
 
 
 def storeys(exported: bytes, upstairs: Point) -> bytes:
-    """What a deployment tool makes of one storey's map: two alike, with a room on the upper one."""
+    """Return a deployment tool's map of two storeys: two alike, with a room on the upper one."""
 
     def named(layer: Layer, floor: str, order: int) -> Layer:
         label = {"building": "A", "floor": floor, "order": str(order), "default": str(order == 0).lower()}

@@ -49,7 +49,7 @@ async def fleet(clock: LockstepClock) -> AsyncIterator[Fleet]:
 
 @pytest.fixture
 def origin(world: World) -> Pose:
-    """Where the robot woke up: the map's origin in the world."""
+    """Return the map's origin in the world: the robot's start."""
     return world.truth.pose_of("a")
 
 
@@ -78,7 +78,7 @@ async def start(client: httpx.AsyncClient, name: str, **options: object) -> int:
 async def finish(
     client: httpx.AsyncClient, forward: Forward, id: int, *, within: float = 300.0
 ) -> tuple[Any, list[str]]:
-    """How it ended, and the stages that it went through."""
+    """Return the end of the action, and its stages."""
     stages: list[str] = []
     for _ in range(int(within * 2)):
         info = (await client.get(f"{ACTIONS}/{id}")).json()

@@ -1,4 +1,4 @@
-"""What a pressed bumper does to motion, as clients of the REST door see it."""
+"""Bumpers during motion, as clients of the REST door see them."""
 
 from typing import Any
 
