@@ -13,6 +13,7 @@ from roboglot.kernels.arrays import FloatArray
 from roboglot.kernels.compiled import kernel
 
 SPHERE, CAPSULE, CYLINDER, BOX = 2, 3, 5, 6  # as in MuJoCo's mjtGeom
+SPARE = 1e-6  # share of a sphere, and m2, by which a ray must pass it at least to miss what is in it
 
 
 @kernel("float64(float64, float64, float64)")
@@ -84,6 +85,8 @@ def _box(x: float, y: float, z: float, dx: float, dy: float, dz: float, sx: floa
             continue
         one, other = (-half - at) / way, (half - at) / way
         near, far = max(near, min(one, other)), min(far, max(one, other))
+        if near > far:
+            return np.inf
     if near > far or far < 0.0:
         return np.inf
     return near if near >= 0.0 else far
@@ -151,17 +154,22 @@ def _cast_from(
     """Fill ``found``: see ``cast``, of one origin."""
     chosen, nearest = np.empty(len(kinds), np.int64), np.empty(len(kinds))
     count = _reached(kinds, places, bounds, origin, reach, chosen, nearest)
-    local = np.empty((count, 3))  # the origin, seen from each solid
+    local, ahead = np.empty((count, 3)), np.empty((count, 4))  # the origin, seen from each solid; the sphere around it
     for place in range(count):
         i = chosen[place]
         x, y, z = origin[0] - places[i, 0], origin[1] - places[i, 1], origin[2] - places[i, 2]
         for axis in range(3):
             local[place, axis] = turns[i, axis] * x + turns[i, 3 + axis] * y + turns[i, 6 + axis] * z
+        ahead[place, 0], ahead[place, 1], ahead[place, 2] = -x, -y, -z
+        ahead[place, 3] = x * x + y * y + z * z - bounds[i] * bounds[i] * (1.0 + SPARE) - SPARE
     for k in range(len(directions)):
         best, u, v, w = np.inf, directions[k, 0], directions[k, 1], directions[k, 2]
         for place in range(count):
             if nearest[place] > best:
                 break
+            along = u * ahead[place, 0] + v * ahead[place, 1] + w * ahead[place, 2]
+            if ahead[place, 3] > 0.0 and (along < 0.0 or along * along < ahead[place, 3]):
+                continue  # it passes the sphere
             i = chosen[place]
             dx = turns[i, 0] * u + turns[i, 3] * v + turns[i, 6] * w
             dy = turns[i, 1] * u + turns[i, 4] * v + turns[i, 7] * w

@@ -26,6 +26,7 @@ def sideways(way: Points, echoes: Points, clearance: float) -> tuple[Points, flo
     length = np.hypot(along[:, 0], along[:, 1])
     along /= np.maximum(length, 1e-9)[:, None]
     normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    echoes = _around(way, echoes, 3.0 * clearance)
     x, y = echoes[None, :, 0] - way[:, None, 0], echoes[None, :, 1] - way[:, None, 1]
     ahead = np.abs(x * along[:, None, 0] + y * along[:, None, 1])
     left = x * normal[:, None, 0] + y * normal[:, None, 1]
@@ -40,6 +41,14 @@ def sideways(way: Points, echoes: Points, clearance: float) -> tuple[Points, flo
     middle = (np.where(gap, upper, 0.0) + np.where(gap, lower, 0.0)) / 2.0
     shift = _spread(np.where(np.abs(middle) <= SHIFT_MAX, middle, 0.0))
     return shift[:, None] * normal, width
+
+
+def _around(way: Points, echoes: Points, reach: float) -> Points:
+    """Those of ``echoes`` that may be within ``reach`` m of the way."""
+    low, high = way.min(axis=0) - reach, way.max(axis=0) + reach
+    x, y = echoes[:, 0], echoes[:, 1]
+    near: Points = echoes[(x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1])]
+    return near
 
 
 def _spread(shift: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from roboglot.model.components.motion.gripper import Gripper, GripperStatus
 from roboglot.model.components.sensing.depth_camera import DepthCamera, DepthImage
 from roboglot.model.components.sensing.time_of_flight import TimeOfFlight, ZoneDistances
+from roboglot.model.geometry import Vector3
 from roboglot.model.robot import Robot
 
 GRASP, GRASP_SIDE = 0.6, 0.12  # m ahead and aside where what the gripper holds is
@@ -38,6 +39,7 @@ class LowSight:
 
         self._robot, self._height, self._radius = robot, robot.description.height, robot.description.radius
         self._last: tuple[DepthImage, tuple[Points, Points]] | None = None  # and what it showed
+        self._zones: dict[str, tuple[NDArray[np.float32], Vector3, NDArray[np.float64], Points]] = {}  # where they look
         self._sort_out: Callable[[Points, Points, Points, float, float], tuple[Points, Points]] = sort_out
 
     def look(self) -> LowView:
@@ -47,7 +49,7 @@ class LowSight:
             views.append(self._in_image(image))
         if TimeOfFlight in robot:
             eyes = robot[TimeOfFlight]
-            views += [self._in_zones(eyes.reading(name)) for name in eyes.names]
+            views += [self._in_zones(name, eyes.reading(name)) for name in eyes.names]
         if not views:
             return LowView(NONE, NONE)
         obstacles = np.concatenate([standing for standing, _ in views])
@@ -63,8 +65,12 @@ class LowSight:
             self._last = image, self._sort_out(image.rays, depths, mount, self._height, self._radius)
         return self._last[1]
 
-    def _in_zones(self, reading: ZoneDistances) -> tuple[Points, Points]:
+    def _in_zones(self, name: str, reading: ZoneDistances) -> tuple[Points, Points]:
         """The same in the zones of a time-of-flight sensor."""
-        rays = reading.rays.astype(np.float64).reshape(*reading.distances.shape, 3)
-        eye = np.array((reading.eye.x, reading.eye.y, reading.eye.z))
+        known = self._zones.get(name)
+        if known is None or known[0] is not reading.rays or known[1] is not reading.eye:
+            rays = reading.rays.astype(np.float64).reshape(*reading.distances.shape, 3)
+            known = reading.rays, reading.eye, rays, np.array((reading.eye.x, reading.eye.y, reading.eye.z))
+            self._zones[name] = known
+        _, _, rays, eye = known
         return self._sort_out(rays, reading.distances.astype(np.float64), eye, self._height, self._radius)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +41,8 @@ class Route:
         self.points, self.along, places = _densified(self.vertices)
         ends = np.cumsum([len(leg) for leg in legs]) - 1
         self.vertices_along = self.along[places]
+        self._corners = [Point(x, y) for x, y in self.vertices.tolist()]
+        self._corners_along: list[float] = self.vertices_along.tolist()
         self.goals_along: list[float] = self.vertices_along[ends].tolist()
         self.goals: list[Point] = [Point(x, y) for x, y in self.vertices[ends].tolist()]
         pairs = zip(self.goals, wanted or self.goals, strict=True)
@@ -143,24 +144,27 @@ class Route:
 
     def remaining(self, pose: Pose, along: float) -> Path:
         """The vertices that are left, from ``pose`` on."""
-        left = self.vertices[self.vertices_along > along + SPACING]
-        if not len(left):
-            left = self.vertices[-1:]
-        return Path.through([(pose.x, pose.y), *map(tuple, left.tolist())])
+        first = min(bisect_right(self._corners_along, along + SPACING), len(self._corners) - 1)
+        return Path((pose.point, *self._corners[first:]))
 
 
 def _densified(
     vertices: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """Points every SPACING metres at most along the polyline; the metres to each; which of them the vertices are."""
-    pieces, lengths, gone, places = [vertices[:1]], [np.zeros(1)], 0.0, [0]
-    for a, b in pairwise(vertices):
-        length = math.hypot(*(b - a).tolist())
+    ahead = np.diff(vertices, axis=0)
+    counts, spans, gone, begins, places = [], [], 0.0, [], [0]
+    for x, y in ahead.tolist():
+        length = math.hypot(x, y)
         count = math.ceil(length / SPACING)
+        counts.append(count)
+        spans.append(length)
+        begins.append(gone)
         places.append(places[-1] + count)
-        if count:
-            shares = np.arange(1, count + 1) / count
-            pieces.append(a + shares[:, None] * (b - a))
-            lengths.append(gone + shares * length)
-            gone += length
-    return np.concatenate(pieces), np.concatenate(lengths), np.array(places)
+        gone += length
+    piece = np.repeat(np.arange(len(counts)), np.array(counts, np.int64))
+    number = np.arange(1, len(piece) + 1) - np.array(places)[piece]
+    shares = number / np.array(counts)[piece]
+    points = vertices[:-1][piece] + shares[:, None] * ahead[piece]
+    along = np.array(begins)[piece] + shares * np.array(spans)[piece]
+    return np.concatenate([vertices[:1], points]), np.concatenate([np.zeros(1), along]), np.array(places)

@@ -147,6 +147,8 @@ def free_of_movers(path: Points, pose: Pose, radius: float, ways: Sequence[Way])
     """Metres along ``path`` that the hull can go and still stand clear of whatever brakes now; inf: all."""
     free = math.inf
     for way in ways:
+        if len(way.points) < 2:
+            continue
         points = way.stopping()
         if len(points) < 2:
             continue

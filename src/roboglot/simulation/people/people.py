@@ -170,11 +170,10 @@ class Walker:
 
     def _do(self, seconds: float, robots: Sequence[Placed], free: Free) -> bool:
         """True if the step is over."""
-        match self.doing:
-            case Walk(to=(x, y), speed=speed):
-                if self._lets_pass(x, y, robots, seconds, free):
-                    return False
-                return self._step(x, y, (speed or self.person.speed) * seconds)
+        doing = self.doing
+        if isinstance(doing, Walk):  # what they do most
+            return self._walk_on(doing, robots, seconds, free)
+        match doing:
             case Look(at=at):
                 return self._turn(self.pose.point.bearing_to(Point(*at)), TURN_RATE * seconds)
             case Wait(seconds=span) | Show(seconds=span):
@@ -188,26 +187,30 @@ class Walker:
             case _:
                 return True
 
-    def _lets_pass(self, x: float, y: float, robots: Sequence[Placed], seconds: float, free: Free) -> bool:
-        """True if they wait for a robot that is close and in the way, or step aside for one that does not move."""
+    def _walk_on(self, walk: Walk, robots: Sequence[Placed], seconds: float, free: Free) -> bool:
+        """A step of the way, unless a robot is in it; whether they are there."""
         if self._dodging is not None:
             self._dodge(self._dodging, robots, self.person.speed * seconds)
-            return True
-        pose = self.pose
+            return False
+        (x, y), pose = walk.to, self.pose
         dx, dy = x - pose.x, y - pose.y
-        heading = math.atan2(dy, dx) if math.hypot(dx, dy) > 1e-9 else pose.yaw
+        left = math.hypot(dx, dy)
+        heading = math.atan2(dy, dx) if left > 1e-9 else pose.yaw
         c, s = math.cos(heading), math.sin(heading)
         for robot in robots:
             off_x, off_y = robot.x - pose.x, robot.y - pose.y
-            beside = c * off_y - s * off_x
-            if 0.0 < c * off_x + s * off_y < MANNERS and abs(beside) < SIDE:
-                self._waited += seconds
-                if self._waited >= PATIENCE:
-                    self._waited = 0.0
-                    self._dodging = self._way_out(heading, beside, free)
-                return True
+            if 0.0 < c * off_x + s * off_y < MANNERS and abs(c * off_y - s * off_x) < SIDE:
+                self._let_pass(heading, c * off_y - s * off_x, seconds, free)
+                return False
         self._waited = 0.0
-        return False
+        return self._stride(x, y, (walk.speed or self.person.speed) * seconds, left, (heading, c, s))
+
+    def _let_pass(self, heading: float, beside: float, seconds: float, free: Free) -> None:
+        """Wait for a robot that is close and in the way, or make up to step aside for one that does not move."""
+        self._waited += seconds
+        if self._waited >= PATIENCE:
+            self._waited = 0.0
+            self._dodging = self._way_out(heading, beside, free)
 
     def _way_out(self, heading: float, beside: float, free: Free) -> Point | None:
         """To the side that the robot leaves more room at, else to the other one, else back; None if all is closed."""
@@ -236,12 +239,17 @@ class Walker:
         pose = self.pose
         left = math.hypot(x - pose.x, y - pose.y)
         heading = math.atan2(y - pose.y, x - pose.x) if left > 1e-9 else pose.yaw
+        return self._stride(x, y, step, left, (heading, math.cos(heading), math.sin(heading)))
+
+    def _stride(self, x: float, y: float, step: float, left: float, way: tuple[float, float, float]) -> bool:
+        """The same with ``left`` metres to go; ``way``: the heading (rad), its cosine and its sine."""
+        pose, (heading, c, s) = self.pose, way
         self.walking = True
         self._way += min(step, left)
         if left <= step:
             self.pose = Pose(x, y, heading)
             return True
-        self.pose = Pose(pose.x + step * math.cos(heading), pose.y + step * math.sin(heading), heading)
+        self.pose = Pose(pose.x + step * c, pose.y + step * s, heading)
         return False
 
     def _turn(self, heading: float, step: float) -> bool:

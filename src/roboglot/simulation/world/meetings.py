@@ -16,8 +16,6 @@ from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.support import GRAVITY
 from roboglot.simulation.building.props import AWAY, Props
 
-Floats = NDArray[np.float64]
-
 ROOM = 0.02  # m that are kept free of doubt: more than contacts reach beyond the shapes
 PERSON_MAX = 3.0  # m/s
 STILL = 1e-6  # m/s
@@ -42,7 +40,8 @@ class Meetings:
         self._radii = np.array([hull.body.hull.radius for hull in hulls])
         self._pulls = np.array([hull.body.base.traction * GRAVITY for hull in hulls])  # m/s2 that wheels can give
         self._revision = -1
-        self._others: tuple[NDArray[np.int64], Floats, Floats] | None = None  # see ``_there``
+        self._pairs = np.triu_indices(len(hulls), 1)
+        self._others: tuple[NDArray[np.int64], list[float], list[float]] | None = None  # see ``_there``
         self._off = False  # whether it looks for none now
         self._left = 0.0  # s until it has to be looked again
         self._wait = AGAIN
@@ -85,40 +84,56 @@ class Meetings:
             hull.disturbed = False
         return not self._data.nefc and all(hull.support.sprung and not hull.touches for hull in self._hulls)
 
-    def _there(self) -> tuple[NDArray[np.int64], Floats, Floats]:
+    def _there(self) -> tuple[NDArray[np.int64], list[float], list[float]]:
         """Return the present movable bodies, their radii around the middle (m), and their top speeds (m/s)."""
         there = np.flatnonzero(self._data.mocap_pos[:, 2] > AWAY[2] / 2)
         people, sizes = self._round[there], self._model.geom_size[self._geoms[there]]
         radii = np.where(people, sizes[:, 0], np.hypot(sizes[:, 0], sizes[:, 1]))
-        return there, radii, np.where(people, PERSON_MAX, 0.0)
+        return there, radii.tolist(), np.where(people, PERSON_MAX, 0.0).tolist()
 
     def _free(self) -> float:
-        """Seconds in which nothing can come to touch a robot, HORIZON at most."""
+        """Seconds in which nothing can come to touch a robot, HORIZON at most; less than WORTH may be any."""
+        hulls = self._hulls
+        free = self._free_of_each_other() if len(hulls) > 1 else HORIZON
+        for hull, radius, pull in zip(hulls, self._radii.tolist(), self._pulls.tolist(), strict=True):
+            if free >= WORTH and not hull.rests:
+                room = hull.walls.gap(hull.x, hull.y, hull.floor) - ROOM
+                free = min(free, _soonest(room, math.hypot(*hull.motion[:2]), pull))
+            if free >= WORTH:
+                free = min(free, self._free_of_others(hull, radius, pull))
+        return free
+
+    def _free_of_others(self, hull: Hull, radius: float, pull: float) -> float:
+        """The same of one robot, and of what is moved by hand."""
         if self._others is None:
             self._others = self._there()
         there, radii, people = self._others
-        places = self._data.mocap_pos[there]
-        hulls = np.array([(hull.x, hull.y) for hull in self._hulls])
+        x, y, free = hull.x, hull.y, HORIZON
+        speed, pull = (0.0, 0.0) if hull.rests else (math.hypot(*hull.motion[:2]), pull)
+        for place, size, person in zip(self._data.mocap_pos[there].tolist(), radii, people, strict=True):
+            gap = math.hypot(x - place[0], y - place[1]) - size - radius - ROOM
+            free = min(free, _soonest(gap, speed + person, pull))
+        return free
+
+    def _free_of_each_other(self) -> float:
+        """The same of all robots among each other."""
+        first, second = self._pairs
+        places = np.array([(hull.x, hull.y) for hull in self._hulls])
         rest = np.array([hull.rests for hull in self._hulls])
         speeds = np.where(rest, 0.0, [math.hypot(*hull.motion[:2]) for hull in self._hulls])
         pulls = np.where(rest, 0.0, self._pulls)
-        away = np.hypot(hulls[:, 0, None] - places[:, 0], hulls[:, 1, None] - places[:, 1])
-        gaps = away - radii - self._radii[:, None] - ROOM
-        free = min(HORIZON, _soonest(gaps, speeds[:, None] + people, pulls[:, None] + 0.0 * people))
-        moving = np.flatnonzero(~rest)
-        walls = [hull.walls.gap(hull.x, hull.y, hull.floor) - ROOM for hull in self._hulls]
-        free = min(free, _soonest(np.array(walls)[moving], speeds[moving], pulls[moving]))
-        if len(hulls) > 1:
-            first, second = np.triu_indices(len(hulls), 1)
-            away = np.hypot(*(hulls[first] - hulls[second]).T)
-            gaps = away - self._radii[first] - self._radii[second] - ROOM
-            free = min(free, _soonest(gaps, speeds[first] + speeds[second], pulls[first] + pulls[second]))
-        return free
+        (x, y), radii = places.T, self._radii
+        gaps = np.hypot(x[first] - x[second], y[first] - y[second]) - radii[first] - radii[second] - ROOM
+        speed, pull = speeds[first] + speeds[second], pulls[first] + pulls[second]
+        gap = np.clip(gaps, 0.0, FAR)
+        ways = speed + np.sqrt(speed * speed + 2.0 * pull * gap)
+        times = np.where((speed > 0.0) | (pull > 0.0), 2.0 * gap / np.maximum(ways, 1e-9), HORIZON)
+        return min(HORIZON, float(times.min()))
 
 
-def _soonest(gaps: Floats, speeds: Floats, pulls: Floats) -> float:
-    """Return when the first of the gaps (m) may close, at speeds (m/s) growing so fast (m/s2); inf: never."""
-    moving = (speeds > 0.0) | (pulls > 0.0)
-    gap, speed, pull = np.clip(gaps[moving], 0.0, FAR), speeds[moving], pulls[moving]
-    ways = speed + np.sqrt(speed * speed + 2.0 * pull * gap)
-    return float(np.min(2.0 * gap / np.maximum(ways, 1e-9), initial=math.inf))
+def _soonest(gap: float, speed: float, pull: float) -> float:
+    """When a gap (m) may be closed, at a speed (m/s) that grows so fast (m/s2); HORIZON: never."""
+    if not (speed > 0.0 or pull > 0.0):
+        return HORIZON
+    gap = min(max(gap, 0.0), FAR)
+    return 2.0 * gap / max(speed + math.sqrt(speed * speed + 2.0 * pull * gap), 1e-9)

@@ -124,12 +124,14 @@ class Physics:
         if pose.yaw != person.facing:
             person.facing = pose.yaw
             self._attitudes[person.mocap] = math.cos(pose.yaw / 2), 0.0, 0.0, math.sin(pose.yaw / 2)
-        self._model.body_conaffinity[person.id] = person.bits
+        if not person.there:
+            person.there = True
+            self._model.body_conaffinity[person.id] = person.bits
 
     def remove_person(self, body: str) -> None:
         """Take a person away; ``move_person`` brings them back."""
         person = self._people[body]
-        self._places[person.mocap], person.x = AWAY, math.nan
+        self._places[person.mocap], person.x, person.there = AWAY, math.nan, False
         self._model.body_conaffinity[person.id] = 0
 
     def spare_person(self, there: Container[str]) -> str:
@@ -221,3 +223,4 @@ class _Standing:
         self.id, self.mocap, self.bits = body.id, int(body.mocapid[0]), int(model.geom_conaffinity[geom])
         self.half = float(model.geom_size[geom][:2].sum())  # m: of a capsule, radius and half its straight part
         self.x = self.y = self.facing = math.nan
+        self.there = False  # whether robots may bump into them

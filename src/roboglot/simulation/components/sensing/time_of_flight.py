@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from msgspec import Meta, Struct
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from roboglot.model.clock import Clock
 from roboglot.model.components.sensing.time_of_flight import TimeOfFlight, ZoneDistances
 from roboglot.model.errors import NotFound
-from roboglot.model.geometry import Vector3
+from roboglot.model.geometry import Orientation, Point, Vector3
 from roboglot.simulation.bodies.hull import Hull, rotation
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Angle, NotNegative, Offset, Positive
@@ -47,6 +47,16 @@ class TimeOfFlightSection(Struct, frozen=True, forbid_unknown_fields=True):
     sensors: Annotated[tuple[Eye, ...], Meta(min_length=1, max_length=SENSORS_MAX)]
 
 
+class _Held(NamedTuple):
+    """Sensors as the torso is held: eyes (n, 3) and rays in base_link, both also as readings have them."""
+
+    posture: tuple[Orientation, Point, float]
+    eyes: Floats
+    ahead: Floats
+    rays: list[NDArray[np.float32]]
+    places: list[Vector3]
+
+
 class SimulatedTimeOfFlight(TimeOfFlight):
     """The torso's attitude turns them along."""
 
@@ -61,6 +71,7 @@ class SimulatedTimeOfFlight(TimeOfFlight):
         self._mounts = np.array([(eye.forward, eye.left, eye.above_belly) for eye in section.sensors])
         self._readings: dict[str, ZoneDistances] = {}
         self._measured_at = -math.inf
+        self._held: _Held | None = None
 
     def reading(self, name: str) -> ZoneDistances:
         if name not in self.names:
@@ -75,18 +86,28 @@ class SimulatedTimeOfFlight(TimeOfFlight):
         """Take readings of all sensors at once."""
         section, hull = self._section, self._hull
         turn = rotation(hull.tilt, hull.turned).T
-        eyes = hull.held(self._mounts) + np.array((hull.shift.x, hull.shift.y, hull.belly))
-        ahead, origins = hull.held(self._bundles), eyes @ turn + np.array((hull.x, hull.y, hull.elevation))
+        posture = hull.attitude, hull.shift, hull.belly
+        if self._held is None or self._held.posture != posture:
+            self._held = self._hold(posture)
+        held = self._held
+        ahead, origins = held.ahead, held.eyes @ turn + np.array((hull.x, hull.y, hull.elevation))
         distances = self._rays.cast(origins, ahead @ turn, section.range_max * 1.5, hull)
         distances += self._random.standard_normal(len(distances)) * section.noise
         distances[distances > section.range_max] = np.inf
         distances[distances < section.range_min] = -np.inf
-        grids, rays = distances.reshape(-1, ZONES, ZONES).astype(np.float32), ahead.astype(np.float32)
+        grids, low, high = distances.reshape(-1, ZONES, ZONES).astype(np.float32), section.range_min, section.range_max
         grids.setflags(write=False)
-        low, high, each = section.range_min, section.range_max, ZONES * ZONES
-        for number, (name, eye) in enumerate(zip(self.names, eyes.tolist(), strict=True)):
-            ways = rays[number * each : (number + 1) * each]
-            self._readings[name] = ZoneDistances(stamp, grids[number], low, high, ways, Vector3(*eye))
+        for name, grid, rays, eye in zip(self.names, grids, held.rays, held.places, strict=True):
+            self._readings[name] = ZoneDistances(stamp, grid, low, high, rays, eye)
+
+    def _hold(self, posture: tuple[Orientation, Point, float]) -> _Held:
+        """Compute where the sensors look from and to, once for as long as the legs hold the torso like this."""
+        hull, (_, shift, belly) = self._hull, posture
+        eyes, ahead = hull.held(self._mounts) + np.array((shift.x, shift.y, belly)), hull.held(self._bundles)
+        rays = ahead.astype(np.float32)
+        rays.setflags(write=False)
+        each = np.split(rays, len(eyes))
+        return _Held(posture, eyes, ahead, each, [Vector3(*eye) for eye in eyes.tolist()])
 
 
 def _bundle(field_of_view: float) -> Floats:
