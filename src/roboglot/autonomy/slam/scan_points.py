@@ -59,7 +59,7 @@ class ScanReader:
         self._last: tuple[LaserScan, ScanPoints] | None = None
         self._key: object = None
         self.carried: NDArray[np.float64] | None = None  # (n, 2) what the robot carries around itself, base_link, m
-        self._directions: NDArray[np.float64] = np.empty((0, 2))
+        self._directions = (np.empty(0), np.empty(0))  # x and y of each ray
 
     def read(self, scan: LaserScan) -> ScanPoints:
         """The scan's points, computed once for all who ask; none if hardly a ray came back."""
@@ -72,7 +72,7 @@ class ScanReader:
         key = (len(ranges), scan.angle_min, scan.angle_increment, scan.mount)
         if key != self._key:
             angles = scan.angle_min + scan.angle_increment * np.arange(len(ranges)) + scan.mount.yaw
-            self._key, self._directions = key, np.stack([np.cos(angles), np.sin(angles)], axis=1)
+            self._key, self._directions = key, (np.cos(angles), np.sin(angles))
         with np.errstate(invalid="ignore"):
             hit = (ranges >= scan.range_min) & (ranges <= scan.range_max)
             empty = ranges > scan.range_max
@@ -80,9 +80,10 @@ class ScanReader:
         if np.count_nonzero(hit) < ECHO_SHARE_MIN * len(ranges):
             none = np.empty((0, 2))
             return ScanPoints(none, np.empty(0, np.uint8), none, sensor)
-        ranges[empty] = min(scan.clear_range, scan.range_max)
-        ends = self._directions * ranges[:, None]
-        ends += (sensor.x, sensor.y)
+        np.putmask(ranges, empty, min(scan.clear_range, scan.range_max))
+        ends = np.empty((len(ranges), 2))
+        for axis, offset in enumerate((sensor.x, sensor.y)):  # many short rows take longer
+            np.add(self._directions[axis] * ranges, offset, out=ends[:, axis])
         seconds = scan.time_increment * len(ranges)
         velocity = self._odometry.reading.twist if seconds and self._odometry else STILL
         if max(velocity.speed, abs(velocity.yaw)) * seconds > DESKEW_FROM:
@@ -90,7 +91,7 @@ class ScanReader:
         if self.carried is not None and len(self.carried):
             mine = hit & (np.hypot(*(ends[:, None] - self.carried).T).min(axis=0) < CARRIED_NEAR)
             hit, empty = hit & ~mine, empty & ~mine
-        points = ends[hit]
+        points = ends.take(np.flatnonzero(hit), axis=0)
         kept = hit | empty
         if np.count_nonzero(kept) < len(kept):
             ends, hit = ends[kept], hit[kept]
