@@ -35,6 +35,7 @@ class Lookout:
         self._scan_at = -math.inf
         self.follower: Follower | None = None
         self.blocked, self.blocked_at = False, -math.inf
+        self.blocked_place = Point()  # map, by what
         self.gap = math.inf  # m, the width of the narrowest that it was to pass lately
         self._stop = self._robot.events.listen(ScanTaken, self._see)
 
@@ -46,6 +47,10 @@ class Lookout:
     def sees(self) -> bool:
         """True if the newest scan is young enough to drive on."""
         return self._clock.time() - self._scan_at <= self._tuning.scan_age_max
+
+    def watches(self, follower: Follower) -> bool:
+        """True if it looks along that way, and lately did: nothing drives along another one."""
+        return self.follower is follower and self.sees
 
     @property
     def squeeze(self) -> str:
@@ -72,6 +77,7 @@ class Lookout:
         self._scan_at = event.stamp
         self._traffic.observe(points, pose, event.stamp)
         self._planner.forget_soon(self._traffic.moving, event.stamp)
+        self._planner.forget(self._traffic.far(pose))
         if self.follower:
             self._look_ahead(self.follower, pose, points)
             if (width := self._narrow.entered(scan.points)) is not None:
@@ -90,10 +96,11 @@ class Lookout:
         free = planner.free_way(path, points, pose, tuning.touch_margin) if math.isfinite(tight) else tight
         follower.stop_at, blocked = follower.along + free, math.isfinite(free)
         self._mind_others(follower, pose, path)
+        if blocked:
+            self.blocked_place = Point(*path[min(int(free / SPACING), len(path) - 1)].tolist())
         if blocked and not self.blocked:
             self.blocked_at = self._clock.time()
-            at = Point(*path[min(int((follower.stop_at - follower.along) / SPACING), len(path) - 1)].tolist())
-            self._robot.events.publish(PathBlocked(stamp=self.blocked_at, action=self._action, at=at))
+            self._robot.events.publish(PathBlocked(stamp=self.blocked_at, action=self._action, at=self.blocked_place))
         self.blocked = blocked
 
     def _mind_others(self, follower: Follower, pose: Pose, path: NDArray[np.float64]) -> None:

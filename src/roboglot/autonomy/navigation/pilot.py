@@ -100,13 +100,13 @@ class Pilot:
         self._lookout.follower = follower
         return follower
 
-    async def _first_route(self) -> Route:
-        """The route from here; waits while only what stands around closes the way."""
+    async def _first_route(self, left: float = math.inf) -> Route:
+        """The route from here; waits while only what stands around closes the way, or the one of ``left`` m."""
         begun, published = self._clock.time(), False
         while True:
             await self._action.hold(self._brake)
             route = await self._replanner.first()
-            if route:
+            if route and not self._replanner.is_too_long(route, left, self._clock.time() - begun):
                 return route
             self._patience.check_place()
             if self._clock.time() - begun > self._patience.seconds:
@@ -126,7 +126,7 @@ class Pilot:
             pose = self._belief.pose
             if self._replanner.advance(follower):
                 self._patience.take(follower.left)
-            if not self._lookout.sees or self._belief.in_doubt:
+            if not self._lookout.watches(follower) or self._belief.in_doubt:
                 follower.stop_at = follower.along
             self._base.set_velocity(follower.command(pose))
             waiting = follower.stop_at - follower.along < self._tuning.waiting_gap and follower.speed < WAITING_SPEED
@@ -145,7 +145,8 @@ class Pilot:
         self._report("waiting", Path(), 0.0)
         await self._courtesy.give_way(follower)
         self._replanner.begin_again(follower)
-        follower.take(await self._first_route())
+        follower.take(await self._first_route(follower.left))
+        self._lookout.follower = follower  # it may have gone aside once more, meanwhile, along another way
         self._patience.take(follower.left)
         self._patience.begin_anew()
         return State.FOLLOWING

@@ -26,6 +26,8 @@ class PilotTuning:
     wait_period: float = 2.0  # until the next plan when there was no way
     detour: float = 3.0  # a way so much longer than the blocked one is taken only after detour_after
     detour_after: float = 4.0
+    others_after: float = 15.0  # … at most, where others stand in it that will leave
+    others_pace: float = 0.8  # m/s at which it would go around them meanwhile
     detours_max: int = 10  # in one drive
     around: float = 0.5  # a way so much longer than the blocked one is another way …
     arounds_max: int = 40  # … and taken so often in one drive

@@ -172,7 +172,7 @@ class Task:
         """The nearest place beside what is shunned."""
         frame = Frame(self.corner, self.evidence.shape)
         cost = self.cost(layers(self.drawn, frame, self.tracks, self.start, self.goals))
-        return waiting_place(cost, frame, self.start, self.shunned)
+        return waiting_place(cost, self.evidence, frame, self.start, self.shunned)
 
     def _reopen(self, cost: NDArray[np.float32]) -> None:
         """Open what the robot has trodden as far as the hull fits."""
@@ -284,6 +284,15 @@ class Planner:
         for place in places:
             cells = seen[frame.around((place,), MOVING_REACH)]
             cells[cells > until] = until
+
+    def forget(self, places: Sequence[Point]) -> None:
+        """Forget what was seen around ``places``: it will be elsewhere before the robot comes there."""
+        if not places:
+            return
+        grid = self._belief.map
+        seen, frame = self._scans.seen(grid), Frame(grid.corner, grid.evidence.shape)
+        for place in places:
+            seen[frame.around((place,), MOVING_REACH)] = 0.0
 
     def observe_low(self, view: LowView, echoes: NDArray[np.float64], pose: Pose, now: float) -> NDArray[np.float64]:
         """Remember what stands beside the lidar's plane and is not among ``echoes`` (map); returns it in map (n, 2)."""

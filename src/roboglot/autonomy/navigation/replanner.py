@@ -31,6 +31,7 @@ class Replanner:
         self._plan: asyncio.Task[Route | None] | None = None
         self._planned_at = -math.inf
         self._stale = self._polite = False  # the plan goes around others only
+        self._around = False  # … around what blocks the way only
         self._detours = self._arounds = 0
         events = course.robot.events
         self._listeners = [events.listen(kind, self._distrust) for kind in DISTRUSTED]
@@ -123,17 +124,18 @@ class Replanner:
 
     def advance(self, follower: Follower) -> bool:
         """Begin a new plan when one is needed; True if ``follower`` was given another route."""
-        now, tuning = self._clock.time(), self._tuning
+        now, tuning, lookout = self._clock.time(), self._tuning, self._lookout
         if self._plan:
             if not self._plan.done():
                 return False
             taken = self._take(follower, self._plan)
             self._plan = None
             return taken
-        needed = self._lookout.blocked or self._stale or follower.beside > tuning.stray
-        polite = not needed and self._lookout.meets
+        needed = lookout.blocked or self._stale or follower.beside > tuning.stray
+        polite = not needed and lookout.meets
         period = tuning.polite_period if polite else tuning.replan_period
         if now - self._planned_at >= period and (needed or polite):
+            self._around = lookout.blocked and not self._stale and follower.beside <= tuning.stray
             self._polite, self._planned_at, self._stale = polite, now, False
             self._plan = asyncio.ensure_future(self._route(self._goal.points[self.passed(follower) :]))
         return False
@@ -146,8 +148,11 @@ class Replanner:
             return False
         if self._polite and route.length > follower.left + tuning.around:
             return False  # to wait takes less
-        detour = route.length > follower.left + tuning.detour
-        if detour and lookout.blocked and self._clock.time() - lookout.blocked_at < tuning.detour_after:
+        more = route.length - follower.left
+        if self._around and not lookout.blocked and more > tuning.around:
+            return False  # what stood there has gone
+        detour = more > tuning.detour
+        if detour and lookout.blocked and self._clock.time() - lookout.blocked_at < self._bears(more):
             return False
         if len(self._goal.points) - self.passed(follower) != len(route.goals):
             self._stale = True  # a goal was reached meanwhile
@@ -159,6 +164,20 @@ class Replanner:
             follower.stop_at = follower.along  # until the next scan says whether this way is free
         lookout.blocked = False
         return True
+
+    def _bears(self, more: float) -> float:
+        """Seconds that it waits before it takes a way that is ``more`` metres longer."""
+        tuning, place = self._tuning, self._lookout.blocked_place
+        if not self._course.traffic.is_closed_by_others(place):
+            return tuning.detour_after
+        return max(tuning.detour_after, min(tuning.others_after, more / tuning.others_pace))
+
+    def is_too_long(self, route: Route, left: float, waited: float) -> bool:
+        """True if ``left`` m were left, and others are about to leave the way that was so much shorter."""
+        more, tuning = route.length - left, self._tuning
+        if more <= tuning.detour or not self._course.traffic.is_among_others(self._course.belief.pose):
+            return False
+        return waited < min(tuning.others_after, more / tuning.others_pace)
 
     def _count(self, detour: bool, *, around: bool) -> None:
         """Bound how often it goes another way. Raises Blocked."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
-import zlib
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 STANDS = 0.05  # m/s
 RULED_AFTER = 0.6  # s of standing in the way of one that goes first: a plan may lead around meanwhile
 FACED_AFTER, FACED_MORE = 3.0, 4.0  # s of standing before something that may want to come here; more by the name
-FACED_MAX = 4  # times in one drive that it goes aside for what may not want anything
+FACED_MAX = 10  # times in one drive that it goes aside for what may not want anything
 ASIDE_MAX = 40  # times in one drive
 GO_SECONDS, STUCK_SECONDS = 10.0, 2.0
 WAIT_MIN, WAIT_MAX = 0.6, 12.0  # s in the waiting place
@@ -64,13 +64,9 @@ class Courtesy:
         if self._asides >= ASIDE_MAX:
             return False
         return now - self._ruled_since > RULED_AFTER or (
-            self._faced < FACED_MAX and now - self._faced_since > FACED_AFTER + FACED_MORE * self._chance
+            self._faced < FACED_MAX
+            and now - self._faced_since > FACED_AFTER + FACED_MORE * chance(self._robot.id, self._faced)
         )
-
-    @property
-    def _chance(self) -> float:
-        """From 0 to 1, by the name and how often it was asked: not the same for two that stand face to face."""
-        return zlib.crc32(f"{self._robot.id} {self._faced}".encode()) / 2**32
 
     async def give_way(self, follower: Follower) -> None:
         """Go aside, and return when the way is free, or after a while."""
@@ -80,7 +76,12 @@ class Courtesy:
         try:
             await self.go_aside(follower.top)
             follower.halt()
-            await self._wait(path, WAIT_MAX if ruled else FACED_AFTER + FACED_MORE * self._chance, ruled)
+            if ruled:
+                await self._wait(path, WAIT_MIN, WAIT_MAX, ruled)
+            else:
+                await self._wait(
+                    path, WAIT_MIN + FACED_MORE * chance(self._robot.id, self._faced), FACED_AFTER + FACED_MORE, ruled
+                )
         finally:
             self._lookout.follower = follower
 
@@ -126,18 +127,29 @@ class Courtesy:
             follower.locate(pose)
             if follower.last and pose.distance_to(follower.end) < THERE:
                 return
-            if not self._lookout.sees or belief.in_doubt:
+            if not self._lookout.watches(follower) or belief.in_doubt:
                 follower.stop_at = follower.along
             base.set_velocity(follower.command(pose))
             if follower.speed > STANDS or abs(follower.yaw_rate) > STANDS:
                 moved = now
             await self._clock.sleep(PERIOD)
 
-    async def _wait(self, path: Points, most: float, ruled: bool) -> None:
-        """Until no other wants to come along ``path``."""
-        begun = self._clock.time()
+    async def _wait(self, path: Points, least: float, most: float, ruled: bool) -> None:
+        """Until no other wants to come along ``path``, or one that goes first wants to where it waits."""
+        traffic, begun = self._traffic, self._clock.time()
+        free_since = begun
         while True:
             await self._clock.sleep(LOOK)
-            waited = self._clock.time() - begun
-            if waited > most or (waited > WAIT_MIN and self._traffic.is_free(path, ruled=ruled)):
+            now = self._clock.time()
+            if not traffic.is_in_the_way(self._course.belief.pose):
+                free_since = now
+            if now - begun > most or now - free_since > RULED_AFTER:
                 return
+            if now - begun > least and traffic.is_free(path, ruled=ruled):
+                return
+
+
+def chance(name: str, times: int) -> float:
+    """From 0 to 1, by a robot's name and how often it was asked: not the same for two that stand face to face."""
+    digest = hashlib.blake2b(f"{name} {times}".encode(), digest_size=4).digest()
+    return int.from_bytes(digest, "big") / 2**32

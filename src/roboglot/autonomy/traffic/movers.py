@@ -5,6 +5,7 @@ Knows no robot and no radio; needs the kernels. All positions are in map, m.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -40,6 +41,8 @@ class Mover:
     radius: float = HULL
     vx: float = 0.0
     vy: float = 0.0
+    heading: float = 0.0  # rad, where it moved last
+    moved_at: float = -math.inf  # s, when
     _seen: deque[tuple[float, float, float]] = field(default_factory=lambda: deque(maxlen=KEPT))
 
     @property
@@ -66,6 +69,8 @@ class Mover:
         vx, vy = float(times @ xs) / spread, float(times @ ys) / spread
         moves = np.hypot(vx, vy) >= MOVES
         self.vx, self.vy = (vx, vy) if moves else (0.0, 0.0)
+        if moves:
+            self.heading, self.moved_at = math.atan2(vy, vx), stamp
 
 
 class MoverTracker:

@@ -17,6 +17,14 @@ REACH = 16.0  # m around the robot that are looked at: no way is announced farth
 KEPT, MOVED = 5.0, 2.0  # s, m after which the map is looked at anew
 
 
+def narrow(evidence: NDArray[np.int16]) -> NDArray[np.bool_]:
+    """The free cells in which no disc as wide as two robots fits."""
+    reach = HALF / RESOLUTION
+    wide = distances((evidence > 0).astype(np.uint8), reach + 1.0) >= reach
+    found: NDArray[np.bool_] = (distances(wide.astype(np.uint8), reach + 2.0) > reach + 1.0) & (evidence < 0)
+    return found
+
+
 class NarrowPlaces:
     """Finds them in the map around the robot, now and then."""
 
@@ -41,7 +49,5 @@ class NarrowPlaces:
 
     def _look(self, grid: EvidenceGrid, here: Point) -> None:
         rows, columns = Frame(grid.corner, grid.evidence.shape).around((here,), REACH)
-        known, reach = grid.evidence[rows, columns], HALF / RESOLUTION
-        wide = distances((known > 0).astype(np.uint8), reach + 1.0) >= reach
-        self._narrow = (distances(wide.astype(np.uint8), reach + 2.0) > reach + 1.0) & (known < 0)
+        self._narrow = narrow(grid.evidence[rows, columns])
         self._first = (grid.first_column + columns.start, grid.first_row + rows.start)

@@ -30,6 +30,8 @@ BEFORE, AFTER = 1.0, 2.0  # s that one comes later, or earlier, from which two d
 LEAVES = 1.2  # m within which a path leaves another's way that it begins in
 ALIKE = 0.5  # cosine from which two go the same way
 SIGHT = 2.5  # s that what the lidar sees is taken to go straight on
+THROUGH = 6.0  # m of a narrow place that is looked along
+OUT = 4  # points that one goes on beyond it
 ASIDE = 0.15  # m to its right that something will give way
 
 Points = NDArray[np.float64]
@@ -44,6 +46,7 @@ class Way:
     radius: float
     outranks: bool  # whether it goes first by rule
     name: str = ""
+    lively: bool = False  # whether it is on its way somewhere, though it may stand now
 
     @property
     def seconds(self) -> Points:
@@ -83,19 +86,32 @@ def rank(announcement: Announcement) -> tuple[bool, int, str]:
     return not announcement.inside, -announcement.priority, announcement.robot
 
 
-def announced_way(other: Announcement, mine: Announcement) -> Way:
+def announced_way(other: Announcement, mine: Announcement, *, lively: bool = True) -> Way:
     """The way that a robot announced."""
     points = [(other.pose.x, other.pose.y), *((point.x, point.y) for point in other.way)]
     outranks = rank(other) < rank(mine)
-    return Way(np.array(points), other.speed, other.radius, outranks, other.robot)
+    return Way(np.array(points), other.speed, other.radius, outranks, other.robot, lively)
 
 
-def expected_way(mover: Mover) -> Way:
-    """Straight on, and a little to the right: as those that meet pass each other."""
+def expected_way(mover: Mover, *, lively: bool = True) -> Way:
+    """Straight on."""
     speed = mover.speed
-    away = np.arange(0.0, speed * SIGHT + STEP, STEP) if speed > 0.0 else np.zeros(1)
-    ux, uy = (mover.vx / speed, mover.vy / speed) if speed > 0.0 else (0.0, 0.0)
-    return Way(np.stack([mover.x + away * ux, mover.y + away * uy], axis=1), speed, mover.radius, outranks=False)
+    points = straight_on(mover, speed * SIGHT + STEP if speed > 0.0 else STEP)
+    return Way(points, speed, mover.radius, outranks=False, lively=lively)
+
+
+def straight_on(mover: Mover, far: float) -> Points:
+    """Points up to ``far`` m ahead of where it is, the way that it moved last."""
+    away = np.arange(0.0, far, STEP)
+    x, y = math.cos(mover.heading), math.sin(mover.heading)
+    return np.stack([mover.x + away * x, mover.y + away * y], axis=1)
+
+
+def through_narrow(mover: Mover, points: Points, narrow: NDArray[np.bool_]) -> Way:
+    """The way of one that is where two cannot pass: out of there, before others come in. ``points`` lie straight on."""
+    wide = np.flatnonzero(~narrow)
+    end = (int(wide[0]) if len(wide) else len(points)) + OUT
+    return Way(points[:end], mover.speed, mover.radius, outranks=True, lively=True)
 
 
 def shifted(way: Way) -> Points:

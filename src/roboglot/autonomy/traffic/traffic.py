@@ -15,6 +15,7 @@ from roboglot.autonomy.traffic.announcer import Announcer
 from roboglot.autonomy.traffic.right_of_way import (
     CLEAR,
     STEP,
+    THROUGH,
     Meeting,
     Way,
     announced_way,
@@ -22,12 +23,15 @@ from roboglot.autonomy.traffic.right_of_way import (
     free_of_movers,
     meetings,
     shifted,
+    straight_on,
+    through_narrow,
 )
+from roboglot.model.components.logistics.traffic_radio import Announcement
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.robot import Robot
 
 if TYPE_CHECKING:
-    from roboglot.autonomy.traffic.movers import MoverTracker
+    from roboglot.autonomy.traffic.movers import Mover, MoverTracker
     from roboglot.autonomy.traffic.narrow_places import NarrowPlaces
 
 ANNOUNCED = 5.0  # m of the way that are, and what is narrow beyond
@@ -35,6 +39,10 @@ SAME = 0.6  # m between what is seen and what is heard of the same robot
 BEFORE_NARROW = 0.35  # m before a narrow place where it waits
 FACING = 0.27 + 0.5  # m between a hull and the middle of what stands before it
 AROUND = 4.0  # m within which others may be what closes the way
+LIVELY = 8.0  # s after it went somewhere that one is taken to go on
+FAR = 3.0  # m away from which such ones will be elsewhere before the robot is there
+STOPPED = 5.0  # s after which one that stands in a narrow place may go back as well
+IN_IT = 0.9  # m between the middle of such a one and what it closes
 TRAIL = 20  # places that it came by
 TRAIL_STEP = 0.2  # m between two of them
 
@@ -50,6 +58,7 @@ class Traffic:
         self._tracker: MoverTracker | None = None  # once something drives: these two need the kernels
         self._narrow: NarrowPlaces | None = None
         self._ways: list[Way] = []
+        self._went: dict[str, float] = {}  # when the others that are heard announced a way last, s
         self._trail: deque[Point] = deque(maxlen=TRAIL)
         self.meeting: Meeting | None = None  # with one that goes first
         self.meets = False  # whether another is about to come into the way
@@ -66,13 +75,40 @@ class Traffic:
         if not self._trail or self._trail[-1].distance_to(pose) > TRAIL_STEP:
             self._trail.append(pose.point)
         heard = self._announcer.heard(stamp)
+        movers = [
+            mover
+            for mover in self._watch().observe(echoes, self._belief.map, pose, stamp)
+            if not any(mover.point.distance_to(other.pose) < SAME for other in heard)
+        ]
+        inside = self._announcer.inside = self._is_inside(pose, heard, movers, stamp)
         self._ways = []
         if heard:
             mine = self._announcer.announcement(stamp)
-            self._ways = [announced_way(other, mine) for other in heard]
-        for mover in self._watch().observe(echoes, self._belief.map, pose, stamp):
-            if not any(mover.point.distance_to(other.pose) < SAME for other in heard):
-                self._ways.append(expected_way(mover))
+            self._ways = [announced_way(other, mine, lively=self._goes(other)) for other in heard]
+        self._went = {other.robot: self._went[other.robot] for other in heard if other.robot in self._went}
+        self._ways += [self._expected(mover, pose, stamp, inside=inside) for mover in movers]
+
+    def _is_inside(self, pose: Pose, heard: list[Announcement], movers: list[Mover], stamp: float) -> bool:
+        """True if two cannot pass where it is, and there are others."""
+        if not heard and not any(stamp - mover.moved_at <= LIVELY for mover in movers):
+            return False
+        return bool(self._narrow_at(np.array([(pose.x, pose.y)]))[0])
+
+    def _goes(self, other: Announcement) -> bool:
+        """True if it announces a way, or did so a moment ago."""
+        if other.way:
+            self._went[other.robot] = other.stamp
+        return other.stamp - self._went.get(other.robot, -math.inf) <= LIVELY
+
+    def _expected(self, mover: Mover, pose: Pose, stamp: float, *, inside: bool) -> Way:
+        """Way of one that is not heard: who is where two cannot pass goes first, if the robot is not."""
+        stood = stamp - mover.moved_at
+        if not inside and stood <= STOPPED:
+            points = straight_on(mover, THROUGH)
+            narrow = self._narrow_at(np.concatenate([[(pose.x, pose.y)], points]))[1:]
+            if narrow[0]:
+                return through_narrow(mover, points, narrow)
+        return expected_way(mover, lively=stood <= LIVELY)
 
     def _watch(self) -> MoverTracker:
         if self._tracker is None:
@@ -85,6 +121,15 @@ class Traffic:
     def moving(self) -> list[Point]:
         """Return the current places of robots that have a goal."""
         return [Point(*way.points[0].tolist()) for way in self._ways if len(way.points) >= 2]
+
+    def far(self, pose: Pose) -> list[Point]:
+        """Places of those that will be elsewhere before the robot comes there."""
+        return [Point(*way.points[0].tolist()) for way in self._ways if way.lively and not way.is_within(FAR, pose)]
+
+    def is_closed_by_others(self, place: Point) -> bool:
+        """True if one that is on its way somewhere stands there, and will leave."""
+        here = Pose(place.x, place.y)
+        return any(way.lively and way.is_within(IN_IT, here) for way in self._ways)
 
     def is_among_others(self, pose: Pose) -> bool:
         """True if robots, or other things that move, are near."""
@@ -166,10 +211,9 @@ class Traffic:
         announcer = self._announcer
         if not announcer.frame:
             return
-        end, announcer.inside = round(ANNOUNCED / SPACING), False
-        if self._ways:  # no other asks whether it is in a narrow place
+        end = round(ANNOUNCED / SPACING)
+        if self._ways:
             narrow = self._narrow_at(path)
-            announcer.inside = bool(narrow[0])
             while end < len(narrow) and narrow[end]:
                 end += 1
         if self.meeting is not None:

@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 
 from roboglot.autonomy.navigation.rules import Frame
 from roboglot.autonomy.slam.evidence import RESOLUTION
+from roboglot.autonomy.traffic.narrow_places import narrow
 from roboglot.kernels.search import ways_from
 from roboglot.model.geometry import Point
 
 REACH = 6.0  # m around in which it is looked for
 SHUN_COST = 4.0  # what a cell on another's way costs more
 SHUN_POINTS = 40
+NARROW_COST = 60.0  # what waiting in a narrow place costs: as 3 m of open floor
 
 Points = NDArray[np.float64]
 
@@ -28,9 +30,16 @@ def shun(cost: NDArray[np.float32], frame: Frame, ways: Sequence[tuple[Points, f
 
 
 def waiting_place(
-    cost: NDArray[np.float32], frame: Frame, here: Point, ways: Sequence[tuple[Points, float]]
+    cost: NDArray[np.float32],
+    evidence: NDArray[np.int16],
+    frame: Frame,
+    here: Point,
+    ways: Sequence[tuple[Points, float]],
 ) -> Point | None:
-    """The place that takes the least to reach and lies farther from all ways than their metres; None if none does."""
+    """The place that takes the least to reach and lies farther from all ways than their metres; None if none does.
+
+    Where two cannot pass it would be in a third one's way: a place beyond that is better, up to a few metres off.
+    """
     rows, columns = frame.around((here,), REACH)
     near = np.ascontiguousarray(cost[rows, columns])
     row, column = (
@@ -41,6 +50,7 @@ def waiting_place(
         return None
     near[row, column] = min(near[row, column], 10.0)
     paid = ways_from(near, row, column)
+    paid += np.where(narrow(evidence[rows, columns]), np.float32(NARROW_COST), np.float32(0.0))
     corner = Point(frame.corner.x + columns.start * RESOLUTION, frame.corner.y + rows.start * RESOLUTION)
     part = Frame(corner, (near.shape[0], near.shape[1]))
     for points, reach in ways:
