@@ -18,6 +18,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NoReturn
@@ -38,7 +39,7 @@ PLAIN = {
 }
 OF_THE_INTERPRETER = ("PYTHON", "LC_", "LANG", "NUMBA_", "OPENBLAS_", "OMP_", "MKL_", "GRPC_", "LD_", "MALLOC_")
 MESSAGE_MAX = 1 << 20
-PR_SET_CHILD_SUBREAPER = 36
+PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER = 1, 36
 SERVER_FD_LIMIT = 4096
 
 _execute_cold: Any = subprocess.Popen._execute_child  # type: ignore[attr-defined]
@@ -106,6 +107,7 @@ def _execute(process: Any, *arguments: Any, **named: Any) -> None:
         "folder": str(wanted["cwd"] or Path.cwd()),
         "environment": dict(os.environ if wanted["env"] is None else wanted["env"]),
         "session": bool(wanted["start_new_session"]),
+        "parent": os.getpid(),
     }
     try:
         process.pid = _parent.start(wish, given)
@@ -141,7 +143,10 @@ def serve(line: socket.socket) -> None:
         reading, writing = os.pipe()
         middle = os.fork()
         if middle == 0:
+            middle = os.getpid()
             if (pid := os.fork()) == 0:
+                while os.getppid() == middle:  # whose end is not the one that we end with
+                    time.sleep(0.0005)
                 _become(json.loads(message), descriptors)
             os.write(writing, str(pid).encode())
             os._exit(0)
@@ -151,10 +156,18 @@ def serve(line: socket.socket) -> None:
             os.close(descriptor)
 
 
+def end_with(parent: int) -> None:
+    """Be killed when the process that started this one ends, however it does."""
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+    if os.getppid() != parent:  # it ended before that was set
+        os._exit(1)
+
+
 def _become(wish: Any, descriptors: list[int]) -> NoReturn:
     """In the fork: be the process that was wanted."""
     status = 70
     try:
+        end_with(wish["parent"])
         for number, descriptor in enumerate([os.dup(given) for given in descriptors]):
             os.dup2(descriptor, number)
         os.closerange(3, SERVER_FD_LIMIT)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+import signal
 import subprocess
+import sys
 import time
 
 import pytest
 
 from roboglot.programs.engine import launcher
+from roboglot.programs.engine.engine import Engine
 from roboglot.programs.engine.launcher import Launcher
 
 
@@ -27,3 +30,21 @@ async def test_a_start_that_is_called_off_leaves_nothing(monkeypatch: pytest.Mon
     with pytest.raises(asyncio.CancelledError):
         await opening
     assert [process.returncode is not None for process in started] == [True]
+
+
+async def test_engine_that_still_starts_closes_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    started, loop, begun = list[subprocess.Popen[bytes]](), asyncio.get_running_loop(), asyncio.Event()
+
+    def never_ready(descriptor: int, filter_required: bool) -> subprocess.Popen[bytes]:
+        started.append(subprocess.Popen([sys.executable, "-c", "import signal; signal.pause()"], pass_fds=[descriptor]))
+        loop.call_soon_threadsafe(begun.set)
+        return started[0]
+
+    monkeypatch.setattr(launcher, "_start_process", never_ready)
+    monkeypatch.setattr(launcher, "EXIT_MAX", 600.0)
+    engine = Engine()
+    engine.open_soon()
+    await begun.wait()
+    async with asyncio.timeout(60):
+        await engine.close()
+    assert started[0].returncode == -signal.SIGKILL

@@ -1,8 +1,9 @@
 """A server of tasks whose robot speaks into a file, for tests that kill it.
 
-python killed_robot.py DATABASE FILE TASKS BEGIN: keeps so many tasks running, recovers those that a killed server
-left behind, and tells on standard output what it asks for and what was acknowledged. With 0 for BEGIN it starts nothing
-new and says "over" when nothing is under way any more. Each run has a number of its own, and says it with each step.
+python killed_robot.py DATABASE FILE TASKS BEGIN PARENT: keeps so many tasks running, recovers those that a killed
+server left behind, and tells on standard output what it asks for and what was acknowledged. With 0 for BEGIN it starts
+nothing new and says "over" when nothing is under way any more. It ends with PARENT, also if that is killed. Each run
+has a number of its own, and says it with each step.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from roboglot.programs.tasks.service import ProgramService
 from roboglot.programs.tasks.states import TaskState
 from roboglot.storage.database import Database
 from roboglot.storage.programs import program_stores
+from tests.warm_start import end_with
 
 SPEED = 600.0
 STEPS = 8
@@ -83,4 +85,5 @@ async def main(database: str, file: str, tasks: int, begin: int) -> None:
 
 
 if __name__ == "__main__":
+    end_with(int(sys.argv[5]))
     asyncio.run(main(sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4])))

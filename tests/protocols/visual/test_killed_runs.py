@@ -25,15 +25,16 @@ UNKNOWN = Description(**TEXTS, radius=0.2, height=0.3)
 
 KILLS = int(os.environ.get("ROBOGLOT_KILLS", "2"))
 TASKS = 3
+ROOT = Path(__file__).parents[3]
+KILLED_ROBOT = (sys.executable, "-m", "tests.protocols.visual.killed_robot")
 PATIENCE = 60.0  # s of the machine's time
 
 
 async def life(database: Path, words: Path, seconds: float | None) -> Counter[tuple[str, ...]]:
     """Return the reports of one life of the server, killed after ``seconds`` of its work; None: it ends its work."""
-    arguments = [str(database), str(words), str(TASKS), "0" if seconds is None else "1"]
-    script = Path(__file__).with_name("killed_robot.py")
+    arguments = [str(database), str(words), str(TASKS), "0" if seconds is None else "1", str(os.getpid())]
     pipe = asyncio.subprocess.PIPE
-    server = await asyncio.create_subprocess_exec(sys.executable, str(script), *arguments, stdout=pipe)
+    server = await asyncio.create_subprocess_exec(*KILLED_ROBOT, *arguments, stdout=pipe, cwd=ROOT)
     assert server.stdout
     reported = []
     if seconds is not None:
@@ -78,3 +79,30 @@ async def test_runs_survive_kills(tmp_path: Path) -> None:
         assert reported["begun", id] <= list(of.values()).count(id) <= reported["asked", id]
     recovered = sum(count for words, count in reported.items() if words[0] == "recovered")
     print(f"{KILLS} kills, {len(runs)} runs, {recovered} recoveries, {len(interrupted)} calls interrupted")
+
+
+async def test_no_robot_outlives_a_killed_test(tmp_path: Path) -> None:
+    """Its parent, as pytest would, starts it and is killed."""
+    start = (
+        "import os, subprocess, sys\n"
+        "robot = subprocess.Popen([*sys.argv[1:], str(os.getpid())], stdout=subprocess.PIPE)\n"
+        "print(robot.stdout.readline().decode().split()[0], robot.pid, flush=True)\n"
+        "robot.wait()\n"
+    )
+    arguments = [str(tmp_path / "robot.db"), str(tmp_path / "words"), "1", "1"]
+    parent = await asyncio.create_subprocess_exec(
+        sys.executable, "-c", start, *KILLED_ROBOT, *arguments, stdout=asyncio.subprocess.PIPE, cwd=ROOT
+    )
+    assert parent.stdout
+    said, number = (await asyncio.wait_for(parent.stdout.readline(), PATIENCE)).decode().split()
+    assert said == "asked"
+    robot = os.pidfd_open(int(number))
+    gone = asyncio.Event()
+    asyncio.get_running_loop().add_reader(robot, gone.set)
+    parent.kill()
+    try:
+        await asyncio.wait_for(gone.wait(), PATIENCE)
+    finally:
+        asyncio.get_running_loop().remove_reader(robot)
+        os.close(robot)
+        await parent.wait()

@@ -229,7 +229,8 @@ class Engine:
         """End every run and the zygote; nothing of theirs is left. Idempotent."""
         self._closed = True
         if self._background is not None:
-            await self._background
+            self._background.cancel()  # a zygote that is still loading has nothing to lose
+            await asyncio.gather(self._background, return_exceptions=True)
         for run in list(self._runs):
             run.end(ExitReason.LOST, "EngineLost", "the program engine was closed")
             run.wire.drop()
@@ -256,13 +257,23 @@ class Engine:
                 raise EngineError("the program engine is closed")
             if self._launcher is None:
                 launcher = Launcher(self._forget, filter_required=self._filter_required)
-                self.layers = [*await launcher.open(), *await asyncio.to_thread(self._group.open)]
+                self.layers = await launcher.open()
                 self._launcher = launcher
+                self.layers = [*self.layers, *await self._open_group()]
                 self._group.step_aside(launcher.pid)
                 self._memory.empty = usage_of(launcher.pid).memory
                 if FILTER not in self.layers:
                     log.warning("robot programs run without a system call filter, as configured: trust each of them")
             return self._launcher
+
+    async def _open_group(self) -> list[str]:
+        """Open the group of programs; not left in the middle, or ``close`` would miss it."""
+        opening = asyncio.ensure_future(asyncio.to_thread(self._group.open))
+        try:
+            return await asyncio.shield(opening)
+        except asyncio.CancelledError:
+            await opening
+            raise
 
     def _forget(self, launcher: Launcher) -> None:
         """The zygote has ended by itself: the next program starts another."""

@@ -150,6 +150,9 @@ class Launcher:
             self._loop.add_reader(ours.fileno(), self._receive)
             return await self._ready
         except BaseException:
+            self._ready.cancel()  # no one asks any more
+            if self._process is not None:
+                self._process.kill()  # it has no workers yet, and may take seconds until it looks at its socket
             await self.close()
             raise
 
