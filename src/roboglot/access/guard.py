@@ -165,7 +165,7 @@ class Guard:
         return self._handshakes.take(host) and self._handshakes_together.take("")
 
     def _follow(self, loop: asyncio.AbstractEventLoop) -> None:
-        """In a thread: looks cost nothing to the robots, and lockstep waits for none of them."""
+        """Follow the list in a thread: looks cost nothing to the robots, and lockstep waits for none of them."""
         seen = self._list.version
         while not self._ended.wait(LOOK_PERIOD):
             if self.now() >= self._next_end:

@@ -33,6 +33,6 @@ def parse_rights(text: str) -> frozenset[Right]:
 
 
 def write_rights(rights: Iterable[Right]) -> str:
-    """As ``parse_rights`` reads them, in their own order."""
+    """Return the rights as ``parse_rights`` reads them, in their own order."""
     chosen = set(rights)
     return ",".join(right for right in Right if right in chosen)

@@ -120,7 +120,7 @@ class Page:
         return self._watch.moving
 
     def beat(self, number: int) -> None:
-        """It is time to look again; a page that still sends skips this one."""
+        """Look again for news; a page that still sends skips this one."""
         self._beat = number
         self._due.set()
 

@@ -24,7 +24,7 @@ class RecordingWish(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class Recordings:
-    """For all robots of one program; so they need the right to admin on all robots."""
+    """Recordings of all robots of one program; so they need the right to admin on all robots."""
 
     def __init__(self, data: Path, recorder: Callable[[], Recorder]) -> None:
         self._folder, self._recorder = data / FOLDER, recorder

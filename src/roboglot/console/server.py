@@ -35,7 +35,7 @@ LIBRARIES = ("uvicorn.protocols.http.httptools_impl", "uvicorn.protocols.websock
 
 
 class Console:
-    """For all robots of one program. ``port`` is the one it got, 0 while it is closed."""
+    """Console of all robots of one program. ``port`` is the one it got, 0 while it is closed."""
 
     def __init__(self, desk: Desk, config: ConsoleConfig, tls: Tls | None = None) -> None:
         self._desk, self._config, self._tls = desk, config, tls

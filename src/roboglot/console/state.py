@@ -51,7 +51,7 @@ PARTS = {  # by which a page decides what panels there are
 
 
 def state_of(robot: Robot) -> dict[str, object]:
-    """Everything but what moves many times a second; each key is sent again when it changed."""
+    """Return all but what changes many times a second; each key is sent again when it changed."""
     return {
         "about": _about(robot),
         "parts": [name for name, interface in PARTS.items() if interface in robot],

@@ -103,7 +103,7 @@ class RobotView:
         return [*words.pose(where), *rates]
 
     def state(self) -> dict[str, object]:
-        """Everything that changes seldom, by key."""
+        """State that changes seldom, by key."""
         return state_of(self.robot) | {
             "drawings": drawings.drawings_of(self.robot),
             "anchor": words.pose(self.anchor) if self.anchor else None,

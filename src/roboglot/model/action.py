@@ -129,13 +129,13 @@ class Action:
         return going and (self.source, self.client) == (source, client())
 
     def report(self, feedback: object) -> None:
-        """For the action's own code: publish progress; the same feedback twice in a row is published once."""
+        """Publish progress, from the action's own code; the same feedback twice in a row is published once."""
         if feedback != self.feedback:
             self.feedback = feedback
             self._owner.announce(self)
 
     async def hold(self, brake: Callable[[], object]) -> bool:
-        """For the action's own loop: if paused, brake and wait for ``resume``. True if it had been paused."""
+        """Brake and wait for ``resume`` if paused, in the action's own loop. True if it had been paused."""
         if self._going_on.is_set():
             return False
         brake()

@@ -89,4 +89,4 @@ class DockNotFound(RobotError):
 
 
 class Expired(RobotError):
-    """It took longer than it may."""
+    """Time limit of a request exceeded."""

@@ -35,7 +35,7 @@ class Box:
 
 
 class Colour(StrEnum):
-    """Of markers and of lines on the floor."""
+    """Colour of markers and of lines on the floor."""
 
     RED = "red"
     GREEN = "green"

@@ -91,7 +91,7 @@ class StagePerson(ABC):
     @property
     @abstractmethod
     def floor(self) -> int:
-        """On which floor."""
+        """Floor of the person."""
 
     @abstractmethod
     def walk_to(self, x: float, y: float, *, speed: float | None = None) -> None:

@@ -109,7 +109,7 @@ class Files:
 
     @property
     def path(self) -> Path:
-        """Of the part that is written now, or will be."""
+        """Path of the part that is written now, or will be."""
         suffix = f"-{self._number:03}" if self._number > 1 else ""
         return self._base.with_name(f"{self._base.name}{suffix}{SUFFIX}")
 

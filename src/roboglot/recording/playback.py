@@ -165,7 +165,7 @@ class Playback(StandIn):
 
     @staticmethod
     def _near(door: _Door, key: str) -> list[int]:
-        """Those whose numbers are nearly the same, the nearest kind first."""
+        """Return requests whose numbers are nearly the same, the nearest kind first."""
         form, numbers = without_numbers(key)
         return [
             place

@@ -75,7 +75,7 @@ class Recording:
         return found
 
     def of(self, robot: str = "", door: str = "") -> list[Exchange]:
-        """Its exchanges, or those of one robot, of one door."""
+        """Return its exchanges, or those of one robot, of one door."""
         return [e for e in self.exchanges if robot in ("", e.robot) and door in ("", e.door)]
 
 

@@ -33,7 +33,7 @@ DROPS_PERIOD = 10.0  # s between two warnings
 
 
 class NotRecording(RobotError):
-    """There is no recording under way, or there is one already; or it cannot be written."""
+    """No recording is under way, or there is one already; or it cannot be written."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,7 +46,7 @@ class Ring:
             self._open.append(entry)
 
     def flush(self) -> None:
-        """Nothing is safe here."""
+        """Do nothing: nothing is safe here."""
 
     def close(self) -> None:
         """Forget all."""

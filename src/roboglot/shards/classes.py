@@ -48,7 +48,7 @@ _decode = msgspec.json.Decoder(ToRoom).decode
 
 
 class FleetClasses:
-    """Of the fleet in one folder."""
+    """Classes of the fleet in one folder."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -99,7 +99,7 @@ class _Link:
         self._pending: set[asyncio.Task[None]] = set()
 
     async def serve(self, reader: asyncio.StreamReader) -> None:
-        """Until it hangs up."""
+        """Serve until it hangs up."""
         mine = None
         try:
             hello = _decode(await reader.readline())

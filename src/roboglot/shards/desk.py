@@ -15,7 +15,7 @@ from roboglot.shards.wishes import SOCKET, Answer, Request, RobotRow, Row
 
 
 class FleetDesk:
-    """For the keeper of one fleet."""
+    """Desk of one fleet's keeper."""
 
     def __init__(self, supervisor: Keeper, folder: Path) -> None:
         self._supervisor = supervisor

@@ -10,34 +10,34 @@ MESSAGE_MAX = 1 << 17  # bytes; a hundred robots' endpoints are 60 kB
 
 
 class Fork(msgspec.Struct, tag=True, frozen=True):
-    """To the nursery, with two descriptors (link and log): fork a shard with the settings in ``folder``."""
+    """Message to the nursery, with two descriptors (link and log): fork a shard with the settings in ``folder``."""
 
     number: int
     folder: str
 
 
 class End(msgspec.Struct, tag=True, frozen=True):
-    """To the nursery: send ``signal`` to this child if it still lives."""
+    """Message to the nursery: send ``signal`` to this child if it still lives."""
 
     number: int
     signal: int
 
 
 class Warm(msgspec.Struct, tag=True, frozen=True):
-    """From the nursery: everything is loaded, ``seconds`` after it was started."""
+    """Message of the nursery: everything is loaded, ``seconds`` after it was started."""
 
     seconds: float
 
 
 class Born(msgspec.Struct, tag=True, frozen=True):
-    """From the nursery."""
+    """Message of the nursery: a shard was forked."""
 
     number: int
     pid: int
 
 
 class Dead(msgspec.Struct, tag=True, frozen=True):
-    """From the nursery; ``status`` is the exit code, negative for a signal."""
+    """Message of the nursery: a child ended; ``status`` is the exit code, negative for a signal."""
 
     number: int
     status: int
@@ -62,7 +62,7 @@ class Beat(msgspec.Struct, tag=True, frozen=True):
 
 
 class Refusal(msgspec.Struct, tag=True, frozen=True):
-    """From a shard: why it cannot start. ``lasting``: its settings are wrong, and another try would end alike."""
+    """Message of a shard: why it cannot start. ``lasting``: its settings are wrong, another try would end alike."""
 
     reason: str
     lasting: bool

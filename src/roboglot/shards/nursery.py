@@ -41,7 +41,7 @@ class Nursery:
         signal.set_wakeup_fd(wake, warn_on_full_buffer=False)
 
     def serve(self) -> None:
-        """Until the control socket ends."""
+        """Serve until the control socket ends."""
         poll = select.poll()
         poll.register(self._control, select.POLLIN)
         poll.register(self._wake, select.POLLIN)
@@ -91,7 +91,7 @@ class Nursery:
         self._tell(Born(number, pid))
 
     def _become_shard(self, parent: int, folder: str, link: int, output: int) -> None:
-        """In the child; never returns."""
+        """Become the shard, in the child; never returns."""
         status = EXIT_BROKEN
         try:
             signal.set_wakeup_fd(-1)

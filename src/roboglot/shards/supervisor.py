@@ -63,7 +63,10 @@ class Shard:
 
 
 class Supervisor:
-    """Of one fleet in one folder. ``start`` returns when every shard is ready or has failed; ``close`` ends them."""
+    """Supervisor of one fleet in one folder.
+
+    ``start`` returns when every shard is ready or has failed; ``close`` ends them.
+    """
 
     def __init__(self, plan: FleetPlan, folder: Path, *, memory_max: int = 0) -> None:
         """Raises FolderInUse if another one uses the folder. ``memory_max``: bytes of a shard, 0: any."""

@@ -59,6 +59,6 @@ class StoredAnnotations(MapAnnotations):
         )
 
     def adopt(self, changed: Annotations) -> None:
-        """They are written."""
+        """Adopt annotations that are written already."""
         self._current = changed
         self._events.publish(AnnotationsChanged(stamp=self._clock.time()))

@@ -42,7 +42,7 @@ def holder_of(folder: Path) -> str:
 
 
 class Residence:
-    """Of the robots of one program. ``lost`` is called once with a robot's name when it must stop."""
+    """Residence of the robots of one program. ``lost`` is called once with a robot's name when it must stop."""
 
     def __init__(
         self,

@@ -20,7 +20,7 @@ class AlreadyThere(DatabaseError):
 
 
 class DiskFull(Refused):
-    """Nothing is left on the robot's disk, or on the one where its database is."""
+    """No room is left on the robot's disk, or on the one where its database is."""
 
 
 class Rows(Protocol):

@@ -6,7 +6,7 @@ from collections import Counter
 
 
 class Connections:
-    """Those of one port: ``most`` at once, and no host has more than half of them."""
+    """Connections of one port: ``most`` at once, and no host has more than half of them."""
 
     def __init__(self, most: int) -> None:
         self._most = most

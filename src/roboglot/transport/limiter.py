@@ -49,7 +49,7 @@ class Limiter:
         return left if left < self._burst else self._burst
 
     def _forget(self, now: float) -> None:
-        """Those whose bucket is full again; if there are none, the first that came."""
+        """Forget those whose bucket is full again; if there are none, the first that came."""
         for key, (left, at) in list(self._buckets.items()):
             if left + (now - at) * self._rate >= self._burst:
                 del self._buckets[key]

@@ -12,7 +12,10 @@ STEP = 4096  # bytes that are counted together: most messages are short
 
 
 class Metered(asyncio.Protocol):
-    """In front of ``inner``. ``spend`` takes a number of bytes and returns the seconds to wait before the next."""
+    """Metered transport in front of ``inner``.
+
+    ``spend`` takes a number of bytes and returns the seconds to wait before the next.
+    """
 
     def __init__(self, inner: asyncio.Protocol, spend: Spend, ended: Callable[[], None]) -> None:
         """``ended`` is called when the connection is lost."""

@@ -65,13 +65,13 @@ class PipeEnd(asyncio.Transport):
             self._other.receive(data)
 
     def write_eof(self) -> None:
-        """Nothing more is written here."""
+        """End the writing side."""
         if not self._ended:
             self._ended = True
             self._other.receive_end()
 
     def can_write_eof(self) -> bool:
-        """As TCP can."""
+        """Return True, as TCP does."""
         return True
 
     def close(self) -> None:
@@ -131,7 +131,7 @@ class PipeEnd(asyncio.Transport):
         return self._protocol
 
     def get_extra_info(self, name: str, default: object = None) -> object:
-        """As of a socket, but there is none."""
+        """Return the default: there is no socket."""
         return self._other.ended if name == "hung_up" else super().get_extra_info(name, default)
 
     # -- from the other end --------------------------------------------------------------------------------------------

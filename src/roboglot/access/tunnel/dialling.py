@@ -55,7 +55,7 @@ class OnePlace:
 
 
 class Dialling:
-    """Of one robot. ``ready`` and ``say`` report to the user: open ports, and one line about what failed."""
+    """Dialling to one robot. ``ready`` and ``say`` report to the user: open ports, and one line about what failed."""
 
     def __init__(
         self,

@@ -55,7 +55,7 @@ BROADCASTS = ("127.255.255.255", "255.255.255.255")
 
 @dataclass(frozen=True, slots=True)
 class Ports:
-    """Of one robot: its address, its TCP ports, where it sends datagrams, and where it calls its client back."""
+    """Ports of one robot: its address, its TCP ports, where it sends datagrams, and where it calls its client back."""
 
     address: str
     tcp: tuple[int, ...]
@@ -214,7 +214,7 @@ class Gateway:
 
 
 class _Entry(asyncio.Protocol):
-    """Before the gateway's TLS: counts connections and bytes by host."""
+    """Meter before the gateway's TLS: counts connections and bytes by host."""
 
     def __init__(self, guard: Guard, connections: Connections, factory: Callable[[], asyncio.Protocol]) -> None:
         self._guard, self._connections, self._factory = guard, connections, factory

@@ -35,7 +35,7 @@ class Link(asyncio.Protocol):
         """Done when it has ended; why."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """It is there."""
+        """Take the transport of a new connection."""
         self.transport = cast(asyncio.Transport, transport)
         self._made(self)
 
@@ -47,7 +47,7 @@ class Link(asyncio.Protocol):
             self.end(str(bad))
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """It is over."""
+        """End the link with its connection."""
         self.end(str(exc or "the other end hung up"))
 
     def pause_writing(self) -> None:
@@ -55,7 +55,7 @@ class Link(asyncio.Protocol):
         self._crowded(True)
 
     def resume_writing(self) -> None:
-        """It was sent."""
+        """Go on sending: the buffer has been sent."""
         self._crowded(False)
 
     async def first(self) -> Frame:

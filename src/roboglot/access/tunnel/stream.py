@@ -76,7 +76,7 @@ class Stream(asyncio.Protocol):
         self._clogged = True
 
     def resume_writing(self) -> None:
-        """It reads again."""
+        """Go on delivering: the client reads again."""
         self._clogged = False
         self._owed += self.undelivered
         self.undelivered = 0
@@ -86,7 +86,7 @@ class Stream(asyncio.Protocol):
     # -- the other end -------------------------------------------------------------------------------------------------
 
     def deliver(self, data: bytes) -> None:
-        """To the local client, or for it as soon as it is connected."""
+        """Deliver to the local client, or as soon as it is connected."""
         if self._transport is None:
             self.undelivered += len(data)
             self._early += data

@@ -95,7 +95,7 @@ class Tunnel:
         return connected
 
     def send_datagram(self, port: int, data: bytes) -> None:
-        """To ``port`` at the other end; lost when the tunnel is full."""
+        """Send to ``port`` at the other end; lost when the tunnel is full."""
         if self._link.transport.get_write_buffer_size() < UNSENT_MAX and len(data) <= DATAGRAM_MAX:
             self._link.send(Kind.DATAGRAM, 0, PORT.pack(port) + data)
 

@@ -34,7 +34,7 @@ class Storey:
 
 
 class _File(msgspec.Struct):
-    """As it is on disk; ``cells`` are int8, row by row, compressed."""
+    """Floor as stored on disk; ``cells`` are int8, row by row, compressed."""
 
     width: int
     height: int

@@ -161,7 +161,7 @@ class Courier:
         return True
 
     async def _rest(self) -> None:
-        """To the parking place, or onto the dock; there at once off work and with a low battery."""
+        """Drive to the parking place, or onto the dock; there at once off work and with a low battery."""
         robot, readiness = self._robot, self.readiness
         readiness.rest_due = False
         docked = readiness.docked

@@ -70,7 +70,7 @@ class Driver:
         self._robot.events.publish(DeliveryReported(stamp=self._robot.clock.time(), news=news))
 
     async def go_to(self, name: str, policy: Policy, speed: float | None) -> None:
-        """To the place of that name. Raises Failed."""
+        """Drive to the place of that name. Raises Failed."""
         try:
             place = place_named(self._robot, name)
         except NotFound:
@@ -78,7 +78,7 @@ class Driver:
         await self.go(place, policy, speed)
 
     async def go(self, known: StoreyPlace, policy: Policy, speed: float | None) -> None:
-        """To that place, by lift if need be, no faster than ``speed`` (m/s). Raises Failed."""
+        """Drive to that place, by lift if need be, no faster than ``speed`` (m/s). Raises Failed."""
         await self._leave_dock(policy)
         if known.floor:
             await self._ride(known.floor, policy)
@@ -127,7 +127,7 @@ class Driver:
         self.report(DeliveryNews.LEFT_DOCK)
 
     async def _drive(self, start: Callable[[], Action], policy: Policy) -> None:
-        """Until it succeeds; again after an emergency stop. Raises Failed."""
+        """Drive until it succeeds; again after an emergency stop. Raises Failed."""
         patience = self._robot.clock.time() + policy.stopped_seconds
         while True:
             await self._wait_until_free(patience)

@@ -1,4 +1,4 @@
-"""At the target: people say when they begin and end, boxes open and shut. Knows no driving and no queue."""
+"""Handover at the target: people say when they begin and end, boxes open and shut. Knows no driving and no queue."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ class Handover:
         return None
 
     async def _serve(self, choice: BoxChoice) -> Failure | None:
-        """Until the person says that it is done, or has waited too long with the door open."""
+        """Serve until the person says that it is done, or has waited too long with the door open."""
         cargo = self._robot[Cargo]
         try:
             was_open = cargo.box(choice.box).door is not DoorState.CLOSED

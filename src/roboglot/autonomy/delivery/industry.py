@@ -25,7 +25,7 @@ TEMPLATES_MAX, OPEN_MAX, ENDED_MAX = 200, 100, 100
 
 
 class CallBook(Industry):
-    """In memory for reading, in the robot's ledger for good."""
+    """Book of calls: in memory for reading, in the robot's ledger for good."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot, self._ledger = robot, robot[Ledger]

@@ -59,11 +59,11 @@ class OrderBook:
 
     @property
     def open(self) -> list[Order]:
-        """Those not ended, oldest first."""
+        """Orders that have not ended, oldest first."""
         return [order for order in self._orders.values() if not order.status.ended]
 
     def get(self, id: str) -> Order:
-        """By its id or number, or NotFound."""
+        """Return an order by its id or number, or raise NotFound."""
         for order in self._orders.values():
             if id in (order.id, order.number):
                 return order
@@ -123,7 +123,7 @@ class OrderBook:
 
 
 def _revived(document: object) -> Order:
-    """As it goes on after the robot went down."""
+    """Return the order as it goes on after the robot went down."""
     order = msgspec.convert(document, Order)
     if order.status is OrderStatus.RUNNING:
         return replace(order, status=OrderStatus.READY)

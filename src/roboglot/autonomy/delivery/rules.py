@@ -26,7 +26,7 @@ BOXED = (OrderKind.TAKEOUT, OrderKind.DISTRIBUTE, OrderKind.STATION)
 
 
 def known_places(robot: Robot) -> Iterator[StoreyPlace]:
-    """Those of this floor (""), then those of all others."""
+    """Return the places of this floor (""), then those of all others."""
     for place in robot[Places].all():
         yield StoreyPlace("", place)
     if Storeys in robot and (maps := robot[Storeys].maps) is not None:

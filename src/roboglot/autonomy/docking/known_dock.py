@@ -53,7 +53,7 @@ class KnownDock:
         return self._pose
 
     def put(self, pose: Pose | None) -> None:
-        """It is there, or nowhere."""
+        """Set the dock's pose; None: there is none."""
         self._pose = pose
         self._on_it = pose is not None and self._robot[DockContact].docked and self._is_near(pose)
 
@@ -70,7 +70,7 @@ class KnownDock:
             self._anchor()
 
     def _learn(self) -> None:
-        """It is where a robot stands that knows where it is and touches a dock, if none is known yet."""
+        """Learn the dock's pose from a localized robot that touches it, if none is known yet."""
         localization = self._robot[Localization]
         if self._pose is None and self._confirmed and localization.lost is None and self._robot[DockContact].docked:
             self._pose, self._on_it = localization.pose, True

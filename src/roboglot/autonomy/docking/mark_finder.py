@@ -66,7 +66,7 @@ def legs_of(points: Points) -> list[Point]:
 
 
 def _rectangles(left: Point, right: Point, legs: list[Point]) -> list[tuple[Pose, float, float]]:
-    """Those with these two as front legs: the middle, half the depth, half the width."""
+    """Return rectangles with these two as front legs: the middle, half the depth, half the width."""
     width = left.distance_to(right)
     if not SIDE_MIN <= width <= SIDE_MAX:
         return []

@@ -71,7 +71,7 @@ class MarkWatch:
         return self.place
 
     def glance(self) -> None:
-        """While moving: correct what is believed by a new sighting, if there is one."""
+        """Correct the believed pose while moving by a new sighting, if there is one."""
         seen, place = self._look(), self.place
         if seen is None or place is None or seen.distance_to(place) > LEAP:
             return

@@ -200,7 +200,7 @@ class MarkDocking(TagDocking):
             await clock.sleep(PERIOD)
 
     async def _go(self, action: Action, goal: Pose) -> None:
-        """To a pose in base_link: a turn, a straight way, a turn; backwards if that is behind."""
+        """Drive to a pose in base_link: a turn, a straight way, a turn; backwards if that is behind."""
         bearing = math.atan2(goal.y, goal.x)
         way = 1.0 if abs(bearing) <= math.pi / 2 else -1.0
         first = bearing if way > 0 else wrap_angle(bearing + math.pi)

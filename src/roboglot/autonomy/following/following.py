@@ -58,7 +58,7 @@ class _Quarry:
     _anchor: Point | None = None
 
     def spot(self, place: Point, stamp: float, seen_from: Pose) -> None:
-        """They are at ``place`` now."""
+        """Note that they are at ``place``."""
         if self._anchor is None:
             self._anchor, self.course = place, seen_from.point.bearing_to(place)
         elif self._anchor.distance_to(place) > STRIDE:
@@ -256,7 +256,7 @@ class SightFollowing(Following):
         return free, left, False
 
     def _towards(self, heading: float, left: float, facing: float, seen: Points) -> tuple[Twist, bool]:
-        """That way as fast as the room allows, turning to ``facing``; and whether there is any room."""
+        """Return the velocity that way, as fast as the room allows, turning to ``facing``; and if there is room."""
         turn = _within(TURN_RATE, TURN_GAIN * facing)
         free = room(seen, self._robot.description.radius, heading)
         speed = min(SPEED, GAIN * left, math.sqrt(2.0 * BRAKING * max(0.0, free - GAP)))

@@ -30,7 +30,7 @@ class Trail:
         self._points: list[Point] = []
 
     def add(self, place: Point) -> None:
-        """They are here now."""
+        """Add the place where they are."""
         if not self._points or self._points[-1].distance_to(place) > STEP:
             self._points.append(place)
             del self._points[:-STEPS_MAX]

@@ -12,7 +12,7 @@ COMMANDS_MAX = 256  # that are remembered
 
 
 class Foresight:
-    """For one move: keeps the commands that odometry cannot show yet."""
+    """Prediction for one move: keeps the commands that odometry cannot show yet."""
 
     def __init__(self, base: Base, clock: Clock) -> None:
         self._base, self._clock = base, clock
@@ -24,7 +24,7 @@ class Foresight:
             self._told.append((self._clock.time(), twist))
 
     def ahead(self, pose: Pose) -> Pose:
-        """From the newest of odometry to where the commands under way will bring it (odom)."""
+        """Return the motion from the newest odometry to where the commands under way will bring it (odom)."""
         now, known = self._clock.time(), self._clock.time() - self._base.delay
         while len(self._told) > 1 and self._told[1][0] <= known:
             self._told.popleft()

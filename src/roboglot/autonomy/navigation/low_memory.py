@@ -20,7 +20,7 @@ Points = NDArray[np.float64]
 
 
 class LowMemory:
-    """Of one map at a time."""
+    """Memory of low obstacles, of one map at a time."""
 
     def __init__(self) -> None:
         self._seen = Cells(np.float32)

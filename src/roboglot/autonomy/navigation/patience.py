@@ -21,7 +21,7 @@ class Patience:
         self._free_at, self._lost_at = clock.time(), math.inf
 
     def begin_anew(self) -> None:
-        """It was held: the time until now does not count."""
+        """Begin anew after a hold: the time until now does not count."""
         self._closest_at = self._free_at = self._clock.time()
 
     def take(self, left: float) -> None:

@@ -79,7 +79,7 @@ class Pilot:
         self._replanner.close()
 
     async def drive(self) -> None:
-        """To all goals in turn and to the final yaw; Unreachable, Blocked or NotLocalized if that fails."""
+        """Drive to all goals in turn and to the final yaw; Unreachable, Blocked or NotLocalized if that fails."""
         steps = {
             State.FOLLOWING: self._follow,
             State.GIVING_WAY: self._give_way,
@@ -180,7 +180,7 @@ class Pilot:
         return pose.distance_to(goal) <= self._goal.options.tolerance
 
     async def _turn(self, follower: Follower) -> State:
-        """To the final yaw, keeping the place."""
+        """Turn to the final yaw, keeping the place."""
         yaw, tuning = self._goal.options.yaw, self._tuning
         if yaw is None:
             return State.ARRIVING

@@ -41,7 +41,7 @@ class Cells(Generic[Kind]):
 
 
 class ScanMemory:
-    """Of one map at a time."""
+    """Memory of scans, of one map at a time."""
 
     def __init__(self) -> None:
         self._seen = Cells(np.float32)

@@ -1,4 +1,4 @@
-"""On which terms a route is planned. Loads no kernels."""
+"""Terms on which a route is planned. Loads no kernels."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ PAINTED, PAINTED_SHARE, PAINTED_POINTS = 12.0, 0.8, 200  # weight of a surface; 
 
 @dataclass(frozen=True, slots=True)
 class Support:
-    """Of ``points`` echoes, how many the map explains and how many it denies: behind walls, in free floor."""
+    """Support for a pose: of ``points`` echoes, how many the map explains, or denies (behind walls, in free floor)."""
 
     points: int
     fitting: int
@@ -175,5 +175,5 @@ def _things(points: NDArray[np.float64], floating: NDArray[np.intp]) -> list[lis
 
 
 def _count(points: NDArray[np.float64], group: list[int]) -> int:
-    """As how many things it counts: people may stand side by side."""
+    """Return as how many things it counts: people may stand side by side."""
     return math.ceil(float(np.hypot(*np.ptp(points[group], 0))) / THING_SIZE)

@@ -178,7 +178,7 @@ def places(
 
 
 def _alike(candidates: list[Candidate]) -> list[Candidate]:
-    """Those of ``candidates`` (the best first) that explain the scan about as well as the best."""
+    """Return those of ``candidates`` (the best first) that explain the scan about as well as the best."""
     if not candidates:
         return []
     first = candidates[0].said  # what the map does not know there may be what tells it from a rival

@@ -38,7 +38,7 @@ class ScanPoints:
         return turned
 
     def nearby(self, most: int) -> NDArray[np.float64]:
-        """At most so many of the points that a search or a judgement looks at, evenly chosen."""
+        """Return at most so many of the points that a search or a judgement looks at, evenly chosen."""
         near = self.points[np.hypot(self.points[:, 0], self.points[:, 1]) < NEARBY]
         return np.ascontiguousarray(near[:: max(1, -(-len(near) // most))])
 

@@ -37,7 +37,7 @@ SQUARE = math.radians(6.0)  # from where on what is seen to the left and to the 
 
 
 class SeenStairAlignment(StairAlignment):
-    """By the time-of-flight sensors in front."""
+    """Alignment by the time-of-flight sensors in front."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -90,7 +90,7 @@ class _Approach:
             await self._clock.sleep(PERIOD)
 
     async def _go(self, deadline: float) -> None:
-        """Until it is close enough to brake."""
+        """Drive until it is close enough to brake."""
         while True:
             held_at = self._clock.time()
             if await self._action.hold(self._brake):

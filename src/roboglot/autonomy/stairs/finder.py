@@ -46,7 +46,7 @@ class StepEdge:
 
     @property
     def distance(self) -> float:
-        """From base_link to the line."""
+        """Distance from base_link to the line, m."""
         return math.hypot(self.foot.x, self.foot.y)
 
 
@@ -100,7 +100,7 @@ def _nearest_in_slices(points: Points) -> Points:
 
 
 def _line_through(points: Points) -> Pose | None:
-    """That most of them lie on."""
+    """Return the line that most of them lie on."""
     kept = points
     for _ in range(4):
         if len(kept) < 4:

@@ -37,7 +37,7 @@ Points = NDArray[np.float64]
 
 
 class Courtesy:
-    """For one drive: knows when to give way, and does."""
+    """Courtesy of one drive: knows when to give way, and does."""
 
     def __init__(self, course: Course, lookout: Lookout, action: Action) -> None:
         self._course, self._lookout, self._action = course, lookout, action
@@ -135,7 +135,7 @@ class Courtesy:
             await self._clock.sleep(PERIOD)
 
     async def _wait(self, path: Points, least: float, most: float, ruled: bool) -> None:
-        """Until no other wants to come along ``path``, or one that goes first wants to where it waits."""
+        """Wait until no other wants to come along ``path``."""
         traffic, begun = self._traffic, self._clock.time()
         free_since = begun
         while True:

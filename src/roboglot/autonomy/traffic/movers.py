@@ -47,7 +47,7 @@ class Mover:
 
     @property
     def point(self) -> Point:
-        """Its middle."""
+        """Middle of the mover."""
         return Point(self.x, self.y)
 
     @property
@@ -56,7 +56,7 @@ class Mover:
         return float(np.hypot(self.vx, self.vy))
 
     def take(self, x: float, y: float, stamp: float) -> None:
-        """It is here now."""
+        """Take a new sighting."""
         self._seen.append((stamp, x, y))
         self.x, self.y, self.stamp = x, y, stamp
         if len(self._seen) < 3:

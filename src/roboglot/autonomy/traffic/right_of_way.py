@@ -115,7 +115,7 @@ def through_narrow(mover: Mover, points: Points, narrow: NDArray[np.bool_]) -> W
 
 
 def shifted(way: Way) -> Points:
-    """Its points, moved to its right, so that who plans around them passes on the other side."""
+    """Return the way's points moved to its right, so that others plan to pass on the other side."""
     if len(way.points) < 2:
         return way.points
     ahead = way.points[-1] - way.points[0]

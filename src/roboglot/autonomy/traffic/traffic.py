@@ -207,7 +207,7 @@ class Traffic:
     # -- itself --------------------------------------------------------------------------------------------------------
 
     def follow(self, path: Points) -> None:
-        """It drives along ``path`` (dense), no farther than to where it has to wait for others."""
+        """Announce a drive along ``path`` (dense), up to where it has to wait for others."""
         announcer = self._announcer
         if not announcer.frame:
             return
@@ -221,5 +221,5 @@ class Traffic:
         announcer.way = path[: end : round(STEP / SPACING)]
 
     def rest(self) -> None:
-        """It goes nowhere."""
+        """Announce that the robot has no goal."""
         self._announcer.way, self.meeting, self.meets = np.empty((0, 2)), None, False

@@ -100,7 +100,7 @@ def _encryption(config: Config) -> str:
 
 
 def _fingerprints(config: Config) -> Iterator[Finding]:
-    """Of the certificates that clients are shown, to be compared at their first use."""
+    """Yield the fingerprints of the certificates that clients are shown, to be compared at their first use."""
     from roboglot.protocols.cyberdog.certificates import SERVER_CERT, fingerprint
     from roboglot.protocols.cyberdog.server import FOLDER
 

@@ -79,7 +79,7 @@ class Calls:
                 yield decode(text, kind, code)
 
     async def do(self, code: Code, params: object = None, *, within: float = TIMEOUT) -> None:
-        """For answers that say nothing but whether it was done: ``success``, ``result`` or nothing at all."""
+        """Ask for answers that only say whether it was done: ``success``, ``result`` or nothing at all."""
         text = await self.text(code, params, within=within)
         check(code, decode(text, dict, code) if text else {})
 

@@ -155,7 +155,7 @@ class RoboMasterClient:
 
     @property
     def descriptor(self) -> int:
-        """Of the control connection, for who watches over it. Raises LinkLost."""
+        """Descriptor of the control connection, for its watchdog. Raises LinkLost."""
         if self._link is None or not self._link.open:
             raise LinkLost(f"{self.host} is not connected")
         return self._link.descriptor

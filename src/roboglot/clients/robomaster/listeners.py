@@ -14,7 +14,7 @@ Listener = Callable[[Telemetry], object]
 
 
 class Listeners:
-    """Those of one client, until ``close``; ``noting``, where there is one, keeps what was heard."""
+    """Listeners of one client, until ``close``; ``noting``, where there is one, keeps what was heard."""
 
     def __init__(self) -> None:
         self.noting: Noting | None = None

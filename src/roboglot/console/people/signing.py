@@ -32,7 +32,7 @@ class Shown(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class Signing:
-    """Of one console."""
+    """Log-in and log-out of one console."""
 
     def __init__(self, desk: Desk, sessions: Sessions, classes: Classes) -> None:
         self._desk, self._sessions, self._classes = desk, sessions, classes
@@ -93,7 +93,7 @@ class Signing:
 
 
 def _header(shown: Shown) -> str:
-    """As a client of HTTP would show it."""
+    """Return the proof as a client of HTTP would show it."""
     if shown.token:
         return f"Bearer {shown.token.strip()}"
     return "Basic " + base64.b64encode(f"{shown.name}:{shown.password}".encode("utf-8", "surrogatepass")).decode()

@@ -255,7 +255,7 @@ def _ends(_check: Check, work: Work) -> Why | None:
 
 
 def distance(spot: Spot, walls: Walls) -> float:
-    """From the middle of the dog to the nearest outline, m; 0 inside of one that is no room."""
+    """Return the distance from the middle of the dog to the nearest outline, m; 0 inside of one that is no room."""
     nearest = math.inf
     for outline in walls:
         for start, end in zip(outline, [*outline[1:], outline[0]], strict=True):

@@ -39,7 +39,7 @@ class Sheet(msgspec.Struct):
 
 
 class ClassFiles:
-    """In one folder."""
+    """Files of classes in one folder."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder

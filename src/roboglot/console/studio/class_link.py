@@ -24,14 +24,14 @@ AGAIN = 1.0  # s until the other end is tried anew
 
 
 class Hello(msgspec.Struct, tag=True, frozen=True):
-    """To the classroom, first: the console of which world this is, and where its pages are."""
+    """First message to the classroom: the console's world, and where its pages are."""
 
     world: str
     page: str
 
 
 class Wished(msgspec.Struct, tag=True, frozen=True):
-    """To the classroom: what a page wishes."""
+    """Message to the classroom: a page's request."""
 
     seat: int
     wish: Member
@@ -39,47 +39,47 @@ class Wished(msgspec.Struct, tag=True, frozen=True):
 
 
 class At(msgspec.Struct, tag=True, frozen=True):
-    """To the classroom: which robot a page works with."""
+    """Message to the classroom: the robot that a page works with."""
 
     seat: int
     robot: str
 
 
 class Drawn(msgspec.Struct, tag=True, frozen=True):
-    """To the classroom: the map of that robot, a PNG in base64."""
+    """Message to the classroom: the map of that robot, a PNG in base64."""
 
     seat: int
     png: str
 
 
 class Left(msgspec.Struct, tag=True, frozen=True):
-    """To the classroom: a page has gone."""
+    """Message to the classroom: a page has gone."""
 
     seat: int
 
 
 class Opened(msgspec.Struct, tag=True, frozen=True):
-    """To the classroom: a class for this world alone."""
+    """Message to the classroom: a class for this world alone."""
 
     code: str
     name: str
 
 
 class Closed(msgspec.Struct, tag=True, frozen=True):
-    """To the classroom: that class is over."""
+    """Message to the classroom: that class is over."""
 
     code: str
 
 
 class Stopped(msgspec.Struct, tag=True, frozen=True):
-    """To the classroom: the answer to ``Stop``; why not, or nothing."""
+    """Answer to the classroom's ``Stop``: why not, or nothing."""
 
     id: int
     why: str = ""
 
 
 class Shows(msgspec.Struct, tag=True, frozen=True):
-    """To the classroom: one who signs in shows a class's code."""
+    """Message to the classroom: one who signs in shows a class's code."""
 
     id: int
     code: str
@@ -87,7 +87,7 @@ class Shows(msgspec.Struct, tag=True, frozen=True):
 
 
 class Admitted(msgspec.Struct, tag=True, frozen=True):
-    """From the classroom: the answer to ``Shows``; why not, or a ``Place``."""
+    """Answer of the classroom to ``Shows``: why not, or a ``Place``."""
 
     id: int
     why: str = ""
@@ -97,20 +97,20 @@ class Admitted(msgspec.Struct, tag=True, frozen=True):
 
 
 class Ended(msgspec.Struct, tag=True, frozen=True):
-    """From the classroom: a class is over."""
+    """Message of the classroom: a class is over."""
 
     code: str
 
 
 class News(msgspec.Struct, tag=True, frozen=True):
-    """From the classroom: what a page is to hear."""
+    """Message of the classroom for a page."""
 
     seat: int
     message: dict[str, object]
 
 
 class Stop(msgspec.Struct, tag=True, frozen=True):
-    """From the classroom: end all that a robot does."""
+    """Message of the classroom: end all that a robot does."""
 
     id: int
     robot: str

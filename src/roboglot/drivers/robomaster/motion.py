@@ -18,7 +18,7 @@ Run = Callable[[], Awaitable[None]]
 
 
 class Motions:
-    """Those of one component: starts them, and waits until they arrive."""
+    """Motions of one component: starts them, and waits until they arrive."""
 
     def __init__(self, robot: Robot, supervisor: Supervisor) -> None:
         self._robot, self._supervisor = robot, supervisor

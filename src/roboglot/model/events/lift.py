@@ -23,14 +23,14 @@ class LiftArrived(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LiftDoorOpened(Event):
-    """Its door stands wide open at ``floor``."""
+    """Door of the lift stands wide open at ``floor``."""
 
     floor: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LiftDoorClosed(Event):
-    """Its door is shut, the car at ``floor``."""
+    """Door of the lift is shut, the car at ``floor``."""
 
     floor: int
 

@@ -21,21 +21,21 @@ class BumperPressed(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BumperReleased(Event):
-    """Nothing touches the hull at ``zone`` any more."""
+    """Hull is no longer touched at ``zone``."""
 
     zone: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CliffDetected(Event):
-    """There is no floor under ``zone``."""
+    """Floor is missing under ``zone``."""
 
     zone: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CliffCleared(Event):
-    """There is floor under ``zone`` again."""
+    """Floor is under ``zone`` again."""
 
     zone: str
 

@@ -57,7 +57,7 @@ class Inbox:
         self._size = self._unread = 0
 
     def close(self) -> None:
-        """Nothing more will come."""
+        """End the queue: nothing more will come."""
         self.closed = True
         self._wake()
 

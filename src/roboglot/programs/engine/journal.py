@@ -61,12 +61,12 @@ def does_something(name: str) -> bool:
 def header_of(
     body: str, modules: Mapping[str, str], utc_offset: int, *, watched: bool = False, seed: int | None = None
 ) -> Header:
-    """Of a new run; without a seed it gets one by chance."""
+    """Return the header of a new run; without a seed it gets one by chance."""
     return Header(body, dict(modules), utc_offset, secrets.randbits(63) if seed is None else seed, watched)
 
 
 class Journal:
-    """Of one run. What cannot be written is given up: the program goes on, but not after a crash."""
+    """Journal of one run. What cannot be written is given up: the program goes on, but not after a crash."""
 
     def __init__(self, store: JournalStore, id: str) -> None:
         self._store = store

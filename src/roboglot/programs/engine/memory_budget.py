@@ -26,7 +26,7 @@ class Spender(Protocol):
 
     @property
     def pid(self) -> int:
-        """Its process."""
+        """Process id."""
 
     def end(self, reason: ExitReason, kind: str, message: str) -> None:
         """End it for this reason."""

@@ -37,7 +37,7 @@ class Share:
         self._paid_until = self._not_before = 0.0
 
     def account(self) -> Account:
-        """Of a new program."""
+        """Return the account of a new program."""
         return Account(self)
 
     def charge(self, seconds: float, now: float) -> None:

@@ -20,7 +20,7 @@ class Usage:
 
 
 def usage_of(pid: int, proc: Path = Path("/proc")) -> Usage:
-    """Of one process; nothing for one that is gone."""
+    """Return the use of one process; nothing for one that is gone."""
     with contextlib.suppress(OSError, ValueError, IndexError):
         _, resident, shared, *_ = (proc / str(pid) / "statm").read_text().split()
         fields = (proc / str(pid) / "stat").read_text().rpartition(")")[2].split()

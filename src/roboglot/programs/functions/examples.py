@@ -44,7 +44,7 @@ class Example:
 
 
 def examples() -> dict[str, Example]:
-    """By the function's name."""
+    """Return the examples by the function's name."""
     text = importlib.resources.files(__package__).joinpath("examples.toml").read_text("utf-8")
     written = {
         name: Example(**fields | {"code": fields["code"].strip()}) for name, fields in tomllib.loads(text).items()

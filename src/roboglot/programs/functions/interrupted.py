@@ -23,7 +23,7 @@ class CallInterrupted(RobotError):
 
 
 class _OutOfReach:
-    """In a robot's place: whatever is asked of it raises ``error``; who asks makes no difference."""
+    """Stand-in for a robot out of reach: every use raises ``error``, whoever it is by."""
 
     admission = Admission()
 

@@ -116,7 +116,7 @@ async def freed(session: Session, target: int) -> Record:
 
 
 def _show(session: Session, target: int, look: Look | None, colour: Colour) -> Record:
-    """In the order of the vendor's checks. Low power comes before programs: it keeps the lights for itself."""
+    """Show in the order of the vendor's checks. Low power comes before programs: it keeps the lights for itself."""
     robot = session.robot
     if target not in ZONES:
         return _answer(TARGET_ERROR, "no such light")

@@ -30,7 +30,7 @@ class Inspector:
         return name in BUILTINS or name in names.plain or name in names.roots or name in MODULES
 
     async def inspect(self, source: str, functions: frozenset[str]) -> tuple[list[Problem], frozenset[str]]:
-        """Its problems, and which of ``functions`` it uses; raises ProgramError where that cannot be found out."""
+        """Return its problems, and which of ``functions`` it uses; raises ProgramError if that fails."""
         try:
             return await self._engine.examine(source, self._prelude, functions=functions)
         except ValueError as error:

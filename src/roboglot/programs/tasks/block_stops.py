@@ -16,7 +16,7 @@ MARKS |= {spelling for spelling, name in SPELLINGS.items() if name in MARKS}
 
 
 class BlockStops:
-    """Of one run."""
+    """Stops at blocks of one run."""
 
     __slots__ = ("_blocks", "_next", "_position", "_seeking")
 
@@ -37,7 +37,7 @@ class BlockStops:
             self._position.step(step)
 
     def passes(self) -> bool:
-        """At a halt before a statement: whether it only leads to the block that is looked for."""
+        """Return whether a halt before a statement only leads to the block that is looked for."""
         if not self._seeking or self._position.at_stop:
             self._seeking = False
             return False
@@ -48,7 +48,7 @@ class BlockStops:
         return True
 
     def halts(self, block: str) -> bool:
-        """At the begin of a block: whether to halt there."""
+        """Return whether to halt at the begin of this block."""
         if not self._next and block not in self._blocks:
             return False
         self._next = False

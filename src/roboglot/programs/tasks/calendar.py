@@ -62,7 +62,7 @@ def due_next(cycle: Cycle, after: float, zone: tzinfo) -> float | None:
 
 
 def _day_matches(cycle: Cycle, day: date) -> bool:
-    """As cron has it: where day and week day are both restricted, either will do."""
+    """Return whether the day matches as in cron: where day and week day are both restricted, either will do."""
     if day.month not in cycle.months:
         return False
     by_day, by_weekday = day.day in cycle.days, day.isoweekday() % 7 in cycle.weekdays

@@ -6,7 +6,7 @@ from roboglot.model.clock import Clock
 
 
 class ProcessTime:
-    """Of one run: between ``begin`` and ``end`` the clock is held unless the process waits."""
+    """Computing time of one run: between ``begin`` and ``end`` the clock is held unless the process waits."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -19,17 +19,17 @@ class ProcessTime:
         self._look()
 
     def ask(self, waiting: bool) -> None:
-        """It waits for the answer to a call, or has it."""
+        """Note that it waits for the answer to a call, or has it."""
         self._asks = waiting
         self._look()
 
     def stop(self, stopped: bool) -> None:
-        """It is suspended, or goes on."""
+        """Note that it is suspended, or goes on."""
         self._stopped = stopped
         self._look()
 
     def end(self) -> None:
-        """It is gone, and what became of it is written down."""
+        """Note that it is gone, and what became of it is written down."""
         self._over = True
         self._look()
 

@@ -32,11 +32,11 @@ class Schedule:
         self._arm()
 
     def drop(self, id: str) -> None:
-        """It waits no more."""
+        """Drop an entry."""
         self._due.pop(id, None)
 
     def clear(self) -> None:
-        """Nothing waits any more."""
+        """Drop all entries."""
         self._due.clear()
         self._heap.clear()
         self._arm()

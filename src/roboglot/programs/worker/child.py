@@ -55,7 +55,7 @@ def main(descriptor: int, whereabouts: Whereabouts) -> int:
 
 
 def probe(whereabouts: Whereabouts) -> int:
-    """In a throw-away child after the lockdown: 0 if the filter refuses what it should, and lines can be reported."""
+    """Probe the lockdown in a throw-away child: 0 if the filter refuses what it should, and lines can be reported."""
     if not whereabouts.works():
         return EXIT_UNTOLD
     for attempt in (partial(os.open, "/", os.O_RDONLY), os.fork, os.getppid):

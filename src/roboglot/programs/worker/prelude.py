@@ -65,7 +65,7 @@ class Prelude:
         return Names(frozenset(constructible | set(self.enums) | functions), self.calls | self.attributes | members)
 
     def to_wire(self) -> dict[str, object]:
-        """As JSON, for the worker."""
+        """Return it as JSON, for the worker."""
         return {
             "calls": sorted(self.calls),
             "attributes": sorted(self.attributes),

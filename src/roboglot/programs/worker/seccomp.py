@@ -79,7 +79,7 @@ def program(machine: str) -> bytes:
 
 
 def _if_number(number: int, argument: int, test: bytes, *, allow_first: bool) -> list[bytes]:
-    """For one system call: load an argument's low half, test it, and allow or refuse."""
+    """Return the filter of one system call: load an argument's low half, test it, and allow or refuse."""
     verdicts = (_ALLOW, _ERRNO | errno.EPERM) if allow_first else (_ERRNO | errno.EPERM, _ALLOW)
     return [
         _instruction(_EQUAL, 0, 4, number),

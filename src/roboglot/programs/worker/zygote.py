@@ -62,7 +62,7 @@ class Zygote:
         return [*layers, "seccomp"] if self._filter else layers
 
     def serve(self) -> None:
-        """Until the control socket ends."""
+        """Serve until the control socket ends."""
         poll = select.poll()
         poll.register(self._control, select.POLLIN)
         poll.register(self._wake, select.POLLIN)
@@ -117,7 +117,7 @@ class Zygote:
             os.close(descriptor)
 
     def _become_program(self, parent: int, used: int, quota: lockdown.Quota, connection: int, memory: int) -> None:
-        """In the child; never returns."""
+        """Become the program, in the child; never returns."""
         status = child.EXIT_BROKEN
         try:
             signal.set_wakeup_fd(-1)

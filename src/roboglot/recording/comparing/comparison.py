@@ -180,7 +180,7 @@ def _by_operation(pushes: Sequence[Exchange]) -> dict[tuple[str, str], list[Exch
 
 
 def compare_order(rows: dict[tuple[str, str], Row], one: Sequence[Exchange], other: Sequence[Exchange]) -> None:
-    """Of operations: which came first, for those that both sessions have."""
+    """Compare the order of operations, of those that both sessions have."""
     firsts = [_first_places(one), _first_places(other)]
     shared = sorted(firsts[0].keys() & firsts[1].keys(), key=lambda key: firsts[0][key])
     for before, after in pairwise(shared):

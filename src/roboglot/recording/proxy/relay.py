@@ -271,7 +271,7 @@ class _Events(Sniffer):
     _rest = b""
 
     def from_client(self, data: bytes) -> None:
-        """Nothing is asked here."""
+        """Do nothing: nothing is asked here."""
 
     def from_robot(self, data: bytes) -> None:
         *whole, self._rest = (self._rest + data).split(b";")

@@ -29,7 +29,7 @@ Files = dict[str, bytes]
 
 
 class TooLarge(ValueError):
-    """There is more in a folder than travels over the network."""
+    """Folder holds more than travels over the network."""
 
 
 class Reference(Protocol):
@@ -86,7 +86,7 @@ def _result(reference: Reference, place: Path | None) -> Result:
 
 
 def _play(trial: Trial, files: Files, seconds_max: float, *, keep: bool) -> tuple[bytes, Files]:
-    """On a node: play one trial; return its result and, if wanted, what it left."""
+    """Play one trial on a node; return its result and, if wanted, what it left."""
     results: list[Result] = []
     with tempfile.TemporaryDirectory(prefix="roboglot-task-") as folder:
         scenarios, left = Path(trial.folder), Path(folder, "left")

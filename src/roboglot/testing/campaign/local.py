@@ -120,7 +120,7 @@ def _end(process: BaseProcess) -> None:
 
 
 def _play(trial: Trial, leave: Path | None, mouth: Connection) -> None:
-    """In the forked process: a group of its own, so that Ctrl-C reaches the campaign alone; it ends with that."""
+    """Play in the forked process: a group of its own, so that Ctrl-C reaches the campaign alone; it ends with that."""
     os.setpgid(0, 0)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     threading.Thread(target=_end_with_campaign, daemon=True).start()

@@ -24,7 +24,7 @@ LANES_MAX = 2000
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """From ``start`` to ``end`` (map, m) along one lane."""
+    """Stretch from ``start`` to ``end`` (map, m) along one lane."""
 
     start: Point
     end: Point

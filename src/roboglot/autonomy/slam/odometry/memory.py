@@ -16,7 +16,7 @@ PERIOD, WAY = 30.0, 10.0  # s between two looks; m driven from which it is worth
 
 
 class OdometryMemory:
-    """From ``start`` to ``close``, for a robot that has settings."""
+    """Memory of learnt odometry from ``start`` to ``close``, for a robot that has settings."""
 
     def __init__(self, robot: Robot, slam: Slam) -> None:
         self._robot, self._slam = robot, slam

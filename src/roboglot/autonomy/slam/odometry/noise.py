@@ -97,7 +97,7 @@ class LearntNoise:
 
     @property
     def factors(self) -> tuple[float, float]:
-        """Of the standard deviations of way and yaw: 1 is as described."""
+        """Factors of the standard deviations of way and yaw: 1 is as described."""
         return math.sqrt(self.way_factor), math.sqrt(self.yaw_factor)
 
 

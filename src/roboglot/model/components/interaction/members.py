@@ -29,7 +29,7 @@ class Members(Component):
 
     @abstractmethod
     def all(self) -> Sequence[Member]:
-        """In the order in which they were added."""
+        """Members in the order in which they were added."""
 
     @abstractmethod
     def get(self, name: str) -> Member:

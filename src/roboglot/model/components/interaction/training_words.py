@@ -29,7 +29,7 @@ class TrainingWords(Component):
 
     @abstractmethod
     def all(self) -> Sequence[TrainedWord]:
-        """In the order in which they were learnt."""
+        """Words in the order in which they were learnt."""
 
     @abstractmethod
     def teach(self, value: str, *, kind: str = "vp_task", seconds: float = 30.0, source: str = "") -> Action:

@@ -12,7 +12,7 @@ from roboglot.model.components.component import Component
 
 
 class DoorState(StrEnum):
-    """Of a box's door."""
+    """State of a box's door."""
 
     OPEN = "open"
     OPENING = "opening"

@@ -154,7 +154,7 @@ class Order:
 
     @property
     def boxes_done(self) -> int:
-        """For how many of its boxes there is a result."""
+        """Number of its boxes with a result."""
         return sum(result.box is not None for result in self.results)
 
 
@@ -192,7 +192,7 @@ class Delivery(Component):
     @property
     @abstractmethod
     def orders(self) -> Sequence[Order]:
-        """Those not ended and the last ended ones, oldest first."""
+        """Open orders and the last ended ones, oldest first."""
 
     @property
     @abstractmethod

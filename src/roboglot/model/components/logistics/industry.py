@@ -20,7 +20,7 @@ class CallKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Operation:
-    """At the place of that name do ``action`` (free text, done by people or a client), then wait (s)."""
+    """Operation at the place of that name: ``action`` (free text, done by people or a client), then wait (s)."""
 
     place: str
     action: str = ""
@@ -58,7 +58,7 @@ class Industry(Component):
     @property
     @abstractmethod
     def templates(self) -> Sequence[RoundTemplate]:
-        """In the order they were made."""
+        """Templates in the order they were made."""
 
     @abstractmethod
     async def put_template(self, template: RoundTemplate) -> None:
@@ -71,7 +71,7 @@ class Industry(Component):
     @property
     @abstractmethod
     def calls(self) -> Sequence[Call]:
-        """Those not ended and the last ended ones, oldest first."""
+        """Open calls and the last ended ones, oldest first."""
 
     @abstractmethod
     async def call(self, kind: CallKind, target: str, *, template: str = "") -> Call:
@@ -79,4 +79,4 @@ class Industry(Component):
 
     @abstractmethod
     async def report(self, id: str, status: OrderStatus, reason: str = "") -> Call:
-        """It runs, succeeded or failed. NotFound; Refused for one that has ended."""
+        """Report that it runs, succeeded or failed. NotFound; Refused for one that has ended."""

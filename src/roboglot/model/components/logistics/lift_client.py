@@ -10,7 +10,7 @@ from roboglot.model.components.component import Component
 
 
 class LiftDoor(StrEnum):
-    """Of the lift, car and landing together."""
+    """State of the lift's doors, car and landing together."""
 
     OPEN = "open"
     OPENING = "opening"

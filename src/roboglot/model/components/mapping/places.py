@@ -14,7 +14,7 @@ class Places(Component):
 
     @abstractmethod
     def all(self) -> Sequence[PointOfInterest]:
-        """In the order they were added."""
+        """Places in the order they were added."""
 
     @abstractmethod
     def get(self, id: str) -> PointOfInterest:

@@ -43,7 +43,7 @@ class Foothold:
 
 @dataclass(frozen=True, slots=True)
 class Footfall:
-    """For so long (s) these feet are on the floor and the others in the air."""
+    """Phase of a gait: for so long (s) these feet are on the floor and the others in the air."""
 
     seconds: float
     down: frozenset[Foot]

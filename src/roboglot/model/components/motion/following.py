@@ -71,4 +71,4 @@ class Following(Component):
     @property
     @abstractmethod
     def place(self) -> Point | None:
-        """Of who or what is followed, where it was seen last, in base_link as it is now (m); None without."""
+        """Last place seen of the one followed, in base_link as it is now (m); None without."""

@@ -54,7 +54,7 @@ class GaitSpec:
 
 
 def _even(x: float, y: float, yaw: float, **more: float) -> GaitSpec:
-    """As fast to one side as to the other."""
+    """Return a gait as fast to one side as to the other."""
     return GaitSpec(Twist(-x, -y, -yaw), Twist(x, y, yaw), **more)
 
 

@@ -26,7 +26,7 @@ class Gripper(Component):
     @property
     @abstractmethod
     def status(self) -> GripperStatus:
-        """As the jaws really stand."""
+        """True position of the jaws."""
 
     @property
     @abstractmethod

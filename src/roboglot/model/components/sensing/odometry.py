@@ -25,7 +25,7 @@ class OdometryNoise:
     yaw_per_metre: float = 0.02
 
     def variances(self, way: float, turn: float) -> tuple[float, float]:
-        """Of the position (m2, in each direction) and of the yaw (rad2) after ``way`` m and ``turn`` rad."""
+        """Return the variances of position (m2, in each direction) and yaw (rad2) after ``way`` m and ``turn`` rad."""
         return (
             (self.still + self.along * way + self.turning * turn) ** 2,
             (self.yaw_still + self.yaw_per_rad * turn + self.yaw_per_metre * way) ** 2,

@@ -34,7 +34,7 @@ class ZoneDistances:
 
     @property
     def points(self) -> NDArray[np.float32]:
-        """Those with a distance (n x 3), as x, y, z in base_link, z above the floor it stands on."""
+        """Points with a distance (n, 3): x, y, z in base_link, m, z above the floor it stands on."""
         ways = self.distances.ravel()
         seen = np.isfinite(ways)
         return (self.rays[seen] * ways[seen, None] + (self.eye.x, self.eye.y, self.eye.z)).astype(np.float32)

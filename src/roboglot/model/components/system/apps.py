@@ -28,7 +28,7 @@ class Apps(Component):
 
     @abstractmethod
     def all(self) -> Sequence[App]:
-        """By name."""
+        """Apps by name."""
 
     @abstractmethod
     async def install(self, name: str, version: str, package: BinaryIO) -> App:

@@ -52,7 +52,7 @@ class Bluetooth(Component):
     @property
     @abstractmethod
     def history(self) -> Sequence[BluetoothDevice]:
-        """Those that were connected once, the latest first."""
+        """Devices that were connected once, the latest first."""
 
     @property
     @abstractmethod

@@ -15,7 +15,7 @@ class FileStore(Component):
 
     @abstractmethod
     async def names(self) -> Sequence[str]:
-        """In alphabetical order."""
+        """Return the names in alphabetical order."""
 
     @abstractmethod
     async def read(self, name: str) -> bytes:

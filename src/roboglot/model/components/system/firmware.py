@@ -70,7 +70,7 @@ class Firmware(Component):
     @property
     @abstractmethod
     def version(self) -> str:
-        """Of the whole, as it runs now."""
+        """Running version of the whole."""
 
     @property
     @abstractmethod

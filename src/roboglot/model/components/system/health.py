@@ -28,7 +28,7 @@ class Health(Component):
 
     @property
     def faults(self) -> list[Fault]:
-        """Those not dismissed, oldest first."""
+        """Faults that were not dismissed, oldest first."""
         return [fault for name, fault in self._faults.items() if name not in self._dismissed]
 
     def has(self, name: str) -> bool:
@@ -41,7 +41,7 @@ class Health(Component):
         return max((fault.level for fault in self.faults), default=None)
 
     def set(self, name: str, present: bool, component: str, level: FaultLevel, message: str = "") -> None:
-        """For components: say whether this is wrong now. Cheap when nothing changed."""
+        """Set whether this is wrong; for components. Cheap when nothing changed."""
         if present == (name in self._faults):
             return
         if not present:

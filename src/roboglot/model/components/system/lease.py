@@ -174,7 +174,7 @@ class Lease(Component):
             self._publish()
 
     def _log(self, holder: Holder) -> None:
-        """At most one line a second: clients that take it from each other all the time are no reason for more."""
+        """Log at most one line a second: clients that take it from each other all the time are no reason for more."""
         if self._clock.time() - self._logged_at >= LOG_PERIOD:
             self._logged_at = self._clock.time()
             log.info("robot %s is moved by %s (%s)", self._robot.id, holder.who, holder.doing or "unknown motion")

@@ -102,7 +102,7 @@ class Link(Component):
         self._heard[what] = self._clock.time()
 
     def move_to(self, state: LinkState, reason: str = "") -> None:
-        """It is like this now."""
+        """Set the state."""
         if (state, reason) == (self._state, self._reason):
             return
         if state is not self._state:

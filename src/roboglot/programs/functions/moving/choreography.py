@@ -37,7 +37,7 @@ class Choreography:
         self.footfalls: list[Footfall] = []
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing: nothing is held."""
 
 
 @ABILITIES.on("choreographer.moonwalk")

@@ -68,7 +68,7 @@ class RangesOn:
         return self._sensors.reading(ULTRASONIC)
 
     def close(self) -> None:
-        """As they were before."""
+        """Switch the sensors back as they were before."""
         if not self._were_on:
             self._sensors.measure(False)
 

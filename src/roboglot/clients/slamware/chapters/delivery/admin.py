@@ -87,4 +87,4 @@ class Admin(Chapter):
 
     @call("GET /api/delivery/v1/voice_resources")
     async def get_voice_resources(self) -> VoicePackages:
-        """They come from the cloud, and no cloud manages this robot."""
+        """Return the voice packages from the cloud; none without a cloud that manages this robot."""

@@ -31,7 +31,7 @@ class Docks(Chapter):
 
     @call("POST /api/core/slam/v1/homedocks/:register")
     async def register_home_dock(self, body: Registration) -> PoseEntry:
-        """There is a dock where the robot stands now."""
+        """Register a dock where the robot stands."""
 
     @call("PUT /api/core/slam/v1/homedocks/{dock_id}")
     async def edit_home_dock(self, dock_id: str, body: PoseChange) -> bool:
