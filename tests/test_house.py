@@ -149,11 +149,16 @@ def test_docstrings_begin_with_verb_or_noun(files: list[Path]) -> None:
 
 
 def test_commit_subjects_have_an_area_and_fit() -> None:
-    """`area: imperative`, 60 characters at most; asked of the last 20, or of what a shallow checkout has of them."""
+    """`area: imperative`, 60 characters at most; asked of the commits that are not pushed yet and can be mended."""
     git = shutil.which("git")
     if git is None or not (ROOT / ".git").exists():
         pytest.skip("there is no history here")
-    log = subprocess.run([git, "log", "-20", "--no-merges", "--format=%s"], cwd=ROOT, capture_output=True, text=True)
+    log = subprocess.run(
+        [git, "log", "-20", "--no-merges", "--format=%s", "HEAD", "--not", "--remotes"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+    )
     if log.returncode:
         pytest.skip("git does not read this checkout")
     assert [line for line in log.stdout.splitlines() if not SUBJECT.fullmatch(line)] == []

@@ -52,7 +52,7 @@ class Meetings:
         self._left, self._others = 0.0, None
 
     def look(self, seconds: float) -> None:
-        """Before a step of so many ``seconds``: have the physics look for contacts in it, or not."""
+        """Decide whether the physics looks for contacts in a step of so many ``seconds``."""
         if not self._possible:
             return
         revision = sum(self._props.revisions.values())
@@ -132,7 +132,7 @@ class Meetings:
 
 
 def _soonest(gap: float, speed: float, pull: float) -> float:
-    """When a gap (m) may be closed, at a speed (m/s) that grows so fast (m/s2); HORIZON: never."""
+    """Return when a gap (m) may close, at a speed (m/s) growing so fast (m/s2); HORIZON: never."""
     if not (speed > 0.0 or pull > 0.0):
         return HORIZON
     gap = min(max(gap, 0.0), FAR)
