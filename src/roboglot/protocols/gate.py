@@ -35,7 +35,7 @@ class Port(NamedTuple):
 
 
 class Gate:
-    """For the ports of one door."""
+    """Gate of one door's ports."""
 
     def __init__(self, admission: Admission, tls: Tls | None = None) -> None:
         self._admission, self._tls = admission, tls
@@ -119,7 +119,7 @@ class Gate:
 
 
 class _Gatekeeper(asyncio.Protocol):
-    """Until the client is known; then the port's own protocol takes over."""
+    """Protocol until the client is known; then the port's own takes over."""
 
     def __init__(self, gate: Gate, factory: Factory, port: Port) -> None:
         self._gate, self._factory, self._port = gate, factory, port

@@ -54,7 +54,7 @@ class Answer(msgspec.Struct):
 
 
 class LeaseDesk:
-    """For all robots of one program."""
+    """Control desk of all robots of one program."""
 
     def __init__(self, folder: Path, robots: Mapping[str, Robot], stage: Stage | None = None) -> None:
         self._robots, self._stage = robots, stage

@@ -39,7 +39,7 @@ class Answer(msgspec.Struct):
 
 
 class RecordDesk:
-    """For one program; ``recorder`` makes its recorder when it is needed first."""
+    """Recording desk of one program; ``recorder`` makes its recorder when it is needed first."""
 
     def __init__(self, folder: Path, recorder: Callable[[], Recorder]) -> None:
         self._recorder = recorder

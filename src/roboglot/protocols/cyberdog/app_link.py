@@ -43,7 +43,7 @@ REDIAL_FIRST, REDIAL_MAX = 1.0, 16.0  # s between two attempts: doubled from the
 
 @dataclass(frozen=True, slots=True)
 class AppRoute:
-    """From the robot's ``own`` address to the app: ``configured`` as host[:port], or the ``last`` before a restart."""
+    """Route from the robot's ``own`` address to the app: ``configured`` host[:port], or the ``last`` one."""
 
     own: str
     configured: str

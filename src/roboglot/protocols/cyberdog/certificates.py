@@ -82,7 +82,7 @@ class CertificateStore:
         self._current = ensure_certificates(folder)
 
     def newest(self) -> Certificates:
-        """As the files are now; what is broken or expired changes nothing. Callable from any thread."""
+        """Return the files' current certificates; broken or expired ones change nothing. Callable from any thread."""
         stamp = self._stamp()
         if stamp == self._read_at:
             return self._current

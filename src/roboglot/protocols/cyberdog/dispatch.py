@@ -1,4 +1,4 @@
-"""From one request to its answers: reads, calls the handler, reports errors in-band. Knows no gRPC."""
+"""Dispatch of a request to its answers: reads, calls the handler, reports errors in-band. Knows no gRPC."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ def _status(answered: object) -> str:
 
 
 def _not_there(code: int) -> dict[str, int] | None:
-    """As a real robot answers whose service for ``code`` is not running; unknown codes get no answer at all."""
+    """Answer as a real robot whose service for ``code`` is not running; unknown codes get no answer at all."""
     if code not in KNOWN:
         log.info("code %d is not supported", code)
         return None

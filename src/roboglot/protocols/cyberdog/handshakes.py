@@ -28,7 +28,7 @@ ASKED_MAX = 2048  # connections that are remembered for having asked for somethi
 
 
 class Handshakes:
-    """Those of one port. ``begun`` may be called from any thread, all else on the loop."""
+    """Handshakes of one port. ``begun`` may be called from any thread, all else on the loop."""
 
     def __init__(self, address: str, port: int) -> None:
         self.port = port

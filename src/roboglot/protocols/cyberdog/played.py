@@ -29,7 +29,7 @@ class _Line:
 
 
 class PlayedPushes:
-    """Those for one app. ``door`` is the name under which they were recorded."""
+    """Recorded pushes for one app. ``door`` is the name under which they were recorded."""
 
     def __init__(self, stand_in: StandIn, app: AppLink, clock: Clock, door: str) -> None:
         self._app, self._clock = app, clock

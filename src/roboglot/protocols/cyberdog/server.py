@@ -194,7 +194,7 @@ class CyberDogDoor:
             task.add_done_callback(self._writing.discard)
 
     def _rest_if_empty(self, context: Context) -> None:
-        """In low power the task under way is stopped."""
+        """Stop the task under way in low power."""
         if (
             context.gaits.state is MachineState.LOW_POWER
             and context.tasks.current

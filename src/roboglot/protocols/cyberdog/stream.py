@@ -9,7 +9,10 @@ Reader = asyncio.Queue[object]  # None ends it
 
 
 class Stream:
-    """At most one reads; who joins later takes it over. The same feedback twice in a row is sent once."""
+    """Stream of feedback with at most one reader; one who joins later takes it over.
+
+    The same feedback twice in a row is sent once.
+    """
 
     def __init__(self) -> None:
         self._last: object = None

@@ -49,10 +49,10 @@ class Listener(Protocol):
     """A client."""
 
     def advertise(self, channels: Sequence[Channel]) -> None:
-        """There are these topics, too."""
+        """Announce further topics."""
 
     def wants(self, channel: int) -> int | None:
-        """Its number for what it subscribed to; None: it has not."""
+        """Return the listener's number for a subscribed topic; None: not subscribed."""
 
     def deliver(self, subscription: int, at: int, data: bytes) -> None:
         """Send a message; ``at``: ns since 1970."""
@@ -69,7 +69,7 @@ class Source(Protocol):
 
     @property
     def channels(self) -> Sequence[Channel]:
-        """Those that are known."""
+        """Known channels."""
 
     def join(self, listener: Listener) -> None:
         """Let a client in: it gets all topics that are known, and those to come."""

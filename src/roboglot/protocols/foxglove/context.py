@@ -43,7 +43,7 @@ class Published(msgspec.Struct, rename="camel"):
 
 
 class Context:
-    """From the client's opening to its end."""
+    """Context of one client, from its opening to its end."""
 
     def __init__(self, robot: Robot, carrier: Carrier, config: FoxgloveConfig, topics: Source | None = None) -> None:
         self.robot, self.config, self.topics = robot, config, topics
@@ -106,12 +106,12 @@ class Context:
     # -- what topics call ----------------------------------------------------------------------------------------------
 
     def advertise(self, channels: Sequence[Channel]) -> None:
-        """There are these topics, too."""
+        """Announce further topics."""
         if channels:
             self.send(message("advertise", channels=[channel.row for channel in channels]))
 
     def wants(self, channel: int) -> int | None:
-        """Its number for what it subscribed to."""
+        """Return the client's number for a subscribed topic."""
         return self.subscriptions.get(channel)
 
     def deliver(self, subscription: int, at: int, data: bytes) -> None:

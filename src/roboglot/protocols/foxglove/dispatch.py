@@ -1,4 +1,4 @@
-"""From one message to what is done: reads, finds the handler, checks the right, reports errors. Never raises."""
+"""Dispatch of a message: reads, finds the handler, checks the right, reports errors. Never raises."""
 
 from __future__ import annotations
 

@@ -88,7 +88,7 @@ class Player:
         self._rewind()
 
     def look_at_camera(self) -> None:
-        """It was filmed then, or not."""
+        """Do nothing: it was filmed then, or not."""
 
     def show_last(self, listener: Listener, channel: int, subscription: int) -> None:
         """Send a newcomer how things stood at this moment of the recording, where the topic says that."""

@@ -51,7 +51,7 @@ class Topics:
 
     @property
     def channels(self) -> list[LiveChannel]:
-        """Those that are known."""
+        """Known channels."""
         return list(self._channels.values())
 
     def join(self, listener: Listener) -> None:
@@ -95,7 +95,7 @@ class Topics:
             self._sampler.film(any(listener.wants(camera) is not None for listener in self._listeners))
 
     def control(self, _listener: Listener, _wish: Wish) -> None:
-        """Nothing is played back here. Raises NotFound."""
+        """Refuse: nothing is played back here. Raises NotFound."""
         raise NotFound("this robot is live; one of a recording (--robot a=recording:FILE) can be played back")
 
     async def _sample(self) -> None:

@@ -33,7 +33,7 @@ class Part(Protocol):
     def __init__(self, context: Context) -> None: ...
 
     def reset(self) -> None:
-        """As before the session."""
+        """Go back to the state before the session."""
 
 
 P = TypeVar("P", bound=Part)
@@ -83,7 +83,7 @@ class Context:
 
     @property
     def source(self) -> str:
-        """Of the actions that the command under way starts: this session, and the connection that sent it."""
+        """Source of the actions that the command under way starts: this session, and the connection that sent it."""
         return f"{self._name} {_speaker.get()}"
 
     @property

@@ -23,14 +23,14 @@ class Datagrams:
             raise OSError(error.errno, f"cannot send from {address}: {error.strerror}") from None
 
     def send(self, datagram: bytes, host: str, port: int) -> None:
-        """To ``host``; lost without a word when the network doesn't take it, as datagrams are."""
+        """Send to ``host``; lost without a word when the network doesn't take it, as datagrams are."""
         try:
             self._socket.sendto(datagram, (host, port))
         except OSError as error:
             log.debug("robomaster: datagram to %s:%d lost: %s", host, port, error)
 
     def close(self) -> None:
-        """Nothing can be sent afterwards."""
+        """Close the socket; nothing can be sent afterwards."""
         self._socket.close()
 
 

@@ -1,4 +1,4 @@
-"""From a command's text to its answer: finds the operation, checks its parameters, runs it, words the result."""
+"""Dispatch of a command: finds the operation, checks its parameters, runs it, words the result."""
 
 from __future__ import annotations
 

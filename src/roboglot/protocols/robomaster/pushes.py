@@ -78,7 +78,7 @@ class Pushes:
             )
 
     def reset(self) -> None:
-        """Everything off, every rate at its default."""
+        """Switch everything off, every rate to its default."""
         for module, name in self._attributes:
             self.switch(module, name, False, None)
 

@@ -28,7 +28,7 @@ class ReadingSource(Protocol):
 
     @property
     def origin(self) -> Pose:
-        """Of chassis positions, in the odometry's frame."""
+        """Origin of chassis positions, in the odometry's frame."""
 
     @property
     def profile(self) -> Profile:

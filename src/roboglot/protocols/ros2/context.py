@@ -21,5 +21,5 @@ class Context:
 
     @property
     def source(self) -> str:
-        """Of the actions that are started here."""
+        """Source of the actions that are started here."""
         return DOOR

@@ -1,4 +1,4 @@
-"""From one message to what is done: reads CDR, finds the handler, reports errors. Never raises."""
+"""Dispatch of a message: reads CDR, finds the handler, reports errors. Never raises."""
 
 from __future__ import annotations
 

@@ -142,7 +142,7 @@ class Application:
         return [(b"access-control-allow-origin", asked.origin.encode("latin-1")), (b"vary", b"Origin")]
 
     def _log(self, client: str, scope: Scope, status: int, body: bytes, seconds: float) -> None:
-        """For ``--verbose``: who asked for what, and how it went."""
+        """Log a request and its outcome, for ``--verbose``."""
         path = scope["raw_path"].decode("latin-1").encode("unicode_escape").decode()[:LOGGED_MAX]
         why = f": {body[:LOGGED_MAX].decode(errors='replace')!r}" if status >= 400 else ""
         ms = seconds * 1000

@@ -75,7 +75,7 @@ class _Schemas:
         )
 
     def components(self) -> Schema:
-        """By name; the options of an action are one of those that its kind has."""
+        """Return the schemas by name; the options of an action are one of those that its kind has."""
         options = [self.of(kind) for kind in dict.fromkeys(factory.options for factory in FACTORIES.values())]
         request = self._components["ActionRequest"]["properties"]
         request["options"] = {"anyOf": [*options, {"type": "null"}]}

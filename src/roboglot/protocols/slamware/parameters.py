@@ -23,7 +23,7 @@ WHOLE_MAX = 2.0**53  # beyond it floats leave integers out
 
 
 class Parameters:
-    """Of one robot's requests; counts the uploads that are under way."""
+    """Parameters of one robot's requests; counts the uploads that are under way."""
 
     def __init__(self, context: Context) -> None:
         self._context = context

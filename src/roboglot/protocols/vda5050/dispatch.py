@@ -1,4 +1,4 @@
-"""From a message of fleet control to what it has the robot do; a refusal becomes an error in the state."""
+"""Dispatch of a message of fleet control to the robot; a refusal becomes an error in the state."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ class Messages:
 
     @staticmethod
     def partly() -> dict[str, str]:
-        """Nothing is there in part."""
+        """Return nothing: no row is there in part."""
         return {}
 
 

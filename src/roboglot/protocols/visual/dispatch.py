@@ -1,4 +1,4 @@
-"""From one frame to its answers: reads, finds the handler, reports errors. Never raises; knows no carrier."""
+"""Dispatch of a frame to its answers: reads, finds the handler, reports errors. Never raises; knows no carrier."""
 
 from __future__ import annotations
 

@@ -129,7 +129,7 @@ class VisualDoor:
         }
 
     def _end_programs_of(self, who: str) -> None:
-        """They lost a right: what they run might count on it."""
+        """End the programs of those who lost a right: what they run might count on it."""
         ending = self._service.end_of(who, f"{who} lost rights on this robot")
         task = asyncio.create_task(ending, name=f"end programs of {who}")
         self._recording.add(task)

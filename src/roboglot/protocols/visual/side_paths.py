@@ -23,7 +23,7 @@ READERS = "log readers"  # the other end of what programs print, in the tap
 
 
 class SidePaths:
-    """Those of one robot, from ``start`` to ``close``."""
+    """Side paths of one robot, from ``start`` to ``close``."""
 
     def __init__(self, service: ProgramService) -> None:
         self._service = service

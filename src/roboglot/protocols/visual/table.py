@@ -21,7 +21,7 @@ def implemented() -> set[str]:
 
 
 def partly() -> dict[str, str]:
-    """Nothing is there in part."""
+    """Return nothing: no row is there in part."""
     return {}
 
 

@@ -43,7 +43,7 @@ class Feet:
         self._homes = [(x, y - math.copysign(inward, y)) for x, y in self._below_hips]
 
     def hang(self, pose: Pose) -> None:
-        """They touch nothing: the robot flies, is held up or lies on its side."""
+        """Let the feet touch nothing: the robot flies, is held up or lies on its side."""
         self._hanging = self.restless = True
         self._places = [_there(pose, *home) for home in self._homes]
         self._heights = [0.0] * len(self._homes)
@@ -92,7 +92,7 @@ class Feet:
         return math.hypot(x - self._homes[index][0], y - self._homes[index][1])
 
     def _stand(self, index: int, pose: Pose, twist: Twist) -> float:
-        """It lands, if it was in the air; a body that is pushed too far drags it along. How far it is from home, m."""
+        """Land a foot, or drag it along with a body that is pushed too far. Return its distance from home, m."""
         last = self._last[index]
         if self._starts[index] is not None and last is not None:
             self._places[index] = self._foothold(index, last, 0.0, pose, twist)
@@ -129,13 +129,13 @@ class Feet:
 
 
 def _there(pose: Pose, x: float, y: float) -> tuple[float, float]:
-    """From base_link at ``pose`` to the world."""
+    """Transform from base_link at ``pose`` to the world."""
     c, s = math.cos(pose.yaw), math.sin(pose.yaw)
     return pose.x + c * x - s * y, pose.y + s * x + c * y
 
 
 def _seen(pose: Pose, x: float, y: float) -> tuple[float, float]:
-    """From the world to base_link at ``pose``."""
+    """Transform from the world to base_link at ``pose``."""
     c, s = math.cos(pose.yaw), math.sin(pose.yaw)
     x, y = x - pose.x, y - pose.y
     return c * x + s * y, c * y - s * x

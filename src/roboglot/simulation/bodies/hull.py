@@ -49,7 +49,7 @@ def wheel_places(body: Body) -> list[tuple[float, float]]:
 
 
 def rotation(tilt: tuple[float, float], yaw: float) -> Floats:
-    """From base_link to world, from roll and pitch (rad) and yaw."""
+    """Return the rotation from base_link to world, from roll and pitch (rad) and yaw."""
     roll, pitch = tilt
     cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
     cy, sy = math.cos(yaw), math.sin(yaw)
@@ -295,7 +295,7 @@ class Hull:
         self.loose = True
 
     def handle(self) -> None:
-        """Before a step: what the hand does."""
+        """Apply what the hand does, before a step."""
         if self.hand is None:
             return
         mass = self.mass

@@ -136,7 +136,7 @@ def dance_frames(
 
 
 def _gripping(now: Twist, wanted: Twist, most: float) -> Twist:
-    """As near to ``wanted`` as a change of ``most`` m/s brings it."""
+    """Return the speed as near to ``wanted`` as a change of ``most`` m/s brings it."""
     change = math.hypot(wanted.x - now.x, wanted.y - now.y)
     if change <= most:
         return wanted
@@ -144,7 +144,7 @@ def _gripping(now: Twist, wanted: Twist, most: float) -> Twist:
 
 
 def straighten(begin: Body, stance: Stance, seconds: float = STRAIGHTEN) -> Iterator[Frame]:
-    """From wherever it is to standing straight."""
+    """Return the motion from wherever it is to standing straight."""
     for part in _parts(seconds, stance):
         yield Frame(begin.towards(stance.straight, ease(part)))
 

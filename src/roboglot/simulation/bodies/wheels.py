@@ -36,7 +36,7 @@ class Wheels:
         self.dead = wheels
 
     def driven(self, wheels: WheelSpeeds) -> WheelSpeeds:
-        """Those that have a motor; the others stand."""
+        """Wheels that have a motor; the others stand."""
         return replace(wheels, **dict.fromkeys(self.dead, 0.0))
 
     def speeds_of(self, twist: Twist) -> WheelSpeeds:

@@ -64,7 +64,7 @@ class Rectangle:
     depth: float
 
     def distance_to(self, x: float, y: float) -> float:
-        """From its edge to a point outside, m; 0 inside."""
+        """Return the distance from its edge to a point outside, m; 0 inside."""
         dx = max(self.x - x, 0.0, x - self.x - self.width)
         dy = max(self.y - y, 0.0, y - self.y - self.depth)
         return math.hypot(dx, dy)

@@ -59,7 +59,7 @@ class LiftCar:
 
     @property
     def elevation(self) -> float:
-        """Of the car's floor, m."""
+        """Elevation of the car's floor, m."""
         return self._base + self._physics.car_lift
 
     @property
@@ -69,7 +69,7 @@ class LiftCar:
 
     @property
     def state(self) -> LiftState:
-        """Its state as broadcast by radio."""
+        """State as broadcast by radio."""
         load = self.passengers.load(self) / self.section.capacity
         return LiftState(self.floor, self._target, self._door, load, self.in_service, bool(self._failure))
 

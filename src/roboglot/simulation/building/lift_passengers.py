@@ -23,7 +23,7 @@ class Car(Protocol):
 
     @property
     def section(self) -> Lift:
-        """Its sizes."""
+        """Sizes of the lift."""
 
     @property
     def frame(self) -> Pose:
@@ -31,7 +31,7 @@ class Car(Protocol):
 
     @property
     def elevation(self) -> float:
-        """Of its floor, m."""
+        """Elevation of the car's floor, m."""
 
     @property
     def floor(self) -> int:
@@ -55,7 +55,7 @@ class Passengers:
         self.carry(lift)
 
     def carry(self, lift: Car) -> None:
-        """They ride with the car."""
+        """Carry the passengers with the car."""
         deep, wide = lift.section.size
         above = lift.elevation - self._props.elevation(lift.floor)
         for index, (x, y) in enumerate(SPOTS[: self._count]):

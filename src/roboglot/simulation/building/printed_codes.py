@@ -57,7 +57,7 @@ def _words(data: bytes, size: int) -> list[int]:
 
 
 def _times(a: int, b: int) -> int:
-    """In the field of 256 elements that QR codes compute in."""
+    """Multiply in the field of 256 elements that QR codes compute in."""
     result = 0
     while b:
         if b & 1:

@@ -70,7 +70,7 @@ class Props:
             raise NotFound(f"no tag {number} was hung up")
 
     def elevation(self, floor: int) -> float:
-        """Of a floor's surface, m."""
+        """Return the elevation of a floor's surface, m."""
         return self._elevations[floor]
 
     def on(self, floor: int) -> list[Solid]:

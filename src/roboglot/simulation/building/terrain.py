@@ -25,7 +25,7 @@ class Ground:
         self.uneven = any(self._terrain)
 
     def height(self, x: float, y: float, floor: int) -> float:
-        """Of the surface above the floor's, m."""
+        """Return the height of the surface above the floor's, m."""
         return max((_height(terrain, x, y) for terrain in self._terrain[floor]), default=0.0)
 
     def grip(self, x: float, y: float, floor: int) -> float:

@@ -48,7 +48,7 @@ class _Somebody:
 
     @property
     def middle(self) -> Floats:
-        """Of the torso, world."""
+        """Middle of the torso, world."""
         middle: Floats = self.joints[5:13].mean(axis=0)
         return middle
 
@@ -63,7 +63,7 @@ def see_people(glance: Glance) -> list[PersonSeen]:
 
 
 def see_skeletons(glance: Glance) -> list[SkeletonSeen]:
-    """Their joints, those outside the picture or hidden marked so."""
+    """Return the joints of people, those outside the picture or hidden marked so."""
     found = []
     for who in _everybody(glance):
         places, _ = glance.view.project(who.joints)
@@ -124,7 +124,7 @@ def see_robots(glance: Glance) -> list[RobotSeen]:
 
 
 def _everybody(glance: Glance) -> Iterator[_Somebody]:
-    """Those who are seen, nearest first."""
+    """Return those who are seen, nearest first."""
     near = []
     for walker in glance.around.walkers:
         away = math.dist((walker.pose.x, walker.pose.y), glance.view.at[:2])
@@ -153,7 +153,7 @@ def _turned(places: Floats, yaw: float) -> Floats:
 
 
 def _heights(hull: Hull) -> tuple[float, float]:
-    """Of underside and top of a robot, world."""
+    """Return the heights of underside and top of a robot, world."""
     section = hull.body.hull
     return hull.elevation + hull.clearance, hull.elevation + hull.belly + section.torso_height
 

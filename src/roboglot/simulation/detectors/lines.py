@@ -15,7 +15,7 @@ CURVATURE_NOISE = 0.02  # 1/m
 
 
 def see_lines(glance: Glance) -> list[LineSeen]:
-    """Of every line the piece in one part that begins nearest, if it is long enough; nearest line first."""
+    """Return of every line the piece that begins nearest, if it is long enough; nearest line first."""
     found = []
     for tape in glance.around.tapes(glance.floor):
         run = _nearest_run(tape, glance)

@@ -60,7 +60,7 @@ class FragileWorld(Protocol):
 
     @property
     def description(self) -> WorldDescription:
-        """As its file says."""
+        """Description as in its file."""
 
     @property
     def building(self) -> Building:

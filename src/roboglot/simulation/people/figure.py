@@ -143,7 +143,7 @@ def extent(joints: Floats) -> tuple[Floats, Floats]:
 
 @lru_cache(maxsize=64)
 def size(height: float, radius: float) -> Floats:
-    """By how much a person of that size is larger than the places above (x, y, z)."""
+    """Return by how much a person of that size is larger than the places above (x, y, z)."""
     return np.array((radius / WIDE, radius / WIDE, height / TALL))
 
 

@@ -89,7 +89,7 @@ class Walker:
 
     @property
     def joints(self) -> Floats:
-        """In their own frame, see ``figure``."""
+        """Return the joints in the person's own frame, see ``figure``."""
         match self.doing:
             case Show(gesture=gesture):
                 joints = figure.gesturing(gesture, self._elapsed)
@@ -213,7 +213,7 @@ class Walker:
             self._dodging = self._way_out(heading, beside, free)
 
     def _way_out(self, heading: float, beside: float, free: Free) -> Point | None:
-        """To the side that the robot leaves more room at, else to the other one, else back; None if all is closed."""
+        """Return a step to the side with more room, else to the other one, else back; None if all is closed."""
         side = -1.0 if beside >= 0.0 else 1.0
         for turn, way in ((side * math.pi / 2, ASIDE), (-side * math.pi / 2, ASIDE), (math.pi, 2.0 * ASIDE)):
             spot = Point(
@@ -260,7 +260,7 @@ class Walker:
 
 
 def _strolling(person: Person) -> Iterator[Step]:
-    """There and back along the path."""
+    """Return a walk there and back along the path."""
     if len(person.path) > 1:
         for spot in (*person.path[1:], *reversed(person.path[:-1])):
             yield Wait(person.pause)

@@ -62,7 +62,7 @@ class Gadgets:
                 )
 
     def all(self) -> Sequence[GadgetInWorld]:
-        """Those on and off."""
+        """Gadgets that are on and off."""
         return tuple(self._all.values())
 
     def get(self, address: str) -> GadgetInWorld:

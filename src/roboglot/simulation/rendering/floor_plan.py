@@ -40,7 +40,7 @@ class Plan:
         return int(self.rooms[row, column])
 
     def seen_from(self, x: float, y: float, yaw: float, spread: float) -> Cells:
-        """For each room number, whether some of it can be seen."""
+        """Return for each room number whether some of it can be seen."""
         visible = np.zeros(ROOMS_MAX + 1, dtype=np.uint8)
         visible[0] = 1
         look(self.solid, self.rooms, (x - self.x) / self.cell, (y - self.y) / self.cell, yaw, spread, visible)

@@ -110,7 +110,7 @@ def _ahead(pose: Pose, way: float) -> tuple[float, float]:
 
 
 def _wall(solid: Solid, plan: Plan, floor: Floor) -> Iterator[Mesh]:
-    """Its four sides, cut where another room begins."""
+    """Yield the wall's four sides, cut where another room begins."""
     length, thickness, height = solid.size
     for turn, span, off in ((0, length, thickness / 2), (1, thickness, length / 2)):
         for side in (-1, 1):

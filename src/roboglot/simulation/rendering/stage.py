@@ -59,7 +59,7 @@ class Life:
 
 
 class Stage:
-    """Everything that cameras may see. ``props`` and ``walkers`` are looked at anew each time."""
+    """Scenery of one world for its cameras. ``props`` and ``walkers`` are looked at anew each time."""
 
     def __init__(
         self,

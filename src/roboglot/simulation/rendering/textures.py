@@ -218,7 +218,7 @@ def _heart() -> NDArray[np.float64]:
 
 
 def _code(kind: str, text: str) -> NDArray[np.float64]:
-    """Its black and white squares."""
+    """Return the code's black and white squares."""
     squares = april(int(text)) if kind == TagKind.APRIL else qr(text)
     index = np.arange(SIZE) * len(squares) // SIZE
     mask: NDArray[np.float64] = squares[::-1][index][:, index].astype(np.float64) * 255.0

@@ -70,7 +70,7 @@ class Air:
         self._sources.append(source)
 
     def silence(self, source: Source) -> None:
-        """It stops at once."""
+        """Stop a sound at once."""
         if source in self._sources:
             self._sources.remove(source)
 

@@ -34,7 +34,7 @@ def speaking_time(text: str) -> float:
 
 
 def hummed(text: str, pitch: float) -> Sound:
-    """As long as saying ``text`` takes: a voice of ``pitch`` Hz that rises and falls with every syllable."""
+    """Return a hum as long as ``text`` takes: a voice of ``pitch`` Hz that rises and falls with every syllable."""
     time = np.arange(round(speaking_time(text) * SAMPLE_RATE)) / SAMPLE_RATE
     tones = range(1, max(2, int(HIGHEST / pitch)))
     wave = sum((np.sin(math.tau * pitch * n * time) / n for n in tones), start=np.zeros(len(time)))

@@ -31,7 +31,7 @@ class Target(Protocol):
     hull: Hull
 
     def meet(self, origin: Floats, way: Floats) -> tuple[float, str] | None:
-        """At which share of the way (world, m) a plate is hit first from outside, and which."""
+        """Return at which share of the way (world, m) a plate is hit first from outside, and which."""
 
     def struck(self, plate: str, velocity: Floats) -> None:
         """A bead of this velocity (world, m/s) burst there."""

@@ -253,7 +253,7 @@ class Stairs(Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def length(self) -> float:
-        """From the first riser to the landing's end, m."""
+        """Length from the first riser to the landing's end, m."""
         return self.steps * self.run + self.landing
 
     @property

@@ -48,7 +48,7 @@ def completed(world: WorldDescription, where: str) -> WorldDescription:
 
 
 def _problems(world: WorldDescription) -> Iterator[str]:
-    """In plain words, the first is enough."""
+    """Yield problems in plain words; the first is enough."""
     yield from _count_problems(world)
     yield from _name_problems(world)
     for number, floor in enumerate(world.floors):

@@ -27,7 +27,7 @@ def overlap(a: Solid, b: Solid) -> bool:
 
 
 def reach_of(solid: Solid) -> float:
-    """From the middle to the farthest point of the footprint, m."""
+    """Return the distance from the middle to the farthest point of the footprint, m."""
     return solid.size[0] / 2 if solid.round else math.hypot(solid.size[0], solid.size[1]) / 2
 
 

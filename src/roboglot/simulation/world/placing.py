@@ -143,7 +143,7 @@ class Places:
 
 
 def _distance(pose: Pose, solid: Solid) -> float:
-    """From the pose to the solid's footprint, m."""
+    """Return the distance from the pose to the solid's footprint, m."""
     if solid.round:
         return pose.distance_to(solid.pose) - solid.size[0] / 2
     seen = pose.relative_to(solid.pose)

@@ -156,7 +156,7 @@ class Sight:
         ]
 
     def _things_at(self, floor: int, height: float) -> list[Four]:
-        """Those that robots do not carry."""
+        """Return the things that robots do not carry."""
         found = []
         for thing in self._things:
             x, y, z = thing.position.tolist()

@@ -38,7 +38,7 @@ class Obstacles:
     elevation: float
 
     def clear(self, eye: Floats, places: Floats, but: Iterable[Hull | Walker]) -> NDArray[np.bool_]:
-        """For each of the places (n x 3, world), whether nothing but ``but`` stands before it."""
+        """Return for each place (n, 3; world) whether nothing but ``but`` stands before it."""
         rows = np.delete(self.rows, [self.movers[one] for one in but if one in self.movers], axis=0)
         ways = places - eye
         lengths = np.linalg.norm(ways, axis=1)
@@ -111,7 +111,7 @@ def _person_row(walker: Walker) -> Row:
 
 
 def _meet_boxes(blocks: Floats, eye: Floats, ways: Floats) -> NDArray[np.bool_]:
-    """For each way, whether it leads through a box (slab test in the boxes' own frames)."""
+    """Return for each way whether it leads through a box (slab test in the boxes' own frames)."""
     if not len(blocks):
         return np.zeros(len(ways), dtype=bool)
     c, s = np.cos(blocks[:, 6]), np.sin(blocks[:, 6])
@@ -127,7 +127,7 @@ def _meet_boxes(blocks: Floats, eye: Floats, ways: Floats) -> NDArray[np.bool_]:
 
 
 def _meet_cylinders(blocks: Floats, eye: Floats, ways: Floats) -> NDArray[np.bool_]:
-    """For each way, whether it leads through a standing cylinder."""
+    """Return for each way whether it leads through a standing cylinder."""
     if not len(blocks):
         return np.zeros(len(ways), dtype=bool)
     off = eye - blocks[:, :3]

@@ -94,7 +94,7 @@ class Ai:
         return None if info is None else (info, *_box(seen.box))
 
     def marker(self, seen: MarkerSeen) -> Numbers | None:
-        """Of the colour asked for and not too near."""
+        """Return whether a marker has the colour asked for and is not too near."""
         info = MARKERS.get(seen.symbol)
         if info is None or seen.colour != self.marker_colour or seen.distance < self.marker_distance:
             return None

@@ -56,7 +56,7 @@ class MediaPort:
         return True
 
     def forget(self, watcher: _Watcher) -> None:
-        """It is gone."""
+        """Forget a client that is gone."""
         self._watchers.discard(watcher)
 
     async def feed(self, watcher: _Watcher) -> None:

@@ -48,7 +48,7 @@ class CloudFolder:
         return self.managed and (Network not in self._robot or self._robot[Network].state.internet)
 
     async def leave(self) -> None:
-        """For good: its map and tasks do not come any more."""
+        """Leave the cloud for good: its map and tasks do not come any more."""
         if self._folder is not None:
             await self._robot[Settings].put(UNBOUND, True)
 
@@ -57,7 +57,7 @@ class CloudFolder:
         return self._read("map.stcm", MAP_MAX) if self.reached else None
 
     def voices(self) -> list[VoicePackage]:
-        """Its voice packages. InvalidGoal for a file that is none."""
+        """Return its voice packages. InvalidGoal for a file that is none."""
         data = self._read("voice.json", VOICE_MAX)
         try:
             return msgspec.json.decode(data, type=list[VoicePackage]) if data else []
@@ -125,7 +125,7 @@ def _mark(path: Path, refused: str = "") -> None:
 
 
 def request_of(task: CloudTask, name: str) -> OrderRequest:
-    """In the model's words; ``name`` is the order's number if the cloud gave it none. InvalidGoal for nonsense."""
+    """Return the order in the model's words; ``name`` if the cloud gave it no number. InvalidGoal for nonsense."""
     number = task.order_id or name[:64]
     if task.type == "INDUSTRY":
         if not task.task_targets:

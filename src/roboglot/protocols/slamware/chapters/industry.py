@@ -73,7 +73,7 @@ async def create_task_template(context: Context, body: TemplateRequest) -> TaskT
 
 @TABLE.on(f"GET {TEMPLATES}", right=Right.SEE, needs=(Industry,))
 async def get_task_templates(context: Context) -> list[TaskTemplate]:
-    """In the order in which they were made."""
+    """Return the templates in the order in which they were made."""
     return [_template(context, template) for template in context.robot[Industry].templates]
 
 
@@ -90,7 +90,7 @@ async def get_industry_tasks(
     type: Literal["carry_calling_by_template", "carry_calling", "industry"] | None = None,
     status: StatusFilter | None = None,
 ) -> list[IndustryTask]:
-    """Those ready and running, oldest first; with ``status`` all also those that ended."""
+    """Return the tasks ready and running, oldest first; with ``status`` all also those that ended."""
     calls = [
         _task(context, call)
         for call in context.robot[Industry].calls

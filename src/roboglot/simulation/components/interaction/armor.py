@@ -85,7 +85,7 @@ class SimulatedArmor(Armor):
     # -- beads ---------------------------------------------------------------------------------------------------------
 
     def meet(self, origin: Floats, way: Floats) -> tuple[float, str] | None:
-        """At which share of a bead's way (world) it hits a plate from outside, and which."""
+        """Return at which share of a bead's way (world) it hits a plate from outside, and which."""
         to_body = rotation(self.hull.tilt, self.hull.turned)
         start, along = (origin - self.hull.position) @ to_body, way @ to_body
         best: tuple[float, str] | None = None
@@ -112,7 +112,7 @@ class SimulatedArmor(Armor):
             self._note(place, HitKind.BEAD)
 
     def _plate(self, place: PlatePlace) -> tuple[Floats, Floats, tuple[float, float]]:
-        """Its middle, its axes (columns: outwards, sideways, up) in base_link, and its size."""
+        """Return its middle, its axes (columns: outwards, sideways, up) in base_link, and its size."""
         section = self._section
         if place in AROUND:
             axes = rotation((0.0, 0.0), AROUND[place])

@@ -121,7 +121,7 @@ class SimulatedCargo(Cargo):
         return self._robot.actions.start(name, run, resources={f"box {box.id}"}, goal=box.id, source=source)
 
     async def _move(self, box: _Box, direction: int, action: Action) -> None:
-        """Until it is there; however it ends, the door stands still."""
+        """Move the door until it is there; however it ends, the door stands still."""
         box.error = ""
         end = 1.0 if direction > 0 else 0.0
         try:

@@ -29,7 +29,7 @@ class JackSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedJack(Jack):
-    """Its top is the hull's while down."""
+    """Jack whose top is the hull's while down."""
 
     def __init__(self, section: JackSection, hull: Hull, shelves: Sequence[ShelfStand], robot: Robot) -> None:
         self.stroke = section.stroke
@@ -75,7 +75,7 @@ class SimulatedJack(Jack):
         self._tell()
 
     def sense(self, _stamp: float, _seconds: float) -> None:
-        """After every tick: the shelf goes where the robot goes, and no farther than what stands in its way."""
+        """Move the shelf with the robot after every tick, and no farther than what stands in its way."""
         if self._shelf is None:
             return
         hull, lifted = self._hull, self._lifted(self._shelf)

@@ -32,7 +32,7 @@ Floats = NDArray[np.float64]
 
 
 class SimulatedGimbal(Gimbal):
-    """Its commands aim the axes, or have them turn."""
+    """Gimbal whose commands aim the axes, or have them turn."""
 
     def __init__(self, section: GimbalSection, hull: Hull, base: SimulatedBase, robot: Robot) -> None:
         side = section.sideways
@@ -139,7 +139,7 @@ class SimulatedGimbal(Gimbal):
 
     @property
     def orientation(self) -> Floats:
-        """From the gimbal's frame to base_link."""
+        """Rotation from the gimbal's frame to base_link."""
         return rotation((0.0, self.axes.pitch.position), self.axes.yaw.position)
 
     # -- actions -------------------------------------------------------------------------------------------------------

@@ -123,7 +123,7 @@ class GimbalAxes:
         return aim.goal - (self.heading if index else self.lean)
 
     def control(self, seconds: float) -> None:
-        """Before the base's: hold against the body's last motion, follow or be followed, turn to where it is aimed."""
+        """Hold against the body's last motion, follow or be followed, turn to the aim; before the base's control."""
         hull = self._hull
         turn, self._turned = hull.turned - self._turned, hull.turned
         if self._resting and not turn and hull.tilt is LEVEL:

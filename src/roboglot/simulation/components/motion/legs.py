@@ -265,7 +265,7 @@ class SimulatedLegs(Legs):
     # -- every tick --------------------------------------------------------------------------------------------------
 
     def control(self, seconds: float) -> None:
-        """Before the physics: move the torso's set point on, the feet, and base_link while performing."""
+        """Move the torso's set point, the feet, and base_link while performing; before the physics."""
         torso = self._torso
         if performance := self._player.performance:
             self._player.play(performance)

@@ -53,7 +53,7 @@ class LidarSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedLidar(Lidar):
-    """In the middle of the torso, looking through its hull."""
+    """Lidar in the middle of the torso, looking through its hull."""
 
     def __init__(
         self,

@@ -28,7 +28,7 @@ class MicrophoneSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedMicrophone(Microphone):
-    """In the middle of the robot; hears equally well to all sides."""
+    """Microphone in the middle of the robot; hears equally well to all sides."""
 
     def __init__(
         self, section: MicrophoneSection, hull: Hull, air: Air, clock: Clock, random: np.random.Generator

@@ -99,7 +99,7 @@ def _seen(strip: Reflector, scan: LaserScan, pose: Pose) -> ReflectorSeen | None
 
 
 class SimulatedReflectors(Reflectors):
-    """Of the robot's lidar, so high above the belly (m)."""
+    """Reflectors as the robot's lidar sees them, so high above the belly (m)."""
 
     def __init__(self, hull: Hull, above_belly: float, world: WorldDescription, robot: Robot) -> None:
         self._detector = ReflectorDetector(hull, above_belly, world, robot.events, robot[Lidar].rate)

@@ -175,7 +175,7 @@ class SimulatedBluetooth(Bluetooth):
         return heard if known is None else dataclasses.replace(known, signal=heard.signal)
 
     def _described(self, gadget: GadgetInWorld) -> BluetoothDevice:
-        """Everything that a connected device reports."""
+        """Return everything that a connected device reports."""
         return dataclasses.replace(
             self._advertised(gadget),
             kind=DeviceKind(gadget.gadget.kind),

@@ -284,7 +284,7 @@ class SimulatedFirmware(Firmware):
 
 
 def _numbers(version: str) -> tuple[int, ...]:
-    """For comparing: the numbers in a version."""
+    """Return the numbers in a version, for comparing."""
     return tuple(int(number) for number in re.findall(r"\d{1,9}", version))
 
 

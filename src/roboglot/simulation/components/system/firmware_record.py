@@ -60,7 +60,7 @@ class FirmwareRecord:
         await self._write(PENDING, [version, modules])
 
     async def boot(self) -> None:
-        """From now on, what waited for a reboot runs."""
+        """Make what waited for a reboot the running version."""
         if pending := self._read(PENDING):
             await self._write(INSTALLED, pending)
             await self._write(PENDING, None)

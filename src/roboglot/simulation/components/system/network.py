@@ -233,7 +233,7 @@ class SimulatedNetwork(Network):
         return self._levels[1]
 
     def _address(self) -> str:
-        """In the network that it is in."""
+        """Return its address in the network that it is in."""
         return self._kept("address", "") or self._radio.lease(self._ssid, self._mac)
 
     @property
@@ -242,7 +242,7 @@ class SimulatedNetwork(Network):
 
     @property
     def _passwords(self) -> dict[str, str]:
-        """By name, the preferred one first."""
+        """Return the passwords by name, the preferred one first."""
         return dict(self._kept("known", list(self._section.known.items())))
 
     def _kept(self, name: str, default: Any) -> Any:

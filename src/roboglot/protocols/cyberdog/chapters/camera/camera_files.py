@@ -37,7 +37,7 @@ class CameraFiles:
         return sorted(path.name for path in self._folder.iterdir() if path.suffix in (".jpg", ".mp4"))
 
     def path(self, name: str) -> Path:
-        """Of a file to be fetched; raises NotFound for any other name."""
+        """Return the path of a file to be fetched; raises NotFound for any other name."""
         if name not in self.names():
             raise NotFound(f"there is no file {name!r}")
         return self._folder / name
@@ -72,7 +72,7 @@ class CameraFiles:
         return bool(self._recording)
 
     def remove(self, path: Path) -> None:
-        """It was fetched whole."""
+        """Remove a file that was fetched whole."""
         path.unlink(missing_ok=True)
         if Disk in self._robot:
             self._robot[Disk].release(_use(path.name))
@@ -97,7 +97,7 @@ class CameraFiles:
         return shutil.disk_usage(ours).free - LOW
 
     def _take(self, name: str) -> None:
-        """Its room on the simulated disk; raises Refused, and drops the file, when there is none.
+        """Take its room on the simulated disk; raises Refused, and drops the file, when there is none.
 
         What a real robot sees is kept on our disk, which counts by itself.
         """

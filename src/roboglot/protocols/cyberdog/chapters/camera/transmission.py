@@ -80,7 +80,7 @@ class Transmission:
         await asyncio.gather(*self._running, *(peer.close() for peer in peers), return_exceptions=True)
 
     def _peer(self, uid: str) -> _Peer | None:
-        """That app's; a new one if there is room."""
+        """Return that app's peer; a new one if there is room."""
         if uid not in self._peers:
             if len(self._peers) >= PEERS_MAX:
                 log.warning("refused pictures to %r: %d apps have some", uid, PEERS_MAX)
@@ -143,7 +143,7 @@ class Transmission:
                 self._begin(peer.close())
 
     def _stream(self, screen: Screen | None) -> VideoStream:
-        """As the camera has it, or for a screen of that shape; one encoder for all screens of one shape."""
+        """Return the camera's stream, or one for a screen of that shape; all screens of one shape share an encoder."""
         if screen is None:
             return self._robot[VideoStream]
         height = 2 * max(1, round(SCREEN_WIDTH * screen.height / screen.width / 2))

@@ -14,7 +14,7 @@ SAMPLES_MAX = 1800
 
 
 class Survey:
-    """Its kind, and the satellites' fixes on the way."""
+    """Kind of a map being made, and the satellites' fixes on the way."""
 
     def __init__(self, outdoor: bool = False) -> None:
         self.outdoor = outdoor

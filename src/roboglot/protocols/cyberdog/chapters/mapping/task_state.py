@@ -104,7 +104,7 @@ class Tasks:
 
     @property
     def last_feedback(self) -> int:
-        """Of the task under way; 0 without."""
+        """Last feedback of the task under way; 0 without."""
         return int(self.current.last or 0) if self.current else 0
 
     def start(

@@ -38,7 +38,7 @@ class WayAhead:
         self._seen_at = Pose()  # odom
 
     def lift(self, wanted: FootLift | None) -> FootLift:
-        """As ``wanted``, but over what is in the way if legs can be lifted so high; what is higher stays there."""
+        """Return ``wanted``, raised over what is in the way if the legs can be lifted so high."""
         wanted, height = wanted or FootLift(), _height_ahead(self._robot)
         here = self._robot[Odometry].reading.pose if Odometry in self._robot else Pose()
         if FLOOR < height >= self._height or here.distance_to(self._seen_at) > PASSED:
@@ -50,7 +50,7 @@ class WayAhead:
 
 
 def _height_ahead(robot: Robot) -> float:
-    """Of the highest thing that lies right ahead, m."""
+    """Return the height of the highest thing right ahead, m."""
     points = _seen(robot)
     x, y, z = points.T
     ahead = z[(x > AHEAD[0]) & (x < AHEAD[1]) & (np.abs(y) < BESIDE)]

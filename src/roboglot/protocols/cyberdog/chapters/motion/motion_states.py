@@ -1,4 +1,4 @@
-"""In which postures motions begin, and what the body and its actions do now."""
+"""Postures in which motions begin, and the current state of the body and its actions."""
 
 from __future__ import annotations
 

@@ -39,14 +39,14 @@ class Region(msgspec.Struct):
 
 @dataclass(frozen=True, slots=True)
 class Manner:
-    """At which side of the person, and how far away (m)."""
+    """Manner of following: at which side of the person, and how far away (m)."""
 
     side: FollowSide
     distance: float
 
 
 def manner_of(relative_pos: int, keep_distance: float) -> Manner:
-    """From the wire's numbers; 0 m is no wish. Raises BadParameters for an unknown side."""
+    """Return the manner by the wire's numbers; 0 m is no wish. Raises BadParameters for an unknown side."""
     if relative_pos not in SIDES:
         raise BadParameters("relative_pos is 200 to 203")
     distance = keep_distance if keep_distance > 0.0 else DISTANCE

@@ -95,7 +95,7 @@ async def connected(call: Call) -> dict[str, object]:
 
 @TABLE.on(Code.BLUETOOTH_FIRMWARE, right=Right.SEE, needs=(Bluetooth,))
 async def firmware_version(call: Call) -> dict[str, object]:
-    """Of the connected device."""
+    """Return the firmware version of the connected device."""
     device = call.context.robot[Bluetooth].connected
     return {"success": device is not None, "message": device.firmware if device else ""}
 

@@ -18,7 +18,7 @@ OVER_TIME = frozenset({SkinMode.REARWARD, SkinMode.FORWARD, SkinMode.FLASH, Skin
 
 @TABLE.on(Code.ENABLE_SKIN, right=Right.DRIVE, needs=(ElectronicSkin,))
 async def enable_skin(call: Call, *, data: bool) -> dict[str, object]:
-    """On or off; off, it is dark."""
+    """Switch the skin on or off; off, it is dark."""
     call.context.robot[ElectronicSkin].enable(data)
     return {"success": True, "message": ""}
 

@@ -113,7 +113,7 @@ def _battery(context: Context) -> dict[str, object]:
 
 
 def _wifi(context: Context) -> dict[str, object]:
-    """Its network in the simulated world, but the address where clients reach it."""
+    """Return its network in the simulated world, but the address where clients reach it."""
     if Network not in context.robot:
         return {"name": "", "ip": context.address, "mac": "", "strength": 0}
     network = context.robot[Network]

@@ -62,7 +62,7 @@ class Unable(Exception):
 
 
 class UpdateJobs:
-    """At most one goal is under way; it goes on when its stream breaks."""
+    """Jobs of updates: at most one goal is under way; it goes on when its stream breaks."""
 
     def __init__(self, robot: Robot, updates: Updates) -> None:
         self.stream: Stream | None = None  # of the goal under way

@@ -83,7 +83,7 @@ class Updates:
         app.on_found.append(self._tell_result)
 
     def progress(self) -> dict[str, int]:
-        """As in 5005."""
+        """Return the progress as in 5005."""
         progress = self._robot[Firmware].progress
         share = round(100 * progress.share)
         match progress.state:
@@ -170,7 +170,7 @@ class Updates:
             self._app.push(STATUS, {"status": word, "code": GOOD})
 
     def _tell_result(self) -> None:
-        """After the reboot: whether the robot runs what was installed."""
+        """Report after the reboot whether the robot runs what was installed."""
         wanted = kept(self._robot, UPDATE, "")
         if not wanted or Firmware not in self._robot or self._robot[Firmware].progress.state in UNDER_WAY:
             return

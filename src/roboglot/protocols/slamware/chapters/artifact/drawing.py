@@ -38,7 +38,7 @@ def line_of(kind: LineKind, line: wire.Line) -> Line:
 
 
 def wire_line(line: Line) -> wire.Line:
-    """As the API writes it."""
+    """Return the line as the API writes it."""
     return wire.Line(_wire_point(line.start), _wire_point(line.end), line.id, dict(line.metadata))
 
 
@@ -63,7 +63,7 @@ def area_of(usage: AreaUsage, rectangle: wire.Strip, metadata: dict[str, str], i
 
 
 def wire_area(area: Area) -> wire.RectangleArea:
-    """As the API writes it."""
+    """Return the area as the API writes it."""
     rectangle = wire.Strip(_wire_point(area.start), _wire_point(area.end), area.half_width)
     return wire.RectangleArea(area.id, AREA_USAGES[area.kind], rectangle, dict(area.metadata))
 

@@ -24,7 +24,7 @@ API = "/api/core/artifact/v1/laser-landmarks"
 
 @TABLE.on(f"GET {API}", right=Right.SEE, needs=(MapAnnotations,))
 async def get_laser_landmarks(context: Context) -> list[PoseEntry]:
-    """Those that the lidar found and those that were set."""
+    """Return the landmarks that the lidar found and those that were set."""
     return [entry_of(mark) for mark in context.robot[MapAnnotations].current.landmarks]
 
 

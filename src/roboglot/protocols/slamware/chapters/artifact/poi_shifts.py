@@ -13,7 +13,7 @@ from roboglot.model.robot import Robot
 
 @dataclass(frozen=True, slots=True)
 class Shift:
-    """Of one place: the pose that it has, and the one that it should have."""
+    """Shift of one place: the pose that it has, and the one that it should have."""
 
     has: Pose
     should: Pose
@@ -55,6 +55,6 @@ class PoiShifts:
 
 
 def _moved(pose: Pose, moved: Sequence[tuple[Pose, Pose]]) -> Pose:
-    """As the nearest of the places that are known before and after."""
+    """Return the pose moved as the nearest of the places that are known before and after."""
     before, after = min(moved, key=lambda pair: pair[0].distance_to(pose))
     return after.compose(pose.relative_to(before))

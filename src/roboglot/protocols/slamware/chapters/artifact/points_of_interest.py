@@ -36,7 +36,7 @@ async def clear_pois(context: Context) -> bool:
 
 @TABLE.on(f"POST {API}/:adjust", right=Right.EDIT, needs=(Places,))
 async def adjust_pois(context: Context) -> None:
-    """After a loop was closed: put the places that were there before to where they are on the straightened map."""
+    """Put places from before a loop closure to where they are on the straightened map."""
     await context.shifts.adjust()
 
 

@@ -81,7 +81,7 @@ async def set_work_mode(context: Context, body: WorkModeEntry) -> OperationReply
 
 @TABLE.on(f"GET {API}/admin/language", right=Right.SEE, needs=(Settings,))
 async def get_language(context: Context) -> Language:
-    """As it was set; at first Chinese."""
+    """Return the language that was set; at first Chinese."""
     return Language(language_of(context.robot))
 
 

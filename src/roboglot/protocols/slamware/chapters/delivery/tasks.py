@@ -43,7 +43,7 @@ StatusFilter = Literal["ready", "running", "succeeded", "failed", "all"]
 async def get_tasks(
     context: Context, type: KindFilter | None = None, status: StatusFilter | None = None
 ) -> list[DeliveryTask]:
-    """Those ready and running, oldest first; with ``status`` all also those that ended."""
+    """Return the tasks ready and running, oldest first; with ``status`` all also those that ended."""
     return [
         task_of(context.robot, order)
         for order in context.robot[Delivery].orders

@@ -195,5 +195,5 @@ def box_of(state: BoxState) -> Box:
 
 
 def orientation_and_type(compartment: Compartment) -> tuple[str, str]:
-    """In capitals."""
+    """Return both in capitals."""
     return compartment.orientation.upper(), compartment.kind.upper()

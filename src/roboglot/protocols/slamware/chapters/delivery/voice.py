@@ -23,7 +23,7 @@ PHRASES = {
 
 
 def language_of(robot: Robot) -> str:
-    """As it was set; at first Chinese."""
+    """Return the language that was set; at first Chinese."""
     return str(robot[Settings].get(LANGUAGE, LANGUAGE_AT_FIRST))
 
 

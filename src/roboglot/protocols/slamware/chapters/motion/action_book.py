@@ -67,7 +67,7 @@ class ActionBook:
             action.cancel("aborted by a client")
 
     def name_of(self, action: Action) -> str:
-        """As what it was asked for, or the nearest vendor name."""
+        """Return the name that it was asked for by, or the nearest vendor name."""
         name, _ = self._named.get(action.id, (self.prefix + _vendor_word(action.name), action))
         return name
 

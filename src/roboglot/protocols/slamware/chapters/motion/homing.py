@@ -25,7 +25,7 @@ PARKING = "PARKING"  # the type of places to park at
 
 
 def go_home(context: Context, options: GoHomeOptions) -> Action:
-    """To the landing point, and by default onto the dock, some times over if need be."""
+    """Drive to the landing point, and by default onto the dock, some times over if need be."""
     wanted = options.gohome_options or GoHome()
     how = wanted.move_options or MoveOptions()
     navigation_options(context.robot, how, None)  # what cannot be done is refused now, not on the way
@@ -69,7 +69,7 @@ async def _to_landing(errand: Errand, home: Pose | None, how: MoveOptions) -> No
 
 
 def return_to_parking(context: Context, options: ReturnToParkingOptions) -> Action:
-    """To the named parking place, or to the nearest one that is free."""
+    """Drive to the named parking place, or to the nearest one that is free."""
     how = options.move_options or MoveOptions()
     navigation_options(context.robot, how, None)
     named = options.target.poi_name if options.target else ""
@@ -91,7 +91,7 @@ def _parking(places: list[PointOfInterest], named: str) -> list[PointOfInterest]
 
 
 async def _park(errand: Errand, places: list[PointOfInterest], how: MoveOptions) -> None:
-    """At the nearest of ``places``; if that is occupied, at the next."""
+    """Park at the nearest of ``places``; if that is occupied, at the next."""
     here = errand.robot[Localization].pose
     problem: Blocked | Unreachable | None = None
     for place in sorted(places, key=lambda place: place.pose.distance_to(here)):

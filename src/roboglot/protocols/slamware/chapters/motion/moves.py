@@ -94,7 +94,7 @@ def _points(places: Sequence[geometry.Location | geometry.Point]) -> list[Point]
 
 
 def move_to(context: Context, options: MoveToOptions) -> Action:
-    """To one place."""
+    """Drive to one place."""
     return navigate(context.robot, _points([options.target]), options.move_options or MoveOptions())
 
 
@@ -140,11 +140,11 @@ def move_by(context: Context, options: MoveByOptions) -> Action:
 
 
 def rotate(context: Context, options: AngleOptions) -> Action:
-    """By an angle."""
+    """Turn by an angle."""
     return context.robot[Driving].move_by(Pose(yaw=options.angle), source=SOURCE)
 
 
 def rotate_to(context: Context, options: AngleOptions) -> Action:
-    """To a heading, the shorter way round."""
+    """Turn to a heading, the shorter way round."""
     turn = wrap_angle(options.angle - context.robot[Localization].pose.yaw)
     return context.robot[Driving].move_by(Pose(yaw=turn), source=SOURCE)

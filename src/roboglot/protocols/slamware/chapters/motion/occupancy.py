@@ -15,7 +15,7 @@ CERTAIN = 40  # evidence from which a cell counts as occupied
 
 
 def stands_in_something(robot: Robot) -> bool:
-    """For a robot that is about to drive."""
+    """Return whether a robot that is about to drive stands in something."""
     if Localization not in robot or Mapping not in robot:
         return False
     here, reach = robot[Localization].pose, robot.description.radius * SHARE

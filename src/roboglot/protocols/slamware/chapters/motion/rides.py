@@ -45,7 +45,7 @@ ENTER_SECONDS = LEAVE_SECONDS = 120.0  # when the client sets no limit
 
 
 def multi_floor_move(context: Context, options: MultiFloorMoveOptions) -> Action:
-    """To a place by its name, or to a pose on a floor, by lift if need be."""
+    """Drive to a place by its name, or to a pose on a floor, by lift if need be."""
     how, target = options.move_options or MoveOptions(), options.target
     navigation_options(context.robot, how, None)
     if not target.poi_name and target.pose is None:
@@ -65,7 +65,7 @@ def multi_floor_move(context: Context, options: MultiFloorMoveOptions) -> Action
 
 
 def multi_floor_back_home(context: Context, options: GoHomeOptions) -> Action:
-    """To the bound dock, or the next best, on whatever floor it is."""
+    """Drive to the bound dock, or the next best, on whatever floor it is."""
     wanted = options.gohome_options or GoHome()
     navigation_options(context.robot, wanted.move_options or MoveOptions(), None)
 
@@ -179,7 +179,7 @@ def enter_elevator(context: Context, options: EnterElevatorOptions) -> Action:
 
 
 async def _cross(errand: Errand, elevator: Elevator, door: Door) -> None:
-    """To where one waits at that door."""
+    """Drive to where one waits at that door."""
     waiting = elevator.waiting(rear=door is Door.REAR)
     await errand.do(navigate(errand.robot, [waiting.point], MoveOptions(), source=PART, yaw=waiting.yaw))
 

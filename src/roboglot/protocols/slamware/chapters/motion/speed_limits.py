@@ -25,7 +25,7 @@ class SpeedLimits:
         self._endings: list[Callable[[], None]] = []
 
     def start(self) -> None:
-        """As configured; what is set by parameters is forgotten when the robot restarts."""
+        """Set the configured limits; parameters set by clients are forgotten when the robot restarts."""
         listen = self._robot.events.listen
         self.reset()
         self._endings = [listen(kind, lambda _: self.reset()) for kind in (Rebooted, ModuleRestarted)]
@@ -38,7 +38,7 @@ class SpeedLimits:
             self._robot[Base].limits = replace(self._robot[Base].limits, twist=self._built)
 
     def reset(self) -> None:
-        """As configured, else as built."""
+        """Set the configured limits, else those of the build."""
         if Base in self._robot:
             base = self._robot[Base]
             speed, turning = self._configured()

@@ -32,7 +32,7 @@ MARKS = {
 
 
 def move_to_tag(context: Context, options: MoveToTagOptions) -> Action:
-    """To the target, and from there to a place before the tag that is seen there, or under the shelf."""
+    """Drive to the target, and from there to a place before the tag that is seen there, or under the shelf."""
     offset = options.target_relative_pose
     goal = MarkGoal(
         mark=MARKS[options.tag_type],

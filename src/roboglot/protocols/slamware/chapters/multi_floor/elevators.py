@@ -71,12 +71,12 @@ class Elevator:
 
     @property
     def inside(self) -> Pose:
-        """In the middle of the car, facing away from the front door."""
+        """Pose in the middle of the car, facing away from the front door."""
         a, b = self.area.start, self.area.end
         return Pose((a.x + b.x) / 2, (a.y + b.y) / 2, self.inward)
 
     def waiting(self, *, rear: bool = False) -> Pose:
-        """Before a door, facing it."""
+        """Pose before a door, facing it."""
         door, yaw = (self.area.end, self.inward + math.pi) if rear else (self.area.start, self.inward)
         return Pose(door.x, door.y, wrap_angle(yaw)).compose(Pose(-self.sill - self.distance))
 
@@ -94,7 +94,7 @@ class Elevator:
 
     @property
     def info(self) -> ElevatorInfo:
-        """As the API writes it."""
+        """Return the elevator as the API writes it."""
         front = [] if self.doors is DoorType.REAR else [pose3d(self.waiting())]
         rear = [] if self.doors is DoorType.FRONT else [pose3d(self.waiting(rear=True))]
         return ElevatorInfo(self.doors, self.id, front, rear)

@@ -23,7 +23,7 @@ class LoadedStoreys:
         return _label(self._context.maps.current)
 
     def places(self) -> list[StoreyPlace]:
-        """Of the floors that are not in memory."""
+        """Return places of the floors that are not in memory."""
         others = (floor for floor in self._context.maps.floors if _label(floor.name) != self.current)
         return [StoreyPlace(_label(floor.name), place) for floor in others for place in floor.places]
 
@@ -33,7 +33,7 @@ class LoadedStoreys:
         return _label(found.name) if found else self.current
 
     def go_to(self, floor: str, source: str) -> Action:
-        """By lift."""
+        """Drive there by lift."""
         found = next((known for known in self._context.maps.floors if _label(known.name) == floor), None)
         if found is None:
             raise InvalidGoal(f"no floor {floor} is loaded")

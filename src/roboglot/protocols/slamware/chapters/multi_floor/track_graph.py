@@ -41,7 +41,7 @@ def way_along(tracks: Sequence[Line], start: Point, end: Point, *, directed: boo
 
 
 def _shares(begins: _Points, spans: _Points, point: _Points) -> NDArray[np.float64]:
-    """For each piece how far along it (0..1) it comes nearest to ``point``."""
+    """Return how far along each piece (0..1) it comes nearest to ``point``."""
     shares: NDArray[np.float64] = ((point - begins) * spans).sum(axis=1) / (spans**2).sum(axis=1)
     return shares.clip(0.0, 1.0)
 
@@ -81,7 +81,7 @@ def _index(nodes: _Points, point: _Points) -> int:
 
 
 def _edges(nodes: _Points, begins: _Points, spans: _Points, *, directed: bool) -> dict[int, dict[int, float]]:
-    """From each node the ways (m) to the next ones along the pieces."""
+    """Return the ways (m) from each node to the next ones along the pieces."""
     edges: dict[int, dict[int, float]] = {}
     for begin, span in zip(begins, spans, strict=True):
         shares = np.clip(((nodes - begin) @ span) / (span @ span), 0.0, 1.0)

@@ -53,7 +53,7 @@ class FloorName:
 
     @property
     def pairs(self) -> Pairs:
-        """As layers say it."""
+        """Return the name as layers carry it."""
         default = "true" if self.default else "false"
         return (("building", self.building), ("floor", self.floor), ("order", str(self.order)), ("default", default))
 

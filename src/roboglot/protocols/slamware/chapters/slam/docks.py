@@ -93,7 +93,7 @@ async def clear_home_docks(context: Context) -> PoseEntry | None:
 
 @TABLE.on(f"POST {API}/homedocks/:register", right=Right.EDIT, needs=(Docking, Localization, MapAnnotations, Settings))
 async def register_home_dock(context: Context, body: Registration) -> PoseEntry:
-    """There is a dock where the robot stands now."""
+    """Register a dock where the robot stands."""
     robot = context.robot
     made = f"{robot.description.serial} dock {robot.clock.epoch()}"
     dock = _entered(robot, PoseEntry(str(uuid.uuid5(uuid.NAMESPACE_OID, made)), None, body.metadata))

@@ -197,7 +197,7 @@ class MapKeeper:
         raise NotFound(f"no floor {floor!r} of {building!r} is loaded")
 
     def forget_floors(self) -> None:
-        """As if nothing had been loaded; the map in memory stays."""
+        """Forget the loaded floors; the map in memory stays."""
         self.floors, self.status, self.current = (), MapLoadStatus.NOT_LOADED, FloorName()
 
     async def _parse(self, data: bytes) -> list[FloorMap]:
@@ -247,7 +247,7 @@ class MapKeeper:
             self._layers = ()
 
     async def move_origin(self, origin: Point) -> None:
-        """Everything in memory that is drawn, as seen from there; the grid's origin has been moved already."""
+        """Move what is drawn in memory to the new origin; the grid's origin has been moved already."""
         async with self._turn:
             basis = {digest: (x + origin.x, y + origin.y) for digest, (x, y) in self._basis.items()}
             await self._robot[MapMemory].replace(
@@ -256,7 +256,7 @@ class MapKeeper:
             self._layers = ()
 
     async def _turn_over(self, floor: FloorMap, digest: str) -> None:
-        """From memory's floor to ``floor`` of the map with ``digest``: its drawings are kept, those there come back."""
+        """Change from memory's floor to ``floor`` of the map with ``digest``, each with its drawings."""
         if digest not in self._basis:  # memory is of another map
             await self._put_drawings(floor, {digest: NOT_MOVED})
             return
@@ -281,7 +281,7 @@ class MapKeeper:
             return {}
 
     async def _put_drawings(self, floor: FloorMap, basis: dict[str, Sequence[float]]) -> None:
-        """Those of the file instead of memory's: all or nothing."""
+        """Replace memory's drawings by those of the file: all or nothing."""
         await self._robot[MapMemory].replace(lambda _: _replacement(floor, basis, {}))
 
 

@@ -43,7 +43,7 @@ class Totals:
 
     @property
     def seconds(self) -> float:
-        """Of robot time so far."""
+        """Robot time so far, s."""
         return self._before[1] + self._robot.clock.time()
 
     def _wait(self) -> None:

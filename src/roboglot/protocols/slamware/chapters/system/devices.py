@@ -112,7 +112,7 @@ async def set_sensor_mask(context: Context, body: Annotated[list[SensorSwitch], 
 
 
 def restore_masks(robot: Robot) -> None:
-    """At a start: what is to be off always is, and nothing else."""
+    """Restore the masks at a start: what is to be off always is, and nothing else."""
     if SensorMasks not in robot or Settings not in robot:
         return
     masks, always = robot[SensorMasks], set(robot[Settings].get(MASKED, []))

@@ -45,7 +45,7 @@ class Show:
         self._step = max(wanted.bright_ms / 1000, STEP_MIN)
 
     async def run(self) -> None:
-        """Until cancelled, or at once for a constant light."""
+        """Show until cancelled, or set a constant light at once."""
         colour = _colour(self._wanted.color)
         match self._wanted.mode:
             case Mode.ALWAYS_BRIGHT:
