@@ -26,6 +26,7 @@ async def test_nothing_that_stands_is_shoved() -> None:
     assert not outcome.sure_but_astray
 
 
+@pytest.mark.slow  # six robots in short: test_nothing_that_stands_is_shoved
 async def test_ten_robots_leave_one_corridor() -> None:
     outcome = await leave(1, seconds=25.0)
     assert outcome.shoved <= SHOVED, outcome.worst

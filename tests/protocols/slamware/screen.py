@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import httpx
 
+from roboglot.model.components.logistics.delivery import Delivery
 from roboglot.model.geometry import Pose
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
@@ -20,7 +22,7 @@ class Screen:
     def __init__(self, client: httpx.AsyncClient, forward: Forward, world: World) -> None:
         self.client, self.forward = client, forward
         self.origin = world.truth.pose_of("a")
-        self._world = world
+        self._world, self._robot = world, world.robot("a")
         self.cargo = ""
         self.boxes: list[int] = []
 
@@ -33,6 +35,11 @@ class Screen:
             assert (await self.client.post(POIS, json=body)).status_code == 200
         cargo = (await self.client.get(f"{API}/cargos")).json()[0]
         self.cargo, self.boxes = cargo["id"], [box["id"] for box in cargo["boxes"]]
+
+    async def wait_for_pickups(self, *, seconds: float) -> None:
+        """Have the robot wait so long instead of the usual 300 s."""
+        delivery = self._robot[Delivery]
+        await delivery.set_policy(replace(delivery.policy, pickup_seconds=seconds))
 
     @property
     def pose(self) -> Pose:

@@ -113,9 +113,12 @@ async def test_a_task_of_a_cabinet(screen: Screen, robot: Robot, cloud: Path) ->
 
 async def test_a_cabinet_that_gives_nothing(screen: Screen, cloud: Path) -> None:
     await screen.prepare(cabinet=(1.5, 0.0, ""), R101=(3.0, 0.0, "ROOM"))
+    await screen.wait_for_pickups(seconds=40)
     cargos = [{"cargo_id": screen.cargo, "boxes": ["000"]}]
     give(cloud, "18", type="STATION_TAKEOUT", location={"poi_name": "R101", "task_points": ["cabinet"]}, cargos=cargos)
-    await screen.forward(seconds=340)
+    await screen.forward(seconds=40)
+    assert (await screen.task("18"))["status"] == "RUNNING"
+    await screen.forward(seconds=40)
     task = await screen.task("18")
     assert (task["status"], task["result"]["reason"]) == ("FAILED", "the cabinet put nothing into a box")
     assert (await screen.box(0))["door_status"] == "CLOSED"

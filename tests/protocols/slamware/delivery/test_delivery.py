@@ -131,6 +131,7 @@ async def test_cancel_brakes_and_finish_ends_as_succeeded(screen: Screen) -> Non
 
 async def test_stops_on_the_way_wait_for_the_operation(screen: Screen) -> None:
     await screen.prepare(A01=(1.0, 0.0, "ROOM"), A02=(1.0, 1.5, "ROOM"), end=(2.5, 1.5, "TABLE"))
+    await screen.wait_for_pickups(seconds=40)
     number = await screen.create("end", "RECYCLE", stops=["A01", "A02"])
     assert (await screen.stage())["stage"] == "GOING_TO_TASK_POINT"
     stage = await screen.until("ARRIVED_AT_TASK_POINT")
@@ -139,7 +140,9 @@ async def test_stops_on_the_way_wait_for_the_operation(screen: Screen) -> None:
     assert await screen.say("end_operation") == 204
     await screen.until("GOING_TO_TASK_POINT", within=5)
     await screen.until("ARRIVED_AT_TASK_POINT")
-    await screen.forward(seconds=301)  # no one says that it may go on
+    await screen.forward(seconds=38)
+    assert (await screen.stage())["stage"] == "ARRIVED_AT_TASK_POINT"
+    await screen.forward(seconds=3)  # no one says that it may go on
     await screen.until("ARRIVED_AT_TARGET")
     assert_pose(screen.pose, x=2.5, y=1.5, within=0.15)
     assert await screen.say("end_pickup") == 204

@@ -46,16 +46,16 @@ async def test_work_modes_decide_who_may_order_what(screen: Screen) -> None:
 
 async def test_tasks_wait_for_working_hours(screen: Screen, robot: Robot) -> None:
     await screen.prepare(R101=(1.5, 0.0, "ROOM"))
-    hours = {"hours": [{"start_time": "00:02:00", "end_time": "00:04:00"}], "restdays": [0]}
+    hours = {"hours": [{"start_time": "00:01:00", "end_time": "00:02:10"}], "restdays": [0]}
     await put(screen, "admin/working_time", hours)  # the virtual day, a Thursday, began a second ago
     assert await get(screen, "admin/working_time") == hours
     number = await screen.create("R101", "RETURN")
-    await screen.forward(seconds=100)
+    await screen.forward(seconds=50)
     assert (await screen.task(number))["status"] == "READY"
     assert robot[DockContact].docked
     await screen.forward(seconds=60)
     assert (await screen.task(number))["status"] == "SUCCEEDED"
-    await screen.forward(seconds=100)
+    await screen.forward(seconds=60)
     assert robot[DockContact].docked
     events = await screen.events()
     assert [event for event in events if "WORK" in event] == ["GET_OFF_WORK", "START_TO_WORK", "GET_OFF_WORK"]
