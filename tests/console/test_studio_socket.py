@@ -13,7 +13,10 @@ import pytest
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
+from roboglot.console.settings import JOIN_BURST
 from roboglot.console.studio.blocks import table
+from roboglot.console.studio.channel import MESSAGES_PER_SECOND_MAX
+from roboglot.console.studio.classroom import PUPILS_MAX
 from roboglot.console.studio.mistakes import explain
 from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.language import check
@@ -234,6 +237,62 @@ async def test_a_flood_of_messages_closes_the_page(shown: Shown) -> None:
     async with page(shown) as studio:
         with pytest.raises(ConnectionClosed):
             await flood(studio)
+
+
+async def test_codes_cannot_be_tried_out(shown: Shown) -> None:
+    async with page(shown) as teacher, page(shown) as guest:
+        await teacher.say(type="class", do="open", name="7b")
+        code = (await teacher.kind("grid"))["code"]
+        for number in range(2 * JOIN_BURST):  # right ones are free
+            await guest.say(type="class", do="join", code=code, name=f"pupil {number % 2}")
+            await guest.kind("joined")
+            await asyncio.sleep(1.0 / MESSAGES_PER_SECOND_MAX)
+        for number in range(JOIN_BURST + 1):
+            await guest.say(type="class", do="join", id=7, code=f"WRONG{number}", name="Eve")
+            why = (await guest.kind("refused"))["why"]
+        assert "too many wrong codes" in why
+    async with page(shown) as again:  # the address, not the page
+        said = set()
+        for number in range(JOIN_BURST // 2):
+            await again.say(type="class", do="join", id=7, code=f"WRONG{number}", name="Eve")
+            said.add((await again.kind("refused"))["why"].partition(":")[0])
+        assert "too many wrong codes from your address" in said
+
+
+async def test_names_alone_do_not_fill_a_class(shown: Shown) -> None:
+    async with page(shown) as teacher, page(shown) as eve, page(shown) as anna:
+        await teacher.say(type="class", do="open", name="7b")
+        code = (await teacher.kind("grid"))["code"]
+        await anna.say(type="class", do="join", code=code, name="Anna", style="{}")
+        await anna.kind("joined")
+        for number in range(PUPILS_MAX + 5):
+            await eve.say(type="class", do="join", code=code, name=f"Eve {number}")
+            await eve.kind("joined")
+            await asyncio.sleep(1.0 / MESSAGES_PER_SECOND_MAX)
+        grid = await teacher.until(lambda m: m["type"] == "grid" and m["pupils"][-1]["name"] == f"Eve {PUPILS_MAX + 4}")
+        assert len(grid["pupils"]) == PUPILS_MAX
+        assert grid["pupils"][0]["name"] == "Anna"
+
+
+@pytest.mark.parametrize(
+    "wish",
+    [
+        {"do": "open", "name": "x" * 41},
+        {"do": "join", "code": "x" * 13, "name": "a"},
+        {"do": "join", "code": "x", "name": "x" * 41},
+        {"do": "hand_in", "style": "x" * 400_001},
+        {"do": "doing", "doing": {"lit": "x" * 301}},
+        {"do": "doing", "doing": {"stars": 1001}},
+        {"do": "erase"},
+    ],
+)
+async def test_wishes_of_a_class_are_bounded(shown: Shown, wish: dict[str, object]) -> None:
+    async with page(shown) as hostile, page(shown) as other:
+        await hostile.say(type="class", **wish)
+        with pytest.raises(ConnectionClosed):
+            await hostile.kind("joined")
+        await other.say(type="check", id=1, body="x = 1")
+        assert (await other.kind("checked"))["problems"] == []
 
 
 async def test_pages_of_strangers_are_refused(shown: Shown) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import time
 from importlib import import_module
 from typing import TYPE_CHECKING, TypeVar, cast
 
@@ -18,7 +19,7 @@ from roboglot.console.people.classes import Classes
 from roboglot.console.people.entry import CHALLENGE, admission_of, enter
 from roboglot.console.people.sessions import Sessions
 from roboglot.console.people.signing import Signing
-from roboglot.console.settings import MESSAGE_MAX, VIEWERS_MAX
+from roboglot.console.settings import JOIN_BURST, JOIN_TRIES, MESSAGE_MAX, VIEWERS_MAX
 from roboglot.console.studio.channel import MESSAGE_MAX as STUDIO_MESSAGE_MAX
 from roboglot.console.studio.channel import Session
 from roboglot.console.studio.class_link import Hello, LinkedRoom
@@ -30,6 +31,7 @@ from roboglot.model.background import load
 from roboglot.model.client_context import client, identity
 from roboglot.model.errors import NotFound
 from roboglot.protocols.browsers import Browsers, of_rows
+from roboglot.transport.limiter import Limiter
 
 if TYPE_CHECKING:
     from roboglot.console.metrics import Metrics
@@ -55,6 +57,7 @@ class Application:
         self._login = Sessions()
         self._classes = Classes(desk, self._classroom, self._stop, self._listening.values, self._put_out)
         self._api = Api(desk, self._classes)
+        self._codes = Limiter(JOIN_TRIES / 60.0, JOIN_BURST, time.monotonic)
         self._signing = Signing(desk, self._login, self._classes)
         for robot in desk.robots.values():
             robot.admission.on_lost(self._close_pages_of)
@@ -188,7 +191,7 @@ class Application:
             return
         await send({"type": "websocket.accept"})
         if scope["path"] == "/studio":
-            session = Session(self._desk, self._classroom, lambda data: _pass(send, data))
+            session = Session(self._desk, self._classroom, lambda data: _pass(send, data), self._codes)
             await self._talk(session, self.sessions, STUDIO_MESSAGE_MAX, receive, send)
         else:
             page = Page(self._desk, lambda data: _pass(send, data), named)

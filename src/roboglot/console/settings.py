@@ -8,6 +8,7 @@ BODY_MAX = 256 * 1024  # bytes of a request's body
 MESSAGES_PER_SECOND_MAX = 100  # of one page
 NAME_MAX = 40  # characters of a person's name
 JOIN_TRIES = 10  # wrong codes of a class a minute, of one address
+JOIN_BURST = 60  # of them at once on pages: a whole class may come back at the same moment
 WISHES_MAX = 32  # commands of one page under way
 CALLS_MAX = 8  # pages that show live video by WebRTC
 CALL_SECONDS = 20.0  # in which such a call is connected

@@ -26,14 +26,15 @@ from roboglot.console.studio.classroom import Room
 from roboglot.console.studio.mistakes import explain
 from roboglot.console.studio.programs import Programs
 from roboglot.console.studio.trial import Trial, TrialEnd, TrialWish
-from roboglot.model.client_context import identity
-from roboglot.model.errors import NotFound, RobotError
+from roboglot.model.client_context import connection, identity
+from roboglot.model.errors import NotFound, Refused, RobotError
 from roboglot.operations import Right
 from roboglot.programs.errors import ProgramError
 from roboglot.programs.language import Problem
 from roboglot.programs.stores import LogEntry
 from roboglot.programs.tasks import debugging
 from roboglot.programs.tasks.reports import Insight, Reading
+from roboglot.transport.limiter import Limiter
 from roboglot.wire.visual.requests import BODY_MAX, FRAME_MAX, ID_MAX
 
 log = logging.getLogger(__name__)
@@ -100,8 +101,10 @@ class Session:
 
     longest = 0  # bytes of a frame: no limit
 
-    def __init__(self, desk: Desk, classroom: Room, send: Send) -> None:
-        self._desk, self._send = desk, send
+    def __init__(self, desk: Desk, classroom: Room, send: Send, codes: Limiter) -> None:
+        """``codes``: how many wrong codes of classes an address may try."""
+        self._desk, self._send, self._codes = desk, send, codes
+        self._showed = ""  # the address that showed a code, until it is known to be right
         self._programs: Programs | None = None
         self._shown = ""  # the program; empty: all
         self._leaving: list[Callable[[], None]] = []
@@ -133,6 +136,9 @@ class Session:
 
     def tell(self, message: dict[str, object]) -> None:
         """Send a message when its turn comes."""
+        if self._showed and message["type"] in ("joined", "elsewhere", "grid"):
+            self._codes.give_back(self._showed)
+            self._showed = ""
         if message["type"] in ("variables", "grid", "map"):  # only the newest counts
             kind = [message.get(key) for key in ("type", "task", "name")]
             same = (m for m in self._waiting if [m.get(key) for key in ("type", "task", "name")] == kind)
@@ -243,12 +249,21 @@ class Session:
         if wish.do == "join" and (who := identity()) in self._desk.pupils:  # signed in by a code: as that pupil
             name, _, code = who.rpartition("@")
             wish = msgspec.structs.replace(wish, name=name, code=code)
+        elif wish.code and wish.do in ("join", "open"):
+            self._show_code()
         await self._seat.take(wish, may_teach=self._desk.may_teach)
         now = time.monotonic()
         if wish.do == "doing" and self._programs is not None and now - self._drawn >= DRAW_EVERY:
             self._drawn = now
             if picture := await draw_map(self._programs.robot):
                 self._seat.draw(picture)
+
+    def _show_code(self) -> None:
+        """Count it as wrong until the class answers. Raises Refused."""
+        host = connection().rpartition(":")[0]
+        if not self._codes.take(host):
+            raise Refused("too many wrong codes from your address: wait a minute")
+        self._showed = host
 
     async def _fetch(self, programs: Programs, wish: Fetch) -> None:
         service = programs.service

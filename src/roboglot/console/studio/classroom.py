@@ -60,6 +60,11 @@ class Pupil:
     bag: Bag = field(default_factory=Bag)
 
 
+def _idle(pupil: Pupil) -> bool:
+    """Return whether nothing is lost with a pupil: no page, no program, no star."""
+    return pupil.seat is None and not (pupil.bag.style or pupil.bag.handed or pupil.doing.stars)
+
+
 class Class:
     """A class and its teachers' pages. ``only``: the one world that it is for; empty: all."""
 
@@ -78,6 +83,8 @@ class Class:
     def enrol(self, name: str) -> Pupil:
         """Return the pupil of that name, a new one if there is none. Raises Refused."""
         if name not in self.pupils:
+            if len(self.pupils) >= PUPILS_MAX and (idle := next(filter(_idle, self.pupils.values()), None)) is not None:
+                del self.pupils[idle.name]
             if len(self.pupils) >= PUPILS_MAX:
                 raise Refused(f"the class has {PUPILS_MAX} pupils")
             self.pupils[name] = Pupil(name, world=NOWHERE, bag=Bag(name))
@@ -203,8 +210,8 @@ class Classroom:
         return Place(joined.code, "" if elsewhere is None else elsewhere.page, seconds)
 
     async def keep(self, code: str, pupil: Pupil) -> None:
-        """Write down what is kept of a pupil. Raises Refused if it cannot be kept."""
-        if self._files is None:
+        """Write down what is kept of a pupil, if there is anything. Raises Refused if it cannot be kept."""
+        if self._files is None or not (pupil.bag.style or pupil.bag.handed):
             return
         try:
             async with self._writing:  # one after the other, so that the newest stays
