@@ -120,6 +120,7 @@ function App() {
     <div class=${`notice ${notice.value.bad ? "bad" : ""}`} role="status" aria-live="polite">${notice.value.text}</div>`;
 }
 
+const NAMES_AFTER = 1000; // ms; a class does not ask at once
 const AWAY_AFTER = 2000; // ms until files are kept for the time without a server: the page itself comes first
 await Promise.all([loadWords("/words", "/studio/words"), loadTable()]);
 want({ moving: false }); // until a map is shown
@@ -134,7 +135,11 @@ effect(() => { if (current.value && online.value === "open") open(program.peek()
 const robot = computed(() => opened.value?.robot ?? "");
 effect(() => { if (robot.value) list().then(() => editor.modules.value.length && editor.remake()).then(handOver).catch(() => undefined); });
 effect(() => { void language.value; runner.show(); });
-effect(() => { if (runner.others.value.some((id) => !listed.peek().some((one) => one.id === id))) list().catch(() => undefined); }); // their names
+let naming = 0;
+effect(() => { // names of the others: looked up once for all that start together
+  if (naming || !runner.others.value.some((id) => !listed.peek().some((one) => one.id === id))) return;
+  naming = window.setTimeout(() => { naming = 0; list().catch(() => undefined); }, NAMES_AFTER * (1 + Math.random()));
+});
 effect(() => { if (status.value === "out") location.assign("/?to=studio"); }); // a name is needed (again)
 let shownId = program.peek().id;
 effect(() => {

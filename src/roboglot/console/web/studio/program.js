@@ -78,6 +78,15 @@ export async function isStored() {
   return Boolean(found) && found.body === python() && found.style === style() && found.state !== "error" && found.mode === "single" && found.condition === "now";
 }
 
+/** Save what is about to run; the save that its last change has waiting is then not needed. */
+export async function saveNow() {
+  const of = whole(), drawn = style(), saved = await saveFrame(of);
+  if (program.value.id !== of.id || python() !== of.body || style() !== drawn) return saved; // changed meanwhile
+  clearTimeout(timer);
+  if (!saved.feedback.state) { note(of.id, false); stored.value = "robot"; }
+  return saved;
+}
+
 async function saveToRobot(of = whole()) {
   if (!opened.value) return; // handed over when the robot is there
   if (!of.body.trim()) { note(of.id, false); return; }

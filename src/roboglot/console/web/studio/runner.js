@@ -6,7 +6,7 @@ import * as bubbles from "./bubbles.js";
 import * as editor from "./editor.js";
 import { ask, debug, frame, listen, online, opened } from "./link.js";
 import { learn, ownerOf } from "./modules.js";
-import { isStored, program, python, saveFrame } from "./program.js";
+import { isStored, program, python, saveNow } from "./program.js";
 
 const LINES_MAX = 500, READINGS_MAX = 40;
 export const phase = signal(/** @type {"idle" | "starting" | "running" | "paused"} */ ("idle"));
@@ -22,6 +22,19 @@ export const textBreaks = signal(/** @type {number[]} */ ([]));
 export const others = signal(/** @type {string[]} */ ([])); // other programs that run on this robot
 export const lights = { count: 0, late: 0 }; // for the benchmark
 let began = 0, next = 1, frameDue = false;
+const NOTE_AFTER = 300; // ms: a class that starts at once moves the page's banner once
+let noted = /** @type {Map<string, boolean>} */ (new Map());
+
+/** Another program runs, or runs no more. @param {string} id @param {boolean} runs */
+function note(id, runs) {
+  if (!noted.size) setTimeout(() => {
+    const now = new Set(others.value);
+    for (const [one, on] of noted) if (on) now.add(one); else now.delete(one);
+    noted = new Map();
+    if (now.size !== others.value.length || others.value.some((one) => !now.has(one))) others.value = [...now];
+  }, NOTE_AFTER);
+  noted.set(id, runs);
+}
 
 export const mine = (id) => id === program.value.id;
 const words = (/** @type {any} */ found) => found[language.value] || found.en || translated(found.text);
@@ -55,7 +68,7 @@ async function runNow(step) {
   printed.value = []; readings.value = []; variables.value = {}; failure.value = null; bubbles.clear();
   try {
     const [known, early] = await Promise.all([isStored(), debug(stops(step)).catch(() => null)]);
-    const saved = known ? null : await saveFrame();
+    const saved = known ? null : await saveNow();
     if (saved?.feedback.state) {
       phase.value = "idle";
       await check();
@@ -123,6 +136,7 @@ export function show() {
 /** The state of the robot after the page was opened, or the link came back. */
 export async function catchUp() {
   const running = opened.value?.running ?? [];
+  noted = new Map();
   others.value = running.filter((id) => !mine(id));
   if (running.includes(program.value.id)) await rejoin(); else settle("idle");
 }
@@ -199,8 +213,8 @@ function blameRun(found) {
 function report({ feedback, block }) {
   if (!feedback || feedback.type !== "task") return;
   if (!mine(feedback.target_id)) {
-    if (feedback.operate === "start" || /now state is suspend/.test(feedback.describe)) others.value = [...new Set([...others.value, feedback.target_id])];
-    if (feedback.operate === "stop" || /now state is shutdown/.test(feedback.describe)) others.value = others.value.filter((id) => id !== feedback.target_id);
+    if (feedback.operate === "start" || /now state is suspend/.test(feedback.describe)) note(feedback.target_id, true);
+    if (feedback.operate === "stop" || /now state is shutdown/.test(feedback.describe)) note(feedback.target_id, false);
     return;
   }
   if (block) {
