@@ -1,4 +1,4 @@
-"""The list of who may do what as it is in memory: looked up in at every request, made anew when the file changed."""
+"""Identities and their rights in memory: looked up at every request, made anew when the file changed."""
 
 from __future__ import annotations
 

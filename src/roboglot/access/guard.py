@@ -176,7 +176,7 @@ class Guard:
                     continue
                 newer = self._store.snapshot()
             except DatabaseError as error:
-                seldom.warning("list", "the list of who may do what cannot be read, and stays as it was: %s", error)
+                seldom.warning("list", "cannot read the list of identities, the last one stays: %s", error)
                 continue
             seen = newer.version
             loop.call_soon_threadsafe(partial(self._adopt_safely, newer))
@@ -187,7 +187,7 @@ class Guard:
         try:
             self._adopt(newer)
         except Exception:
-            log.exception("the list of who may do what could not be taken over: it stays as it was")
+            log.exception("cannot apply the list of identities, the last one stays")
 
 
 class RobotAdmission(Admission):

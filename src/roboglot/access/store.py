@@ -1,4 +1,4 @@
-"""The list of who may do what: written by ``roboglot access``, read by the running robots.
+"""Store of identities and their rights: written by ``roboglot access``, read by the running robots.
 
 It is a SQLite file of its own, or where robots are kept on a PostgreSQL server, there, for all programs of a fleet.
 Several programs use it at once, so every change is one transaction, and counts the version up.

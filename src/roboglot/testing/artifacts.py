@@ -38,7 +38,7 @@ def save(server: RobotServer, folder: Path, title: str, failure: str) -> Sequenc
             server.call(server.runtime.recorder.save_ring, recording)
             saved.append(recording)
     except Exception:
-        log.exception("what %s leaves behind could not be kept whole", title)
+        log.exception("cannot save all artifacts of %s", title)
     return saved
 
 

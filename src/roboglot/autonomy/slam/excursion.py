@@ -109,9 +109,9 @@ class Excursions:
         if excursion.way < WAY_MIN:
             return
         if any(self._is_denied(view) for view in views[:: math.ceil(len(views) / JUDGED_MAX)]):
-            log.info("what was seen while lost does not fit the map: %d scans are dropped", len(views))
+            log.info("dropped %d scans taken while lost: they do not fit the map", len(views))
             return
-        log.info("what was seen while lost is added to the map: %d scans on %.1f m", len(views), excursion.way)
+        log.info("added %d scans taken while lost to the map: %.1f m", len(views), excursion.way)
         self._joining.extend(views)
 
     def _is_denied(self, view: View) -> bool:

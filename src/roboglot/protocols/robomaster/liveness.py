@@ -144,7 +144,7 @@ class Vigil:
             if not self._drives(driver.name):
                 ask = driver.rest(echoed)
             elif driver.missing(echoed, elapsed):
-                log.warning("robomaster: %s does not answer; what it set in motion stops", driver.name)
+                log.warning("robomaster: %s does not answer; its motions are stopped", driver.name)
                 self._gone(driver.name)
             if ask and self._echoes:
                 self._echoes.ask(driver.host)
