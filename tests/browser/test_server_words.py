@@ -9,7 +9,7 @@ import pytest
 
 from roboglot.console.assets import FOLDER
 from tests.browser.served import OpenConsole, until
-from tests.browser.test_studio import Open, studio
+from tests.browser.test_studio import FOREVER, Open, loaded, studio
 
 __all__ = ["studio"]  # the fixture
 pytestmark = pytest.mark.asyncio(loop_scope="session")
@@ -60,3 +60,12 @@ async def test_refusals_are_in_the_language_of_the_page(studio: Open, language: 
     await page.fill("form:nth-of-type(1) input[name=name]", "Anna")
     await page.click("form:nth-of-type(1) button")
     await until(page, f"document.querySelector('.notice').textContent === {json.dumps(said)}")
+
+
+async def test_labels_of_blocks_are_chinese_too(studio: Open) -> None:
+    page = await studio(language="zh")
+    await loaded(page, FOREVER)
+    await until(page, "document.querySelector('.blocklyZoomIn, .blocklyZoom')")
+    labels = await page.evaluate("[...document.querySelectorAll('.workspace [aria-label]')].map(e => e.ariaLabel)")
+    assert labels
+    assert [label for label in labels if re.search("[A-Za-z]{4}", label)] == []

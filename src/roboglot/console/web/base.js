@@ -53,6 +53,9 @@ export async function loadWords(...from) {
 /** The words of the language chosen; those before it until they are there. */
 const spoken = () => words.value[language.value] ?? Object.values(words.value)[0] ?? {};
 
+/** What stands behind a prefix in the keys that there are. @param {string} prefix */
+export const keysUnder = (prefix) => Object.keys(spoken()).filter((key) => key.startsWith(prefix)).map((key) => key.slice(prefix.length));
+
 /** The sentence under a key, with {names} filled in; ``why`` is the server's. @param {string} key @param {Record<string, unknown>} [values] */
 export function t(key, values = {}) {
   const text = spoken()[key] ?? key;

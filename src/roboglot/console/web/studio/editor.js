@@ -1,7 +1,7 @@
 // The workspace of blocks: made, loaded, watched; which block is lit, where it halts, what is wrong with it.
 import * as Blockly from "blockly";
 import { effect, signal } from "@preact/signals";
-import { kept, language, say, t, theme as shade } from "../base.js";
+import { kept, keysUnder, language, say, t, theme as shade } from "../base.js";
 import { defineModule, newId, pythonOf } from "./blocks.js";
 import { together } from "./speed.js";
 import { found, noteUse, recentBlocks, theme, toolbox, wanted } from "./toolbox.js";
@@ -34,6 +34,7 @@ export function remake() {
   workspace?.dispose();
   Blockly.setLocale(Blockly.messages[language.value] ?? Blockly.messages.en);
   Blockly.Msg.PROCEDURES_HUE = "#a33b5e";
+  for (const key of keysUnder("blockly.")) Blockly.Msg[key] = t(`blockly.${key}`); // which Blockly has in English only
   workspace = Blockly.inject(place, {
     toolbox: toolbox(modules.value.flatMap(defineModule), allowed), renderer: "zelos", theme: theme(look.value), media: "/studio/vendor/media/", sounds: false,
     trashcan: true, comments: true, maxTrashcanContents: 20, move: { scrollbars: true, drag: true, wheel: true },
