@@ -12,7 +12,7 @@ import itertools
 import math
 import time
 from abc import ABC, abstractmethod
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sized
 from contextlib import contextmanager
 from contextvars import copy_context
 from functools import partial
@@ -314,7 +314,8 @@ class LockstepClock(Clock):
         if end < self._now:
             raise ValueError("time does not go back")
         await asyncio.sleep(0)
-        await self._settle()
+        ready = _ready_of(asyncio.get_running_loop())
+        await self._settle(ready)
         yielded = self._now
         while self._heap and self._heap[0][0] <= end + 1e-9:
             when, _, timer = heapq.heappop(self._heap)
@@ -322,17 +323,15 @@ class LockstepClock(Clock):
                 continue
             self._now = max(self._now, when)
             callback()
-            await self._settle()
+            if ready or self._held:  # mostly there is nothing
+                await self._settle(ready)
             if self._now - yielded >= YIELD_AFTER:  # nothing else may have been ready for long; sockets want a turn
                 yielded = self._now
                 await asyncio.sleep(0)
         self._now = max(self._now, end)
 
-    async def _settle(self) -> None:
+    async def _settle(self, ready: Sized) -> None:
         """Give way until no other callback of the loop is ready."""
-        ready = getattr(asyncio.get_running_loop(), "_ready", None)
-        if ready is None:
-            raise RuntimeError("a lockstep clock needs asyncio's own event loop")
         while ready or self._held:
             if ready:
                 await asyncio.sleep(0)
@@ -361,3 +360,11 @@ class LockstepClock(Clock):
     def _wake(self) -> None:
         if self._released is not None and not self._released.done():
             self._released.set_result(None)
+
+
+def _ready_of(loop: asyncio.AbstractEventLoop) -> Sized:
+    """The callbacks that the loop will run next, as they are at any time."""
+    ready: Sized | None = getattr(loop, "_ready", None)
+    if ready is None:
+        raise RuntimeError("a lockstep clock needs asyncio's own event loop")
+    return ready

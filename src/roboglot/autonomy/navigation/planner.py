@@ -17,7 +17,7 @@ from roboglot.autonomy.navigation.rules import Frame, Layers, layers
 from roboglot.autonomy.navigation.scan_memory import Cells, ScanMemory
 from roboglot.autonomy.navigation.terms import Shunned, Terms
 from roboglot.autonomy.slam.belief import Belief
-from roboglot.autonomy.slam.evidence import RESOLUTION, is_too_large
+from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid, is_too_large
 from roboglot.autonomy.slam.scan_points import ScanPoints
 from roboglot.autonomy.traffic.waiting_place import shun, waiting_place
 from roboglot.kernels.distance import distances
@@ -259,6 +259,7 @@ class Planner:
         self._trodden = Cells(np.uint8)  # where the robot's middle has been
         self._trodden_radius = 0.0  # m that it had around it, at least
         self._last: Pose | None = None
+        self._stood: tuple[EvidenceGrid, float, float, float] | None = None  # map, place and radius, the last time
         self._doubted: NDArray[np.int16] = np.zeros((0, 0), np.int16)
         self._doubted_until = -math.inf
 
@@ -313,6 +314,10 @@ class Planner:
         if not (self._belief.localizing and self._belief.quality >= TRODDEN_QUALITY):
             return
         grid = self._belief.map
+        here = grid, pose.x, pose.y, self.radius
+        if here == self._stood and last is not None and (last.x, last.y) == (pose.x, pose.y):
+            return  # that is marked
+        self._stood = here
         trodden = self._trodden.of(grid)
         if self.radius > self._trodden_radius:  # it carries more than what got through there
             trodden[:] = 0

@@ -161,7 +161,7 @@ class Slam:
     def _take(self, event: ScanTaken) -> None:
         belief, odometry, self._newest = self._belief, event.odometry, event
         self._straighten(odometry, event.stamp)
-        if np.count_nonzero(np.isnan(event.scan.ranges)) > (1.0 - ECHO_SHARE_MIN) * len(event.scan.ranges):
+        if _is_covered(event.scan.ranges):
             belief.quality *= 1.0 - QUALITY_GAIN
             return  # a covered lidar sends scans that say nothing: as if it sent none
         if self.whereabouts.hear(event.stamp) and belief.map.scans and belief.localizing:
@@ -356,6 +356,13 @@ class Slam:
         shift = straightened.distance_to(pose)
         self._robot.events.publish(LoopClosed(stamp=stamp, shift=shift, moved=self._loops.moved))
         self._robot.events.publish(PoseJumped(stamp=stamp, pose=straightened))
+
+
+def _is_covered(ranges: NDArray[np.float32]) -> bool:
+    """True if hardly a ray measured anything."""
+    if not math.isnan(np.minimum.reduce(ranges, initial=np.inf)):  # which no NaN gets past
+        return False
+    return bool(np.count_nonzero(np.isnan(ranges)) > (1.0 - ECHO_SHARE_MIN) * len(ranges))
 
 
 def _is_sure(best: Match) -> bool:
