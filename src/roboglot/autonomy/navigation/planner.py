@@ -17,7 +17,7 @@ from roboglot.autonomy.navigation.rules import Frame, Layers, layers
 from roboglot.autonomy.navigation.scan_memory import Cells, ScanMemory
 from roboglot.autonomy.navigation.terms import Shunned, Terms
 from roboglot.autonomy.slam.belief import Belief
-from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid, is_too_large
+from roboglot.autonomy.slam.evidence import RESOLUTION, is_too_large
 from roboglot.autonomy.slam.scan_points import ScanPoints
 from roboglot.autonomy.traffic.waiting_place import shun, waiting_place
 from roboglot.kernels.distance import distances
@@ -259,7 +259,7 @@ class Planner:
         self._trodden = Cells(np.uint8)  # where the robot's middle has been
         self._trodden_radius = 0.0  # m that it had around it, at least
         self._last: Pose | None = None
-        self._stood: tuple[EvidenceGrid, float, float, float] | None = None  # map, place and radius, the last time
+        self._stood: tuple[object, ...] = ()  # what it marked the last time: map, from where to where, and radius
         self._doubted: NDArray[np.int16] = np.zeros((0, 0), np.int16)
         self._doubted_until = -math.inf
 
@@ -272,9 +272,8 @@ class Planner:
         """Remember what stands around; returns the near echoes in map (n, 2)."""
         grid = self._belief.map
         gone = self._load.gone_from(grid)
-        shown = grid.evidence
-        if now < self._doubted_until and self._doubted.shape == shown.shape:
-            shown = self._doubted
+        doubts = now < self._doubted_until and self._doubted.shape == grid.evidence.shape
+        shown = self._doubted if doubts else grid.evidence
         evidence = _without(shown, grid.corner, gone) if len(gone) else shown
         return self._scans.observe(grid, evidence, scan, pose, now)
 
@@ -314,17 +313,15 @@ class Planner:
         if not (self._belief.localizing and self._belief.quality >= TRODDEN_QUALITY):
             return
         grid = self._belief.map
-        here = grid, pose.x, pose.y, self.radius
-        if here == self._stood and last is not None and (last.x, last.y) == (pose.x, pose.y):
+        if (here := (grid, last, pose, self.radius)) == self._stood:
             return  # that is marked
         self._stood = here
         trodden = self._trodden.of(grid)
         if self.radius > self._trodden_radius:  # it carries more than what got through there
             trodden[:] = 0
         self._trodden_radius = self.radius
-        if last is None or last.distance_to(pose) > TREAD_MAX:
-            last = pose
-        _mark_line(trodden, grid.corner, last.point, pose.point)
+        begin = pose if last is None or last.distance_to(pose) > TREAD_MAX else last
+        _mark_line(trodden, grid.corner, begin.point, pose.point)
 
     def free_way(self, path: NDArray[np.float64], points: NDArray[np.float64], pose: Pose, margin: float) -> float:
         """Metres along ``path`` that the hull can go before one of ``points`` is within ``margin`` m; inf: all."""

@@ -63,10 +63,11 @@ class Courtesy:
         self._faced_since = min(self._faced_since, now) if faced else math.inf
         if self._asides >= ASIDE_MAX:
             return False
-        return now - self._ruled_since > RULED_AFTER or (
-            self._faced < FACED_MAX
-            and now - self._faced_since > FACED_AFTER + FACED_MORE * chance(self._robot.id, self._faced)
-        )
+        if now - self._ruled_since > RULED_AFTER:
+            return True
+        if not faced or self._faced >= FACED_MAX:
+            return False
+        return now - self._faced_since > FACED_AFTER + FACED_MORE * chance(self._robot.id, self._faced)
 
     async def give_way(self, follower: Follower) -> None:
         """Go aside, and return when the way is free, or after a while."""

@@ -113,10 +113,11 @@ def _things(echoes: Points, pose: Pose) -> list[tuple[float, float]]:
     """The middles of what hangs together."""
     if len(echoes) < ECHOES_MIN:
         return []
-    gaps = np.hypot(*(echoes - np.roll(echoes, 1, axis=0)).T) > LINK
+    gaps = np.hypot(*(echoes - np.concatenate((echoes[-1:], echoes[:-1]))).T) > LINK
     starts = np.flatnonzero(gaps)
     if len(starts):
-        echoes, starts = np.roll(echoes, -starts[0], axis=0), starts - starts[0]
+        first = starts[0]
+        echoes, starts = np.concatenate((echoes[first:], echoes[:first])), starts - first
     found = []
     for thing in np.split(echoes, starts[1:]) if len(starts) else [echoes]:
         if len(thing) < ECHOES_MIN or float(np.hypot(*np.ptp(thing, axis=0))) > WIDE_MAX:
