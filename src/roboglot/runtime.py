@@ -151,14 +151,14 @@ class Runtime:
         self.guard = self._build_guard() if config.access.on else None
         self._gateway: Gateway | None = None
         self._tls = self._build_tls()
-        self._leases = LeaseDesk(config.data, self.fleet.robots, self.fleet.world.hands)
+        self.leases = LeaseDesk(config.data, self.fleet.robots, self.fleet.world.hands)
         self._recorder: Recorder | None = None
         self._record_desk = RecordDesk(config.data, lambda: self.recorder)
         self._types = doors
         self._programs: dict[str, Programs] = {}
         self._rehearsals = Rehearsals(memory_together=together)
         self.doors = {robot.name: self._build_doors(robot, self.fleet.robots[robot.name]) for robot in config.robots}
-        self.console = self._build_console() if config.console.enabled else None
+        self.console = Console(self.build_desk(), config.console, self._tls) if config.console.enabled else None
 
     def _join_registry(self) -> Residence | None:
         """Have every robot's lease ask the registry. Raises OSError, ValueError if it cannot be opened."""
@@ -197,7 +197,8 @@ class Runtime:
 
             stage = self.fleet.world.hands
             origin = origin_of(self.config, version("roboglot"))
-            self._recorder = Recorder(self.config.record, self.fleet.robots, stage, self.clock, origin)
+            outside = self.fleet.world.outside
+            self._recorder = Recorder(self.config.record, self.fleet.robots, stage, self.clock, origin, outside)
         return self._recorder
 
     def _begin_recording(self) -> None:
@@ -270,7 +271,9 @@ class Runtime:
         except ssl.SSLError as error:
             raise ValueError(f"[access.tls] {pair[0]}: {error}") from None
 
-    def _build_console(self) -> Console:
+    def build_desk(self) -> Desk:
+        """Return what a console works with."""
+
         def listed() -> dict[str, Sequence[Endpoint]]:
             return {name: doors.endpoints for name, doors in self.doors.items()}
 
@@ -285,7 +288,7 @@ class Runtime:
 
         desk = Desk(world, self.fleet.robots, self.fleet.world.hands, listed, studio, running)
         desk.recordings = Recordings(self.config.data, lambda: self.recorder)
-        return Console(desk, self.config.console, self._tls)
+        return desk
 
     def _scene_of(self, name: str) -> Scene:
         """Return what a rehearsal of a robot's program needs of the world as it is now."""
@@ -305,7 +308,7 @@ class Runtime:
         self._begin_recording()
         for doors in self.doors.values():
             await doors.open()
-        await self._leases.open()
+        await self.leases.open()
         await self._record_desk.open()
         if self.guard is not None and self.config.access.gateway:
             self._gateway = self._build_gateway(self.guard)
@@ -324,7 +327,7 @@ class Runtime:
         if self.console is not None:
             await _in_time("the console", self.console.close())
         await asyncio.gather(*(doors.close() for doors in self.doors.values()))
-        await _in_time("control of the robots", self._leases.close())
+        await _in_time("control of the robots", self.leases.close())
         await self._record_desk.close()
         if self.clock.repeats:  # how much robot time robots take to stand still depends on the machine from here on
             await self._close_recorder()

@@ -16,7 +16,7 @@ async def test_a_request_and_its_reply_belong_together(clock: LockstepClock) -> 
         tap.reply("slamware", "GET /x", "no", "403", "not now", began)
         asked, answered = viewer.drain()
     common = ("a", "slamware", "10.0.0.7:5000", "slamware 10.0.0.7")
-    assert asked == Exchange(0.0, *common, Direction.REQUEST, "GET /x", b"GET /x\n\n")
+    assert asked == Exchange(0.0, *common, Direction.REQUEST, "GET /x", b"GET /x\n\n", turn=0)
     assert answered == Exchange(0.25, *common, Direction.REPLY, "GET /x", b"no", "403", "not now", 0.25)
 
 

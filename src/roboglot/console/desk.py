@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from roboglot.console.recordings import Recordings
 
 CLIENT = "console"
+COMMAND = "command"  # the kind of inputs that are commands
 TAKE = "take_control"  # a verb of its own: it is about who asks
 assert map_verbs  # registers its verbs
 
@@ -140,15 +141,21 @@ class Desk:
         robot = self.view(name, verb).robot
         if verb == TAKE:
             self.check(robot, verb, Right.DRIVE)
-            with robot.admission.noting(CLIENT, verb):
+            with robot.admission.noting(CLIENT, verb), self._input(robot, verb, values, client):
                 return await robot[Lease].take(client)
         if (operation := VERBS.get(verb)) is None:
             raise NotFound(f"there is no verb {verb!r}")
         self.check(robot, verb, operation.right)
         if operation.right is Right.SEE:
             return await operation.call(robot, values)
-        with robot.admission.noting(CLIENT, verb):
+        with robot.admission.noting(CLIENT, verb), self._input(robot, verb, values, client):
             return await operation.call(robot, values)
+
+    @staticmethod
+    def _input(
+        robot: Robot, verb: str, values: Mapping[str, object], client: str
+    ) -> contextlib.AbstractContextManager[None]:
+        return robot.outside.noting(COMMAND, verb, {"values": dict(values), "by": client})
 
     @contextlib.contextmanager
     def noting(self, what: str) -> Iterator[None]:

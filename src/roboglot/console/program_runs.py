@@ -9,6 +9,7 @@ from roboglot.model.errors import NotFound
 from roboglot.programs.stores import StoredProgram
 
 TASK = "console_script"
+PROGRAM = "program"  # the kind of inputs that are such programs
 SOURCE_MAX = 64 * 1024  # characters of a program
 LINES_MAX = 200  # newest ones of the log that an answer holds
 
@@ -18,7 +19,8 @@ async def start(desk: Desk, name: str, source: str) -> dict[str, object]:
     programs = _programs(desk, name, Right.PROGRAM)
     if not 0 < len(source) <= SOURCE_MAX:
         raise ValueError(f"a program has 1 to {SOURCE_MAX} characters")
-    with desk.robots[name].admission.noting(CLIENT, "program"):
+    robot = desk.robots[name]
+    with robot.admission.noting(CLIENT, "program"), robot.outside.noting(PROGRAM, "run", {"source": source}):
         await programs.service.save(StoredProgram(TASK, "run by a script", "", "single", "now", source, ""))
         await programs.service.run(TASK)
     return await program(desk, name)

@@ -13,6 +13,7 @@ from roboglot.model.components.motion.driving import Driving
 from roboglot.model.geometry import Twist
 from roboglot.model.robot import Robot
 
+PAD = "pad"  # the kind of inputs that come from one
 Share = Annotated[float, msgspec.Meta(ge=-1, le=1)]
 
 
@@ -50,17 +51,23 @@ class Pad:
         if not (wish.x or wish.y or wish.yaw):
             self.let_go("the pad was let go")
             return True
+        self.move(wish.x, wish.y, wish.yaw)
+        return True
+
+    def move(self, x: float, y: float, yaw: float) -> None:
+        """Drive with these shares of the base's top speeds. Raises what driving raises."""
         limits = self._robot[Base].limits
         top = limits.twist
-        twist = Twist(wish.x * top.x, wish.y * top.x if limits.holonomic else 0.0, wish.yaw * top.yaw).clamped(top)
-        self._robot[Driving].drive(twist, lifetime=DEAD_MAN * self._pace, source=self._source)
-        return True
+        twist = Twist(x * top.x, y * top.x if limits.holonomic else 0.0, yaw * top.yaw).clamped(top)
+        with self._robot.outside.noting(PAD, "move", {"source": self._source, "x": x, "y": y, "yaw": yaw}):
+            self._robot[Driving].drive(twist, lifetime=DEAD_MAN * self._pace, source=self._source)
 
     def let_go(self, why: str) -> None:
         """End what this page drives."""
-        for action in self._robot.actions.running():
-            if action.source == self._source:
-                action.cancel(why)
+        with self._robot.outside.noting(PAD, "let_go", {"source": self._source, "why": why}):
+            for action in self._robot.actions.running():
+                if action.source == self._source:
+                    action.cancel(why)
 
     @property
     def _pace(self) -> float:

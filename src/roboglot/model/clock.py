@@ -11,119 +11,19 @@ import heapq
 import itertools
 import math
 import time
-from abc import ABC, abstractmethod
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sized
-from contextlib import contextmanager
+from collections import deque
+from collections.abc import Callable, Sized
 from contextvars import copy_context
 from functools import partial
-from typing import Protocol, TypeVar
 
-T = TypeVar("T")
+from roboglot.model.clock_base import HOLD_MAX, Clock, Timer
+
+__all__ = ["LEAD", "LOCKSTEP_EPOCH", "Clock", "LockstepClock", "PatientClock", "RealClock", "Timer"]
 YIELD_AFTER = 0.5  # s of lockstep time
-HOLD_MAX = 5.0  # s of the machine that lockstep time waits for work outside of the event loop
+ROUNDS_MAX = 200  # of the event loop
 LEAD = 0.1  # s that a patient clock goes further than the world
 STANDING = 0.002  # real s between two looks at a patient clock that stands still
 LOCKSTEP_EPOCH = 1_767_225_600.0  # 2026-01-01T00:00:00Z: lockstep traces carry no real date
-
-
-class Timer(Protocol):
-    """Something due on the clock that can still be called off."""
-
-    def cancel(self) -> None: ...
-
-
-class Clock(ABC):
-    """Reads and waits for robot time, in seconds.
-
-    ``repeats``: the same inputs give the same trace; nothing may come from chance or from how fast the machine is.
-    """
-
-    repeats = False
-
-    @abstractmethod
-    def time(self) -> float:
-        """Seconds since this clock started; never goes back."""
-
-    @abstractmethod
-    def epoch(self) -> float:
-        """Calendar time as seconds since 1970-01-01 UTC, running at this clock's pace."""
-
-    @abstractmethod
-    def call_at(self, when: float, callback: Callable[[], None]) -> Timer:
-        """Call ``callback`` once when ``time()`` has reached ``when``; soon (never inside this call) if it is past."""
-
-    def hold(self, work: object) -> None:  # noqa: B027 - time that passes by itself waits for nothing
-        """Begin ``work`` outside of the event loop (a process, a disk); lockstep time waits until ``release``."""
-
-    def release(self, work: object) -> None:  # noqa: B027
-        """End what ``hold`` began; do nothing if it has ended."""
-
-    def reached(self, stamp: float) -> None:  # noqa: B027 - most clocks wait for no world
-        """The world has been simulated up to there; inf: there is none any more."""
-
-    @contextmanager
-    def holding(self) -> Iterator[None]:
-        """Hold while ``with`` lasts."""
-        work = object()
-        self.hold(work)
-        try:
-            yield
-        finally:
-            self.release(work)
-
-    def call_later(self, delay: float, callback: Callable[[], None]) -> Timer:
-        """Call ``callback`` once, ``delay`` seconds from now."""
-        return self.call_at(self.time() + delay, callback)
-
-    async def sleep_until(self, when: float) -> None:
-        """Wait until ``time()`` has reached ``when``."""
-        woken: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-
-        def wake() -> None:
-            if not woken.done():
-                woken.set_result(None)
-
-        timer = self.call_at(when, wake)
-        try:
-            await woken
-        finally:
-            timer.cancel()
-
-    async def sleep(self, seconds: float) -> None:
-        """Wait ``seconds`` of robot time."""
-        await self.sleep_until(self.time() + seconds)
-
-    async def every(self, period: float) -> AsyncIterator[float]:
-        """Yield the time every ``period`` seconds from now on, without drift; missed beats are skipped."""
-        start, beat = self.time(), 0
-        while True:
-            beat = max(beat + 1, math.ceil((self.time() - start) / period - 1e-9))
-            await self.sleep_until(start + beat * period)
-            yield self.time()
-
-    async def wait_for(self, awaitable: Awaitable[T], timeout: float) -> T:
-        """The awaitable's result, or TimeoutError after ``timeout`` seconds of robot time (it is cancelled then)."""
-        task = asyncio.ensure_future(awaitable)
-        waiter = asyncio.current_task()
-        cancelled_before = waiter.cancelling() if waiter else 0
-        expired = False
-
-        def expire() -> None:
-            nonlocal expired
-            expired = True
-            task.cancel()
-
-        timer = self.call_later(timeout, expire)
-        try:
-            return await task
-        except asyncio.CancelledError:
-            # A waiter that is cancelled in the very moment of the time-out must not go on.
-            if expired and not (waiter and waiter.cancelling() > cancelled_before):
-                raise TimeoutError(f"nothing within {timeout} s") from None
-            task.cancel()
-            raise
-        finally:
-            timer.cancel()
 
 
 class _RealTimer:
@@ -282,7 +182,8 @@ class LockstepClock(Clock):
 
     Needs asyncio's own event loop: after each instant it waits until the loop has nothing ready to run, and only that
     loop lets us see it (uvloop does not). Sockets are not waited for: code that uses one awaits the reply itself.
-    What ``hold`` has announced is waited for, at most HOLD_MAX seconds each.
+    What ``hold`` has announced is waited for, at most HOLD_MAX seconds each. What ``arrive`` brings happens when
+    nothing is ready to run any more, one after the other; at rest after ROUNDS_MAX rounds of the loop at the latest.
     """
 
     repeats = True
@@ -293,9 +194,17 @@ class LockstepClock(Clock):
         self._released: asyncio.Future[None] | None = None
         self._order = itertools.count()
         self._heap: list[tuple[float, int, _LockstepTimer]] = []
+        self._turn = 0
+        self._arrived: deque[Callable[[], None]] = deque()
+        self._letting_in: asyncio.Task[None] | None = None
+        self._advancing = False
 
     def time(self) -> float:
         return self._now
+
+    @property
+    def turn(self) -> int:
+        return self._turn
 
     def epoch(self) -> float:
         return LOCKSTEP_EPOCH + self._now
@@ -309,37 +218,79 @@ class LockstepClock(Clock):
         """Let ``seconds`` pass: every due callback runs, and all that follows from it, before the next instant."""
         await self.advance_to(self._now + seconds)
 
-    async def advance_to(self, end: float) -> None:
-        """Let time pass until exactly ``end``."""
+    async def advance_to(self, end: float, turn: int = -1) -> None:
+        """Let time pass until exactly ``end``; with ``turn``, only until so many timers have fired in that instant."""
         if end < self._now:
             raise ValueError("time does not go back")
-        await asyncio.sleep(0)
-        ready = _ready_of(asyncio.get_running_loop())
-        await self._settle(ready)
+        if self._letting_in is not None:
+            await asyncio.wait((self._letting_in,))
+        self._advancing = True
+        try:
+            await asyncio.sleep(0)
+            await self._settle()
+            await self._fire(end, turn)
+        finally:
+            self._advancing = False
+        self._set(max(self._now, end))
+
+    async def _fire(self, end: float, turn: int) -> None:
         yielded = self._now
-        while self._heap and self._heap[0][0] <= end + 1e-9:
-            when, _, timer = heapq.heappop(self._heap)
-            if (callback := timer.callback) is None:
+        ready, limit = _ready(), end if turn >= 0 else end + 1e-9
+        while self._heap and self._heap[0][0] <= limit:
+            when, _, timer = self._heap[0]
+            if (callback := timer.callback) is not None and max(when, self._now) == end:
+                fired = self._turn if self._now == end else 0
+                if 0 <= turn <= fired:
+                    break
+            heapq.heappop(self._heap)
+            if callback is None:
                 continue
-            self._now = max(self._now, when)
+            self._set(max(self._now, when))
+            self._turn += 1
             callback()
-            if ready or self._held:  # mostly there is nothing
-                await self._settle(ready)
+            if ready or self._held or self._arrived:  # mostly there is nothing
+                await self._settle()
             if self._now - yielded >= YIELD_AFTER:  # nothing else may have been ready for long; sockets want a turn
                 yielded = self._now
                 await asyncio.sleep(0)
-        self._now = max(self._now, end)
 
-    async def _settle(self, ready: Sized) -> None:
-        """Give way until no other callback of the loop is ready."""
-        while ready or self._held:
+    def _set(self, now: float) -> None:
+        if now != self._now:
+            self._now, self._turn = now, 0
+
+    async def _settle(self) -> None:
+        """Give way until no other callback of the loop is ready, and what came from outside has happened."""
+        ready = _ready()
+        while ready or self._held or self._arrived:
             if ready:
                 await asyncio.sleep(0)
+            elif self._arrived:
+                self._arrived.popleft()()
             else:
                 await self._wait_for_work()
 
-    def hold(self, work: object) -> None:
-        self._held[work] = asyncio.get_running_loop().time() + HOLD_MAX
+    def arrive(self, happening: Callable[[], None]) -> None:
+        self._arrived.append(happening)
+        if self._advancing:
+            self._wake()
+        elif self._letting_in is None:
+            self._letting_in = asyncio.get_running_loop().create_task(self._let_in(), name="lockstep")
+
+    async def _let_in(self) -> None:
+        """Let in what comes while time stands still."""
+        ready = _ready()
+        try:
+            while self._arrived:
+                for _ in range(ROUNDS_MAX):
+                    await asyncio.sleep(0)
+                    if not ready:
+                        break
+                self._arrived.popleft()()
+        finally:
+            self._letting_in = None
+
+    def hold(self, work: object, seconds: float = HOLD_MAX) -> None:
+        self._held[work] = asyncio.get_running_loop().time() + seconds
 
     def release(self, work: object) -> None:
         if self._held.pop(work, None) is not None:
@@ -362,9 +313,9 @@ class LockstepClock(Clock):
             self._released.set_result(None)
 
 
-def _ready_of(loop: asyncio.AbstractEventLoop) -> Sized:
-    """The callbacks that the loop will run next, as they are at any time."""
-    ready: Sized | None = getattr(loop, "_ready", None)
+def _ready() -> Sized:
+    """Return what the running loop will do next."""
+    ready: Sized | None = getattr(asyncio.get_running_loop(), "_ready", None)
     if ready is None:
         raise RuntimeError("a lockstep clock needs asyncio's own event loop")
     return ready

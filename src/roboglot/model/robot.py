@@ -12,6 +12,7 @@ from roboglot.model.clock import Clock
 from roboglot.model.components.component import Component
 from roboglot.model.errors import ComponentMissing
 from roboglot.model.events import EventStream
+from roboglot.model.inputs.outside import Outside
 from roboglot.model.stand_in import StandIn
 from roboglot.model.tap import Tap
 
@@ -41,6 +42,7 @@ class Robot:
     events: EventStream = field(default_factory=EventStream)
     actions: Actions = field(init=False)
     tap: Tap = field(init=False)
+    outside: Outside = field(init=False)
     admission: Admission = field(default_factory=Admission)
     stand_in: StandIn | None = None  # who answers at its doors in its place
     _components: dict[type[Component], Component] = field(default_factory=dict)
@@ -48,6 +50,7 @@ class Robot:
     def __post_init__(self) -> None:
         self.actions = Actions(self.clock, self.events)
         self.tap = Tap(self.id, self.clock)
+        self.outside = Outside(self.id, self.clock)
 
     def add(self, interface: type[C], component: C) -> C:
         """Give the robot a component; one of a kind."""

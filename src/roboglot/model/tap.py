@@ -48,7 +48,8 @@ class Exchange(NamedTuple):  # made for each message: a frozen dataclass takes f
     none. ``client``: for whom, as the control lease has it. ``operation``: the key in the protocol's contract; empty if
     it is none of them. ``payload``: the message in the protocol's own bytes (REST: "POST /path?query", an empty line,
     the body), with passwords left out. Of a reply: ``status`` in the protocol's words ("200", "ok", "fail"),
-    ``refusal`` why it was not done in plain words (empty: it was), ``seconds`` of robot time since the request.
+    ``refusal`` why it was not done in plain words (empty: it was), ``seconds`` of robot time since the request. Of a
+    request: ``turn`` of the clock.
     """
 
     stamp: float
@@ -62,6 +63,7 @@ class Exchange(NamedTuple):  # made for each message: a frozen dataclass takes f
     status: str = ""
     refusal: str = ""
     seconds: float = 0.0
+    turn: int = -1
 
 
 class _Answer(NamedTuple):
@@ -151,6 +153,7 @@ class Tap:
             answer.status,
             answer.refusal,
             seconds,
+            self._clock.turn if direction is Direction.REQUEST else -1,
         )
         for listener in tuple(self._listeners):
             listener(exchange)

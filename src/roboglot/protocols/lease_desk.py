@@ -20,6 +20,7 @@ from roboglot.model.robot import Robot
 from roboglot.model.stage import Stage
 
 NAME = "lease.sock"  # in the data folder
+LEASE = "lease"  # the kind of inputs that come from here
 
 
 class Request(msgspec.Struct, forbid_unknown_fields=True):
@@ -80,7 +81,7 @@ class LeaseDesk:
 
     async def _grant(self, request: Request) -> None:
         if request.all:
-            wishes = (self._do(request, robot) for robot in self._robots.values())
+            wishes = (self.do(request, robot) for robot in self._robots.values())
             ends = await asyncio.gather(*wishes, return_exceptions=True)  # one that refuses holds up no other
             for name, end in zip(self._robots, ends, strict=True):
                 if isinstance(end, BaseException):
@@ -89,7 +90,12 @@ class LeaseDesk:
         robot = self._robots.get(request.robot)
         if robot is None:
             raise LookupError(f"there is no robot {request.robot!r}; there are {', '.join(self._robots)}")
-        await self._do(request, robot)
+        await self.do(request, robot)
+
+    async def do(self, request: Request, robot: Robot) -> None:
+        """Do it with one robot. Raises LookupError where that cannot be."""
+        with robot.outside.noting(LEASE, request.do, {"who": request.who}):
+            await self._do(request, robot)
 
     async def _do(self, request: Request, robot: Robot) -> None:
         match request.do:

@@ -53,6 +53,7 @@ def _plain(_at: int, value: object) -> bytes:
 
 KINDS = {
     "exchange": Kind("roboglot.Exchange", lambda _at, value: messages.encode_exchange(value)),
+    "input": Kind("roboglot.Input", lambda _at, value: messages.encode_input(value)),
     "event": Kind("roboglot.Event", _plain),
     "action": Kind("roboglot.Action", _plain),
     "battery": Kind("roboglot.Battery", _plain),

@@ -16,6 +16,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from roboglot.model.inputs.outside import Input
 from roboglot.model.tap import Direction, Exchange
 
 DEPTH_MAX = 6
@@ -37,6 +38,7 @@ class Kept(msgspec.Struct, omit_defaults=True):
     status: str = ""
     refusal: str = ""
     seconds: float = 0.0
+    turn: int = -1
     text: str = ""
     json: msgspec.Raw | msgspec.UnsetType = msgspec.UNSET
     base64: str = ""
@@ -77,6 +79,7 @@ def encode_exchange(exchange: Exchange) -> bytes:
             exchange.status,
             exchange.refusal,
             exchange.seconds,
+            exchange.turn,
             text,
             msgspec.Raw(body) if body else msgspec.UNSET,
             base64.b64encode(rest).decode() if rest else "",
@@ -101,7 +104,19 @@ def decode_exchange(data: bytes) -> Exchange:
         kept.status,
         kept.refusal,
         kept.seconds,
+        kept.turn,
     )
+
+
+def encode_input(given: Input) -> bytes:
+    """Return what came from outside as a message of the file."""
+    return _encode(given._asdict())
+
+
+def decode_input(data: bytes) -> Input:
+    """Return what ``encode_input`` was given. Raises msgspec.DecodeError."""
+    value = _parsed.decode(data)
+    return msgspec.convert([value.get(name) for name in Input._fields], Input)
 
 
 def encode_plain(value: object) -> bytes:
@@ -158,6 +173,7 @@ SCHEMAS = {  # JSON schemas, by name
         status=_TEXT,
         refusal=_TEXT,
         seconds=_NUMBER,
+        turn={"type": "integer"},
         text=_TEXT,
         json={},
         base64=_TEXT,
@@ -178,5 +194,16 @@ SCHEMAS = {  # JSON schemas, by name
     ),
     "roboglot.Pressure": _schema("roboglot.Pressure", stamp=_NUMBER, pressure=_NUMBER, deviation=_NUMBER),
     "roboglot.State": _schema("roboglot.State"),
+    "roboglot.Input": _schema(
+        "roboglot.Input",
+        stamp=_NUMBER,
+        turn={"type": "integer"},
+        robot=_TEXT,
+        kind=_TEXT,
+        name=_TEXT,
+        values={"type": "object"},
+        client=_TEXT,
+        connection=_TEXT,
+    ),
     "roboglot.Mark": _schema("roboglot.Mark", text=_TEXT),
 }

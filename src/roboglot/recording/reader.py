@@ -15,8 +15,9 @@ from mcap.exceptions import McapError
 from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
 
+from roboglot.model.inputs.outside import Input
 from roboglot.model.tap import DRIVER, Direction, Exchange
-from roboglot.recording.messages import decode_exchange
+from roboglot.recording.messages import decode_exchange, decode_input
 
 log = logging.getLogger(__name__)
 RECORD_MAX = 1 << 30  # bytes of one record of the file
@@ -50,6 +51,7 @@ class Recording:
     facts: dict[str, str] = field(default_factory=dict)
     attachments: dict[str, bytes] = field(default_factory=dict)
     exchanges: list[Exchange] = field(default_factory=list)
+    inputs: list[tuple[int, Input]] = field(default_factory=list)  # how many exchanges were before it
     topics: dict[str, int] = field(default_factory=dict)
     first: int = 0
     last: int = 0
@@ -193,6 +195,9 @@ def _read_part(path: Path, recording: Recording) -> None:
                 recording.topics[channel.topic] = recording.topics.get(channel.topic, 0) + 1
                 recording.first = min(recording.first or record.log_time, record.log_time)
                 recording.last = max(recording.last, record.log_time)
+                if schema.name == "roboglot.Input" and len(recording.inputs) < EXCHANGES_MAX:
+                    recording.inputs.append((len(recording.exchanges), decode_input(record.data)))
+                    recording.epoch = recording.epoch or record.log_time / 1e9 - recording.inputs[-1][1].stamp
                 if schema.name == "roboglot.Exchange" and len(recording.exchanges) < EXCHANGES_MAX:
                     exchange = decode_exchange(record.data)
                     recording.exchanges.append(exchange)

@@ -15,6 +15,7 @@ from roboglot.model.clock import Clock, LockstepClock
 from roboglot.model.components.system.health import FaultLevel
 from roboglot.model.errors import RobotError
 from roboglot.model.events import FaultRaised
+from roboglot.model.inputs.outside import Input, Outside
 from roboglot.model.robot import Robot
 from roboglot.model.stage import Stage
 from roboglot.recording.entries import Entry
@@ -54,8 +55,17 @@ class Recorder:
     """One program's. Made without work; ``start`` begins a recording, ``stop`` ends it."""
 
     def __init__(
-        self, config: RecordConfig, robots: Mapping[str, Robot], stage: Stage | None, clock: Clock, origin: Origin
+        self,
+        config: RecordConfig,
+        robots: Mapping[str, Robot],
+        stage: Stage | None,
+        clock: Clock,
+        origin: Origin,
+        outside: Outside | None = None,
     ) -> None:
+        """``outside`` tells what is done to the world."""
+        self._outside = outside
+        self._looking: list[Callable[[], None]] = []  # what ends it
         self._config, self._robots, self._stage, self._clock, self._origin = config, robots, stage, clock, origin
         self._redaction = Redaction((*FIELDS, *config.redact))
         self._files: Files | None = None
@@ -221,6 +231,8 @@ class Recorder:
             return
         self._samplers = [Sampler(robot, self._put, video=self._config.video) for robot in self._robots.values()]
         self._truth = TruthSampler(self._stage, self._put) if self._stage and self._config.truth else None
+        if self._outside is not None:
+            self._looking.append(self._outside.listen(self._note_input))
         self._handler = _LogHandler(self)
         logging.getLogger("roboglot").addHandler(self._handler)
         self._sampling = asyncio.get_running_loop().create_task(self._sample(), name="recorder")
@@ -236,7 +248,9 @@ class Recorder:
         if self._thread is None and self._ring_thread is None:
             for sampler in self._samplers:
                 sampler.close()
-            self._samplers = []
+            for leave in self._looking:
+                leave()
+            self._samplers, self._looking = [], []
             if self._handler is not None:
                 logging.getLogger("roboglot").removeHandler(self._handler)
             if self._sampling is not None:
@@ -267,6 +281,9 @@ class Recorder:
 
     def _stamp(self) -> tuple[int, int]:
         return Stamps(next(iter(self._robots.values()))).now()
+
+    def _note_input(self, given: Input) -> None:
+        self._put(Entry("/inputs", "input", *self._stamp(), given))
 
     def note_log(self, record: logging.LogRecord) -> None:
         """Take a line of the log along."""

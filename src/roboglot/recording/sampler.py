@@ -17,6 +17,7 @@ from roboglot.model.components.system.lease import Lease
 from roboglot.model.components.system.link import Link
 from roboglot.model.events import ActionChanged, Event, ScanTaken
 from roboglot.model.geometry import ORIGIN, Pose
+from roboglot.model.inputs.outside import Input
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import LaserScan
 from roboglot.model.tap import Exchange
@@ -59,6 +60,7 @@ class Sampler:
         self._leave = [
             robot.tap.listen(self._note_exchange),
             robot.events.listen(Event, self._note_event),
+            robot.outside.listen(self._note_input),
         ]
         self._filming: asyncio.Task[None] | None = None
         self.film(video)
@@ -98,6 +100,9 @@ class Sampler:
 
     def _note_exchange(self, exchange: Exchange) -> None:
         self._send(exchange.door, "exchange", exchange, self._stamps.at(exchange.stamp), time.time_ns())
+
+    def _note_input(self, given: Input) -> None:
+        self._send("inputs", "input", given, self._stamps.at(given.stamp), time.time_ns())
 
     def _note_event(self, event: Event) -> None:
         at, wall = self._stamps.now()

@@ -9,13 +9,15 @@ from dataclasses import dataclass
 from itertools import groupby, zip_longest
 from pathlib import Path
 
+from roboglot.model.inputs.outside import ANSWER
+from roboglot.model.tap import Direction
 from roboglot.recording.entries import NANO
 from roboglot.recording.reader import Record, read_messages
 
 AROUND = 5  # messages before the first difference
 SHOWN_MAX = 300  # characters of one
 LEFT_OUT = frozenset({"/log"})  # lines of the log name ports
-OTHER_ENDS = ("connection", "client")  # of an exchange: ports of clients
+UNCOUNTED = ("connection", "client", "turn")  # of exchanges and inputs: ports of clients, and an order that is seen
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,8 +41,8 @@ class Verdict:
 def difference(recorded: Path, now: Path) -> Verdict:
     """Compare the messages of two files: topic, robot time and bytes, in order. Raises BadRecording, OSError.
 
-    Within one instant the order counts in each topic, and there among requests, among replies and among pushes: which
-    of two that do not wait for each other comes first is the machine's affair.
+    Within one instant the order counts in each topic, and there among requests, among replies and among pushes of one
+    kind: which of two that do not wait for each other comes first is the machine's affair.
     """
     around: deque[str] = deque(maxlen=AROUND)
     agreed = 0
@@ -54,27 +56,28 @@ def difference(recorded: Path, now: Path) -> Verdict:
 
 
 def _messages(path: Path) -> Iterator[tuple[str, int, bytes]]:
-    counted = (record for record in read_messages(path) if record.topic not in LEFT_OUT and not _is_heartbeat(record))
+    counted = (record for record in read_messages(path) if record.topic not in LEFT_OUT)
     for at, records in groupby(counted, lambda record: record.at):
         for record in sorted(records, key=_stream):
             yield record.topic, at, _bytes(record)
 
 
-def _is_heartbeat(record: Record) -> bool:
-    """A dog's, which come from when its app is connected on: as soon as the machine has done that."""
-    return record.topic.endswith("/cyberdog") and bool(record.json()["operation"] == "heartbeat")
-
-
-def _stream(record: Record) -> tuple[str, str]:
-    """Return the stream in which a message has its order: its topic, and the direction of an exchange."""
-    return record.topic, record.json()["direction"] if record.schema == "roboglot.Exchange" else ""
+def _stream(record: Record) -> tuple[str, str, str]:
+    """Return what a message has an order in: its topic, and the direction of an exchange; a push also its operation."""
+    if record.schema == "roboglot.Input":
+        value = record.json()
+        return record.topic, value["kind"], value["name"] if value["kind"] == ANSWER else ""
+    if record.schema != "roboglot.Exchange":
+        return record.topic, "", ""
+    value = record.json()
+    return record.topic, value["direction"], value["operation"] if value["direction"] == Direction.PUSH else ""
 
 
 def _bytes(record: Record) -> bytes:
-    if record.schema != "roboglot.Exchange":
+    if record.schema not in ("roboglot.Exchange", "roboglot.Input"):
         return record.data
     value: dict[str, object] = record.json()
-    for name in OTHER_ENDS:
+    for name in UNCOUNTED:
         value.pop(name, None)
     return json.dumps(value, sort_keys=True).encode()
 

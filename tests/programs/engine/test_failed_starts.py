@@ -36,7 +36,7 @@ class Counting(RealClock):
         super().__init__()
         self.held: set[object] = set()
 
-    def hold(self, work: object) -> None:
+    def hold(self, work: object, seconds: float = 5.0) -> None:  # noqa: ARG002
         self.held.add(work)
 
     def release(self, work: object) -> None:

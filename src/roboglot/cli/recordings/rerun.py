@@ -88,13 +88,15 @@ def configuration(recording: Recording, folder: Path) -> Config:
 
 async def run(recording: Recording, config: Config) -> list[str]:
     """Run it, recorded as configured; returns the inputs that were not heard. Raises OSError for a taken address."""
+    from roboglot.cli.recordings.repeating import Repeater
     from roboglot.model.clock import LockstepClock
     from roboglot.recording.inputs import Inputs
     from roboglot.runtime import Runtime
 
     runtime = Runtime(config)
     assert isinstance(runtime.clock, LockstepClock)
-    inputs = Inputs(recording.exchanges, runtime.clock, lambda robot, door: _line(runtime, robot, door))
+    repeat = Repeater(runtime)
+    inputs = Inputs(recording, runtime.clock, lambda robot, door: _line(runtime, robot, door), repeat)
     for robot in runtime.fleet.robots.values():
         robot.tap.listen(inputs.hear)
     try:
@@ -117,13 +119,14 @@ def _line(runtime: Runtime, robot: str, door: str) -> Line:
     from roboglot.model.clock import RealClock
 
     line = LINES[door](host, port, RealClock(), lambda _operation, _data: None)
-    if isinstance(line, DogLine):
+    if isinstance(line, DogLine) and getattr(section, "plaintext", False):
+        line.options = {}
+    elif isinstance(line, DogLine):
         from roboglot.protocols.cyberdog.certificates import export_client
         from roboglot.protocols.cyberdog.server import FOLDER
 
         folder = config.data / "app"
         if not folder.exists():
             export_client(config.data / FOLDER, folder)
-        app = getattr(section, "app", "").rpartition(":")[2] or str(getattr(section, "app_port", 8981))
-        line.options = {"certs": str(folder), "app": app}
+        line.options = {"certs": str(folder)}  # and no app: what it said is in the recording
     return line

@@ -9,30 +9,21 @@ from __future__ import annotations
 import asyncio
 import logging
 import zlib
-from collections.abc import AsyncIterable, Callable
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from urllib.parse import unquote
 
-import grpc
-
 from roboglot.model.clock import Clock
+from roboglot.model.inputs.outside import Outside
 from roboglot.model.tap import Tap
+from roboglot.protocols.cyberdog.app_line import DONE, AppLine, Credentials, delivery
 from roboglot.protocols.cyberdog.frame_queue import Delivery
 from roboglot.protocols.cyberdog.outbox import Outbox
 from roboglot.protocols.cyberdog.table import Push
-from roboglot.wire.cyberdog.channel import (
-    APP_NAME,
-    HEARTBEAT_DEADLINE,
-    HEARTBEAT_PERIOD,
-    LOST_AFTER,
-    PUSH_DEADLINE,
-    PUSH_MAX,
-    client_options,
-)
+from roboglot.wire.cyberdog.channel import HEARTBEAT_DEADLINE, HEARTBEAT_PERIOD, LOST_AFTER, PUSH_DEADLINE, PUSH_MAX
 from roboglot.wire.cyberdog.chapters.system import HEARTBEAT, Beats
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
-from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import GrpcAppStub
 from roboglot.wire.cyberdog.text import write
 
 log = logging.getLogger(__name__)
@@ -62,11 +53,12 @@ class AppLink:
     def __init__(
         self,
         clock: Clock,
-        credentials: Callable[[], grpc.ChannelCredentials] | None,
+        credentials: Credentials,
         route: AppRoute,
         *,
         ticks: Callable[[str], pb.Ticks],
         tap: Tap | None = None,
+        outside: Outside | None = None,
         on_host: Callable[[str], None] = lambda _: None,
     ) -> None:
         """``on_host`` is called with the host that is connected."""
@@ -81,10 +73,12 @@ class AppLink:
         self._app_port = app_port
         self._ticks = ticks
         self._tap = tap
+        self._outside = outside or Outside("", clock)
         self._target = self._configured or (f"{last}:{app_port}" if last else "")
         self._host, self._on_host = last, on_host
         self._news = asyncio.Event()  # the address changed, or a client called: worth dialling at once
-        self._stub: GrpcAppStub | None = None
+        self._line: AppLine | None = None
+        self._ended = False
         self._outboxes: dict[int, Outbox] = {}
         self._beats = Beats()
         self._task: asyncio.Task[None] | None = None
@@ -96,6 +90,7 @@ class AppLink:
 
     async def close(self) -> None:
         """Hang up; nothing is sent any more."""
+        self._ended = True
         if self._task:
             self._task.cancel()
             await asyncio.gather(self._task, return_exceptions=True)
@@ -161,29 +156,22 @@ class AppLink:
 
     async def _keep(self, target: str) -> bool:
         """Dial ``target`` and send heartbeats until it is lost or has another address; whether one got through."""
-        options = client_options(APP_NAME)
-        if self._credentials is None:
-            channel = grpc.aio.insecure_channel(target, options=options)
-        else:
-            channel = grpc.aio.secure_channel(target, self._credentials(), options=options)
+        self._line = line = AppLine(target, self._credentials)
         try:
-            self._stub = stub = GrpcAppStub(channel)
-            return await self._beat(target, stub)
+            return await self._beat(target, line)
         finally:
-            self._stub = None
+            self._line = None
             self._set_connected(False)
-            await channel.close()
+            await (line.close() if self._ended else self._outside.ask("close", line.close))
 
-    async def _beat(self, target: str, stub: GrpcAppStub) -> bool:
-        heard = False
-        own = await _route_to(target) if self._address in WILDCARDS else self._address
+    async def _beat(self, target: str, line: AppLine) -> bool:
+        heard, own = False, self._address
+        if own in WILDCARDS:
+            own = await self._outside.ask("route", lambda: _route_to(target))
         last = self._clock.time()
         while self._target == target:
             began, asked = self._clock.time(), len(self._asking)
-            try:
-                await self._clock.wait_for(stub.heartbeat(self._noted(self._ticks(own))), HEARTBEAT_DEADLINE)
-            except (grpc.aio.AioRpcError, TimeoutError) as error:
-                log.debug("no heartbeat to %s: %s", target, _in_short(error))
+            if not await self._got_through(line, self._noted(self._ticks(own))):
                 if self._clock.time() - last >= LOST_AFTER:
                     break
             else:
@@ -195,6 +183,14 @@ class AppLink:
                 del self._asking[:asked]
             await self._clock.sleep_until(max(began + HEARTBEAT_PERIOD, self._clock.time()))
         return heard
+
+    async def _got_through(self, line: AppLine, ticks: pb.Ticks) -> bool:
+        asking = self._outside.ask(HEARTBEAT, lambda: line.heartbeat(ticks))
+        try:
+            return await self._clock.wait_for(asking, HEARTBEAT_DEADLINE) == DONE
+        except TimeoutError:
+            log.debug("no heartbeat within %s s", HEARTBEAT_DEADLINE)
+            return False
 
     def _noted(self, ticks: pb.Ticks) -> pb.Ticks:
         """Report a heartbeat to the tap if a connected app gets it."""
@@ -232,48 +228,17 @@ class AppLink:
 
     async def send(self, code: int, text: str) -> Delivery:
         """One push; its failure affects no other. Returns when it is acknowledged or given up."""
-        if self._stub is None:
+        if (line := self._line) is None:
             return Delivery.FAILED
+        key = str(int(code))
         if self._tap is not None and self._tap.watched:
-            self._tap.push("cyberdog", self._target, str(int(code)), text)
+            self._tap.push("cyberdog", self._target, key, text)
         try:
-            await self._clock.wait_for(_read_to_the_end(self._stub.sendMsg(_request(code, text))), PUSH_DEADLINE)
-        except TimeoutError as error:
-            log.debug("push %d failed: %s", code, _in_short(error))
+            asking = self._outside.ask(key, lambda: line.push(code, text))
+            return delivery(await self._clock.wait_for(asking, PUSH_DEADLINE))
+        except TimeoutError:
+            log.debug("push %s was not acknowledged within %s s", key, PUSH_DEADLINE)
             return Delivery.SILENT
-        except (grpc.aio.AioRpcError, grpc.aio.UsageError) as error:
-            log.debug("push %d failed: %s", code, _in_short(error))
-            return _after(error)
-        except asyncio.CancelledError:  # the channel was closed under it; or its outbox is
-            if (task := asyncio.current_task()) and task.cancelling():
-                raise
-            log.debug("push %d failed: the app was lost", code)
-            return Delivery.FAILED
-        return Delivery.DONE
-
-
-def _in_short(error: Exception) -> str:
-    """Return the failure of a call in one line."""
-    if isinstance(error, grpc.aio.AioRpcError):
-        return f"{error.code().name.lower()}: {error.details()}"
-    return str(error) or "it takes too long"
-
-
-def _after(error: grpc.aio.AioRpcError | grpc.aio.UsageError) -> Delivery:
-    """An app that answered with an error has the message; where the connection broke it may not."""
-    broken = (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.CANCELLED)
-    arrived = isinstance(error, grpc.aio.AioRpcError) and error.code() not in broken
-    return Delivery.DONE if arrived else Delivery.FAILED
-
-
-def _request(code: int, text: str) -> pb.SendRequest:
-    return pb.SendRequest(nameCode=code, params=text)
-
-
-async def _read_to_the_end(call: AsyncIterable[object]) -> None:
-    """The app may answer; real robots read that and ignore it."""
-    async for _ in call:
-        pass
 
 
 @lru_cache(64)

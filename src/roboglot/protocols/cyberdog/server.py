@@ -137,6 +137,7 @@ class CyberDogDoor:
             AppRoute(self._address, self._config.app, self._config.app_port, str(kept(robot, APP, ""))),
             ticks=lambda own: ticks(context, own),
             tap=robot.tap,
+            outside=robot.outside,
             on_host=self._keep_app,
         )
         context = self._parts(app)
@@ -239,7 +240,7 @@ class _Service(GrpcAppServicer):
         async def reply(value: object) -> None:
             if tap.watched:
                 tap.reply("cyberdog", str(int(code)), write(value), "ok", began=call.began)
-            await rpc.write(_answer(code, value))
+            await self._say(rpc, _answer(code, value))
 
         call = Call(code, request.params, self._context, reply)
         try:
@@ -248,7 +249,7 @@ class _Service(GrpcAppServicer):
             log.info("%d: %s", code, bad)
             last, code = error(InBandError.BAD_PARAMETERS), 0
         if last is not None:
-            await rpc.write(_answer(code, last))
+            await self._say(rpc, _answer(code, last))
 
     async def getFile(self, request: pb.SendRequest, rpc: grpc.aio.ServicerContext) -> None:  # noqa: N802
         """Photos and recordings in chunks; errors are chunks, too."""
@@ -264,8 +265,13 @@ class _Service(GrpcAppServicer):
             async for chunk in chunks:
                 if tap.watched:
                     tap.reply("cyberdog", str(int(request.nameCode)), chunk.SerializeToString(), "ok", began=began)
-                await rpc.write(chunk)
+                await self._say(rpc, chunk)
                 await self._count(peer, len(chunk.buffer))
+
+    async def _say(self, rpc: grpc.aio.ServicerContext, message: object) -> None:
+        """Write to a client; how long that takes the machine is none of the robot's time."""
+        with self._context.robot.clock.holding():
+            await rpc.write(message)
 
     async def _count(self, peer: str, size: int) -> None:
         """Bytes to or from a client; one that has had too many waits."""

@@ -20,6 +20,8 @@ from roboglot.kernels.ahead import KernelsUnavailable, compile_beside
 from roboglot.model.background import load
 from roboglot.model.clock import Clock, RealClock, Timer
 from roboglot.model.geometry import Pose
+from roboglot.model.inputs.noted_stage import noted
+from roboglot.model.inputs.outside import Outside
 from roboglot.model.robot import Description, Robot
 from roboglot.model.sound import claps
 from roboglot.simulation.bodies.assembly import SimulatedRobot
@@ -74,7 +76,8 @@ def _version() -> str:
 class World:
     """A described world with robots in it, and its time. Raises ValueError in plain words if it cannot be built.
 
-    ``truth`` is what really is the case; ``hands`` change it; ``faults`` break things.
+    ``truth`` is what really is the case; ``hands`` change it, and what they do is noted ``outside``; ``own_hands`` are
+    those of the world itself; ``faults`` break things.
     """
 
     def __init__(
@@ -108,7 +111,9 @@ class World:
             self._population.hull(placement.name).place(*start)
         self._loading: asyncio.Task[None] | None = None
         self.truth = Truth(self._population, self._environment)
-        self.hands = Hands(self._population, self._environment, clock, lambda: self.faults)
+        self.own_hands = Hands(self._population, self._environment, clock, lambda: self.faults)
+        self.outside = Outside("", clock)
+        self.hands = noted(self.own_hands, self.outside)
         self.faults = Faults(self, description.faults)
         self._ticks = 0
         self._origin = 0.0

@@ -1,0 +1,94 @@
+"""A stage whose changes are noted as inputs, so that a lockstep run can be repeated with the same hands in it."""
+
+from __future__ import annotations
+
+import base64
+import inspect
+from collections.abc import Callable, Mapping
+from functools import lru_cache, partial
+from typing import TYPE_CHECKING, TypeVar, cast, get_type_hints
+
+import msgspec
+
+from roboglot.extras import lazy
+from roboglot.model.inputs.outside import Input, Outside
+from roboglot.model.sound import Samples, Sound
+from roboglot.model.stage import Stage, StagePerson
+
+if TYPE_CHECKING:
+    import numpy as np
+else:
+    np = lazy("numpy")
+
+HANDS = "hands"  # the kind of these inputs
+PERSON, OPTIONS = "person", "options"
+LOOKS = frozenset({"world_file", PERSON})  # methods that change nothing
+T = TypeVar("T")
+S = TypeVar("S", bound=Stage)
+
+
+def noted(stage: S, outside: Outside) -> S:
+    """Return ``stage`` as whoever is outside of the world gets it."""
+    return cast(S, _Noted(stage, Stage, outside, {}))
+
+
+class _Noted:
+    """A stage or a person in one; ``given`` goes into each note."""
+
+    def __init__(self, inner: object, kind: type, outside: Outside, given: Mapping[str, object]) -> None:
+        self._inner, self._kind, self._outside, self._given = inner, kind, outside, given
+
+    def __getattr__(self, name: str) -> object:
+        value = getattr(self._inner, name)
+        if name == PERSON:
+            return self._person
+        if not self._outside.watched or name in LOOKS or not inspect.isfunction(getattr(self._kind, name, None)):
+            return value
+        return partial(self._carry_out, name, value)
+
+    def _person(self, name: str) -> StagePerson:
+        person = _Noted(cast(Stage, self._inner).person(name), StagePerson, self._outside, {PERSON: name})
+        return cast(StagePerson, person)
+
+    def _carry_out(self, name: str, method: Callable[..., T], /, *args: object, **named: object) -> T:
+        values = _signature(self._kind, name).bind(None, *args, **named).arguments
+        values.pop("self")
+        whole = {**self._given, **{key: msgspec.to_builtins(value, enc_hook=_samples) for key, value in values.items()}}
+        with self._outside.noting(HANDS, name, whole):
+            return method(*args, **named)
+
+
+def do_again(stage: Stage, noted: Input) -> None:
+    """Do what hands did. Raises what they raised, and ValueError for what is no change that hands make."""
+    values = dict(noted.values)
+    target: Stage | StagePerson = stage
+    if PERSON in values:
+        target = stage.person(str(values.pop(PERSON)))
+    kind: type = Stage if target is stage else StagePerson
+    method = getattr(kind, noted.name, None)
+    if noted.name in LOOKS or not inspect.isfunction(method):
+        raise ValueError(f"hands cannot {noted.name[:50]!r}")
+    hints = get_type_hints(method)
+    options = cast(dict[str, object], values.pop(OPTIONS, {}))
+    try:
+        arguments = {name: _value(value, hints[name]) for name, value in values.items()}
+    except (KeyError, msgspec.ValidationError) as error:
+        raise ValueError(f"{noted.name}: {error}") from None
+    getattr(target, noted.name)(**arguments, **options)
+
+
+@lru_cache(64)
+def _signature(kind: type, name: str) -> inspect.Signature:
+    return inspect.signature(getattr(kind, name))
+
+
+def _samples(value: object) -> str:
+    """Return the samples of a sound as text."""
+    return base64.b64encode(cast(Samples, value).tobytes()).decode()
+
+
+def _value(value: object, hint: type) -> object:
+    if hint is Sound:
+        sound = cast(dict[str, str], value)
+        return Sound(sound["name"], np.frombuffer(base64.b64decode(sound["samples"]), np.int16))
+    return msgspec.convert(value, hint)

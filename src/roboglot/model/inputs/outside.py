@@ -1,0 +1,137 @@
+"""What comes to robots from outside and is no request at a door: noted, so that a lockstep run can be repeated.
+
+Hands that change the world, commands at the console, and what others answer whom a robot calls itself (a dog's app).
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import Counter
+from collections.abc import Awaitable, Callable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import partial
+from typing import NamedTuple
+
+from roboglot.model.client_context import client, connection
+from roboglot.model.clock import Clock
+
+ANSWER = "answer"  # the kind of what someone answers whom the robot called
+PATIENCE = 2.0  # s of the machine that lockstep time waits for such an answer
+_carried_out: ContextVar[bool] = ContextVar("carried_out", default=False)
+
+
+class Input(NamedTuple):
+    """One of them. ``stamp``: robot time, s; ``turn``: the clock's; ``robot``: empty if it concerns the world.
+
+    ``kind`` says which part of the program understands ``name`` and ``values``, which are what JSON has.
+    ``client`` and ``connection``: for whom, as with an exchange.
+    """
+
+    stamp: float
+    turn: int
+    robot: str
+    kind: str
+    name: str
+    values: Mapping[str, object]
+    client: str = ""
+    connection: str = ""
+
+
+Listener = Callable[[Input], None]
+
+
+class Outside:
+    """One robot's, or a world's. ``watched`` says whether anybody listens; look at it before making ``values``."""
+
+    def __init__(self, robot: str, clock: Clock) -> None:
+        self._robot, self._clock = robot, clock
+        self._listeners: list[Listener] = []
+        self._playing = False
+        self._asked: Counter[str] = Counter()
+        self._waiting: dict[tuple[str, int], asyncio.Future[str]] = {}  # by name, and the how manieth of that name
+        self._answers_come = True  # the last one asked was no longer than PATIENCE about it
+
+    @property
+    def watched(self) -> bool:
+        """Whether anybody listens, and this is not what an input that was noted leads to."""
+        return bool(self._listeners) and not _carried_out.get()
+
+    def listen(self, listener: Listener) -> Callable[[], None]:
+        """Call ``listener`` with every input; returns what ends it."""
+        self._listeners.append(listener)
+        return lambda: self._listeners.remove(listener) if listener in self._listeners else None
+
+    def note(self, kind: str, name: str, values: Mapping[str, object]) -> None:
+        """Tell who listens."""
+        who = ("", "") if kind == ANSWER else (client(), connection())
+        note = Input(self._clock.time(), self._clock.turn, self._robot, kind, name, values, *who)
+        for listener in tuple(self._listeners):
+            listener(note)
+
+    @contextmanager
+    def noting(self, kind: str, name: str, values: Mapping[str, object]) -> Iterator[None]:
+        """Note it; what it leads to is no input of its own."""
+        if not self.watched:
+            yield
+            return
+        self.note(kind, name, values)
+        before = _carried_out.set(True)
+        try:
+            yield
+        finally:
+            _carried_out.reset(before)
+
+    # -- answers of others ---------------------------------------------------------------------------------------------
+
+    async def ask(self, name: str, work: Callable[[], Awaitable[str]]) -> str:
+        """Return what ``work`` hears from someone out there, in a word; its end is an input.
+
+        Where a lockstep run is noted, time waits for it as long as answers usually come soon, and robots learn of it
+        when they have come to rest. Where it is played, nobody is asked.
+        """
+        self._asked[name] += 1
+        number = self._asked[name]
+        if not (self._clock.repeats and (self._playing or self._listeners)):
+            return await work()
+        answer: asyncio.Future[str] = asyncio.get_running_loop().create_future()
+        self._waiting[name, number] = answer
+        task = None if self._playing else asyncio.ensure_future(work())
+        began = asyncio.get_running_loop().time()
+        if task is not None:
+            if self._answers_come:
+                self._clock.hold(answer, PATIENCE)
+            task.add_done_callback(lambda done: self._clock.arrive(partial(self._hear, name, number, done)))
+        try:
+            return await answer
+        finally:
+            if task is not None:
+                self._answers_come = asyncio.get_running_loop().time() - began < PATIENCE
+                self._clock.release(answer)
+                task.cancel()
+            self._waiting.pop((name, number), None)
+
+    def _hear(self, name: str, number: int, done: asyncio.Future[str]) -> None:
+        """``done`` has ended."""
+        answer = self._waiting.get((name, number))
+        if answer is None or answer.done() or done.cancelled():
+            return
+        if (error := done.exception()) is not None:
+            answer.set_exception(error)
+        else:
+            self.answer(name, number, done.result())
+
+    def play(self) -> None:
+        """From now on nobody is asked: ``answer`` says what is heard."""
+        self._playing = True
+
+    def waits(self, name: str, number: int) -> bool:
+        """Return whether the robot waits for an answer to the call with this number among those of that name."""
+        return (name, number) in self._waiting
+
+    def answer(self, name: str, number: int, said: str) -> None:
+        """Let the robot hear what that call was answered."""
+        answer = self._waiting.pop((name, number))
+        if not answer.done():
+            self.note(ANSWER, name, {"number": number, "said": said})
+            answer.set_result(said)

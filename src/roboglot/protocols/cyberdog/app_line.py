@@ -1,0 +1,84 @@
+"""One connection from a robot to an app, and what its calls come to in a word. Knows no robot."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import AsyncIterable, Callable, Coroutine
+
+import grpc
+
+from roboglot.protocols.cyberdog.frame_queue import Delivery
+from roboglot.wire.cyberdog.channel import APP_NAME, client_options
+from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
+from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import GrpcAppStub
+
+log = logging.getLogger(__name__)
+DONE, CLOSED, UNUSABLE = "ok", "closed", "unusable"  # beside the names of gRPC's statuses
+BROKEN = frozenset({"unavailable", "cancelled", CLOSED, UNUSABLE})
+Credentials = Callable[[], grpc.ChannelCredentials] | None
+
+
+class AppLine:
+    """Made without work; the first call connects."""
+
+    def __init__(self, target: str, credentials: Credentials) -> None:
+        self._target, self._credentials = target, credentials
+        self._channel: grpc.aio.Channel | None = None
+
+    async def heartbeat(self, ticks: pb.Ticks) -> str:
+        """Say how the robot is."""
+        stub = self._stub()
+        return await self._outcome(_one(stub.heartbeat(ticks)), "heartbeat")
+
+    async def push(self, code: int, text: str) -> str:
+        """Send one message; return when it is acknowledged."""
+        stub = self._stub()
+        return await self._outcome(_read_to_the_end(stub.sendMsg(pb.SendRequest(nameCode=code, params=text))), code)
+
+    async def close(self) -> str:
+        """Hang up."""
+        if self._channel is not None:
+            await self._channel.close()
+        return DONE
+
+    def _stub(self) -> GrpcAppStub:
+        if self._channel is None:
+            options = client_options(APP_NAME)
+            if self._credentials is None:
+                self._channel = grpc.aio.insecure_channel(self._target, options=options)
+            else:
+                self._channel = grpc.aio.secure_channel(self._target, self._credentials(), options=options)
+        return GrpcAppStub(self._channel)
+
+    async def _outcome(self, call: Coroutine[None, None, None], what: object) -> str:
+        try:
+            await call
+        except grpc.aio.AioRpcError as error:
+            name: str = error.code().name.lower()
+            log.debug("%s to %s failed: %s: %s", what, self._target, name, error.details())
+            return name
+        except grpc.aio.UsageError as error:
+            log.debug("%s to %s failed: %s", what, self._target, error)
+            return UNUSABLE
+        except asyncio.CancelledError:  # the channel was closed under it; or its task is cancelled
+            if (task := asyncio.current_task()) and task.cancelling():
+                raise
+            log.debug("%s to %s failed: the app was lost", what, self._target)
+            return CLOSED
+        return DONE
+
+
+def delivery(outcome: str) -> Delivery:
+    """Return what became of a push: an app that answered with an error has it; where the line broke it may not."""
+    return Delivery.FAILED if outcome in BROKEN else Delivery.DONE
+
+
+async def _one(call: Coroutine[None, None, object]) -> None:
+    await call
+
+
+async def _read_to_the_end(call: AsyncIterable[object]) -> None:
+    """The app may answer; real robots read that and ignore it."""
+    async for _ in call:
+        pass

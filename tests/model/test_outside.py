@@ -1,0 +1,93 @@
+"""What comes from outside: noted, let in when robots have come to rest, and played instead of asked for."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from roboglot.model.clock import LockstepClock
+from roboglot.model.inputs.outside import ANSWER, Input, Outside
+
+
+@pytest.fixture
+def clock() -> LockstepClock:
+    return LockstepClock()
+
+
+async def never() -> str:
+    raise AssertionError("nobody is asked")
+
+
+async def test_time_waits_for_an_answer(clock: LockstepClock) -> None:
+    outside, noted = Outside("a", clock), list[Input]()
+    outside.listen(noted.append)
+
+    async def answered() -> str:
+        await asyncio.sleep(0.01)  # of the machine
+        return "ok"
+
+    async def ask() -> float:
+        assert await outside.ask("heartbeat", answered) == "ok"
+        return clock.time()
+
+    await clock.advance(1.0)
+    asking = asyncio.ensure_future(ask())
+    await clock.advance(5.0)
+    assert await asking == 1.0
+    assert [(one.stamp, one.kind, one.name, one.values) for one in noted] == [
+        (1.0, ANSWER, "heartbeat", {"number": 1, "said": "ok"})
+    ]
+
+
+async def test_nobody_is_asked_in_a_rerun(clock: LockstepClock) -> None:
+    outside = Outside("a", clock)
+    outside.play()
+    asking = asyncio.ensure_future(outside.ask("push", never))
+    await clock.advance(1.0)
+    assert (outside.waits("push", 1), outside.waits("push", 2), outside.waits("close", 1)) == (True, False, False)
+    outside.answer("push", 1, "unavailable")
+    assert await asking == "unavailable"
+
+
+async def test_given_up_call_is_answered_no_more(clock: LockstepClock) -> None:
+    outside = Outside("a", clock)
+    outside.play()
+    with pytest.raises(TimeoutError):
+        await asyncio.gather(clock.wait_for(outside.ask("push", never), 2.0), clock.advance(3.0))
+    assert not outside.waits("push", 1)
+
+
+async def test_arrivals_come_one_by_one_at_rest(clock: LockstepClock) -> None:
+    said: list[str] = []
+
+    async def busy(name: str) -> None:
+        for _ in range(5):
+            await asyncio.sleep(0)
+        said.append(name)
+
+    tasks = [asyncio.ensure_future(busy("work"))]
+    clock.arrive(lambda: tasks.append(asyncio.ensure_future(busy("first"))))
+    clock.arrive(lambda: said.append("second"))
+    await clock.advance(1.0)
+    assert said == ["work", "first", "second"]
+
+
+async def test_time_stops_between_timers_of_an_instant(clock: LockstepClock) -> None:
+    fired: list[int] = []
+    for number in range(3):
+        clock.call_at(1.0, lambda number=number: fired.append(number))  # type: ignore[misc]
+    await clock.advance_to(1.0, 2)
+    assert (fired, clock.time(), clock.turn) == ([0, 1], 1.0, 2)
+    await clock.advance_to(1.0)
+    assert (fired, clock.turn) == ([0, 1, 2], 3)
+
+
+async def test_what_an_input_leads_to_is_none(clock: LockstepClock) -> None:
+    outside, noted = Outside("", clock), list[Input]()
+    outside.listen(noted.append)
+    with outside.noting("command", "go", {}):
+        assert not outside.watched
+        with outside.noting("hands", "push", {}):
+            pass
+    assert [one.name for one in noted] == ["go"]

@@ -1,0 +1,202 @@
+"""A session in lockstep in which everybody does something: four protocols, a dog's app, hands, the console's desk."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import dataclasses
+import itertools
+import json
+import os
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from urllib.request import Request, urlopen
+
+from websockets.asyncio.client import ClientConnection, connect
+
+from roboglot.clients.cyberdog.link import Link
+from roboglot.clients.errors import ClientError
+from roboglot.clients.slamware import SlamwareClient
+from roboglot.config import Config, ConsoleConfig, RecordConfig, RobotConfig, load_config
+from roboglot.model.clock import LockstepClock, RealClock
+from roboglot.model.tap import Direction, Exchange
+from roboglot.protocols import sections
+from roboglot.runtime import Runtime
+from roboglot.testing.addresses import free_port
+from roboglot.wire.slamware.chapters.motion import MoveOptions, MoveToOptions
+from roboglot.wire.slamware.geometry import Location
+
+WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
+ADDRESS = f"127.0.194.{101 + WORKER}"
+FRAME: dict[str, object] = dict.fromkeys(("style", "describe", "body"), "") | {
+    "type": "task",
+    "target_id": [],
+    "mode": "single",
+    "condition": "now",
+}
+PROGRAM = """
+import random
+for number in range(3):
+    cyberdog.task.block('b%d' % random.randint(0, 99))
+    time.sleep(0.4)
+"""
+
+
+def config(folder: Path) -> Config:
+    base = load_config(
+        None,
+        {
+            "data": str(folder / "data"),
+            "world": "office",
+            "lockstep": True,
+            "cyberdog": {"plaintext": True, "app_port": free_port()},
+        },
+        sections(),
+    )
+    return dataclasses.replace(
+        base,
+        robots=(RobotConfig("a", "universal", ADDRESS),),
+        record=RecordConfig(to=str(folder / "r.mcap")),
+        console=ConsoleConfig(address=ADDRESS),
+    )
+
+
+class Session:
+    """One runtime and its clients."""
+
+    def __init__(self, folder: Path) -> None:
+        self.config = config(folder)
+        self.runtime = Runtime(self.config)
+        clock = self.runtime.clock
+        assert isinstance(clock, LockstepClock)
+        self.clock = clock
+        self.rest = SlamwareClient(ADDRESS)
+        self.pushed: list[tuple[int, str]] = []
+        self.answers: dict[int, list[str]] = {}
+        self.heard: dict[tuple[str, Direction], int] = {}
+        self.tasks: set[asyncio.Task[None]] = set()
+        self._numbers = itertools.count()
+        self.dog: Link
+
+    def hear(self, exchange: Exchange) -> None:
+        key = exchange.door, exchange.direction
+        self.heard[key] = self.heard.get(key, 0) + 1
+
+    def new_app(self) -> Link:
+        port = int(self.config.doors["cyberdog"].app_port)  # type: ignore[attr-defined]
+        return Link(
+            ADDRESS, 50052, None, RealClock(), app_port=port, pushed=lambda code, text: self.pushed.append((code, text))
+        )
+
+    async def until_heard(self, door: str, direction: Direction, count: int) -> None:
+        async with asyncio.timeout(20):
+            while self.heard.get((door, direction), 0) < count:  # noqa: ASYNC110 - the tap calls back in the loop
+                await asyncio.sleep(0.0005)
+
+    async def dog_asks(self, code: int, **values: object) -> None:
+        """Ask and go on as soon as the dog has heard it; answers may take their time."""
+        number = self.heard.get(("cyberdog", Direction.REQUEST), 0) + 1
+
+        async def listen() -> None:
+            with contextlib.suppress(ClientError):
+                async for _, text in self.dog.send(code, json.dumps(values)):
+                    self.answers.setdefault(code, []).append(text)
+
+        task = asyncio.ensure_future(listen())
+        self.tasks.add(task)
+        task.add_done_callback(self.tasks.discard)
+        await self.until_heard("cyberdog", Direction.REQUEST, number)
+
+    async def console_does(self, path: str, **values: object) -> None:
+        console = self.runtime.console
+        assert console is not None
+        await asyncio.to_thread(_post, f"http://{ADDRESS}:{console.port}/api/{path}", values)
+
+    async def frame(self, socket: ClientConnection, operate: str, body: str = "") -> None:
+        number = self.heard.get(("visual", Direction.REQUEST), 0) + 1
+        targets = [] if operate == "inquiry" else ["t"]
+        frame = FRAME | {"target_id": targets, "id": f"x-{next(self._numbers)}", "operate": operate, "body": body}
+        await socket.send(json.dumps(frame))
+        await self.until_heard("visual", Direction.REQUEST, number)
+
+
+def _post(url: str, values: object) -> None:
+    request = Request(url, json.dumps(values).encode(), {"content-type": "application/json"})
+    with urlopen(request, timeout=20) as answer:
+        assert answer.status == 200
+
+
+@asynccontextmanager
+async def begun(folder: Path) -> AsyncIterator[Session]:
+    session = Session(folder)
+    await session.runtime.start()
+    session.runtime.fleet.robots["a"].tap.listen(session.hear)
+    try:
+        yield session
+    finally:
+        session.rest.close()
+        for task in tuple(session.tasks):
+            task.cancel()
+        await session.runtime.close()
+
+
+async def hold(folder: Path, rounds: int) -> Session:
+    """Hold a session of ``rounds`` times 20 s of robot time."""
+    async with begun(folder) as session:
+        clock, rest = session.clock, session.rest
+        reader, writer = await asyncio.open_connection(ADDRESS, 40923)
+
+        async def text(line: bytes) -> None:
+            writer.write(line)
+            await reader.readuntil(b";")
+
+        async with connect(f"ws://{ADDRESS}:50053/programs") as socket, asyncio.TaskGroup() as group:
+            reading = group.create_task(_read_all(socket))
+            await clock.advance(1.037)
+            await session.frame(socket, "save", PROGRAM)
+            await clock.advance(0.1)
+            for number in range(rounds):
+                session.dog = session.new_app()
+                await session.dog.open()
+                await session.dog_asks(10001)
+                await clock.advance(1.513)
+                await session.dog_asks(1004, motion_id=111 if number % 2 else 101)
+                await clock.advance(0.831)
+                await session.frame(socket, "run")
+                await session.dog_asks(6003, map_name="")
+                await rest.begin("MoveToAction", MoveToOptions(Location(0.5 + 0.3 * (number % 3), 0.2), MoveOptions()))
+                await clock.advance(2.513)
+                box = {"x": 2.0, "y": 1.0 + 0.1 * number, "width": 0.3, "depth": 0.3}
+                await session.console_does("world/add_box", **box)
+                await session.dog_asks(6004, type=1, map_name="", goalX=1.0, goalY=0.4, theta=0.0)
+                await clock.advance(2.021)
+                for line in (b"command;", b"chassis position ?;", b"robot battery ?;"):
+                    await text(line)
+                await session.console_does("world/inject_fault", kind="lidar_gone", robot="a", duration=1.5)
+                await rest.get_pose()
+                await clock.advance(2.411)
+                await session.dog_asks(2002, **FRAME | {"operate": "inquiry", "id": f"d-{number}"})
+                await session.frame(socket, "inquiry")
+                await session.console_does("robots/a/drive", x=0.2, seconds=1.0)
+                await clock.advance(1.117)
+                await session.console_does("world/push", robot="a", x=4.0, y=1.0)
+                session.runtime.fleet.world.hands.touch("a")
+                await clock.advance(2.5)
+                await session.dog_asks(6009, type=0)
+                await clock.advance(1.011)
+                await session.console_does("world/remove_box", number=_last_box(session))
+                await session.dog.close()  # the app goes away without a word
+                await clock.advance(6.557)
+            reading.cancel()
+        writer.close()
+    return session
+
+
+def _last_box(session: Session) -> int:
+    return session.runtime.fleet.world.hands.obstacles[-1].number
+
+
+async def _read_all(socket: ClientConnection) -> None:
+    async for _ in socket:
+        pass
