@@ -138,6 +138,35 @@ def test_all_parts_are_read_as_one(tmp_path: Path) -> None:
     assert numbers(tmp_path / "x.mcap") == list(range(35))
 
 
+def test_each_part_begins_with_how_things_stand(tmp_path: Path) -> None:
+    files = Files(tmp_path / "x.mcap", ORIGIN, Redaction(), Limits(part_seconds=10.0, total_bytes=9000))
+    files.open(0)
+    for number, topic in enumerate(("/a/control", "/a/faults", "/a/control")):  # noted once, at the beginning
+        files.write(Entry(topic, "state", number, number, {"number": number}))
+    for second in range(100):
+        files.write(tick(second, second))
+    files.close()
+    assert not (tmp_path / "x.mcap").exists()
+    first, *later = sorted(tmp_path.iterdir())
+    assert later
+    assert parts(first) == [first, *later]
+    standing = list(read_messages(first, "/a/control", "/a/faults"))  # once, though each part has it
+    assert sorted((one.topic, one.json()["number"]) for one in standing) == [("/a/control", 2), ("/a/faults", 1)]
+    assert {one.at for one in standing} == {next(read_messages(first, "/a/events")).at}
+    assert numbers(first) == list(range(numbers(first)[0], 100))
+    assert len(list(read_messages(later[-1], "/a/control"))) == 1
+
+
+def test_files_of_others_are_no_parts(tmp_path: Path) -> None:
+    """A name that ends in a number makes no part."""
+    for name in ("run-001.mcap", "run-002.mcap"):
+        files = Files(tmp_path / name, ORIGIN, Redaction(), Limits())
+        files.open(0)
+        files.write(tick(1))
+        files.close()
+    assert parts(tmp_path / "run-001.mcap") == [tmp_path / "run-001.mcap"]
+
+
 class SlowSink:
     def __init__(self) -> None:
         self.go_on, self.written, self.closed = threading.Event(), list[Entry](), False
@@ -169,14 +198,18 @@ class FullDisk(SlowSink):
     def write(self, entry: Entry) -> None:  # noqa: ARG002
         raise OSError(errno.ENOSPC, "No space left on device")
 
+    def close(self) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
 
-def test_full_disk_ends_the_recording_and_says_so() -> None:
+
+def test_full_disk_ends_the_recording_and_says_so_once(caplog: pytest.LogCaptureFixture) -> None:
     thread = WriterThread(FullDisk())
     thread.put(tick(1))
     thread.settle()
     assert thread.failure == "No space left on device"
     assert not thread.put(tick(2))
     thread.close()
+    assert [record.message for record in caplog.records] == ["recording ends: No space left on device"]
 
 
 def test_only_the_unwritable_value_is_left_out(tmp_path: Path) -> None:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import socket
+from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
+import grpc
 import pytest
 
 from roboglot.clients.robomaster.datagrams import BROADCAST_PORT
@@ -214,3 +216,51 @@ def test_pieces_of_any_size_are_put_together() -> None:
     for byte in b"HTTP/1.1 404 Not Found\r\ntransfer-encoding: chunked\r\n\r\n3\r\nabc\r\n0\r\n\r\n":
         rest.from_robot(bytes([byte]))
     assert noted == [("", b"POST /a?b=1\n\n{}", ""), ("", b"abc", "404")]
+
+
+UNREADABLE = b"\xff\xff\xff\xff not of the service"
+
+
+async def test_dog_s_message_that_cannot_be_read_passes(tmp_path: Path) -> None:
+    """Requests, answers, pushes and heartbeats are bytes to the proxy; what it cannot read is noted as it is."""
+    path, heard, (robot_port, app_port, called) = tmp_path / "x.mcap", list[bytes](), (free_port() for _ in range(3))
+
+    async def stream(request: bytes, _context: object) -> AsyncIterator[bytes]:
+        heard.append(request)
+        yield UNREADABLE + b" answer"
+
+    async def beat(request: bytes, _context: object) -> bytes:
+        heard.append(request)
+        return UNREADABLE + b" answer"
+
+    async def serve(where: str) -> grpc.aio.Server:
+        methods = {
+            "sendMsg": grpc.unary_stream_rpc_method_handler(stream),
+            "heartbeat": grpc.unary_unary_rpc_method_handler(beat),
+        }
+        server = grpc.aio.server(options=[("grpc.so_reuseport", 0)])
+        server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler("grpcapi.GrpcApp", methods),))
+        assert server.add_insecure_port(where)
+        await server.start()
+        return server
+
+    target = Target(f"cyberdog://{ADDRESS}:{robot_port}?certs=none&app={called}")
+    book = Book(path, target, "0")
+    ends = [await serve(f"{ADDRESS}:{robot_port}"), await serve(f"127.0.0.1:{app_port}")]
+    relay = DogRelay(target, BETWEEN, book, None, app_port)
+    await relay.open()
+    try:
+        async with (
+            grpc.aio.insecure_channel(f"{BETWEEN}:{robot_port}") as phone,
+            grpc.aio.insecure_channel(f"127.0.0.1:{called}") as dog,
+        ):
+            asked = [answer async for answer in phone.unary_stream("/grpcapi.GrpcApp/sendMsg")(UNREADABLE + b" 1")]
+            told = [answer async for answer in dog.unary_stream("/grpcapi.GrpcApp/sendMsg")(UNREADABLE + b" 2")]
+            beaten = await dog.unary_unary("/grpcapi.GrpcApp/heartbeat")(UNREADABLE + b" 3")
+    finally:
+        await relay.close()
+        book.close()
+        await asyncio.gather(*(end.stop(None) for end in ends))
+    assert heard == [UNREADABLE + b" 1", UNREADABLE + b" 2", UNREADABLE + b" 3"]
+    assert [*asked, *told, beaten] == [UNREADABLE + b" answer"] * 3
+    assert UNREADABLE + b" answer" in [exchange.payload for exchange in read_recording(path).of(door="cyberdog")]

@@ -13,6 +13,7 @@ from mcap.writer import CompressionType, Writer
 
 from roboglot.recording.entries import KINDS, NANO, Entry, encoded
 from roboglot.recording.redaction import Redaction
+from roboglot.recording.standing import REPEATED, Standing
 
 log = logging.getLogger(__name__)
 LIBRARY = "roboglot"
@@ -67,10 +68,17 @@ class PartWriter:
 
     def write(self, entry: Entry) -> None:
         """Add one."""
-        channel = self._channels.get((entry.topic, entry.kind)) or self._channel(entry)
         self._sequence += 1
+        self._add(entry, self._sequence)
+
+    def repeat(self, entry: Entry) -> None:
+        """Add one that an earlier part has, too: whoever reads both passes over it."""
+        self._add(entry, REPEATED)
+
+    def _add(self, entry: Entry, sequence: int) -> None:
+        channel = self._channels.get((entry.topic, entry.kind)) or self._channel(entry)
         data = encoded(entry, self._redaction)
-        self._writer.add_message(channel, entry.at, data, entry.wall, self._sequence)
+        self._writer.add_message(channel, entry.at, data, entry.wall, sequence)
 
     def _channel(self, entry: Entry) -> int:
         kind = KINDS[entry.kind]
@@ -96,7 +104,10 @@ class PartWriter:
 
 
 class Files:
-    """The parts of one recording: ``PATH.mcap``, then ``PATH-002.mcap`` and so on; in a folder they get names."""
+    """The parts of one recording: ``PATH.mcap``, then ``PATH-002.mcap`` and so on; in a folder they get names.
+
+    Each begins with how things stand, so that it can be read when those before it are deleted.
+    """
 
     def __init__(self, path: Path, origin: Origin, redaction: Redaction, limits: Limits) -> None:
         self._base = path.with_suffix("") if path.suffix == SUFFIX else path
@@ -104,6 +115,7 @@ class Files:
         self._part: PartWriter | None = None
         self._number = 0
         self._closed: list[tuple[Path, int]] = []
+        self._standing = Standing()
         self.written = 0  # entries
         self.deleted = 0  # parts
 
@@ -129,6 +141,7 @@ class Files:
         if full:
             part = self._next(entry.at)
         part.write(entry)
+        self._standing.note(entry)
         self.written += 1
 
     def flush(self) -> None:
@@ -152,4 +165,6 @@ class Files:
             log.warning("recording: %s is deleted, for all parts have %d bytes", path, self._limits.total_bytes)
         self._number += 1
         self._part = PartWriter(self.path, self._origin, self._redaction, at, self._number)
+        for entry in self._standing.at(at):
+            self._part.repeat(entry)
         return self._part

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import re
 import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -18,6 +19,7 @@ from mcap.stream_reader import StreamReader
 from roboglot.model.inputs.outside import Input
 from roboglot.model.tap import DRIVER, Direction, Exchange
 from roboglot.recording.messages import decode_exchange, decode_input
+from roboglot.recording.standing import REPEATED
 
 log = logging.getLogger(__name__)
 RECORD_MAX = 1 << 30  # bytes of one record of the file
@@ -168,7 +170,7 @@ def read_recording(path: Path) -> Recording:
     """Read the file at ``path`` and the parts that follow it. Raises BadRecording, OSError."""
     recording = Recording(path)
     for part in parts(path):
-        _read_part(part, recording)
+        _read_part(part, recording, first=part == path)
     if "version" not in recording.facts:
         raise BadRecording(f"{path} is not a recording of roboglot")
     return recording
@@ -176,17 +178,27 @@ def read_recording(path: Path) -> Recording:
 
 def parts(path: Path) -> Sequence[Path]:
     """Return the files that a recording consists of."""
-    found, number = [path], 2
-    while (following := path.with_name(f"{path.stem}-{number:03}{path.suffix}")).exists():
+    found, stem, number = [path], path.stem, 2
+    if (numbered := re.fullmatch(r"(.+)-(\d{3,})", stem)) and _part_of(path) == numbered[2].lstrip("0") != "1":
+        stem, number = numbered[1], int(numbered[2]) + 1  # those before it are deleted, or not wanted
+    while (following := path.with_name(f"{stem}-{number:03}{path.suffix}")).exists():
         found.append(following)
         number += 1
     return found
 
 
-def _read_part(path: Path, recording: Recording) -> None:
+def _part_of(path: Path) -> str:
+    """Return the number that a part says it has; empty if it says none."""
+    found = (record for record, *_ in records(path) if isinstance(record, Metadata) and record.name == "roboglot")
+    return str(next((record.metadata.get("part", "") for record in found), ""))
+
+
+def _read_part(path: Path, recording: Recording, *, first: bool) -> None:
     recording.whole = False
     for record, channel, schema in records(path):
         match record:
+            case Message(sequence=0) if not first:
+                pass  # an earlier part has it
             case Metadata(name="roboglot"):
                 recording.facts |= {key: value for key, value in record.metadata.items() if key != "part"}
             case Attachment():
@@ -210,5 +222,7 @@ def read_messages(path: Path, *topics: str) -> Iterator[Record]:
     """Yield the messages of these topics (none: all), in the file's order. Raises BadRecording, OSError."""
     for part in parts(path):
         for record, channel, schema in records(part):
-            if isinstance(record, Message) and channel and schema and (not topics or channel.topic in topics):
+            if not isinstance(record, Message) or not channel or not schema or (topics and channel.topic not in topics):
+                continue
+            if part == path or record.sequence != REPEATED:
                 yield Record(channel.topic, schema.name, record.log_time, record.data)

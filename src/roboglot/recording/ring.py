@@ -15,11 +15,10 @@ import zstandard
 from roboglot.recording.entries import NANO, Entry
 from roboglot.recording.files import Origin, PartWriter
 from roboglot.recording.redaction import Redaction
+from roboglot.recording.standing import STANDING, STANDING_MAX
 
 BYTES_MAX = 64 << 20  # of compressed entries; what is older goes first
 BLOCK_SECONDS = 1.0
-STANDING = frozenset({"state", "battery", "grid", "scene"})  # kinds of which the last one holds until the next
-STANDING_MAX = 1000  # topics
 
 
 class Ring:

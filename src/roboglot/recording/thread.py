@@ -120,5 +120,7 @@ class WriterThread:
             log.exception("recording: a value of %s cannot be written", entry.topic)
 
     def _fail(self, error: OSError) -> None:
+        if self.failure:  # it has been said
+            return
         self.failure = error.strerror or str(error)
         log.error("recording ends: %s", self.failure)

@@ -1,0 +1,27 @@
+"""What is noted once or when it changes (the body, the map, faults): the last of it holds until the next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from roboglot.recording.entries import Entry
+
+STANDING = frozenset({"state", "battery", "grid", "scene"})  # kinds of which the last one holds until the next
+STANDING_MAX = 1000  # topics
+REPEATED = 0  # the sequence of messages in a file that an earlier part has, too
+
+
+class Standing:
+    """The last entry of each topic of these kinds."""
+
+    def __init__(self) -> None:
+        self._last: dict[str, Entry] = {}
+
+    def note(self, entry: Entry) -> None:
+        """Keep it, if it holds until the next one."""
+        if entry.kind in STANDING and (entry.topic in self._last or len(self._last) < STANDING_MAX):
+            self._last[entry.topic] = entry
+
+    def at(self, at: int) -> Sequence[Entry]:
+        """Return all of them, as they are at this time (ns since 1970)."""
+        return [entry._replace(at=at) for entry in self._last.values()]
