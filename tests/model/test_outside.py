@@ -1,4 +1,4 @@
-"""What comes from outside: noted, let in when robots have come to rest, and played instead of asked for."""
+"""Inputs from outside: noted, let in when robots have come to rest, and played instead of asked for."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def clock() -> LockstepClock:
 
 
 async def never() -> str:
-    raise AssertionError("nobody is asked")
+    raise AssertionError("no one is asked")
 
 
 async def test_time_waits_for_an_answer(clock: LockstepClock) -> None:
@@ -40,7 +40,7 @@ async def test_time_waits_for_an_answer(clock: LockstepClock) -> None:
     ]
 
 
-async def test_nobody_is_asked_in_a_rerun(clock: LockstepClock) -> None:
+async def test_no_one_is_asked_in_a_rerun(clock: LockstepClock) -> None:
     outside = Outside("a", clock)
     outside.play()
     asking = asyncio.ensure_future(outside.ask("push", never))

@@ -202,7 +202,7 @@ class FullDisk(SlowSink):
         raise OSError(errno.ENOSPC, "No space left on device")
 
 
-def test_full_disk_ends_the_recording_and_says_so_once(caplog: pytest.LogCaptureFixture) -> None:
+def test_full_disk_ends_recording_and_is_said_once(caplog: pytest.LogCaptureFixture) -> None:
     thread = WriterThread(FullDisk())
     thread.put(tick(1))
     thread.settle()

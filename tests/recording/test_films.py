@@ -30,7 +30,7 @@ class FarCamera:
         self.watched = False
 
 
-async def test_a_real_robot_s_video_is_recorded_as_it_comes() -> None:
+async def test_real_robot_video_is_recorded_as_it_comes() -> None:
     clock, noted = LockstepClock(), list[Entry]()
     plate = Description(
         maker="", model="", serial="", hardware_version="", software_version="", radius=0.25, height=0.3

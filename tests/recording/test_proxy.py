@@ -255,12 +255,12 @@ async def test_dog_s_message_that_cannot_be_read_passes(tmp_path: Path) -> None:
             grpc.aio.insecure_channel(f"127.0.0.1:{called}") as dog,
         ):
             asked = [answer async for answer in phone.unary_stream("/grpcapi.GrpcApp/sendMsg")(UNREADABLE + b" 1")]
-            told = [answer async for answer in dog.unary_stream("/grpcapi.GrpcApp/sendMsg")(UNREADABLE + b" 2")]
+            pushed = [answer async for answer in dog.unary_stream("/grpcapi.GrpcApp/sendMsg")(UNREADABLE + b" 2")]
             beaten = await dog.unary_unary("/grpcapi.GrpcApp/heartbeat")(UNREADABLE + b" 3")
     finally:
         await relay.close()
         book.close()
         await asyncio.gather(*(end.stop(None) for end in ends))
     assert heard == [UNREADABLE + b" 1", UNREADABLE + b" 2", UNREADABLE + b" 3"]
-    assert [*asked, *told, beaten] == [UNREADABLE + b" answer"] * 3
+    assert [*asked, *pushed, beaten] == [UNREADABLE + b" answer"] * 3
     assert UNREADABLE + b" answer" in [exchange.payload for exchange in read_recording(path).of(door="cyberdog")]

@@ -28,7 +28,7 @@ def world() -> World:
 async def test_hands_do_the_same_in_another_world() -> None:
     first, second, noted = world(), world(), list[Input]()
     hands = first.hands
-    hands.add_obstacle(Pose(1.0, 1.0))  # before anybody listens
+    hands.add_obstacle(Pose(1.0, 1.0))  # before they are noted
     second.hands.add_obstacle(Pose(1.0, 1.0))
     first.outside.listen(noted.append)
     number = hands.add_obstacle(Pose(2.0, 1.0, 0.5), (0.3, 0.2, 1.0))
@@ -42,7 +42,7 @@ async def test_hands_do_the_same_in_another_world() -> None:
     name = hands.add_person(Pose(1.5, 1.5), name="Ann")
     hands.person(name).gesture(next(iter(Gesture)), seconds=2.0)
     with pytest.raises(NotFound):
-        hands.remove_person("nobody")
+        hands.remove_person("no one")
     assert [one.name for one in noted] == [
         *("add_obstacle", "move_obstacle", "place", "push", "pull", "touch", "make_sound", "inject_fault"),
         *("add_person", "gesture", "remove_person"),

@@ -1,4 +1,4 @@
-"""What every clock of robots can do; ``model/clock.py`` has the clocks themselves."""
+"""Interface of every clock of robots; ``model/clock.py`` has the clocks themselves."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Clock(ABC):
 
     @property
     def turn(self) -> int:
-        """How many timers of a lockstep clock have fired in this very instant; -1: time passes by itself."""
+        """Number of timers that have fired in this very instant of a lockstep clock; -1: time passes by itself."""
         return -1
 
     def arrive(self, happening: Callable[[], None]) -> None:

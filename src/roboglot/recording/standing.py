@@ -1,4 +1,4 @@
-"""What is noted once or when it changes (the body, the map, faults): the last of it holds until the next."""
+"""Values that are noted once or when they change (body, map, faults): the last one holds until the next."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ def do_again(stage: Stage, noted: Input) -> None:
     kind: type = Stage if target is stage else StagePerson
     method = getattr(kind, noted.name, None)
     if noted.name in LOOKS or not inspect.isfunction(method):
-        raise ValueError(f"hands cannot {noted.name[:50]!r}")
+        raise ValueError(noted.name[:50])
     hints = get_type_hints(method)
     options = cast(dict[str, object], values.pop(OPTIONS, {}))
     try:

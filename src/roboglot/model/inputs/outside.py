@@ -1,4 +1,4 @@
-"""What comes to robots from outside and is no request at a door: noted, so that a lockstep run can be repeated.
+"""Inputs that come to robots from outside and are no requests at doors: noted, so that a lockstep run can be repeated.
 
 Hands that change the world, commands at the console, and what others answer whom a robot calls itself (a dog's app).
 """
@@ -54,7 +54,7 @@ class Outside:
 
     @property
     def watched(self) -> bool:
-        """Whether anybody listens, and this is not what an input that was noted leads to."""
+        """True while anybody listens, and this is not what an input that was noted leads to."""
         return bool(self._listeners) and not _carried_out.get()
 
     def listen(self, listener: Listener) -> Callable[[], None]:
