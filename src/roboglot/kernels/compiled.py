@@ -1,4 +1,4 @@
-"""How every kernel is compiled: ahead for its one signature, kept on disk, without the interpreter's lock.
+"""Compilation of every kernel: ahead for its one signature, kept on disk, without the interpreter's lock.
 
 No C wrapper is made, which nothing calls and which takes a tenth of the compiler's time. Kernels are written with loops
 rather than array expressions, reductions, ``np.full`` or ``np.round``: those compile ten times as slowly, and run no

@@ -1,4 +1,4 @@
-"""What a grid of depths shows: what stands on the floor, and floor."""
+"""Obstacles and floor in a grid of depths."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NEAR = 2.5  # m from base_link within which depth is precise enough
 def sort_out(
     rays: FloatArray, ways: FloatArray, eye: FloatArray, height: float, inner: float
 ) -> tuple[FloatArray, FloatArray]:
-    """What stands, and where there is floor: x and y in base_link (n, 2; m), row by row.
+    """Return obstacles and floor: x and y in base_link (n, 2; m), row by row.
 
     ``rays`` (rows from above, columns, 3) go out from ``eye`` (3), both in base_link; ``ways`` (rows, columns) is how
     many of its lengths each goes, not finite where nothing was seen. What is above ``height`` (m) is passed below; what

@@ -183,7 +183,7 @@ def gaps(
     sensor: FloatArray,
     resolution: float,
 ) -> FloatArray:
-    """How far (m) each of ``points`` lies off its surface with base_link at the pose, and the surface's weight (n, 2).
+    """Return how far (m) each point lies off its surface, base_link at the pose, and the surface's weight (n, 2).
 
     inf and 0: there is none near. The more hits made the surface, the greater is its weight.
     """

@@ -1,4 +1,4 @@
-"""What the lidar sees now against where the robot wants to go: obstacle memory, inflation, free way along a path."""
+"""Obstacles of the lidar and the robot's way: memory, inflation, free way along a path."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FEW = 200  # cells up to which asking each ray for them costs less than followin
 
 @kernel("boolean(int16[:,::1], int64, int64)")
 def beside_occupied(evidence: Int16Array, row: int, col: int) -> bool:
-    """Whether the cell or one of its eight neighbours is occupied."""
+    """Return whether the cell or one of its eight neighbours is occupied."""
     for r in range(max(0, row - 1), min(evidence.shape[0], row + 2)):
         for c in range(max(0, col - 1), min(evidence.shape[1], col + 2)):
             if evidence[r, c] > 0:
@@ -24,9 +24,9 @@ def beside_occupied(evidence: Int16Array, row: int, col: int) -> bool:
 
 @kernel("int64(float64, float64, float64, int32[:,::1], int64, float64[:,::1])")
 def _noted_near(row: float, col: float, reach: float, noted: Int32Array, count: int, near: FloatArray) -> int:
-    """How many of the ``noted`` cells may be met within ``reach`` of (row, col), all in cells.
+    """Return how many ``noted`` cells may be met within ``reach`` of (row, col), all in cells.
 
-    ``near`` gets where their middles are from there.
+    ``near`` gets the places of their middles from there.
     """
     found = 0
     for k in range(count):
@@ -39,7 +39,7 @@ def _noted_near(row: float, col: float, reach: float, noted: Int32Array, count: 
 
 @kernel("boolean(float64, float64, float64[:,::1], int64)")
 def _meets(up: float, along: float, near: FloatArray, count: int) -> bool:
-    """Whether a ray in this direction may pass through one of the cells with their middles ``near``."""
+    """Return whether a ray in this direction may pass through one of the cells with their middles ``near``."""
     square = up * up + along * along
     for k in range(count):
         aside = along * near[k, 0] - up * near[k, 1]
@@ -185,10 +185,9 @@ def inflated_cost(
 
 @kernel("float64(float64[:,::1], float64[:,::1], float64, float64, float64)")
 def free_way(path: FloatArray, points: FloatArray, x: float, y: float, radius: float) -> float:
-    """How far a disc of ``radius`` can go along ``path`` (n, 2; m, dense) before it touches one of ``points``.
+    """Return how far a disc of ``radius`` can go along ``path`` (n, 2; m, dense) before it touches ``points``.
 
-    inf: all the way.
-    Points that it only gets farther from are no hindrance: who stands close to a wall may leave it.
+    inf: all the way. Points that it only gets farther from are no hindrance: a robot close to a wall may leave it.
     """
     gone = 0.0
     for i in range(path.shape[0]):
@@ -301,7 +300,7 @@ def reopen(
 
 @kernel("float64(float64[:,::1], float64, int64)")
 def corridor(points: FloatArray, half: float, stretches: int) -> float:
-    """How wide it is between what stands to the left and to the right, where that is widest; inf: one side is open.
+    """Return the widest gap between what stands to the left and to the right, m; inf: one side is open.
 
     Of ``points`` (n, 2; base_link, m) those count that lie less than ``half`` m ahead or behind, in so many stretches.
     """

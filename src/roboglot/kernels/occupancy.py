@@ -248,7 +248,7 @@ def _is_pierced(
 def verdicts(
     evidence: Int16Array, points: FloatArray, x: float, y: float, slack: float, resolution: float
 ) -> ByteArray:
-    """What the map says of each echo at ``points`` (n, 2; m from the grid's corner), seen from (x, y).
+    """Return the map's verdict on each echo at ``points`` (n, 2; m from the grid's corner), seen from (x, y).
 
     FITTING: on or beside an occupied cell; CROSSING: so, but the ray passes through a wall more than ``slack`` m before
     its end; HIDDEN: not so, behind a wall; FLOATING: in the midst of floor that was seen free; else UNKNOWN.

@@ -1,4 +1,4 @@
-"""Where in a whole map a scan fits best: branch and bound over places and headings. Exact on its steps.
+"""Search of the pose in a whole map where a scan fits best: branch and bound. Exact on its steps. Exact on its steps.
 
 A bound for a square of places is the sum, over the scan's points, of the best field value within the square's size
 (``pyramid``). Squares that cannot beat the best place found are dropped unseen.
@@ -81,7 +81,7 @@ def _roots(fields: ByteArray, floors: ByteArray, offsets: Int32Array, enough: in
 
 @kernel("boolean(int64[:,::1], int64, int64, int64, int64, int64, int64)")
 def _is_taken(taken: IntArray, heading: int, row: int, col: int, apart: int, turned: int, headings: int) -> bool:
-    """Whether (heading, row, col) lies within ``apart`` cells and ``turned`` headings of one that was found before."""
+    """Return whether (heading, row, col) lies within ``apart`` cells and ``turned`` headings of an earlier find."""
     for k in range(taken.shape[0]):
         turn = abs(heading - taken[k, 0])
         if min(turn, headings - turn) > turned:

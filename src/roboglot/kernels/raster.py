@@ -1,8 +1,9 @@
-"""Which polygon is seen at each pixel: culls, clips and projects quads and fills a depth buffer. No colours here.
+"""Rasterizer: culls, clips and projects quads and fills a depth buffer with their numbers. No colours here. No colours
+here.
 
 Camera frame: x right, y down, z forward. A plane seen through a pixel is linear in 1/z, and texture coordinates times
-1/z are too, so a polygon is kept as eleven coefficients: 1/z = p0 x + p1 y + p2, u = (p3 x + p4 y + p5) z + p6,
-v = (p7 x + p8 y + p9) z + p10, with x, y in pixels.
+1/z are too, so a polygon is kept as eleven coefficients: 1/z = p0 x + p1 y + p2, u = (p3 x + p4 y + p5) z + p6, v = (p7
+x + p8 y + p9) z + p10, with x, y in pixels.
 """
 
 from __future__ import annotations

@@ -40,7 +40,7 @@ def _at(planes: FloatArray, k: int, x: float, y: float) -> tuple[float, float, f
 
 @kernel(error_model="numpy", inline="always")
 def _texels(planes: FloatArray, k: int, z: float, u: float, v: float) -> float:
-    """How many of a texture's 256 texels lie between two pixels there, between sharp and calm."""
+    """Return how many of a texture's 256 texels lie between two pixels there, between sharp and calm."""
     across = abs(planes[k, 3] - (u - planes[k, 6]) * planes[k, 0]) + abs(
         planes[k, 7] - (v - planes[k, 10]) * planes[k, 0]
     )
@@ -52,7 +52,7 @@ def _texels(planes: FloatArray, k: int, z: float, u: float, v: float) -> float:
 
 @kernel(error_model="numpy", inline="always")
 def _level(texels: float) -> int:
-    """Which copy of the texture has about one texel per pixel."""
+    """Return the copy of the texture that has about one texel per pixel."""
     level = 0
     while texels > 1.0 and level < LEVELS - 1:
         texels *= 0.5
@@ -158,7 +158,7 @@ def _paint_chroma(
 
 @kernel(error_model="numpy", inline="always")
 def _cell(cells: ByteArray, frame: FloatArray, u: float, v: float) -> int:
-    """What ``cells`` says at a place of the floor."""
+    """Return the value of ``cells`` at a place of the floor."""
     column = int(min(max((u - frame[0]) * frame[2], 0.0), cells.shape[1] - 1.0))
     row = int(min(max((v - frame[1]) * frame[2], 0.0), cells.shape[0] - 1.0))
     return int(cells[row, column])
@@ -178,7 +178,7 @@ def _shadow(cells: ByteArray, frame: FloatArray, u: float, v: float) -> float:
 
 @kernel(error_model="numpy", inline="always")
 def _run(seen: Uint16Array, y: int, x: int, limit: int) -> int:
-    """Where the run of equal numbers that begins at (x, y) ends, at ``limit`` if not before."""
+    """Return the end of the run of equal numbers that begins at (x, y), at ``limit`` if not before."""
     number, end = seen[y, x], x
     while end + BLOCK <= limit:
         other = np.uint16(0)

@@ -31,7 +31,7 @@ def _first(a: float, b: float, c: float) -> float:
 
 @kernel("float64(float64, float64, float64, float64, float64, float64, float64, float64)")
 def _shell(x: float, y: float, z: float, dx: float, dy: float, dz: float, radius: float, half: float) -> float:
-    """Where a ray meets the round side of an upright cylinder, within ``half`` of its middle."""
+    """Return how far a ray goes to the round side of an upright cylinder, within ``half`` of its middle."""
     a, b, c = dx * dx + dy * dy, x * dx + y * dy, x * x + y * y - radius * radius
     root = b * b - a * c
     if root < 0.0 or a < 1e-15:
@@ -45,7 +45,7 @@ def _shell(x: float, y: float, z: float, dx: float, dy: float, dz: float, radius
 
 @kernel("float64(float64, float64, float64, float64, float64, float64, float64, float64)")
 def _capsule(x: float, y: float, z: float, dx: float, dy: float, dz: float, radius: float, half: float) -> float:
-    """Where a ray meets an upright capsule: its side, or one of the two round ends beyond it."""
+    """Return how far a ray goes to an upright capsule: its side, or one of the two round ends beyond it."""
     found = _shell(x, y, z, dx, dy, dz, radius, half)
     for end in (-half, half):
         a, b = dx * dx + dy * dy + dz * dz, x * dx + y * dy + (z - end) * dz
@@ -62,7 +62,7 @@ def _capsule(x: float, y: float, z: float, dx: float, dy: float, dz: float, radi
 
 @kernel("float64(float64, float64, float64, float64, float64, float64, float64, float64)")
 def _cylinder(x: float, y: float, z: float, dx: float, dy: float, dz: float, radius: float, half: float) -> float:
-    """Where a ray meets an upright cylinder: its side, or one of its flat ends."""
+    """Return how far a ray goes to an upright cylinder: its side, or one of its flat ends."""
     found = _shell(x, y, z, dx, dy, dz, radius, half)
     if abs(dz) < 1e-15:
         return found
@@ -76,7 +76,7 @@ def _cylinder(x: float, y: float, z: float, dx: float, dy: float, dz: float, rad
 
 @kernel("float64(float64, float64, float64, float64, float64, float64, float64, float64, float64)")
 def _box(x: float, y: float, z: float, dx: float, dy: float, dz: float, sx: float, sy: float, sz: float) -> float:
-    """Where a ray meets a box of these half extents; from within, where it leaves it."""
+    """Return how far a ray goes to a box of these half extents; from within, to where it leaves it."""
     near, far = -np.inf, np.inf
     for at, way, half in ((x, dx, sx), (y, dy, sy), (z, dz, sz)):
         if abs(way) < 1e-15:
@@ -98,7 +98,7 @@ def _box(x: float, y: float, z: float, dx: float, dy: float, dz: float, sx: floa
 def _along(
     kind: int, x: float, y: float, z: float, dx: float, dy: float, dz: float, sx: float, sy: float, sz: float
 ) -> float:
-    """How far a ray from (x, y, z) goes until it meets a solid of this kind, in the solid's own frame."""
+    """Return how far a ray from (x, y, z) goes until it meets a solid of this kind, in the solid's own frame."""
     if kind == BOX:
         return _box(x, y, z, dx, dy, dz, sx, sy, sz)
     if kind == CYLINDER:
@@ -118,7 +118,7 @@ def _reached(
     chosen: NDArray[np.int64],
     nearest: FloatArray,
 ) -> int:
-    """How many solids may be met: ``chosen`` gets their rows, ``nearest`` how near at least (m), the nearest first."""
+    """Return how many solids may be met: ``chosen`` gets their rows, ``nearest`` their least distances (m), sorted."""
     count = 0
     for i in range(len(kinds)):
         if kinds[i] not in (SPHERE, CAPSULE, CYLINDER, BOX):

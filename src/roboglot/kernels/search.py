@@ -37,7 +37,7 @@ def _trace(came: Int8Array, start: int, goal: int, width: int) -> Int32Array:
 
 @kernel("float64(int64, int64)")
 def _least_cost(rows: int, columns: int) -> float:
-    """What the way over so many rows and columns costs at least: octile distance on open floor."""
+    """Return the least cost of the way over so many rows and columns: octile distance on open floor."""
     rows, columns = abs(rows), abs(columns)
     return float(max(rows, columns) + (DIAGONAL - 1.0) * min(rows, columns))
 
@@ -125,7 +125,7 @@ def shortest_path(cost: SingleArray, start_row: int, start_col: int, goal_row: i
 
 
 def ways_from(cost: SingleArray, row: int, col: int) -> SingleArray:
-    """What the cheapest way to each cell costs (float32, shape of ``cost``), by the same rules; inf: there is none."""
+    """Return the cost of the cheapest way to each cell (float32, shape of ``cost``); inf: there is none."""
     height, width = cost.shape
     # The goal lies below the grid, where no way leads: the search ends when all is found.
     paid, came = np.zeros((height + 1) * width, np.float32), np.zeros(height * width, np.int8)
