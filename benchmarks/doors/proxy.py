@@ -61,11 +61,8 @@ async def measure(door: str, folder: Path, requests: int, called: int, claims: C
     """Ask with and without the proxy in turns; it runs in this process, as all of them do."""
     target = Target(f"cyberdog://{ROBOT}?certs=none&app={called}" if door == "cyberdog" else f"{door}://{ROBOT}")
     book = Book(folder / f"{door}.mcap", target, "0")
-    relay: Relay | DogRelay
-    if door == "cyberdog":
-        relay = DogRelay(target, BETWEEN, book, None, free_port())
-    else:
-        relay = Relay(target, BETWEEN, book)
+    is_dog = door == "cyberdog"
+    relay = DogRelay(target, BETWEEN, book, None, free_port()) if is_dog else Relay(target, BETWEEN, book)
     await relay.open()
     lines = [await opened(door, ROBOT), await opened(door, BETWEEN)]
     try:
