@@ -49,6 +49,21 @@ def test_overrides_win_over_the_file(tmp_path: Path) -> None:
     assert [(r.name, r.address) for r in config.robots] == [("x", "127.0.0.1"), ("y", "127.0.0.2")]
 
 
+def test_address_moves_first_robot_of_a_file(tmp_path: Path) -> None:
+    """It took the file's robots away and started another one."""
+    path = tmp_path / "robots.toml"
+    path.write_text('[[robots]]\nname = "x"\nbody = "cyberdog2"\n[[robots]]\nname = "y"\n', "utf-8")
+    robots = load_config(path, {"address": "127.3.0.1"}).robots
+    assert [(robot.name, robot.body, robot.address) for robot in robots] == [
+        ("x", "cyberdog2", "127.3.0.1"),
+        ("y", "universal", "127.3.0.2"),
+    ]
+    assert [robot.address for robot in load_config(None, {"address": "127.3.0.9"}).robots] == ["127.3.0.9"]
+    path.write_text("robots = 3\n", "utf-8")
+    with pytest.raises(ValueError, match="robots"):
+        load_config(path, {"address": "127.3.0.1"})
+
+
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [

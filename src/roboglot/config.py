@@ -236,7 +236,8 @@ def load_config(
 ) -> Config:
     """Read the file at ``path`` (or none) with ``overrides`` (those not None) on top. Raises ValueError naming the key.
 
-    ``doors`` are the types of the doors' sections by name (``roboglot.protocols.sections()``).
+    The override ``address`` is that of the first robot. ``doors`` are the types of the doors' sections by name
+    (``roboglot.protocols.sections()``).
     """
     try:
         values: dict[str, object] = tomllib.loads(path.read_text(encoding="utf-8")) if path else {}
@@ -260,7 +261,9 @@ def config_of(
         if isinstance(values["access"].get("tls"), dict):
             values["access"]["tls"] = {"on": True} | values["access"]["tls"]
     for key, value in overrides.items():
-        if value is not None:
+        if key == "address" and value is not None:
+            values["robots"] = _moved(values.get("robots") or [{}], value)
+        elif value is not None:
             before = values.get(key, {})
             values[key] = before | value if isinstance(value, dict) and isinstance(before, dict) else value
     given = {name: values.pop(name) for name in doors if name in values}
@@ -270,6 +273,14 @@ def config_of(
         raise ValueError(f"{origin}: {error}") from None
     sections = {name: _section(name, doors[name], section, origin) for name, section in given.items()}
     return dataclasses.replace(config, robots=with_addresses(config.robots), doors=sections)
+
+
+def _moved(robots: object, address: object) -> object:
+    """Return rows of robots with the first one at another address; what are no rows is refused later."""
+    match robots:
+        case [dict() as first, *others]:
+            return [{**first, "address": address}, *others]
+    return robots
 
 
 def _section(name: str, kind: type, values: object, origin: str) -> object:

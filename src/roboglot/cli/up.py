@@ -104,7 +104,8 @@ def command(
             config,
             {
                 "world": world,
-                "robots": _robots(robot or [], address) if robot or address else None,
+                "robots": _robots(robot) if robot else None,
+                "address": address,
                 "speed": speed,
                 "lockstep": lockstep or None,
                 "seed": seed,
@@ -174,12 +175,10 @@ def _sections(given: Mapping[str, object]) -> dict[str, object]:
     return found
 
 
-def _robots(texts: list[str], address: str | None) -> list[dict[str, object]]:
+def _robots(texts: list[str]) -> list[dict[str, object]]:
     """Return robot a first, with the options of the command line, then the others."""
     robots = {"a": RobotConfig()} | {r.name: r for r in map(parse_robot, texts)}
-    rows = [dataclasses.asdict(robot) for robot in robots.values()]
-    rows[0]["address"] = address or rows[0]["address"]
-    return rows
+    return [dataclasses.asdict(robot) for robot in robots.values()]
 
 
 async def _serve(config: Config, *, open_console: bool) -> int:
