@@ -252,7 +252,7 @@ async def test_server_away_rights_stay_and_rows_are_kept(
         await until(lambda: guard.may("cell", "a", Right.DRIVE))
         server.stop()
         guard.audit.note(note(1))
-        await until(lambda: {"cannot write the audit yet", "cannot be read"} <= said(caplog))
+        await until(lambda: {"cannot write the audit yet", "cannot read the list"} <= said(caplog))
         assert await guard.admit("10.0.0.7:1", bearer) == "cell"
         assert guard.may("cell", "a", Right.DRIVE)
         with pytest.raises(DatabaseError):
@@ -279,7 +279,7 @@ async def test_server_away_rights_stay_and_rows_are_kept(
 
 
 def said(caplog: pytest.LogCaptureFixture) -> set[str]:
-    phrases = ("cannot write the audit yet", "cannot be read")
+    phrases = ("cannot write the audit yet", "cannot read the list")
     return {phrase for phrase in phrases for record in caplog.records if phrase in record.getMessage()}
 
 

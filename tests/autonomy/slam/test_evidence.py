@@ -131,7 +131,7 @@ def test_a_full_map_says_so_once(caplog: pytest.LogCaptureFixture) -> None:
         grid.make_room(0.0, 0.0, 420.0, 1.0)
     assert grid.full
     assert len(caplog.records) == 1
-    assert "it has 400 x " in caplog.text
+    assert "map has its largest size, 400 x " in caplog.text
 
 
 def test_wide_map_is_bounded_and_keeps_its_cells() -> None:
