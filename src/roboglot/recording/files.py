@@ -72,7 +72,7 @@ class PartWriter:
         self._add(entry, self._sequence)
 
     def repeat(self, entry: Entry) -> None:
-        """Add one that an earlier part has, too: whoever reads both passes over it."""
+        """Add one that an earlier part has, too: readers of both pass over it."""
         self._add(entry, REPEATED)
 
     def _add(self, entry: Entry, sequence: int) -> None:

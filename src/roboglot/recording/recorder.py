@@ -63,7 +63,7 @@ class Recorder:
         origin: Origin,
         outside: Outside | None = None,
     ) -> None:
-        """``outside`` tells what is done to the world."""
+        """``outside``: inputs that change the world."""
         self._outside = outside
         self._looking: list[Callable[[], None]] = []  # what ends it
         self._config, self._robots, self._stage, self._clock, self._origin = config, robots, stage, clock, origin

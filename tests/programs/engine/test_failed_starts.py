@@ -1,4 +1,4 @@
-"""Whatever fails between the wish to run a program and its first line is said, nothing is left, the next one runs."""
+"""Failures between the wish to run a program and its first line: reported, nothing is left, the next one runs."""
 
 from __future__ import annotations
 

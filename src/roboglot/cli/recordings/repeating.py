@@ -7,24 +7,21 @@ from collections.abc import Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, cast
 
-from roboglot.console import program_runs
-from roboglot.console.desk import COMMAND, Desk
-from roboglot.console.program_runs import PROGRAM
-from roboglot.console.teleop import PAD, Pad
+from roboglot.console import desk, program_runs, teleop
 from roboglot.model.client_context import ask_for
 from roboglot.model.errors import RobotError
-from roboglot.model.inputs.noted_stage import HANDS, do_again
+from roboglot.model.inputs import noted_stage
 from roboglot.model.inputs.outside import ANSWER, Input
 from roboglot.operations import BadParameters
 from roboglot.programs.errors import ProgramError
-from roboglot.protocols.lease_desk import LEASE, Request
+from roboglot.protocols import lease_desk
 
 if TYPE_CHECKING:
     from roboglot.runtime import Runtime
 
 
 class Repeater:
-    """One runtime's, whose robots call nobody any more."""
+    """Repeater of one runtime's inputs; its robots make no calls of their own any more."""
 
     def __init__(self, runtime: Runtime) -> None:
         self._runtime, self._robots = runtime, runtime.fleet.robots
@@ -32,11 +29,11 @@ class Repeater:
             robot.outside.play()
 
     @cached_property
-    def _desk(self) -> Desk:
+    def _desk(self) -> desk.Desk:
         return self._runtime.build_desk()
 
     async def __call__(self, given: Input) -> bool:
-        """Do it; False: it is an answer for which nobody waits yet. What was refused then is refused again."""
+        """Do it; False: the robot does not wait for that answer yet. What was refused then is refused again."""
         if given.kind == ANSWER:
             return self._answer(given)
         ask_for(given.client, given.connection)
@@ -53,21 +50,18 @@ class Repeater:
 
     async def _do(self, given: Input, values: Mapping[str, str]) -> None:
         match given.kind:
-            case "hands":
-                do_again(self._runtime.fleet.world.hands, given)
-            case "command":
+            case noted_stage.HANDS:
+                noted_stage.do_again(self._runtime.fleet.world.hands, given)
+            case desk.COMMAND:
                 asked = cast(Mapping[str, object], values["values"])
                 await self._desk.command(given.robot, given.name, asked, values["by"])
-            case "program":
+            case program_runs.PROGRAM:
                 await program_runs.start(self._desk, given.robot, values["source"])
-            case "pad" if given.name == "move":
+            case teleop.PAD if given.name == "move":
                 shares = float(values["x"]), float(values["y"]), float(values["yaw"])
-                Pad(self._robots[given.robot], values["source"]).move(*shares)
-            case "pad":
-                Pad(self._robots[given.robot], values["source"]).let_go(values["why"])
-            case "lease":
-                request = Request(given.name, given.robot, values["who"])  # type: ignore[arg-type]
+                teleop.Pad(self._robots[given.robot], values["source"]).move(*shares)
+            case teleop.PAD:
+                teleop.Pad(self._robots[given.robot], values["source"]).let_go(values["why"])
+            case lease_desk.LEASE:
+                request = lease_desk.Request(given.name, given.robot, values["who"])  # type: ignore[arg-type]
                 await self._runtime.leases.do(request, self._robots[given.robot])
-
-
-assert {HANDS, COMMAND, PROGRAM, PAD, LEASE} == {"hands", "command", "program", "pad", "lease"}

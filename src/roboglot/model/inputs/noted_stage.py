@@ -28,7 +28,7 @@ S = TypeVar("S", bound=Stage)
 
 
 def noted(stage: S, outside: Outside) -> S:
-    """Return ``stage`` as whoever is outside of the world gets it."""
+    """Return ``stage`` with its changes noted, for everything outside of the world."""
     return cast(S, _Noted(stage, Stage, outside, {}))
 
 

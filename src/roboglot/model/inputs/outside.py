@@ -22,7 +22,7 @@ _carried_out: ContextVar[bool] = ContextVar("carried_out", default=False)
 
 
 class Input(NamedTuple):
-    """One of them. ``stamp``: robot time, s; ``turn``: the clock's; ``robot``: empty if it concerns the world.
+    """One input. ``stamp``: robot time, s; ``turn``: the clock's; ``robot``: empty if it concerns the world.
 
     ``kind`` says which part of the program understands ``name`` and ``values``, which are what JSON has.
     ``client`` and ``connection``: for whom, as with an exchange.
@@ -42,7 +42,7 @@ Listener = Callable[[Input], None]
 
 
 class Outside:
-    """One robot's, or a world's. ``watched`` says whether anybody listens; look at it before making ``values``."""
+    """Inputs of one robot, or of a world. Make ``values`` only while they are ``watched``."""
 
     def __init__(self, robot: str, clock: Clock) -> None:
         self._robot, self._clock = robot, clock
@@ -54,7 +54,7 @@ class Outside:
 
     @property
     def watched(self) -> bool:
-        """True while anybody listens, and this is not what an input that was noted leads to."""
+        """True while there are listeners, and this is not the effect of an input that was noted."""
         return bool(self._listeners) and not _carried_out.get()
 
     def listen(self, listener: Listener) -> Callable[[], None]:
@@ -63,7 +63,7 @@ class Outside:
         return lambda: self._listeners.remove(listener) if listener in self._listeners else None
 
     def note(self, kind: str, name: str, values: Mapping[str, object]) -> None:
-        """Tell who listens."""
+        """Hand an input to the listeners."""
         who = ("", "") if kind == ANSWER else (client(), connection())
         note = Input(self._clock.time(), self._clock.turn, self._robot, kind, name, values, *who)
         for listener in tuple(self._listeners):
@@ -88,7 +88,7 @@ class Outside:
         """Return what ``work`` hears from someone out there, in a word; its end is an input.
 
         Where a lockstep run is noted, time waits for it as long as answers usually come soon, and robots learn of it
-        when they have come to rest. Where it is played, nobody is asked.
+        when they have come to rest. Where it is played, ``work`` is not begun.
         """
         self._asked[name] += 1
         number = self._asked[name]
@@ -122,7 +122,7 @@ class Outside:
             self.answer(name, number, done.result())
 
     def play(self) -> None:
-        """From now on nobody is asked: ``answer`` says what is heard."""
+        """Make no calls from now on: ``answer`` says what is heard."""
         self._playing = True
 
     def waits(self, name: str, number: int) -> bool:
