@@ -19,11 +19,11 @@ from roboglot.storage.transactions import DatabaseError, DiskFull
 
 log = logging.getLogger(__name__)
 
-WAITING_MAX = 10_000  # rows that wait for the disk; then they are dropped, and a row says how many
-TOGETHER_MAX = 500  # rows of one transaction
-AGAIN_SECONDS = 1.0  # between two tries to write them
-REPEATED_WITHIN = 1.0  # s: the same again so soon is counted, and the count written then
-KINDS_MAX = 1024  # different rows whose repetitions are counted
+WAITING_MAX = 10_000  # rows waiting to be written; beyond this they are dropped and a row records how many
+TOGETHER_MAX = 500  # rows per transaction
+AGAIN_SECONDS = 1.0  # between two attempts to write them
+REPEATED_WITHIN = 1.0  # s within which an equal row is counted instead of written again
+KINDS_MAX = 1024  # different rows whose repetitions are counted at the same time
 CLOSE_SECONDS = 5.0
 
 
@@ -50,7 +50,7 @@ class Audit:
 
     def note(self, entry: Entry) -> None:
         """Keep it. The same within REPEATED_WITHIN is only counted: a joystick sends 50 commands a second."""
-        host = entry.address.rpartition(":")[0]  # another connection of it is not another kind
+        host = entry.address.rpartition(":")[0]  # another connection from the same host is not another kind
         key = (entry.who, host, *entry[3:8])
         with self._lock:
             kind = self._kinds.get(key)
@@ -98,7 +98,7 @@ class Audit:
             try:
                 taken = [self._queue.get(timeout=REPEATED_WITHIN)]
                 while len(taken) < TOGETHER_MAX and taken[-1] is not None and not self._queue.empty():
-                    taken.append(self._queue.get())  # no one else takes any
+                    taken.append(self._queue.get())  # this thread is the only reader
             except queue.Empty:
                 self._settle(now())
                 continue

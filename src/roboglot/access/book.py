@@ -8,9 +8,9 @@ from roboglot.access.rights import ALL_ROBOTS, EVERYTHING, NOTHING, whole
 from roboglot.access.store import Identity, Kind
 from roboglot.operations import Right
 
-LOCAL = "local"  # who programs on this machine are, where they need no name
+LOCAL = "local"  # the identity of local programs where no credentials are needed
 
-Rights = dict[str, frozenset[Right]]  # by who has them
+Rights = dict[str, frozenset[Right]]  # by identity
 
 
 class Book:

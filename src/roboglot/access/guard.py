@@ -38,11 +38,11 @@ from roboglot.transport.seldom import Seldom
 log = logging.getLogger(__name__)
 seldom = Seldom(log)
 
-LOOK_PERIOD = 0.25  # s between two looks at the list and at the clock
-HANDSHAKES = 20  # TLS handshakes a second of one address, and twice as many at once
-HANDSHAKES_TOGETHER = 200  # of all
-ALLOWED_MAX = 4096  # pairs of an identity and an operation that need no further look
-BURST_SECONDS = 2.0  # of bytes that may come at once
+LOOK_PERIOD = 0.25  # s between two checks of the list and of expiry times
+HANDSHAKES = 20  # TLS handshakes per second from one address; bursts of twice as many
+HANDSHAKES_TOGETHER = 200  # per second from all addresses
+ALLOWED_MAX = 4096  # cached pairs of identity and operation
+BURST_SECONDS = 2.0  # the burst allowance: seconds' worth of bytes at once
 
 
 class Tunnelled(NamedTuple):
@@ -80,7 +80,7 @@ class Guard:
         self._own = () if shared else (self._store, self._trail)
         self.audit = audit.Audit(self._trail)
         self.requests = Limiter(config.requests, config.requests, time.monotonic)
-        self.tunnels: dict[str, Tunnelled] = {}  # by the loopback address that stands for each
+        self.tunnels: dict[str, Tunnelled] = {}  # by the loopback address that stands for each client
         self._list = self._store.snapshot()
         self._book = Book(self._list.identities)
         self._proofs = Proofs(self._book, config.logins)
@@ -169,7 +169,7 @@ class Guard:
         seen = self._list.version
         while not self._ended.wait(LOOK_PERIOD):
             if self.now() >= self._next_end:
-                self._next_end = float("inf")  # until it is counted anew
+                self._next_end = float("inf")  # until recomputed
                 loop.call_soon_threadsafe(lambda: self._adopt_safely(self._list))
             try:
                 if self._store.version == seen:
@@ -200,7 +200,7 @@ class RobotAdmission(Admission):
         self.connections_max = guard.config.connections
         self._rights: Rights = {}
         self._needs: dict[str, Right] = {}
-        self._allowed: dict[tuple[str, str], Right] = {}  # the right that sufficed, until rights change
+        self._allowed: dict[tuple[str, str], Right] = {}  # the right that sufficed; cleared when rights change
         self._listeners: list[Callable[[str], None]] = []
         self._releasing: asyncio.Future[None] | None = None
         self._offers: dict[int, tuple[asyncio.Server, Callable[[], asyncio.Protocol]]] = {}

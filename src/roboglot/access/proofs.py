@@ -12,11 +12,11 @@ from roboglot.access.store import Kind
 from roboglot.model.admission import LockedOut, Proof, ProofKind, Unknown
 from roboglot.transport.limiter import Limiter
 
-PROOFS_MAX = 4096  # clients whose proof needs no further look
-CHECKS_MAX = 16  # passwords that wait to be checked; each takes 50 ms of a thread
+PROOFS_MAX = 4096  # clients whose proof is cached
+CHECKS_MAX = 16  # passwords waiting to be checked; each check takes 50 ms of a thread
 TRIES_SECONDS = 60.0
-TRIES_OF_ONE_NAME = 10  # times as many as of one address: others' guesses must not lock a person out at once
-HTTP = ProofKind.HTTP  # looking a member up in its class takes longer than all else here
+TRIES_OF_ONE_NAME = 10  # times the limit of one address, so that others' guesses do not lock a person out at once
+HTTP = ProofKind.HTTP  # the class look-up of a member is slower than everything else here
 
 
 class Proofs:
@@ -24,7 +24,7 @@ class Proofs:
 
     def __init__(self, book: Book, logins: int) -> None:
         self._book = book
-        self._owners: dict[str, str] = {}  # by the header that shows who it is
+        self._owners: dict[str, str] = {}  # by the header that carries the proof
         self._tries = Limiter(logins / TRIES_SECONDS, logins, time.monotonic)
         often = TRIES_OF_ONE_NAME * logins
         self._tries_of_name = Limiter(often / TRIES_SECONDS, often, time.monotonic)
@@ -93,6 +93,6 @@ class Proofs:
             async with self._checking:
                 kept = self._book.password_of(name)
                 fits = await asyncio.to_thread(password_fits, password, kept)
-                return fits and kept == self._book.password_of(name)  # it may have been replaced meanwhile
+                return fits and kept == self._book.password_of(name)  # the password may have been replaced meanwhile
         finally:
             self._waiting -= 1

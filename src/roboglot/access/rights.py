@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from roboglot.operations import Right
 
 ALL_ROBOTS = "*"
-# Driving includes seeing; programs drive; administrators may do everything.
+# Driving includes seeing; programs may drive; administrators may do everything.
 BRINGS = {
     Right.SEE: frozenset({Right.SEE}),
     Right.DRIVE: frozenset({Right.SEE, Right.DRIVE}),

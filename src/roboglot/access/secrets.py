@@ -9,7 +9,7 @@ import secrets
 
 PASSWORD_MIN, PASSWORD_MAX = 8, 256  # characters
 TOKEN_BYTES = 32
-_N, _R, _P = 1 << 14, 8, 1  # of scrypt: 16 MB and about 50 ms
+_N, _R, _P = 1 << 14, 8, 1  # scrypt parameters: 16 MB and about 50 ms per hash
 _SALT_BYTES, _KEY_BYTES = 16, 32
 
 

@@ -27,11 +27,11 @@ IDENTITIES_MAX = 10_000
 class Kind(StrEnum):
     """Kind of an identity, and so its means of authentication."""
 
-    PERSON = "person"  # by a password
-    MACHINE = "machine"  # by a token
-    APP = "app"  # by a client certificate, whose common name is the identity's
-    GUEST = "guest"  # by a token for a time, made by the program itself: a pupil who joined a class by its code
-    ADDRESS = "address"  # by where it comes from: for clients that can show nothing
+    PERSON = "person"  # shows a password
+    MACHINE = "machine"  # shows a token
+    APP = "app"  # shows a client certificate; its common name is the identity
+    GUEST = "guest"  # shows a temporary token issued by the program: a pupil who joined a class by its code
+    ADDRESS = "address"  # recognized by address, for clients that cannot show anything
 
 
 @dataclass(frozen=True, slots=True)

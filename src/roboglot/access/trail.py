@@ -17,8 +17,8 @@ from roboglot.storage.transactions import Connection, Transactions
 
 FILE = "audit.db"  # in the data folder
 SCHEMA = "roboglot.storage.schema.audit"
-PAGE = 1000  # rows that are read at once
-TEXT_MAX = 300  # characters of one field
+PAGE = 1000  # rows per read
+TEXT_MAX = 300  # characters per field
 FIELDS = "number, at, who, address, robot, door, operation, outcome, reason, repeats, hash"
 
 
@@ -57,7 +57,7 @@ class Trail:
 
     def __init__(self, database: Transactions) -> None:
         self._database = database
-        self._tried: tuple[Sequence[Entry], End] | None = None  # what was added last, perhaps
+        self._tried: tuple[Sequence[Entry], End] | None = None  # the last batch, which may or may not have been written
 
     def __enter__(self) -> Self:
         return self
@@ -75,9 +75,9 @@ class Trail:
         self._tried = None
 
     def _add(self, connection: Connection, entries: Sequence[Entry]) -> None:
-        connection.execute("UPDATE audit_turn SET taken=1")  # other programs wait until this one is done
+        connection.execute("UPDATE audit_turn SET taken=1")  # blocks other programs until this transaction ends
         if self._tried is not None and self._tried[0] == entries and _is_kept(connection, self._tried[1]):
-            return  # the connection broke after they were kept
+            return  # the connection broke after the commit
         number, digest = _end(connection)
         for entry in map(_cut, entries):
             number += 1

@@ -12,7 +12,7 @@ from urllib.request import Request, urlopen
 import msgspec
 
 ANSWER_MAX = 16 << 20  # bytes
-SECONDS = 20.0  # for one answer
+SECONDS = 20.0  # per answer
 
 
 T = TypeVar("T")

@@ -16,8 +16,8 @@ from pydantic import BaseModel, Field
 from roboglot.agents.console import ConsoleClient, Refused
 
 T = TypeVar("T")
-SECONDS_MAX = 120.0  # that a tool waits for an action or a program
-LOOK = 0.1  # s between two looks at what is under way
+SECONDS_MAX = 120.0  # a tool's longest wait for an action or a program
+LOOK = 0.1  # s between two checks of what is under way
 DEFAULT = "a"
 
 Robot = Annotated[str, Field(min_length=1, max_length=80, description="The robot's name, as `robots` lists it.")]

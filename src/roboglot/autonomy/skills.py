@@ -78,7 +78,7 @@ if TYPE_CHECKING:
     from roboglot.autonomy.slam.slam import Slam
 
 log = logging.getLogger(__name__)
-UNAVAILABLE = "navigation unavailable"  # the fault's name while there is no mapping and no navigation
+UNAVAILABLE = "navigation unavailable"  # the fault raised while there is neither mapping nor navigation
 
 
 class Autonomy:
@@ -179,7 +179,7 @@ class Autonomy:
             self._loading.cancel()
         self._stop_treading()
         if self._memory is not None:
-            with contextlib.suppress(RobotError):  # its disk is full
+            with contextlib.suppress(RobotError):  # the disk may be full
                 await self._memory.close()
         if self._slam is not None:
             self._slam.close()
@@ -228,7 +228,7 @@ class Autonomy:
         course.planner = planner = planner_class(course.belief, self._robot.description.radius, course.load)
         self._stop_treading = self._robot.events.listen(ScanTaken, lambda _: planner.tread(course.belief.pose))
         log.info("robot %s can map and navigate (kernels loaded in %.1f s)", self._robot.id, perf_counter() - begun)
-        if isinstance(self._robot.clock, RealClock):  # the cameras' kernels, before a client wants a picture
+        if isinstance(self._robot.clock, RealClock):  # loads the cameras' kernels before a client asks for a picture
             with contextlib.suppress(KernelsUnavailable):
                 await compile_beside(report=_log_progress)
 

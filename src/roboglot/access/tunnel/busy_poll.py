@@ -7,8 +7,8 @@ import os
 import time
 from collections.abc import Callable
 
-AWAKE = 200e-6  # s after a message: a robot's answer, and most clients' next question, come within it
-SHORT_MAX = 2048  # bytes of a message that is a question or an answer; streams of more bear the delay
+AWAKE = 200e-6  # s of polling after a message: a robot's answer and most clients' next request arrive within it
+SHORT_MAX = 2048  # bytes of a request or an answer; larger ones are streams, which bear the delay
 _make_way: Callable[[], object] = getattr(os, "sched_yield", lambda: None)
 
 
@@ -34,7 +34,7 @@ class BusyPoll:
         if self._stirred:
             self._until, self._stirred = now + AWAKE, False
         if now < self._until:
-            _make_way()  # to client or robot, if the kernel woke it on this core
+            _make_way()  # for the client or the robot, if the kernel woke it on this core
             self._loop.call_soon(self._poll)
         else:
             self._polling = False

@@ -24,7 +24,7 @@ from roboglot.transport.tls import TlsCall
 log = logging.getLogger(__name__)
 
 GREETING_SECONDS_MAX = 10.0
-BESIDE_AGAIN = 1.0  # s until another second connection is tried
+BESIDE_AGAIN = 1.0  # s between attempts to open the second connection
 BROADCAST = "127.255.255.255"
 ROBOT_IP = b"robot ip "
 
@@ -74,7 +74,7 @@ class KnownGateways:
                 f" remove its line from {self._path}"
             )
         self._path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-        beside = self._path.with_name(f"{self._path.name}.{os.getpid()}")  # others may read it meanwhile
+        beside = self._path.with_name(f"{self._path.name}.{os.getpid()}")  # other processes may read it meanwhile
         beside.write_text(json.dumps({**known, gateway: shown}, indent=1))
         beside.replace(self._path)
         return shown, True
@@ -117,7 +117,7 @@ class Connector:
     async def _call(self, made: Callable[[], Link]) -> Link:
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
         context.minimum_version = ssl.TLSVersion.TLSv1_3
-        context.check_hostname, context.verify_mode = False, ssl.CERT_NONE  # the fingerprint is what is checked
+        context.check_hostname, context.verify_mode = False, ssl.CERT_NONE  # the fingerprint is checked instead
         loop = asyncio.get_running_loop()
         _, call = await loop.create_connection(lambda: TlsCall(made, context), self._gateway, self._port)
         return cast(Link, await call.over)
@@ -158,10 +158,10 @@ class Connector:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
             sender.setblocking(False)
             sender.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
-            sender.bind((self._address, 0))  # clients check where a datagram comes from
+            sender.bind((self._address, 0))  # clients check the source of a datagram
 
             def pass_on(port: int, data: bytes) -> None:
-                if port in broadcasts and data.startswith(ROBOT_IP):  # for this machine the robot is here
+                if port in broadcasts and data.startswith(ROBOT_IP):  # on this machine, the robot is here
                     data = ROBOT_IP + self._address.encode()
                 with contextlib.suppress(OSError):
                     sender.sendto(data, (BROADCAST if port in broadcasts else "127.0.0.1", port))

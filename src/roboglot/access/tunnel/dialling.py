@@ -12,7 +12,7 @@ from typing import Protocol
 from roboglot.access.tunnel.connector import Connector, NotTrusted, Refused, Trust
 
 AGAIN_AFTER = 1.0  # s
-SOON = 0.5  # s between two questions where a robot is that nothing runs now
+SOON = 0.5  # s between two questions about a robot that no program runs at present
 
 
 class Unusable(Exception):

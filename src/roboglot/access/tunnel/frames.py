@@ -16,16 +16,16 @@ CREDIT = struct.Struct("!I")
 class Kind(IntEnum):
     """Kind of a frame."""
 
-    HELLO = 1  # the client: who it is, and which robot it wants; JSON
-    WELCOME = 2  # the gateway: the ports that there are; JSON
-    REFUSED = 3  # the gateway: why not; text
+    HELLO = 1  # from the client: its identity and the robot that it wants; JSON
+    WELCOME = 2  # from the gateway: its ports; JSON
+    REFUSED = 3  # from the gateway: the reason; text
     OPEN = 4  # a new stream, to this port at the other end
     DATA = 5
-    CREDIT = 6  # so many more bytes may be sent on the stream
+    CREDIT = 6  # this many more bytes may be sent on the stream
     CLOSE = 7  # the stream has ended
     DATAGRAM = 8  # to this port at the client's end
     PING = 9
-    EOF = 10  # nothing more is sent on the stream, and it may still be answered
+    EOF = 10  # no more data will be sent on the stream; the other end may still answer
 
 
 class Frame(NamedTuple):

@@ -43,13 +43,13 @@ log = logging.getLogger(__name__)
 seldom = Seldom(log)
 
 TUNNELS_MAX = 256
-TUNNELS_OF_ONE_MAX = 64  # of one identity
-CONNECTIONS_MAX = 512  # tunnels, and connections that are not yet tunnels
+TUNNELS_OF_ONE_MAX = 64  # per identity
+CONNECTIONS_MAX = 512  # tunnels, and connections that are not tunnels yet
 HELLO_SECONDS_MAX = 5.0
-FIRST_ADDRESS, ADDRESSES = IPv4Address("127.64.0.1"), 4 * TUNNELS_MAX  # of tunnels; other gateways may have some
-PORTS_WITHIN = range(1, 1024)  # of connections within the process: the kernel gives others
+FIRST_ADDRESS, ADDRESSES = IPv4Address("127.64.0.1"), 4 * TUNNELS_MAX  # of tunnels; other gateways may use some
+PORTS_WITHIN = range(1, 1024)  # of connections within the process; the kernel assigns the ports of all others
 EVERYWHERE = ("", "0.0.0.0", "::")
-ELSEWHERE = {socket.AF_INET: "192.0.2.1", socket.AF_INET6: "2001:db8::1"}  # of RFC 5737, RFC 3849: no machine's
+ELSEWHERE = {socket.AF_INET: "192.0.2.1", socket.AF_INET6: "2001:db8::1"}  # no machine's (RFC 5737, RFC 3849)
 BROADCASTS = ("127.255.255.255", "255.255.255.255")
 
 
@@ -89,10 +89,10 @@ class Gateway:
     ) -> None:
         self._guard, self._robots, self._host, self.port, self._tls = guard, robots, host, port, tls
         self._server: asyncio.Server | None = None
-        self._addresses: dict[str, str] = {}  # of tunnels, and whose they are
+        self._addresses: dict[str, str] = {}  # identity by the tunnel's address
         self._connections = Connections(CONNECTIONS_MAX)
         self._sessions: set[asyncio.Task[None]] = set()
-        self._tunnels: dict[str, Tunnel] = {}  # by the key of their beats
+        self._tunnels: dict[str, Tunnel] = {}  # by the key of their heartbeats
 
     async def start(self) -> None:
         """Listen. Raises OSError, ssl.SSLError."""
@@ -114,7 +114,7 @@ class Gateway:
         if host in EVERYWHERE:
             kind = socket.AF_INET6 if ":" in host else socket.AF_INET
             with socket.socket(kind, socket.SOCK_DGRAM) as probe:
-                probe.connect((ELSEWHERE[kind], 9))  # sends nothing
+                probe.connect((ELSEWHERE[kind], 9))  # a UDP connect sends nothing
                 host = probe.getsockname()[0]
         return f"[{host}]:{self.port}" if ":" in host else f"{host}:{self.port}"
 
@@ -143,7 +143,7 @@ class Gateway:
             seldom.info(host, "a tunnel of %s ended: %s", host, error or "no greeting came")
         except Unknown as unknown:
             link.send(Kind.REFUSED, 0, str(unknown).encode())
-            link.transport.close()  # after what was said
+            link.transport.close()  # after the frames already queued
         except asyncio.CancelledError:
             log.info("the gateway closes")
         finally:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 PING_PERIOD = 0.1  # s
-IDLE_PERIOD = 0.05  # s between two looks while no one drives
-QUICK_PERIOD = 0.0125  # s between two beats while the client drives: what TCP lost is missed by those behind it
-QUICK_SECONDS = 0.5  # that an end goes on with it after the other did
-QUIET_AFTER = 0.3  # s of silence after which the client is as good as gone: what it drives by hand stops
-QUIET_ALONE_AFTER = 1.0  # s of silence of the tunnel itself that beats beside it excuse: what it carries comes late
-QUIET_LOOKS = 3  # at once, one after another: the loop has read its sockets between them, whatever its order
-HELD_UP = 0.1  # s between two looks: this end was held up, perhaps the other end by the same, so it may speak first
-LOST_AFTER = 5.0  # s of silence that the tunnel and its connections bear: lines that lose packets come back
+IDLE_PERIOD = 0.05  # s between two checks while no one drives
+QUICK_PERIOD = 0.0125  # s between heartbeats while the client drives: later ones reveal a packet that TCP lost
+QUICK_SECONDS = 0.5  # for which an end keeps this up after the other has stopped
+QUIET_AFTER = 0.3  # s of silence after which the client counts as gone: whatever it drives by hand stops
+QUIET_ALONE_AFTER = 1.0  # s of silence of the tunnel itself that its separate heartbeats excuse: data is late
+QUIET_LOOKS = 3  # in a row: the loop has read its sockets between them, in whatever order
+HELD_UP = 0.1  # s between two checks: this end was held up, and the other may have been too, so it may speak first
+LOST_AFTER = 5.0  # s of silence that the tunnel and its connections survive: lossy lines recover
 
 
 class Look(NamedTuple):
@@ -33,7 +33,7 @@ class Heartbeat:
         """The other end has asked for quick beats until then."""
         self._said = now - PING_PERIOD
         self._patient_until = 0.0
-        self._looks = 0  # in a row that saw the other end silent
+        self._looks = 0  # in a row in which the other end was silent
 
     def hear(self, now: float, *, quick: bool = False) -> None:
         """The other end is there; ``quick``: it wants quick beats."""

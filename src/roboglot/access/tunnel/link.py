@@ -9,7 +9,7 @@ from typing import cast
 
 from roboglot.access.tunnel.frames import HEAD, BadFrame, Frame, Kind
 
-EARLY_MAX = 16  # frames before someone takes them
+EARLY_MAX = 16  # frames kept until a reader is set
 
 Take = Callable[[Kind, int, bytes], None]
 _KINDS = {int(kind): kind for kind in Kind}
@@ -92,7 +92,7 @@ class Link(asyncio.Protocol):
         self.transport.abort()
 
     def _cut(self, data: bytes) -> None:
-        if self._take is not None and not self._buffer and len(data) >= HEAD.size:  # mostly it is one frame
+        if self._take is not None and not self._buffer and len(data) >= HEAD.size:  # usually it is one whole frame
             number, stream, length = HEAD.unpack_from(data)
             if number == Kind.DATA and len(data) == HEAD.size + length:
                 self._stir(length)

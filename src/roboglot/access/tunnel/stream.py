@@ -9,11 +9,11 @@ from typing import cast
 from roboglot.access.tunnel.frames import CREDIT, Kind
 from roboglot.access.tunnel.link import Link
 
-WINDOW = 256 * 1024  # bytes of a stream under way; what a slow reader leaves waits at the sender
-READ_MAX = 512 * 1024  # bytes that may come from a socket at once, also with an all but empty window
+WINDOW = 256 * 1024  # bytes of a stream in flight; data for a slow reader waits at the sender
+READ_MAX = 512 * 1024  # bytes read from a socket at once, even if the window is almost empty
 RECEIVED_MAX = WINDOW + READ_MAX
-PIECE = 32 * 1024  # bytes of one DATA frame
-CREDIT_STEP = WINDOW // 4  # bytes that are credited together
+PIECE = 32 * 1024  # bytes per DATA frame
+CREDIT_STEP = WINDOW // 4  # bytes credited at a time
 
 
 class Stream(asyncio.Protocol):
@@ -22,11 +22,11 @@ class Stream(asyncio.Protocol):
     def __init__(self, number: int, link: Link, forget: Callable[[int], None]) -> None:
         self._number, self._link, self._forget = number, link, forget
         self._transport: asyncio.Transport | None = None
-        self._credit = WINDOW  # bytes that the other end has room for
-        self._held = self._paused = False  # by a tunnel that is full; not read from
+        self._credit = WINDOW  # bytes for which the other end has room
+        self._held = self._paused = False  # held by a full tunnel; reading paused
         self._clogged = False  # the local client does not read
-        self._early = bytearray()  # before the connection is there
-        self._owed = 0  # bytes that were taken and not yet credited
+        self._early = bytearray()  # received before the local connection is open
+        self._owed = 0  # bytes taken but not credited yet
         self.undelivered = 0
         """Bytes that the local client has not taken, as far as is known."""
         self._ended_here = self._ended_there = self._over = False

@@ -14,9 +14,9 @@ from roboglot.access.tunnel.stream import RECEIVED_MAX, WINDOW, Stream
 log = logging.getLogger(__name__)
 
 STREAMS_MAX = 64
-UNSENT_MAX = 1024 * 1024  # bytes that wait for the tunnel; datagrams beyond are lost, as datagrams are
+UNSENT_MAX = 1024 * 1024  # bytes queued for the tunnel; datagrams beyond this are dropped, as UDP may do
 DATAGRAM_MAX = 32 * 1024  # bytes
-QUICK = b"!"  # of a PING: answer in kind
+QUICK = b"!"  # payload of a PING: answer in kind
 
 Opened = Callable[[int, Callable[[], asyncio.Protocol]], Awaitable[object]]
 
@@ -44,7 +44,7 @@ class Tunnel:
         drives: Callable[[], bool] = lambda: False,
     ) -> None:
         self._link = link
-        self._beside: Link | None = None  # carries beats alone: what one connection loses, the other still shows
+        self._beside: Link | None = None  # for heartbeats only: they arrive while the other link loses packets
         self._next = first
         self._opened, self._datagram, self._quiet, self._drives = opened, datagram, quiet, drives
         self._streams: dict[int, Stream] = {}

@@ -29,15 +29,15 @@ from roboglot.model.events import MapReplaced, PoseJumped
 from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
 from roboglot.model.robot import Robot
 
-COMES_MAX = 180.0  # s that the lift is waited for
-DOOR_HELD = 30.0  # s at a time that the door is kept open
+COMES_MAX = 180.0  # s to wait for the lift
+DOOR_HELD = 30.0  # s for which the door is held open at a time
 SPEED, TURN_RATE = 0.3, 0.5  # m/s, rad/s through the door
 GAIN, TURN_GAIN = 1.5, 2.0  # 1/s
-LEAN, LEAN_MAX = 1.5, 0.3  # rad per m beside the straight line
+LEAN, LEAN_MAX = 1.5, 0.3  # rad per m of offset from the straight line
 THERE = 0.03  # m
-ROOM = 0.08  # m that must stay free before the hull
-PATIENCE = 20.0  # s without getting on through the door
-TRIP_MAX = 10.0  # m between waiting place and car
+ROOM = 0.08  # m that must stay free in front of the hull
+PATIENCE = 20.0  # s without progress through the door
+TRIP_MAX = 10.0  # m between the waiting place and the car
 
 
 class LiftFloors(Floors):
@@ -47,7 +47,7 @@ class LiftFloors(Floors):
         self.robot, self.belief, self.navigation = robot, belief, navigation
         self._others = StoreyShelf(robot)
         self._current = 0
-        self._places: tuple[Pose, Pose] | None = None  # waiting, inside
+        self._places: tuple[Pose, Pose] | None = None  # the waiting place, and the place inside the car
 
     @property
     def current(self) -> int:
@@ -83,7 +83,9 @@ class LiftFloors(Floors):
             return
         waiting, inside = self._places
         lift, belief = self.robot[LiftClient], self.belief
-        aboard = belief.pose.distance_to(inside) < waiting.distance_to(inside) / 2  # it could not get out last time
+        aboard = (
+            belief.pose.distance_to(inside) < waiting.distance_to(inside) / 2
+        )  # still in the car since the last try
         if floor == self._current and not aboard:
             return
         if not aboard:
@@ -92,7 +94,7 @@ class LiftFloors(Floors):
             action.report(RideStage.CALLING)
             await self._comes(self._current)
         mapped = belief.mapping
-        belief.mapping = False  # doors open and shut, and the car is no part of any floor
+        belief.mapping = False  # doors open and close, and the car belongs to no floor
         try:
             action.report(RideStage.BOARDING)
             await self._through(inside, backwards=False)
@@ -166,7 +168,7 @@ class LiftFloors(Floors):
         drawn = robot[MapAnnotations].current if MapAnnotations in robot else Annotations()
         home = robot[Docking].home if Docking in robot else None
         old = Storey(belief.map, home, drawn, waiting, inside)
-        # Who replaces the annotations keeps the maps of the building himself.
+        # An operation that replaces the annotations also saves them in the building's map store.
         await self._others.put(self._current, old, lasting=redraw)
         new = await self._others.take(floor)
         here, stamp = belief.pose, robot.clock.time()

@@ -20,8 +20,8 @@ from roboglot.model.events import DeliveryNews
 from roboglot.model.robot import Robot
 
 log = logging.getLogger(__name__)
-HOURS_LOOK = 10.0  # s between looks at the clock while there is nothing to do
-BASE_LOOK = 1.0  # s between looks whether another client still drives the robot
+HOURS_LOOK = 10.0  # s between two checks of the opening hours while idle
+BASE_LOOK = 1.0  # s between two checks whether another client still drives the robot
 
 
 class Courier:

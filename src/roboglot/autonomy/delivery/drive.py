@@ -21,7 +21,7 @@ from roboglot.model.events import DeliveryNews, DeliveryReported
 from roboglot.model.robot import Robot
 
 SOURCE = "delivery"
-LOOK = 1.0  # s between looks whether the robot may drive again
+LOOK = 1.0  # s between two checks whether the robot may drive again
 UNDOCK_RETRY, UNDOCK_MAX = 5.0, 120.0  # s
 RATIO_MIN = 0.02
 FAILURES: dict[type[RobotError], Failure] = {
@@ -104,7 +104,7 @@ class Driver:
     async def _ride(self, floor: str, policy: Policy) -> None:
         maps = self._robot[Storeys].maps
         if maps is None:
-            raise Failed(Failure.NO_PLACE)  # who knew the floor is gone
+            raise Failed(Failure.NO_PLACE)  # the component that knew the floor is gone
         if maps.current != floor:
             await self._drive(lambda: maps.go_to(floor, SOURCE), policy)
 
@@ -134,7 +134,7 @@ class Driver:
             try:
                 self._action = action = start()
             except EmergencyStopped:
-                await self._robot.clock.sleep(LOOK)  # limp, until it is asked to stand up
+                await self._robot.clock.sleep(LOOK)  # the legs are limp until a client asks the robot to stand up
                 continue
             except RobotError as error:
                 raise Failed(_failure_of(error)) from error

@@ -24,7 +24,7 @@ async def follow_up(robot: Robot, book: OrderBook, driver: Driver, readiness: Re
     """Report that it was not collected, and have a COLLECT order bring back what is left."""
     kind = order.request.kind
     if order.failure is Failure.INTERRUPTED:
-        readiness.rest_due = False  # another client has the robot
+        readiness.rest_due = False  # another client is driving the robot
     if order.failure is Failure.NOT_LOCALIZED:
         readiness.lose()
     if kind is OrderKind.DISINFECT:

@@ -14,8 +14,8 @@ from roboglot.model.events import BoxChanged
 from roboglot.model.robot import Robot
 
 SOURCE = "delivery"
-FILLED_LOOK = 1.0  # s between two looks into boxes
-SHUT_RETRY = 5.0  # s between two tries to shut a door with something in it
+FILLED_LOOK = 1.0  # s between two checks of the boxes
+SHUT_RETRY = 5.0  # s between two attempts to close a door that something blocks
 Note = Callable[[PickUp], Awaitable[None]]
 
 

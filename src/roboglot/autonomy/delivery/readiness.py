@@ -15,7 +15,7 @@ from roboglot.model.components.motion.docking import Docking
 from roboglot.model.events import BatteryChanged, DeliveryNews, DockContactChanged, PoseJumped
 from roboglot.model.robot import Robot
 
-RECOVERED = 80  # percent from which the robot works again after it was low
+RECOVERED = 80  # percent at which the robot resumes work after a low battery
 
 
 class Service(Protocol):

@@ -19,7 +19,7 @@ from roboglot.model.components.mapping.storeys import StoreyPlace, Storeys
 from roboglot.model.errors import InvalidGoal, NotFound, Refused
 from roboglot.model.robot import Robot
 
-NAME, TYPE = "display_name", "type"  # what people write on places
+NAME, TYPE = "display_name", "type"  # metadata that users set on places
 RECEPTION, PARKING = "RECEPTION", "PARKING"
 STOPS_MAX, BOXES_MAX = 50, 50
 BOXED = (OrderKind.TAKEOUT, OrderKind.DISTRIBUTE, OrderKind.STATION)
@@ -52,7 +52,7 @@ def at_work(policy: Policy, epoch: float) -> bool:
     if now.isoweekday() % 7 in policy.rest_days:
         return False
     second = now.hour * 3600 + now.minute * 60 + now.second
-    # hours that end before they begin go over midnight
+    # Hours that end before they begin run past midnight.
     return not policy.hours or any(
         begin <= second < end if begin <= end else second >= begin or second < end for begin, end in policy.hours
     )

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from roboglot.model.geometry import Pose, wrap_angle
 
 WIDTH, WIDTH_SLACK = 0.36, 0.06  # m
-GAP = 0.07  # m between neighbouring echoes where one thing ends
-STRAIGHT = 0.015  # m, root of the mean square beside the front's line
+GAP = 0.07  # m between neighbouring echoes at which one object ends
+STRAIGHT = 0.015  # m RMS from the line through the front
 ECHOES_MIN = 6
-MOVED_MAX, TURNED_MAX = 0.4, math.radians(25.0)  # from where it was: m, rad
-REACH = 2.0  # m around the robot that are looked at
-SEARCH_REACH = 2.5  # m around the robot in which a dock is looked for whose place is unknown
+MOVED_MAX, TURNED_MAX = 0.4, math.radians(25.0)  # from the dock's known place: m, rad
+REACH = 2.0  # m around the robot that are examined
+SEARCH_REACH = 2.5  # m around the robot, when the dock's place is unknown
 OBLIQUE_MAX = math.radians(70.0)  # between a front and the line of sight
 
 Echoes = NDArray[np.float64]
@@ -57,7 +57,7 @@ def things_of(echoes: Echoes) -> list[Echoes]:
     breaks = np.flatnonzero(steps > GAP) + 1
     if not len(breaks):
         return []
-    around = np.roll(echoes, -breaks[0], axis=0)  # a thing may lie across the scan's first echo
+    around = np.roll(echoes, -breaks[0], axis=0)  # an object may straddle the start of the scan
     return [thing for thing in np.split(around, breaks[1:] - breaks[0]) if len(thing)]
 
 

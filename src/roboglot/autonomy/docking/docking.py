@@ -31,20 +31,20 @@ from roboglot.model.events import ScanTaken
 from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
 from roboglot.model.robot import Robot
 
-APPROACH_SPEED, CONTACT_SPEED = 0.2, 0.04  # m/s far from and close to the contacts: emergency braking lets who creeps
+APPROACH_SPEED, CONTACT_SPEED = 0.2, 0.04  # m/s far from and near the contacts; the emergency brake permits the second
 SLOW_FROM = 0.18  # m before the contacts
-OVERRUN = 0.06  # m behind where the contacts should be that are tried
-STUCK_SECONDS = 2.0  # without getting on
+OVERRUN = 0.06  # m beyond the expected place of the contacts
+STUCK_SECONDS = 2.0  # without progress
 PROGRESS = 0.004  # m
 ROOM_TO_TURN = 0.45  # m ahead of the contacts
-LOOKS, LOOK_SECONDS = 5, 2.0  # scans that are looked at, and how long they are waited for
-ASIDE, MOVED = 0.04, 0.03  # m beside, from where it was: from when on the approach is repeated, the place learnt anew
-LEAN, LEAN_MAX = 4.0, 0.4  # rad per m beside the axis, for a base that cannot go sideways
+LOOKS, LOOK_SECONDS = 5, 2.0  # scans examined, and how long to wait for them
+ASIDE, MOVED = 0.04, 0.03  # m off the axis, m from the known place, beyond which it tries again
+LEAN, LEAN_MAX = 4.0, 0.4  # rad per m of sideways error, for a base that cannot move sideways
 SIDE_GAIN, TURN_GAIN = 2.0, 3.0  # 1/s
 SIDE_SPEED, TURN_RATE = 0.1, 0.5  # m/s, rad/s
-SIDE_SHIFTS = (0.0, 0.02, -0.02)  # m to the left that each try aims at: the map may be a little off
-CHARGE_SECONDS = 1.0  # until the battery says that it charges
-CANDIDATES_MAX = 3  # things that look like a dock and are tried, the nearest first
+SIDE_SHIFTS = (0.0, 0.02, -0.02)  # m to the left at which the tries aim in turn: the map may be a little off
+CHARGE_SECONDS = 1.0  # to wait until the battery reports that it charges
+CANDIDATES_MAX = 3  # objects like a dock that are tried, nearest first
 
 
 class RearDocking(Docking):
@@ -124,7 +124,7 @@ class RearDocking(Docking):
         for front in fronts[:CANDIDATES_MAX]:
             try:
                 await self._try(action, pose.compose(front).compose(Pose(radius)), 0.0)
-            except (Blocked, Unreachable) as error:  # it was something else, or stands where there is no room
+            except (Blocked, Unreachable) as error:  # it was another object, or it stands where the robot does not fit
                 reasons.append(str(error))
             if self._robot[DockContact].docked:
                 return
@@ -138,7 +138,7 @@ class RearDocking(Docking):
         await self._approach(action, home)
         seen = await self._look(home)
         if seen is not None and abs(seen.relative_to(home).y) > ASIDE:
-            await self._approach(action, seen)  # it was moved: to the place before where it is now
+            await self._approach(action, seen)  # the dock was moved: drive to the place in front of it again
             seen = await self._look(seen) or seen
         action.report("docking")
         await self._back_up(action, seen or home.compose(Pose(0.0, shift, 0.0)))
@@ -185,7 +185,7 @@ class RearDocking(Docking):
         while not contact.docked:
             if await action.hold(lambda: base.set_velocity(STILL)):
                 closest_at = clock.time()
-            seen = localization.pose.relative_to(home)  # x: what is left; y and yaw: how far off the axis
+            seen = localization.pose.relative_to(home)  # x: distance left; y and yaw: offset from the axis
             if seen.x < closest - PROGRESS:
                 closest, closest_at = seen.x, clock.time()
             if seen.x < -OVERRUN or clock.time() - closest_at > STUCK_SECONDS:
@@ -194,12 +194,12 @@ class RearDocking(Docking):
             side = _within(SIDE_SPEED, -SIDE_GAIN * seen.y)
             turn = _within(TURN_RATE, -TURN_GAIN * wrap_angle(seen.yaw))
             if not base.limits.holonomic:
-                # Backwards, the heading leads to the axis; close to the contacts it only straightens.
+                # In reverse, the heading steers towards the axis; near the contacts it is only straightened.
                 lean = _within(LEAN_MAX, LEAN * seen.y) if seen.x > SLOW_FROM / 2 else 0.0
                 base.set_velocity(Twist(-speed, 0.0, _within(TURN_RATE, TURN_GAIN * (lean - wrap_angle(seen.yaw)))))
                 await clock.sleep(PERIOD)
                 continue
-            # The correction lies in the dock's frame; the robot's differs by its small yaw.
+            # The correction is in the dock's frame, which differs from the robot's by a small yaw.
             c, s = math.cos(seen.yaw), math.sin(seen.yaw)
             base.set_velocity(Twist(-c * speed + s * side, s * speed + c * side, turn))
             await clock.sleep(PERIOD)

@@ -19,7 +19,7 @@ from roboglot.model.events import (
 from roboglot.model.geometry import ORIGIN, Pose
 from roboglot.model.robot import Robot
 
-BESIDE = 0.5  # m from the known dock within which a contact is taken for that dock's: the map may be a little off
+BESIDE = 0.5  # m from the known dock within which a contact is attributed to it: the map may be a little off
 
 
 class KnownDock:
@@ -29,9 +29,9 @@ class KnownDock:
         self._robot = robot
         docked = robot[DockContact].docked
         self._pose: Pose | None = ORIGIN if docked else None
-        self._on_it = docked  # whether the contacts touch this dock, and no other
-        self._confirmed = True  # whether scans confirmed the pose that was given last
-        self._anchored = False  # whether it has said already where the robot is since it was last given a pose
+        self._on_it = docked  # whether the contacts touch this dock rather than another
+        self._confirmed = True  # whether scans have confirmed the last pose that was set
+        self._anchored = False  # whether the robot's place was announced since the pose was last set
         listen = robot.events.listen
         self._listeners = [
             listen(DockContactChanged, self._touched),

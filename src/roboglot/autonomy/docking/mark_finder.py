@@ -16,11 +16,11 @@ from roboglot.model.geometry import Point, Pose, wrap_angle
 from roboglot.model.perception import ReflectorSeen
 
 REACH = 3.0  # m
-AHEAD = math.radians(60.0)  # to both sides of where the robot looks
-LEG_MAX, LEG_HALF = 0.09, 0.02  # m: widest echo of a leg; from its face to its middle
-LEGS_MAX = 24  # things as thin as legs that are looked at, nearest first
+AHEAD = math.radians(60.0)  # to either side of the robot's heading
+LEG_MAX, LEG_HALF = 0.09, 0.02  # m: the widest echo of a leg; the distance from its face to its centre
+LEGS_MAX = 24  # leg-sized objects examined, nearest first
 SIDE_MIN, SIDE_MAX = 0.4, 1.5  # m between legs
-SQUARE = 0.05  # m that a leg may stand beside its corner
+SQUARE = 0.05  # m by which a leg may miss its corner
 MARGIN = 0.1  # m inside the legs that must be empty
 
 Points = NDArray[np.float64]
@@ -84,7 +84,7 @@ def _rectangles(left: Point, right: Point, legs: list[Point]) -> list[tuple[Pose
         for other in sides[1]:
             if abs(one.x - other.x) < SQUARE:
                 depth = -(one.x + other.x) / 2
-                turn = math.atan2(-(one.y + other.y) / 2, depth)  # the hind legs sharpen the direction
+                turn = math.atan2(-(one.y + other.y) / 2, depth)  # the rear legs sharpen the direction
                 middle = front.compose(Pose(-depth / 2, (one.y + other.y) / 4, turn))
                 found.append((middle, depth / 2, width / 2))
     return found

@@ -19,11 +19,11 @@ from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.robot import Robot
 
-LOOK_SECONDS = 4.0  # how long a mark is looked for
-LOOKS = 5  # sightings that are averaged
-FRESH = 0.35  # the share of a new sighting in what is believed while moving
-LEAP = 0.25  # m from what is believed: something else
-TRAIL = 100  # poses remembered, for sightings that come late
+LOOK_SECONDS = 4.0  # to search for a mark
+LOOKS = 5  # sightings averaged
+FRESH = 0.35  # the weight of a new sighting while moving
+LEAP = 0.25  # m from the estimate: another object
+TRAIL = 100  # poses remembered, for sightings that arrive late
 SENSES: dict[Mark, type[Vision | Reflectors | Lidar]] = {
     Mark.PRINTED: Vision,
     Mark.REFLECTORS: Reflectors,

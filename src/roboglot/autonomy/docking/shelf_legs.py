@@ -28,18 +28,18 @@ from roboglot.model.events import JackChanged
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.robot import Robot
 
-REACH = 1.1  # m from base_link that the legs of what is lifted stand at most
-NEAREST = 10  # legs that are tried as corners
-SHELVES_MAX = 32  # places where shelves were taken away that are remembered
+REACH = 1.1  # m from base_link within which a lifted object's legs stand
+NEAREST = 10  # legs tried as corners
+SHELVES_MAX = 32  # places of removed shelves that are remembered
 
 
 @dataclass(slots=True)
 class Load:
     """Load on the jack, and the former places (map, m) of things taken away that the map still shows."""
 
-    radius: float = 0.0  # m around base_link that it takes up
-    gone: list[NDArray[np.float64]] = field(default_factory=list)  # (n, 2) legs of each
-    grid: EvidenceGrid | None = None  # the map that ``gone`` is on
+    radius: float = 0.0  # m around base_link that the shelf occupies
+    gone: list[NDArray[np.float64]] = field(default_factory=list)  # (n, 2): the legs of each removed shelf
+    grid: EvidenceGrid | None = None  # the map to which ``gone`` refers
 
     def gone_from(self, grid: EvidenceGrid) -> NDArray[np.float64]:
         """Return the former places (n, 2) of legs that ``grid`` may still show."""

@@ -20,21 +20,21 @@ from roboglot.model.errors import Blocked, InvalidGoal, NotFound, RobotError, Un
 from roboglot.model.geometry import STILL, Point, Pose, Twist, wrap_angle
 from roboglot.model.robot import Robot
 
-SPEED, CREEP = 0.2, 0.045  # m/s on the way, and where emergency braking lets only who creeps
+SPEED, CREEP = 0.2, 0.045  # m/s on the way, and where emergency braking allows only creeping
 SLOW_FROM = 0.15  # m before the end
 TURNING = 0.6  # rad/s
-LANE = 0.5  # m before the end from where the way is straight
-ON_AXIS, ON_AXIS_YAW = 0.02, math.radians(4.0)  # from where on the robot first goes to the lane
-GOOD, GOOD_YAW = 0.03, math.radians(4.0)  # beside the place at the end: m, rad
+LANE = 0.5  # m before the end where the straight part begins
+ON_AXIS, ON_AXIS_YAW = 0.02, math.radians(4.0)  # off the axis; beyond it starts from the straight part
+GOOD, GOOD_YAW = 0.03, math.radians(4.0)  # offset at the end: m, rad
 ARRIVED = 0.004  # m
 STUCK_SECONDS, PROGRESS = 2.0, 0.004
-LEAN, LEAN_MAX = 3.0, 0.3  # rad per m beside the axis
+LEAN, LEAN_MAX = 3.0, 0.3  # rad per m of sideways error
 TURN_GAIN, TURN_RATE = 3.0, 0.5  # 1/s, rad/s
-CLOSE, TOUCH = 0.1, 0.02  # m before the hull: where nothing else is said, and at least
+CLOSE, TOUCH = 0.1, 0.02  # m in front of the hull: the default, and the least
 PLACE_MAX, DISTANCE_MAX = 3.0, 5.0  # m
 ROOM_TO_TURN = 0.3  # m beyond the hull's radius
 RETRIES_MAX = 20
-BLIND = 0.35  # m before the end of a way from where the mark is no longer looked at: it is too near, or around
+BLIND = 0.35  # m before the end from where the mark is no longer observed: it is too near, or all around the robot
 
 
 class MarkDocking(TagDocking):
@@ -42,7 +42,7 @@ class MarkDocking(TagDocking):
 
     def __init__(self, robot: Robot, navigation: GridNavigation, driving: OdometryDriving) -> None:
         self._robot, self._navigation, self._driving = robot, navigation, driving
-        self._docked: dict[Mark, MarkGoal] = {}  # what it docked at last: how many strips that has, which texts
+        self._docked: dict[Mark, MarkGoal] = {}  # the last mark docked at: its number of strips and their texts
 
     @property
     def marks(self) -> frozenset[Mark]:
@@ -161,7 +161,7 @@ class MarkDocking(TagDocking):
             end = self._end(watch, goal)
             if -self._here.relative_to(end).x > BLIND:
                 watch.glance()
-            seen = self._here.relative_to(end)  # x: what is left, negative; y: beside the axis, to its left
+            seen = self._here.relative_to(end)  # x: distance left, negative; y: offset to the left of the axis
             left, yaw = -seen.x, wrap_angle(seen.yaw - (math.pi if goal.backward else 0.0))
             if left < ARRIVED:
                 return
@@ -169,7 +169,7 @@ class MarkDocking(TagDocking):
                 closest, closest_at = left, clock.time()
             elif clock.time() - closest_at > STUCK_SECONDS:
                 raise Blocked("something holds the robot before the mark")
-            # Backwards, ``yaw`` is that of the back: the way goes where it points, as ahead.
+            # In reverse, ``yaw`` is that of the rear, so the robot moves where it points, as when driving forward.
             lean = _within(LEAN_MAX, -LEAN * seen.y * (1.0 if left > SLOW_FROM else left / SLOW_FROM))
             turn = _within(TURN_RATE, TURN_GAIN * wrap_angle(lean - yaw))
             base.set_velocity(Twist(way * (SPEED if left > SLOW_FROM else CREEP), 0.0, turn))
@@ -184,7 +184,7 @@ class MarkDocking(TagDocking):
                 async with watch.open():
                     axis = Pose(start.x, start.y, wrap_angle((await watch.find()).yaw + math.pi))
             except NotFound:
-                pass  # nothing to keep square to: straight on
+                pass  # nothing to align with: straight on
         farthest, farthest_at, sign = 0.0, clock.time(), math.copysign(1.0, way)
         while farthest < abs(way):
             if await action.hold(lambda: base.set_velocity(STILL)):

@@ -29,19 +29,19 @@ from roboglot.model.robot import Robot
 from roboglot.model.sensing import LaserScan
 
 DISTANCE_MIN, DISTANCE_MAX = 0.5, 5.0  # m
-OUT_OF_SIGHT = 0.6  # s after which it stops and looks where the person was last
+OUT_OF_SIGHT = 0.6  # s after which the robot stops and searches where the person was last seen
 LOST = 15.0  # s after which it gives up
 SPEED, TURN_RATE = 1.0, 1.5  # m/s, rad/s at most
 GAIN, TURN_GAIN = 1.2, 2.5  # 1/s
-AHEAD = 1.0  # m of room straight ahead that are enough for now
-ROUND_THE_CORNER = 0.3  # m from where they were seen last, where it turns to where they went
-TOO_NEAR = 1.8  # m, within which a person may stand and yet not be recognised
+AHEAD = 1.0  # m of free room straight ahead that suffice for the moment
+ROUND_THE_CORNER = 0.3  # m from the last sighting at which the robot turns to where the person went
+TOO_NEAR = 1.8  # m within which a person may stand unrecognized
 BACK, BACK_BEARING = 0.2, 0.5  # m/s, rad
-CLOSE = 0.08  # m from its place within which it stands
-BESIDE = math.radians(130.0)  # from where the person walks, at which its place beside them is: a little behind
-STRIDE = 0.3  # m after which a person's direction is taken anew
-TAG_FRESH = 0.35  # the share of a new ranging in where the tag is believed to be; in sight, and a third of it without
-GAP, BRAKING = 0.15, 0.8  # m kept before the hull; m/s2 to brake with
+CLOSE = 0.08  # m from its place within which the robot stands still
+BESIDE = math.radians(130.0)  # from the person's course, at which the robot's place beside them lies: a little behind
+STRIDE = 0.3  # m after which a person's direction is updated
+TAG_FRESH = 0.35  # the weight of a new range of the tag: while in sight; a third of it otherwise
+GAP, BRAKING = 0.15, 0.8  # m kept in front of the hull; m/s2 of braking
 
 
 @dataclass(slots=True)
@@ -51,9 +51,9 @@ class _Quarry:
     number: int | None
     place: Point | None = None
     seen_at: float = 0.0
-    course: float = 0.0  # rad in odom: where they walk, or as seen from the robot at first
+    course: float = 0.0  # rad in odom: the person's course, at first the bearing from the robot
     trail: Trail = field(default_factory=Trail)
-    around: float | None = None  # rad in odom: the direction in which it goes around something
+    around: float | None = None  # rad in odom: the direction of the current detour
     ranged_at: float = -math.inf  # robot time
     _anchor: Point | None = None
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from roboglot.model.geometry import Point
 
-LINK = 0.15  # m between neighbouring points of one thing
-WIDE_MAX = 1.2  # m that a thing may measure: what is wider is a wall
-REACH = 0.4  # m around the place where it is looked for, first and from scan to scan
+LINK = 0.15  # m between neighbouring points of one object
+WIDE_MAX = 1.2  # m across an object; anything wider is a wall
+REACH = 0.4  # m around the expected place that are searched, from scan to scan
 
 Points = NDArray[np.float64]
 

@@ -14,11 +14,11 @@ from roboglot.model.geometry import Point, Pose
 
 STEP = 0.15  # m between two points of a trail
 STEPS_MAX = 200
-HEADINGS = 48  # directions that are tried, all around
-SIDEWAYS_COST = 1.0  # of a radian away from the goal, against a metre of room
-TURN_COST = 0.35  # of a radian away from the direction taken last
-ROOM_WANTED = 1.5  # m: more room than this is no better
-SLACK = 0.06  # m beyond the hull's radius that a way is wide
+HEADINGS = 48  # directions tried, all around
+SIDEWAYS_COST = 1.0  # of a radian away from the goal, relative to a metre of room
+TURN_COST = 0.35  # of a radian away from the last direction
+ROOM_WANTED = 1.5  # m: more room than this has no further value
+SLACK = 0.06  # m of clearance beyond the hull's radius
 
 Points = NDArray[np.float64]
 

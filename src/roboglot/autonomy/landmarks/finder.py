@@ -8,9 +8,9 @@ from itertools import permutations
 
 from roboglot.model.geometry import Point, Pose, wrap_angle
 
-SPAN_SLACK, FIT = 0.08, 0.15  # m: between two distances, between a strip and its landmark
-SAME, SAME_YAW = 0.3, 0.15  # of two answers that are one
-STRIPS_MIN = 3  # two strips fit in two ways
+SPAN_SLACK, FIT = 0.08, 0.15  # m: between two distances; between a strip and its landmark
+SAME, SAME_YAW = 0.3, 0.15  # difference of two answers that count as one
+STRIPS_MIN = 3  # two strips fit in two ways, so at least three
 
 
 def pose_by_landmarks(seen: Sequence[Point], known: Sequence[Point]) -> Pose | None:

@@ -20,14 +20,14 @@ from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
 
 KEY = "laser_landmarks.updating"
-SURE = 0.5  # quality of localization from which strips have a place
-LOST, LOST_SECONDS = 0.2, 3.0  # quality below which, for so long, known landmarks are looked for
-TURNING_MAX = 0.4  # rad/s: faster, directions are vague
-SIGHTINGS = 12  # at one place, until it is a landmark
+SURE = 0.5  # quality of localization from which strips are placed
+LOST, LOST_SECONDS = 0.2, 3.0  # quality below which known landmarks are searched, after so long
+TURNING_MAX = 0.4  # rad/s beyond which directions are vague
+SIGHTINGS = 12  # at one place before it becomes a landmark
 NEAR = 0.3  # m between two sightings of one strip
-MOVED = 0.06  # m from where it was until a landmark is moved
+MOVED = 0.06  # m of displacement after which a landmark is moved
 CANDIDATES_MAX = 200
-NAMES = uuid.UUID("0f3fd5f1-7d62-4c6b-9a55-6a9c0c1a40ce")  # the name space of their ids
+NAMES = uuid.UUID("0f3fd5f1-7d62-4c6b-9a55-6a9c0c1a40ce")  # the name space of landmark ids
 
 
 @dataclass(slots=True)
@@ -49,7 +49,7 @@ class LandmarkKeeper(LaserLandmarks):
     def __init__(self, robot: Robot, belief: Belief) -> None:
         self._robot, self._belief = robot, belief
         self._candidates: list[_Candidate] = []
-        self._unsaved = True  # for a robot without settings
+        self._unsaved = True  # only for a robot without settings
         self._lost_since: float | None = None
         self._writing: asyncio.Task[None] | None = None
         self._viewer = robot[Reflectors].detector.subscribe()

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from roboglot.autonomy.slam.belief import SURE
 from roboglot.model.geometry import Point, Pose, wrap_angle
 
-NOISE = 0.04  # m, standard deviation of where a strip is seen against where its landmark is
-GATE = 5.0  # standard deviations within which a strip is taken for a landmark: the match of scans is too sure of itself
-GATE_MAX = 1.0  # m, however unsure the pose is
+NOISE = 0.04  # m: standard deviation of a strip's sighting relative to its landmark
+GATE = 5.0  # standard deviations within which a strip matches a landmark: scan matching overrates its certainty
+GATE_MAX = 1.0  # m, however uncertain the pose is
 
 Floats = NDArray[np.float64]
 

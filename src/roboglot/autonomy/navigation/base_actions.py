@@ -18,7 +18,7 @@ from roboglot.model.geometry import STILL
 from roboglot.model.robot import Robot
 
 PERIOD = 0.02  # s between two commands to the base
-BRAKING_MAX = 3.0  # s; a base that still turns its wheels then is not waited for any longer
+BRAKING_MAX = 3.0  # s to wait for wheels that still turn
 STANDSTILL_SPEED = 0.01  # m/s
 STANDSTILL_YAW_RATE = 0.03  # rad/s
 
@@ -93,7 +93,7 @@ async def stand_still(robot: Robot) -> None:
     base.set_velocity(STILL)
     deadline = clock.time() + BRAKING_MAX
     if base.delay > 0.0:
-        await clock.sleep(base.delay)  # until then it reports how it moved before
+        await clock.sleep(base.delay)  # until then the base reports its earlier motion
     while clock.time() < deadline and not isinstance(base.refusal, Unconnected):
         velocity = base.velocity
         if velocity.speed < STANDSTILL_SPEED and abs(velocity.yaw) < STANDSTILL_YAW_RATE:

@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-SHIFT_MAX = 0.08  # m: more is another way
-TANGENT = 3  # points before and behind between which the way's direction is measured
-PLATEAU, RAMP = 4, 5  # points around a gap that are shifted as much as the gap is, and over which that is spread
+SHIFT_MAX = 0.08  # m: a larger shift would be another route
+TANGENT = 3  # points before and after between which the route's direction is measured
+PLATEAU, RAMP = 4, 5  # points around a gap that are shifted as much as the gap, and over which the shift fades
 
 Points = NDArray[np.float64]
 

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from roboglot.autonomy.navigation.planner import Planner
     from roboglot.autonomy.navigation.route import Route
 
-SPEED_MAX = 1.2  # m/s: faster, it could not stop for what steps out of a door
-READY_MAX = 180.0  # s that a drive waits for the planner and the first map
+SPEED_MAX = 1.2  # m/s beyond which the robot could not stop for a person who steps out of a door
+READY_MAX = 180.0  # s for which a drive waits for the planner and the first map
 
 
 @dataclass(frozen=True, slots=True)

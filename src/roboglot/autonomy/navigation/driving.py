@@ -26,12 +26,12 @@ from roboglot.model.robot import Robot
 MOVE_MAX = 1000.0  # m in one move
 TURN_MAX = 1000.0  # rad in one move
 LIFETIME_MAX = 86_400.0  # s
-PATIENCE = 2.0  # s without progress until a move gives up
+PATIENCE = 2.0  # s without progress before a move gives up
 PROGRESS = 0.005  # m (or rad / TURN_WEIGHT) that count as progress
-TURN_WEIGHT = 0.2  # m per rad, to add the way left in both into one number
-CLOSE = 0.004  # m: braked here, to stand within 1 cm
+TURN_WEIGHT = 0.2  # m per rad, to add the remaining distance and turn into one number
+CLOSE = 0.004  # m at which braking begins, to stand within 1 cm
 CLOSE_YAW = math.radians(0.4)
-GOOD = 0.01  # m: what counts as there once it stands
+GOOD = 0.01  # m of error accepted at standstill
 GOOD_YAW = math.radians(1.0)
 CORRECTIONS_MAX = 3
 
@@ -49,7 +49,7 @@ class _Move:
     """One move in the odom frame; ``turned`` follows odometry's yaw past whole turns."""
 
     goal: Pose
-    yaw: float  # total to be turned, not wrapped
+    yaw: float  # total turn, not wrapped
     turned: float
     last_yaw: float
     straight: Ramp
@@ -74,7 +74,7 @@ class _Move:
         """The twist for the next period."""
         yaw_rate = math.copysign(self.turn.step(abs(angle), PERIOD), angle)
         speed = self.straight.step(distance, PERIOD)
-        # By the middle of the period base_link has turned on: aim from there.
+        # base_link will have turned further by the middle of the period: aim from there.
         bearing = pose.point.bearing_to(self.goal) - (pose.yaw + yaw_rate * PERIOD / 2.0)
         return Twist(speed * math.cos(bearing), speed * math.sin(bearing), yaw_rate)
 
@@ -134,7 +134,7 @@ class OdometryDriving(Driving):
 
         before = self._moving
         now = self._robot[Base].velocity
-        back = now.x * offset.x + now.y * offset.y < 0.0  # wheels that are turned back at once slip
+        back = now.x * offset.x + now.y * offset.y < 0.0  # wheels that are reversed at once slip
         if before is None or back or not before.action.may_go_on(source) or before.action.paused:
             before = None
         moving = _Moving(before.move if before else None)
@@ -144,7 +144,7 @@ class OdometryDriving(Driving):
             await self.move(action, offset, top, top_yaw, moving)
 
         moving.action = start_on_base(self._robot, "move by", run, goal=offset, source=source, on_busy=on_busy)
-        if before is not None:  # it was cancelled just now, and stops nothing
+        if before is not None:  # it was cancelled just now and stops nothing
             before.action.hands_over = True
             moving.minding = asyncio.get_running_loop().create_task(self._mind(moving), name="taking over a move")
         self._moving = moving
@@ -185,7 +185,7 @@ class OdometryDriving(Driving):
                 raise hindrance
             await clock.sleep(min(PERIOD, left))
         if self._command is command:
-            self._action = None  # it brakes from now on: what comes meanwhile begins anew
+            self._action = None  # the robot brakes from now on: later commands start afresh
 
     async def _hold_at_most(self, action: Action, seconds: float) -> None:
         """A pause outlives no lifetime."""
@@ -244,9 +244,9 @@ class OdometryDriving(Driving):
         """Drive until close enough to brake; Blocked without progress."""
         base, odometry, clock = self._robot[Base], self._robot[Odometry], self._robot.clock
         foresight = Foresight(base, clock)
-        # A correction after overshooting must be able to move however slow the plan was.
+        # A correction after overshooting must be able to move, however slow the plan was.
         move.straight.top, move.turn.top = max(move.straight.top, 0.05), max(move.turn.top, 0.1)
-        if base.delay > 0.0:  # what comes late must not be hurried
+        if base.delay > 0.0:  # late commands must not be hurried
             move.straight.gain = move.turn.gain = min(APPROACH_GAIN, 1.0 / base.delay)
         best, best_at = math.inf, clock.time()
         while True:

@@ -14,17 +14,17 @@ from roboglot.model.components.motion.base import BaseLimits
 from roboglot.model.geometry import Point, Pose, Twist, wrap_angle
 
 PERIOD = 0.04  # s between two commands
-LOOKAHEAD, LOOKAHEAD_SECONDS = 0.12, 0.2  # m, and m per m/s, at which the path is aimed for
-FINAL = 0.3  # m from the end it goes straight for the goal and keeps its heading
-FINAL_SPEED = 0.5  # m/s there
+LOOKAHEAD, LOOKAHEAD_SECONDS = 0.12, 0.2  # m, and m per m/s, of look-ahead along the path
+FINAL = 0.3  # m from the end: head straight for the goal and keep the heading
+FINAL_SPEED = 0.5  # m/s within that distance
 TURN_ON_SPOT = math.radians(60.0)  # heading error beyond which the robot turns before it drives
 TURN_AT_END = math.radians(15.0)  # for a differential base close to the goal
 TURN_GAIN = 4.0  # 1/s
 TURN_RATE = 2.0  # rad/s at most: scans smear in faster turns
-REACTION = 0.1  # s that may pass until a scan and a command take effect
-SLOW = 0.35  # m/s past what is close
+REACTION = 0.1  # s until a scan or a command can take effect
+SLOW = 0.35  # m/s past near obstacles
 STOP_GAP = 0.05  # m kept from an obstacle on the path
-STEP_MAX = 0.15  # m between two poses that the robot drove; more is a correction of where it believes to be
+STEP_MAX = 0.15  # m between two driven poses; a larger step is a correction of the estimated pose
 
 
 @dataclass(slots=True)
@@ -35,14 +35,14 @@ class Follower:
     top: float  # m/s
     route: Route
     along: float = 0.0  # m along the route
-    beside: float = 0.0  # m beside it
-    stop_at: float = math.inf  # m along the route where something is in the way
-    slow_at: float = math.inf  # m along the route where something is passed closely
+    beside: float = 0.0  # m beside the route
+    stop_at: float = math.inf  # m along the route where an obstacle is in the way
+    slow_at: float = math.inf  # m along the route where an obstacle is passed closely
     speed: float = 0.0
     yaw_rate: float = 0.0
     _passed: int = field(default=0)
     _last: Point | None = field(default=None)
-    _turning: bool = field(default=False)  # on the spot
+    _turning: bool = field(default=False)  # in place
 
     def take(self, route: Route) -> None:
         """Go on along another route."""

@@ -10,7 +10,7 @@ from roboglot.model.components.mapping.annotations import Annotations
 from roboglot.model.events import RobotBlocked
 from roboglot.model.robot import Robot
 
-BLOCKED_SECONDS = 180.0  # s of waiting until that is published
+BLOCKED_SECONDS = 180.0  # s of waiting before BaseBlocked is published
 
 
 @dataclass(slots=True)
@@ -25,7 +25,7 @@ class Journey:
     obeyed: Annotations | None = None
     far: float = 0.0  # m driven
     far_max: float = math.inf  # m that it may drive; finite once the way leads through unknown floor
-    closed_since: float = math.inf  # since when something has stood on a way over known floor
+    closed_since: float = math.inf  # since when an obstacle has stood on a way over known floor
     since: float = math.inf
     published: bool = False
 

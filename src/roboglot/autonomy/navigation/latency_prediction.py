@@ -8,7 +8,7 @@ from roboglot.model.clock import Clock
 from roboglot.model.components.motion.base import Base
 from roboglot.model.geometry import Pose, Twist
 
-COMMANDS_MAX = 256  # that are remembered
+COMMANDS_MAX = 256  # commands remembered
 
 
 class Foresight:

@@ -21,7 +21,7 @@ from roboglot.model.geometry import Point, Pose
 if TYPE_CHECKING:
     from roboglot.autonomy.navigation.planner import Planner
 
-ANNOUNCED_MAX = 12.0  # m of the way that others may hear of
+ANNOUNCED_MAX = 12.0  # m of the planned way that are announced to others
 
 
 class Lookout:
@@ -35,8 +35,8 @@ class Lookout:
         self._scan_at = -math.inf
         self.follower: Follower | None = None
         self.blocked, self.blocked_at = False, -math.inf
-        self.blocked_place = Point()  # map, by what
-        self.gap = math.inf  # m, the width of the narrowest that it was to pass lately
+        self.blocked_place = Point()  # in map; of the obstacle that blocks the way
+        self.gap = math.inf  # m: the narrowest gap that was ahead lately
         self._stop = self._robot.events.listen(ScanTaken, self._see)
 
     def close(self) -> None:

@@ -14,7 +14,7 @@ from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
 from roboglot.kernels.depth import remember_low
 from roboglot.model.geometry import Pose
 
-EXPLAINED = 0.1  # m around an echo within which depth says nothing new
+EXPLAINED = 0.1  # m around an echo within which depth adds nothing
 
 Points = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from roboglot.model.components.sensing.time_of_flight import TimeOfFlight, ZoneD
 from roboglot.model.geometry import Vector3
 from roboglot.model.robot import Robot
 
-GRASP, GRASP_SIDE = 0.6, 0.12  # m ahead and aside where what the gripper holds is
+GRASP, GRASP_SIDE = 0.6, 0.12  # m ahead and aside that an object in the gripper covers
 
 Points = NDArray[np.float64]
 NONE: Points = np.empty((0, 2))
@@ -35,11 +35,11 @@ class LowSight:
     """Looks when asked, at what the sensors measure then."""
 
     def __init__(self, robot: Robot) -> None:
-        from roboglot.kernels.depth import sort_out  # it takes Numba
+        from roboglot.kernels.depth import sort_out  # it needs Numba
 
         self._robot, self._height, self._radius = robot, robot.description.height, robot.description.radius
-        self._last: tuple[DepthImage, tuple[Points, Points]] | None = None  # and what it showed
-        self._zones: dict[str, tuple[NDArray[np.float32], Vector3, NDArray[np.float64], Points]] = {}  # where they look
+        self._last: tuple[DepthImage, tuple[Points, Points]] | None = None  # the newest image and what it showed
+        self._zones: dict[str, tuple[NDArray[np.float32], Vector3, NDArray[np.float64], Points]] = {}  # what they see
         self._sort_out: Callable[[Points, Points, Points, float, float], tuple[Points, Points]] = sort_out
 
     def look(self) -> LowView:

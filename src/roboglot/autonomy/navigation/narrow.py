@@ -7,16 +7,16 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-HALF_LENGTH, STRETCHES = 0.6, 4  # m ahead and behind that count, and into how many stretches they are cut
-ROOM = 0.3  # m on either side, beyond the hull, that is little
-WIDE_AFTER = 5  # scans without walls until the next corridor is another one
+HALF_LENGTH, STRETCHES = 0.6, 4  # m ahead and behind that count, and the number of stretches they are cut into
+ROOM = 0.3  # m on either side of the hull that count as little room
+WIDE_AFTER = 5  # scans without walls before the next corridor is a new one
 
 
 class NarrowWatch:
     """Examines every scan and reports each corridor once. A doorway is no corridor: it has no length."""
 
     def __init__(self, radius: float) -> None:
-        from roboglot.kernels.obstacles import corridor  # it takes Numba
+        from roboglot.kernels.obstacles import corridor  # it needs Numba
 
         self._corridor: Callable[[NDArray[np.float64], float, int], float] = corridor
         self._width = 2 * (radius + ROOM)

@@ -28,7 +28,7 @@ RETRIES_MAX = 1000
 RETRY_AFTER = 5.0  # s
 TOUR_PASSES = 30  # of improving a tour
 NO_WAY = 1e6  # m
-NEAR = 0.5  # m from a place that is as good as there, in a tour
+NEAR = 0.5  # m from a stop that count as reached, in a tour
 
 
 class GridNavigation(Navigation):
@@ -91,7 +91,7 @@ class GridNavigation(Navigation):
         if not places:
             return []
         _checked(places, NavigationOptions())
-        await self._course.ready()  # hence the kernels are loaded
+        await self._course.ready()  # the kernels are loaded from here on
         from roboglot.kernels.touring import EXACT_MAX, visiting_order
 
         stops = (self._robot[Localization].pose.point, *places)

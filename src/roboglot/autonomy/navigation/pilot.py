@@ -30,9 +30,9 @@ if TYPE_CHECKING:
     from roboglot.autonomy.navigation.planner import Planner
     from roboglot.autonomy.navigation.route import Route
 
-FIRST_ROUTE_PERIOD = 1.0  # s between two tries to find a way at all
-WAITING_SPEED = 0.05  # m/s below which a robot before something waits
-CRUISE_SHARE = 0.7  # of the top speed that is driven on the whole
+FIRST_ROUTE_PERIOD = 1.0  # s between two attempts to find any route
+WAITING_SPEED = 0.05  # m/s below which a robot in front of an obstacle counts as waiting
+CRUISE_SHARE = 0.7  # of the top speed that a long drive averages
 
 
 class State(Enum):
@@ -146,7 +146,7 @@ class Pilot:
         await self._courtesy.give_way(follower)
         self._replanner.begin_again(follower)
         follower.take(await self._first_route(follower.left))
-        self._lookout.follower = follower  # it may have gone aside once more, meanwhile, along another way
+        self._lookout.follower = follower  # the robot may have given way again meanwhile, along another route
         self._patience.take(follower.left)
         self._patience.begin_anew()
         return State.FOLLOWING

@@ -29,26 +29,26 @@ from roboglot.model.components.motion.navigation import Tracks
 from roboglot.model.errors import Unreachable
 from roboglot.model.geometry import Point, Pose
 
-MARGIN = 0.05  # m kept beyond the hull when planning
-REACH = 0.5  # m beyond the hull in which obstacles cost
+MARGIN = 0.05  # m of clearance beyond the hull in plans
+REACH = 0.5  # m beyond the hull within which obstacles add cost
 NEAR_COST = 8.0
 UNKNOWN_COST = 3.0
-SLACK = 1.02  # a straight line may cost this much more than the cells it replaces
-ESCAPE_MAX = 0.8  # m to the nearest open cell for a robot that stands too close to something
-OBSTACLE_SECONDS = 10.0  # how long one is remembered that is out of sight
-MOVING_SECONDS, MOVING_REACH = 1.0, 0.4  # … of what moves, and m around its middle that it takes
-GONE_NEAR = 0.1  # m around where a leg stood that is taken away: what the map shows there counts no more
+SLACK = 1.02  # a straight line may cost this much more than the cells that it replaces
+ESCAPE_MAX = 0.8  # m to the nearest open cell, for a robot that stands too close to an obstacle
+OBSTACLE_SECONDS = 10.0  # how long an obstacle out of sight is remembered
+MOVING_SECONDS, MOVING_REACH = 1.0, 0.4  # … one that moves, and m around its centre that it occupies
+GONE_NEAR = 0.1  # m around the place of a removed leg where the map no longer counts
 SLOW = 0.35  # m/s past obstacles
-HALF_DIAGONAL = 0.036  # m from a cell's centre to its corner: such a cell may reach into a goal's tolerance
+HALF_DIAGONAL = 0.036  # m from a cell's centre to its corner: the cell may reach into a goal's tolerance
 DOUBT = 5.0  # s
-THIN = 0.1  # m: the radius of a hull that gets through most gaps
-TREAD_MAX = 0.3  # m between two scans; more is a correction of where it believes to be
-SQUEEZE = 0.06  # m less than the hull's radius that the map may show free where it has been: walls are whole cells
-TRODDEN_QUALITY = 0.5  # of localization, from which the robot knows where it has been
-THING_CELLS = 20  # the size up to which what stands alone may be a person
-OFF_MAP = 30.0  # m beyond what is known within which a goal may lie
-ROOM = 20  # cells beyond start and goal that the grid must hold
-ROUGH_CELLS = 16_000  # of the rough grid on which many ways are measured at once
+THIN = 0.1  # m: the radius of a hull that passes most gaps
+TREAD_MAX = 0.3  # m between two scans; a larger step is a correction of the estimated pose
+SQUEEZE = 0.06  # m less than the hull's radius that the map may show where the robot has been: walls are whole cells
+TRODDEN_QUALITY = 0.5  # quality of localization from which the robot's own track counts
+THING_CELLS = 20  # cells up to which an isolated object may be a person
+OFF_MAP = 30.0  # m beyond the known map within which a goal may lie
+ROOM = 20  # cells of margin around start and goal that the grid must hold
+ROUGH_CELLS = 16_000  # of the coarse grid on which many routes are measured at once
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,7 @@ class Task:
     drawn: Annotations
     tracks: Tracks
     straight: bool = False
-    explains: bool = False  # says how narrow the way is if there is none
+    explains: bool = False  # computes the width of the narrowest place when there is no route
     shunned: Shunned = ()
 
     def solve(self) -> Route:
@@ -78,7 +78,7 @@ class Task:
         self._check_near()
         cost = self.cost(rules)
         legs: list[NDArray[np.float64]] = []
-        start, driven = self.start, dict[tuple[Point, Point], NDArray[np.float64]]()  # who patrols comes by again
+        start, driven = self.start, dict[tuple[Point, Point], NDArray[np.float64]]()  # a patrol repeats
         for number, goal in enumerate(self.goals, start=1):
             leg = driven.get((start, goal))
             if leg is None:
@@ -151,7 +151,7 @@ class Task:
     def cost(self, rules: Layers | None) -> NDArray[np.float32]:
         """Return each cell's cost for the hull, inf where it must not be."""
         if rules:
-            self.seen[rules.closed] = np.inf  # what must not be entered stands there for ever
+            self.seen[rules.closed] = np.inf  # a closed area never expires
         cost: NDArray[np.float32] = inflated_cost(
             self.evidence,
             self.seen,
@@ -195,7 +195,7 @@ class Task:
         if last is None:
             raise Unreachable(f"{name} is too close to an obstacle, or in one")
         path = self._path(cost, first, last)
-        if not len(path):  # it may have been where it stands but no way leads on from there, as beside a dock
+        if not len(path):  # the robot may fit where it stands although no route leads on from there, as beside a dock
             never = np.where(self.trodden > 0, np.float32(np.inf), cost)
             elsewhere = self._open_cell(never, start, ESCAPE_MAX)
             if elsewhere is not None and elsewhere != first:
@@ -204,7 +204,7 @@ class Task:
             raise Unreachable(f"no path leads to {name}{self._too_narrow(first, last) if self.explains else ''}")
         kept = path[corners(cost, path, SLACK)]
         inner = (kept[:, ::-1] + 0.5) * RESOLUTION + (self.corner.x, self.corner.y)
-        # The ends are the given points themselves, unless those lie in cells that are closed.
+        # The ends are the given points themselves, unless those lie in closed cells.
         at_start, at_goal = first == self._cell(start), last == self._cell(goal)
         inside = inner[int(at_start) : len(inner) - int(at_goal)]
         end = goal if at_goal else self._within_tolerance(goal, Point(*inner[-1].tolist()))
@@ -256,10 +256,10 @@ class Planner:
     def __init__(self, belief: Belief, radius: float, load: Load) -> None:
         self._belief, self._hull, self._load = belief, radius, load
         self._scans, self._low = ScanMemory(), LowMemory()
-        self._trodden = Cells(np.uint8)  # where the robot's middle has been
-        self._trodden_radius = 0.0  # m that it had around it, at least
+        self._trodden = Cells(np.uint8)  # where the robot's centre has been
+        self._trodden_radius = 0.0  # m that were free around it, at least
         self._last: Pose | None = None
-        self._stood: tuple[object, ...] = ()  # what it marked the last time: map, from where to where, and radius
+        self._stood: tuple[object, ...] = ()  # the last stroke that was marked: map, from, to and radius
         self._doubted: NDArray[np.int16] = np.zeros((0, 0), np.int16)
         self._doubted_until = -math.inf
 
@@ -314,10 +314,10 @@ class Planner:
             return
         grid = self._belief.map
         if (here := (grid, last, pose, self.radius)) == self._stood:
-            return  # that is marked
+            return  # already marked
         self._stood = here
         trodden = self._trodden.of(grid)
-        if self.radius > self._trodden_radius:  # it carries more than what got through there
+        if self.radius > self._trodden_radius:  # the load is wider than whatever passed there before
             trodden[:] = 0
         self._trodden_radius = self.radius
         begin = pose if last is None or last.distance_to(pose) > TREAD_MAX else last
@@ -386,7 +386,7 @@ def _without(evidence: NDArray[np.int16], corner: Point, gone: NDArray[np.float6
 def _mark_line(trodden: NDArray[np.uint8], corner: Point, start: Point, end: Point) -> None:
     """Set the cells of ``trodden`` under a straight way, two cells wide."""
     count = math.ceil(start.distance_to(end) / RESOLUTION) + 1
-    if count <= 2:  # from one scan to the next
+    if count <= 2:  # as from one scan to the next
         for place in (start, end)[:count]:
             column = math.floor((place.x - corner.x) / RESOLUTION - 0.5)
             row = math.floor((place.y - corner.y) / RESOLUTION - 0.5)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from roboglot.autonomy.navigation.planner import Planner
     from roboglot.autonomy.navigation.route import Route
 
-DISTRUSTED = (PoseJumped, MapReplaced, AnnotationsChanged)  # events after which the route is planned anew
+DISTRUSTED = (PoseJumped, MapReplaced, AnnotationsChanged)  # events after which the route is planned again
 
 
 class Replanner:
@@ -27,11 +27,11 @@ class Replanner:
     def __init__(self, course: Course, planner: Planner, goal: Goal, journey: Journey, lookout: Lookout) -> None:
         self._course, self._planner, self._goal, self._journey = course, planner, goal, journey
         self._clock, self._tuning, self._lookout = course.robot.clock, course.tuning, lookout
-        self._first = journey.passed  # the goal that the route begins with
+        self._first = journey.passed  # the goal with which the route begins
         self._plan: asyncio.Task[Route | None] | None = None
         self._planned_at = -math.inf
-        self._stale = self._polite = False  # the plan goes around others only
-        self._around = False  # … around what blocks the way only
+        self._stale = self._polite = False  # the plan only leads around other robots
+        self._around = False  # … only around the obstacle in the way
         self._detours = self._arounds = 0
         events = course.robot.events
         self._listeners = [events.listen(kind, self._distrust) for kind in DISTRUSTED]
@@ -69,7 +69,7 @@ class Replanner:
             return await self._known_route(goals)
         except Unreachable:
             if self._course.belief.in_doubt:
-                return None  # that says nothing of the goal
+                return None  # that does not concern the goal
             raise
 
     async def _known_route(self, goals: tuple[Point, ...]) -> Route | None:
@@ -147,10 +147,10 @@ class Replanner:
             self._planned_at = self._clock.time() + tuning.wait_period - tuning.replan_period
             return False
         if self._polite and route.length > follower.left + tuning.around:
-            return False  # to wait takes less
+            return False  # waiting takes less time
         more = route.length - follower.left
         if self._around and not lookout.blocked and more > tuning.around:
-            return False  # what stood there has gone
+            return False  # the obstacle has left
         detour = more > tuning.detour
         if detour and lookout.blocked and self._clock.time() - lookout.blocked_at < self._bears(more):
             return False
@@ -161,7 +161,7 @@ class Replanner:
         self._first += follower.passed
         follower.take(route)
         if lookout.blocked:
-            follower.stop_at = follower.along  # until the next scan says whether this way is free
+            follower.stop_at = follower.along  # until the next scan shows whether this route is free
         lookout.blocked = False
         return True
 

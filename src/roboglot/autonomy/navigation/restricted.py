@@ -18,10 +18,10 @@ from roboglot.model.events import ScanTaken
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
 
-BRAKING, REACTION, MARGIN = 0.5, 0.3, 0.25  # m/s2, s, m: how far ahead of the hull an area counts as entered
-SOON = 5.0  # s within which a claimed area is entered, or given back
-STEP = 0.1  # m between the places ahead that are looked at
-MANUAL = frozenset({"drive", "move by"})  # steering by hand is not held up
+BRAKING, REACTION, MARGIN = 0.5, 0.3, 0.25  # m/s2, s, m: for the distance at which an area counts as entered
+SOON = 5.0  # s within which a claimed area is entered or released
+STEP = 0.1  # m between the places ahead that are checked
+MANUAL = frozenset({"drive", "move by"})  # manual driving is not held up
 
 
 class RestrictedAreas:
@@ -30,7 +30,7 @@ class RestrictedAreas:
     def __init__(self, robot: Robot, belief: Belief) -> None:
         self._robot, self._belief = robot, belief
         self._held: tuple[Action, str] | None = None
-        self._entering: dict[str, float] = {}  # until when a claim holds for an area that it is about to enter
+        self._entering: dict[str, float] = {}  # until when a claim holds for an area about to be entered
         self._stop = robot.events.listen(ScanTaken, self._look)
 
     def close(self) -> None:
@@ -41,7 +41,7 @@ class RestrictedAreas:
     def _look(self, event: ScanTaken) -> None:
         radio, drawn = self._robot[TrafficRadio], self._robot[MapAnnotations].current
         if not drawn.areas and not radio.claims and self._held is None:
-            return  # as on most maps
+            return  # most maps have none
         areas = {_name(area): area for area in drawn.areas_of(AreaKind.RESTRICTED) if area.robots_max}
         pose, ahead = self._belief.pose, self._ahead()
         full: str | None = None

@@ -14,13 +14,13 @@ from roboglot.autonomy.navigation.speed_profile import BRAKING_SHARE
 from roboglot.model.geometry import Path, Point, Pose, wrap_angle
 
 SPACING = 0.05  # m between two points
-CORNER_REACH = 5  # points before and behind between which a bend is measured
+CORNER_REACH = 5  # points before and after between which a bend is measured
 SIDEWAYS_ACCELERATION = 0.6  # m/s2 in bends
-PASSED = 0.05  # m from a goal on the way that count as reached, at most
-PASSED_BESIDE = 0.025  # m from where the way passes a goal that is occupied
-CENTRED = 30  # points ahead that are moved to the middle of gaps
-GOAL_KEPT = 0.2  # m around a goal in which they are not
-SEARCH_AHEAD = 40  # points among which the nearest is looked for
+PASSED = 0.05  # m from an intermediate goal that count as reached, at most
+PASSED_BESIDE = 0.025  # m from the point where the route passes an occupied goal
+CENTRED = 30  # points ahead that are centred in gaps
+GOAL_KEPT = 0.2  # m around a goal that are not centred
+SEARCH_AHEAD = 40  # points among which the nearest is searched
 
 
 class Route:
@@ -48,10 +48,10 @@ class Route:
         pairs = zip(self.goals, wanted or self.goals, strict=True)
         reach = min(PASSED, max(PASSED_BESIDE, tolerance / 2))
         self.reaches = [reach if end.distance_to(goal) < 1e-6 else PASSED_BESIDE for end, goal in pairs]
-        self._goals_at: list[int] = places[ends].tolist()  # which of the points
+        self._goals_at: list[int] = places[ends].tolist()  # indices into the points
         self.speeds: NDArray[np.float64] = np.zeros(len(self.points))
-        self.unknown = 0.0  # m of it over floor that was never seen
-        self.ends_known = False  # whether the map knows the floor of all goals
+        self.unknown = 0.0  # m over floor that was never seen
+        self.ends_known = False  # whether the map knows the floor at all goals
         self._ceilings: NDArray[np.float64] = np.zeros(len(self.points))
         self._marks: list[float] = self.along.tolist()  # the same, for single look-ups
         self._spots: list[list[float]] = self.points.tolist()

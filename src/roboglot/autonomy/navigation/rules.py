@@ -24,15 +24,15 @@ from roboglot.model.components.mapping.annotations import (
 from roboglot.model.components.motion.navigation import Tracks
 from roboglot.model.geometry import Point
 
-WALL_HALF = 0.75 * RESOLUTION  # m beside a virtual wall that are closed: no diagonal slips through
-TRACK_HALF = 1.5 * RESOLUTION  # m beside a track that are on it
-OFF_TRACK_COST = 3.0  # more for a cell beside the tracks, where they are preferred
-ENTRY = 1.5  # m between the tracks and start or goal that may be driven off them at most
+WALL_HALF = 0.75 * RESOLUTION  # m beside a virtual wall that are closed, so that no diagonal passes
+TRACK_HALF = 1.5 * RESOLUTION  # m beside a track that count as on it
+OFF_TRACK_COST = 3.0  # extra cost of a cell beside the tracks, where they are preferred
+ENTRY = 1.5  # m that may be driven off the tracks at start and goal
 ENTRY_SLACK = 0.15  # m beyond the nearest point of the tracks
 ENTRY_COST = 12.0
-LEAVING_COST = 20.0  # inside a forbidden area for a robot that is to leave it
-DANGEROUS_SPEED = 0.3  # m/s where an area does not say
-SPEED_MIN = 0.05  # m/s: a speed limit must not stop a robot
+LEAVING_COST = 20.0  # inside a forbidden area that the robot is leaving
+DANGEROUS_SPEED = 0.3  # m/s where an area gives none
+SPEED_MIN = 0.05  # m/s: a speed limit must not stop the robot
 
 Mask = NDArray[np.bool_]
 
@@ -133,7 +133,7 @@ def layers(drawn: Annotations, frame: Frame, tracks: Tracks, start: Point, goals
     closed = frame.beside(drawn.lines_of(LineKind.WALL), WALL_HALF)
     for area in _kept_out_of(drawn):
         if area.contains(start):
-            # A robot inside may leave; a goal inside stays out of reach unless it is a lift's.
+            # A robot inside may leave; a goal inside stays unreachable unless it belongs to a lift.
             extra = np.zeros(frame.shape, np.float32) if extra is None else extra
             extra[frame.inside(area)] += LEAVING_COST if area.kind is AreaKind.FORBIDDEN else 0.0
         elif area.kind is not AreaKind.ELEVATOR or not any(map(area.contains, goals)):

@@ -13,7 +13,7 @@ from roboglot.kernels.obstacles import remember
 from roboglot.model.geometry import Pose
 
 OBSTACLE_RANGE = 5.0  # m within which obstacles are remembered
-NOTED_MAX = 4000  # cells that are listed: when there are more, all rays are followed
+NOTED_MAX = 4000  # cells in the list; when there are more, all rays are traced
 
 Kind = TypeVar("Kind", bound=np.generic)
 
@@ -45,7 +45,7 @@ class ScanMemory:
 
     def __init__(self) -> None:
         self._seen = Cells(np.float32)
-        self._listed: NDArray[np.float32] | None = None  # of which these are the cells that are not 0, if so few
+        self._listed: NDArray[np.float32] | None = None  # the nonzero cells of it, if they are few
         self._noted, self._count = np.empty((NOTED_MAX, 2), np.int32), 0
 
     def seen(self, grid: EvidenceGrid) -> NDArray[np.float32]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-BRAKING_SHARE = 0.8  # of the deceleration that the base can do is planned with; the rest pays for its lag
-APPROACH_GAIN = 6.0  # 1/s; near the goal the speed is this times the way left
+BRAKING_SHARE = 0.8  # of the possible deceleration that plans use; the rest covers the base's lag
+APPROACH_GAIN = 6.0  # 1/s; near the goal the speed is this times the remaining distance
 
 
 def trapezoid_time(distance: float, speed: float, acceleration: float) -> float:

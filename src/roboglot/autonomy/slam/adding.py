@@ -12,7 +12,7 @@ from roboglot.model.components.mapping.annotations import Annotations, AreaKind,
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.robot import Robot
 
-ADD_AFTER, ADD_AFTER_YAW, ADD_PERIOD = 0.15, math.radians(12.0), 1.0  # m, rad, s between scans added to the map
+ADD_AFTER, ADD_AFTER_YAW, ADD_PERIOD = 0.15, math.radians(12.0), 1.0  # m, rad, s between two scans in the map
 FILL_AFTER, FILL_AFTER_YAW = 0.4, math.radians(20.0)
 
 

@@ -13,8 +13,8 @@ from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.events import LostReason
 from roboglot.model.geometry import ORIGIN, Pose
 
-SURE = (0.003**2, 0.003**2, 0.002**2)  # m2, m2, rad2: the smallest variances ever believed
-SET_BY_CLIENT = (0.15**2, 0.15**2, 0.1**2)  # variances of a pose that a client gave
+SURE = (0.003**2, 0.003**2, 0.002**2)  # m2, m2, rad2: lower bounds of the variances
+SET_BY_CLIENT = (0.15**2, 0.15**2, 0.1**2)  # variances of a pose set by a client
 
 
 def _sure() -> NDArray[np.float64]:
@@ -32,12 +32,12 @@ class Belief:
     localizing: bool = True
     mapping: bool = True
     closing_loops: bool = True
-    lost: LostReason | None = None  # why the place in the map is not known
-    confirmed: bool = True  # whether scans have confirmed the pose that was given, or found after a shove
-    search: bool = False  # the next scan is to be matched in a wide window
+    lost: LostReason | None = None  # why the pose in the map is unknown
+    confirmed: bool = True  # whether scans have confirmed a pose that was set, or found after a displacement
+    search: bool = False  # match the next scan in a wide window
     map: EvidenceGrid = field(default_factory=EvidenceGrid)
     revision: int = 0  # of the map
-    frame: str = ""  # names the map that was loaded: who loaded the same one means the same places
+    frame: str = ""  # identifies the loaded map: robots that loaded the same one share coordinates
     reader: ScanReader = field(init=False)
 
     def __post_init__(self) -> None:

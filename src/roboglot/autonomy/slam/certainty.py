@@ -18,21 +18,21 @@ from roboglot.kernels.matching import gaps
 from roboglot.kernels.occupancy import CROSSING, FITTING, FLOATING, HIDDEN, verdicts
 from roboglot.model.geometry import Pose
 
-SLACK = 0.15  # m that a point may lie off what the map shows
+SLACK = 0.15  # m by which a point may miss the map's surfaces
 JUDGED_POINTS_MAX, ALL_POINTS = 120, 500
-APART, MISSED = 0.3, 3  # m, points between two that still belong to one thing
-THING_SIZE, THING_POINTS = 0.8, 3  # m at most, points at least, of a thing that may stand in the way: a person
-THINGS_MAX, THINGS_SHARE = 3, 0.4  # as many may stand around the robot, hiding so much of what it sees
-INLIER, CLOSE = 0.08, 0.04  # m off the surface
-WELL_KNOWN, SURE_WELL_KNOWN = 4.0, 0.5  # weight of a surface that many hits made; share of points near such ones
-SURE_FITTING, SURE_HIDDEN, SURE_FLOATING = 0.85, 0.02, 0.02  # share of the points, of a place that is sure …
-SURE_AGREEMENT, SURE_CLOSE, SURE_SIGMA = 0.95, 0.925, 0.03  # … of those near a surface; m, in its worst direction
-SURE_CROSSING = 0.02  # share of the points on a surface that are seen through another one: doors, thin things
-CROWDED, CROWDED_CLOSE = 0.02, 0.975  # with more than so much set aside, so much of the rest must be close
-CLOSE_PER_HIDDEN = 4.0  # how much more of it for each share of rays that pass through walls
-EXACT, EXACT_HIDDEN = 0.965, 0.004  # share of points close to surfaces from which a place outdoes …
-OUTDONE = 0.08  # … others with so much less
-PAINTED, PAINTED_SHARE, PAINTED_POINTS = 12.0, 0.8, 200  # weight of a surface; share of the points near such ones
+APART, MISSED = 0.3, 3  # m; missing points between two that still belong to one object
+THING_SIZE, THING_POINTS = 0.8, 3  # m at most, points at least, of an object that may stand in the way: a person
+THINGS_MAX, THINGS_SHARE = 3, 0.4  # such objects around the robot, and the share of its view that they hide
+INLIER, CLOSE = 0.08, 0.04  # m from the surface
+WELL_KNOWN, SURE_WELL_KNOWN = 4.0, 0.5  # weight of a surface with many hits; share of points near such surfaces
+SURE_FITTING, SURE_HIDDEN, SURE_FLOATING = 0.85, 0.02, 0.02  # shares of points required for a certain place …
+SURE_AGREEMENT, SURE_CLOSE, SURE_SIGMA = 0.95, 0.925, 0.03  # … of those near a surface; m, in the worst direction
+SURE_CROSSING = 0.02  # share of the points on one surface seen through another: doors, thin objects
+CROWDED, CROWDED_CLOSE = 0.02, 0.975  # beyond this share set aside, the share of the rest that must be close
+CLOSE_PER_HIDDEN = 4.0  # added to that for each share of rays that pass through walls
+EXACT, EXACT_HIDDEN = 0.965, 0.004  # share of points close to surfaces from which a place beats …
+OUTDONE = 0.08  # … rivals that have this much less
+PAINTED, PAINTED_SHARE, PAINTED_POINTS = 12.0, 0.8, 200  # weight of a surface; share of points near such; points
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,23 +20,23 @@ from roboglot.kernels.matching import gaps
 from roboglot.model.geometry import Pose
 
 CONTRADICTION = 0.015  # m between both poses from which they are compared
-ALONG, STILL = 0.05, 0.004  # m per m driven, m: what wheels that do not slip get wrong in one step
+ALONG, STILL = 0.05, 0.004  # m per m driven, m: the error of wheels without slip in one step
 POINTS_MAX = 300
-TELLING, GAP_MIN, GAP_MAX = 0.3, 0.01, 0.2  # share of the contradiction, m, by which a point fits one pose better; cap
-MAD, NOISES = 1.48, 1.5  # standard deviation by a median; how many of them a contradiction must have
-FITS = 0.04  # m off a surface at most of a point that speaks for a pose
-ONE_VOICE = 0.9  # share of those points that must speak for the scan's pose
-VOTES_MIN = 4  # points for odometry, or it has no say
-WAY_MAX, TURN_MAX = 0.3, 0.3  # m, rad: a longer step of odometry is no witness against a scan
-PAST = 1.0  # s over which the wheels are asked again
-PAST_TURN_MAX = 2.0  # rad turned meanwhile at most
+TELLING, GAP_MIN, GAP_MAX = 0.3, 0.01, 0.2  # share of the contradiction, m, by which a point must prefer a pose; cap
+MAD, NOISES = 1.48, 1.5  # standard deviation from a median; the number of them that a contradiction needs
+FITS = 0.04  # m from a surface within which a point votes
+ONE_VOICE = 0.9  # share of the votes that the scan's pose needs
+VOTES_MIN = 4  # votes for odometry below which it is ignored
+WAY_MAX, TURN_MAX = 0.3, 0.3  # m, rad: longer steps of odometry are no evidence against a scan
+PAST = 1.0  # s of history over which odometry is compared again
+PAST_TURN_MAX = 2.0  # rad turned within it, at most
 
 
 class WheelWitness:
     """Asks the wheels about every match: over the newest step, and over the last second."""
 
     def __init__(self) -> None:
-        # stamp, where the wheels alone put base_link, where it was believed to be (map), m driven
+        # stamp, base_link by odometry alone, its believed pose (map), m driven
         self._past: deque[tuple[float, Pose, Pose, float]] = deque()
         self._wheels = Pose()
 

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from roboglot.model.geometry import Pose
 
-WINDOW = 1.0  # s in which a shove happens
-SHOVED, SHOVED_PER_METRE = 0.05, 0.05  # m, and m per m driven meanwhile, that odometry may be wrong by
+WINDOW = 1.0  # s that a displacement takes
+SHOVED, SHOVED_PER_METRE = 0.05, 0.05  # m, and m per m driven, of odometry error beyond which the robot was displaced
 SIGMAS = 3.0  # standard deviations of the prior that explain a correction
-QUIET = 1.0  # s after a pose was set in which corrections say nothing
+QUIET = 1.0  # s after a pose was set in which corrections are ignored
 
 
 class DisplacementWatch:

@@ -22,10 +22,10 @@ log = logging.getLogger(__name__)
 T = TypeVar("T")
 
 RESOLUTION = 0.05  # m
-GRID_MAX = 8000  # cells along one side; what lies beyond is not mapped
-CELLS_MAX = 8_000_000  # 20,000 m2: 26 bytes each, twice while the map is straightened
-GROWTH = 100  # cells of room made beyond what asks for it
-PER_STEP = 8  # evidence that makes one step of the int8 map
+GRID_MAX = 8000  # cells along one side; anything beyond is not mapped
+CELLS_MAX = 8_000_000  # 20,000 m2 at 26 bytes per cell, twice while the map is straightened
+GROWTH = 100  # cells of extra room when the grid grows
+PER_STEP = 8  # evidence per step of the int8 map
 
 
 class EvidenceGrid:
@@ -35,11 +35,11 @@ class EvidenceGrid:
         self.evidence: NDArray[np.int16] = np.zeros((0, 0), np.int16)
         self.surface: NDArray[np.float32] = np.zeros((0, 0, 5), np.float32)
         self.marks: NDArray[np.int32] = np.zeros((0, 0), np.int32)
-        self.first_column = 0  # index, counted from the map's origin, of column 0
+        self.first_column = 0  # of column 0, counted from the map's origin
         self.first_row = 0
         self.scans = 0
-        self.frozen = False  # whether there are cells that no scan may change
-        self.full = False  # whether something was left out because there are CELLS_MAX, or GRID_MAX along a side
+        self.frozen = False  # whether some cells are protected from scans
+        self.full = False  # whether something was omitted because of CELLS_MAX or GRID_MAX
         self._drawn = OccupancyGrid(np.zeros((0, 0), np.int8), RESOLUTION, Point())
         self._drawn_scans = 0
         self._kept: dict[str, tuple[int, object]] = {}
@@ -127,7 +127,7 @@ class EvidenceGrid:
         if self._drawn_scans != self.scans:
             rows, columns = (np.flatnonzero(self.evidence.any(axis=axis)) for axis in (1, 0))
             known = self.evidence[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] if len(rows) else self.evidence
-            steps = np.abs(known) // PER_STEP + (known != 0)  # what is known never becomes 0
+            steps = np.abs(known) // PER_STEP + (known != 0)  # known cells never become 0
             drawn = (np.sign(known) * np.minimum(steps, 127)).astype(np.int8)
             drawn.setflags(write=False)
             first = (int(columns[0]), int(rows[0])) if len(rows) else (0, 0)
@@ -158,7 +158,7 @@ def _grown(begin: int, end: int, wanted_begin: int, wanted_end: int, empty: bool
         return begin, end
     new_begin = wanted_begin - GROWTH if empty or wanted_begin < begin else begin
     new_end = wanted_end + GROWTH if empty or wanted_end > end else end
-    if new_end - new_begin > most:  # keep what there is and share the rest
+    if new_end - new_begin > most:  # keep the present extent and share the rest
         spare = most - (end - begin)
         before = min(begin - new_begin, max(spare // 2, spare - (new_end - end)))
         new_begin = begin - before

@@ -21,14 +21,14 @@ from roboglot.model.geometry import Pose, wrap_angle
 
 log = logging.getLogger(__name__)
 
-VIEWS_MAX = 1000  # kept of one excursion: 300 m of way, 20 MB
-RAYS_KEPT_MAX = 400  # of each view
+VIEWS_MAX = 1000  # per excursion: 300 m of driving, 20 MB
+RAYS_KEPT_MAX = 400  # per view
 VIEW_AFTER, VIEW_AFTER_YAW = 0.3, math.radians(20.0)  # m, rad between two views
-MATCHED, KNOWN_SURE = 0.5, 0.6  # agreement to be matched; share of known points that makes less a contradiction
-WAY_MIN = 1.0  # m: what was seen on less was seen by the scans that found the place, too
-JUDGED_MAX = 30  # views that the map is asked about
-DENIED_AGREEMENT, DENIED_HIDDEN, JUDGED_SHARE = 0.5, 0.2, 0.3  # as where a place is lost: the map denies a view
-JOINED_AT_ONCE = 4  # views with each scan, so that the loop is not held up
+MATCHED, KNOWN_SURE = 0.5, 0.6  # agreement of a match; share of known points from which less is a contradiction
+WAY_MIN = 1.0  # m: on a shorter way the scans that found the place saw the same
+JUDGED_MAX = 30  # views checked against the map
+DENIED_AGREEMENT, DENIED_HIDDEN, JUDGED_SHARE = 0.5, 0.2, 0.3  # contradiction by the map, as for a lost pose
+JOINED_AT_ONCE = 4  # views added per scan, so that the loop is not held up
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ class Excursion:
             best = fit(self._grid, scan, self._pose, self._covariance)
             if best.fit >= POINTS_MIN and best.agreement >= MATCHED:
                 self._pose, self._covariance = best.pose, best.covariance
-            elif best.known >= KNOWN_SURE * best.points:  # it was carried on: this hangs together with nothing before
+            elif best.known >= KNOWN_SURE * best.points:  # it was carried: nothing links this view to the others
                 self._begin()
         if self._seen is None or _is_apart(self._pose, self._seen):
             self._seen = self._pose

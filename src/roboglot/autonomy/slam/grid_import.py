@@ -22,8 +22,8 @@ from roboglot.autonomy.slam.evidence import (
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.maps import OccupancyGrid
 
-HITS = 3.0  # what an imported surface weighs, in hits of the lidar
-SAME = 1e-4  # relative difference of resolutions that count as equal: files have single precision
+HITS = 3.0  # weight of an imported surface, in hits of the lidar
+SAME = 1e-4  # relative difference of resolutions that count as equal: files use single precision
 
 
 def evidence_of(grid: OccupancyGrid) -> EvidenceGrid:
@@ -38,7 +38,7 @@ def evidence_of(grid: OccupancyGrid) -> EvidenceGrid:
     imported.evidence[cells == 0] = 0
     imported.surface = _surfaces(cells)
     imported.marks = np.zeros(cells.shape, np.int32)
-    imported.scans = 1  # it is no empty map
+    imported.scans = 1  # so that the map does not count as empty
     return imported
 
 
@@ -78,7 +78,7 @@ def _surfaces(cells: NDArray[np.int8]) -> NDArray[np.float32]:
                 there = free[1 + down : 1 + down + height, 1 + along : 1 + along + width] / math.hypot(down, along)
                 towards_x += along * there
                 towards_y += down * there
-    length = np.maximum(np.hypot(towards_x, towards_y), 1.0)  # a thin wall is seen from both sides: shorter
+    length = np.maximum(np.hypot(towards_x, towards_y), 1.0)  # a thin wall is seen from both sides
     surface = np.zeros((height, width, 5), np.float32)
     occupied = cells > 0
     surface[occupied, 0] = HITS

@@ -17,10 +17,10 @@ from roboglot.model.events import RobotDisplaced
 from roboglot.model.robot import Robot
 
 log = logging.getLogger(__name__)
-PERIOD = 0.02  # s between two readings; one that is missed says nothing of the time before it
-SPEED_LEAK, WAY_LEAK = 0.5, 1.0  # s after which a third of a difference in speed, and of its way, is left
-SHOVED, OVER = 0.05, 0.03  # m from which it is a shove, and below which it is over; hard driving stays below 0.035
-MISSED = 1.5 * PERIOD  # s between two readings from which one is missing
+PERIOD = 0.02  # s between two readings; after a missed one, its period is unknown
+SPEED_LEAK, WAY_LEAK = 0.5, 1.0  # s after which a third of the difference in speed, in distance, remains
+SHOVED, OVER = 0.05, 0.03  # m at which a displacement begins and ends; hard driving stays below 0.035
+MISSED = 1.5 * PERIOD  # s between two readings that mean that one is missing
 
 
 class InertialDisplacement:
@@ -32,9 +32,9 @@ class InertialDisplacement:
         self._task: asyncio.Task[None] | None = None
         self._stamp = -math.inf
         self._wheels = (0.0, 0.0)  # m/s in odom
-        self._speed = (0.0, 0.0)  # m/s that only the accelerometer knows of
+        self._speed = (0.0, 0.0)  # m/s that only the accelerometer measured
         self._way = (0.0, 0.0)  # m
-        self._farthest = 0.0  # m, of the shove that is going on; 0 without one
+        self._farthest = 0.0  # m of the current displacement; 0 without one
         self._reported = False
 
     def start(self) -> None:
@@ -50,7 +50,7 @@ class InertialDisplacement:
     async def _watch(self) -> None:
         with contextlib.suppress(asyncio.CancelledError):
             while True:
-                # Between two readings, so that each is seen once.
+                # At half the period of the readings, so that each is seen once.
                 clock = self._robot.clock
                 await clock.sleep(max(PERIOD / 2, self._imu.reading.stamp + MISSED - clock.time()))
                 shoved = self._check()

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from roboglot.autonomy.slam.slam import Slam
 
 POSITION_MAX = 10_000.0  # m from the origin
-SEARCH_SECONDS = 10.0  # that it looks for a place that fits
-AROUND_SECONDS = 60.0  # … and drives around, if it may
+SEARCH_SECONDS = 10.0  # to search for a place that fits
+AROUND_SECONDS = 60.0  # … including driving around, if allowed
 SEARCH_PERIOD = 0.5  # s between two scans that are tried
 
 
@@ -90,7 +90,7 @@ class LidarLocalization(Localization):
             found, odometry = await self._look(region)
             if len(found) == 1 and await self._settle(found[0], odometry):
                 return
-            if len(found) > 1:  # another scan from the same place says no more
+            if len(found) > 1:  # another scan from the same place adds nothing
                 raise NotLocalized(f"{len(found)} places look like what the lidar sees: drive to where they differ")
             if self._robot.clock.time() > deadline:
                 if not self.started:
@@ -105,7 +105,7 @@ class LidarLocalization(Localization):
             if self._robot.clock.time() > deadline:
                 raise NotReady("localization is warming up: no scan has been compared with the map yet")
             await self._robot.clock.sleep(SEARCH_PERIOD)
-        from roboglot.autonomy.slam.look_around import Hypotheses, go_on  # needs the kernels, which are loaded now
+        from roboglot.autonomy.slam.look_around import Hypotheses, go_on  # needs the kernels, which are loaded by now
 
         hypotheses = Hypotheses()
         while self._robot.clock.time() <= deadline:
@@ -130,7 +130,7 @@ class LidarLocalization(Localization):
 
     async def _settle(self, place: Match, odometry: Pose) -> bool:
         """Believe ``place`` and match newer scans there; whether the robot stands where they say."""
-        from roboglot.autonomy.slam.look_around import settle  # needs the kernels, which are loaded now
+        from roboglot.autonomy.slam.look_around import settle  # needs the kernels, which are loaded by now
 
         assert self.estimator is not None
         self.estimator.believe(place, odometry)

@@ -27,16 +27,16 @@ from roboglot.model.geometry import ORIGIN, Pose, wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import LaserScan
 
-DIRECTIONS = 24  # that it may go in
+DIRECTIONS = 24  # tried
 BESIDE, BEFORE, STOP_BEFORE = 0.08, 0.2, 0.12  # m beside and before the hull that stay free
-STEP_MIN, STEP_MAX = 0.3, 1.0  # m that it goes at a time
-PERIOD = 0.1  # s between two looks ahead
+STEP_MIN, STEP_MAX = 0.3, 1.0  # m per step
+PERIOD = 0.1  # s between two checks ahead
 SPEED = 0.25  # m/s
-AHEAD = math.radians(120.0)  # it does not go back where it came from, unless nothing else is open
-SAME, SAME_YAW = 0.25, math.radians(8.0)  # between where a place should be by odometry now and where it is found
-SETTLE_SECONDS = 5.0  # that newer scans may take to agree
-LISTEN_PERIOD = 0.05  # s between two looks for a newer scan
-SETTLED, SETTLED_YAW = 0.02, math.radians(1.0)  # m, rad between two scans of a robot that stands where it was found
+AHEAD = math.radians(120.0)  # directions behind are taken only if nothing else is open
+SAME, SAME_YAW = 0.25, math.radians(8.0)  # difference between the place expected by odometry and the place found
+SETTLE_SECONDS = 5.0  # for newer scans to agree
+LISTEN_PERIOD = 0.05  # s between two checks for a newer scan
+SETTLED, SETTLED_YAW = 0.02, math.radians(1.0)  # m, rad between two scans of a robot standing where it was found
 
 
 async def settle(clock: Clock, estimator: Slam, belief: Belief) -> bool:
@@ -72,7 +72,7 @@ class Hypotheses:
 
     places: Sequence[Match] = ()
     odometry: Pose = ORIGIN
-    complete: bool = False  # whether there can be no others
+    complete: bool = False  # whether all candidates are in the list
 
     def narrow(self, found: Sequence[Match], odometry: Pose) -> Match | None:
         """Keep those that ``found`` has, too; the place, when only one is left."""
@@ -80,7 +80,7 @@ class Hypotheses:
         expected = [place.pose.compose(step) for place in self.places]
         left = [match for match in found if any(_is_same(match.pose, pose) for pose in expected)]
         known, self.odometry = self.complete, odometry
-        if not known or not left:  # the first look, or all were wrong
+        if not known or not left:  # the first scan, or all candidates were wrong
             left, known = list(found), False
         self.places, self.complete = left, known or 0 < len(found) < PLACES_MAX
         return left[0] if len(left) == 1 and (known or len(found) == 1) else None

@@ -31,20 +31,20 @@ from roboglot.model.geometry import Pose, wrap_angle
 log = logging.getLogger(__name__)
 
 KEYFRAMES_MAX = 10_000
-RAYS_KEPT_MAX = 400  # of each scan
+RAYS_KEPT_MAX = 400  # per scan
 KEY_AFTER, KEY_AFTER_YAW = 0.4, math.radians(20.0)  # m, rad between two keyframes
 SAME, SAME_YAW = 0.25, math.radians(15.0)  # m, rad around a keyframe within which no other is needed
-WAY_MIN = 15.0  # m driven since the place was seen
-DRIFT, DRIFT_PER_METRE, DRIFT_MAX = 0.5, 0.05, 4.0  # m that the pose may be wrong after so much way
+WAY_MIN = 15.0  # m driven since the place was last seen
+DRIFT, DRIFT_PER_METRE, DRIFT_MAX = 0.5, 0.05, 4.0  # m of possible drift after that distance
 TURN_MAX = math.radians(25.0)
-TRY_AFTER, TRUSTED_FOR = 1.0, 5.0  # m to the next try; after a place was found just where it should be
-AROUND = 8  # keyframes before and after that make the local map
-LOCAL_REACH = 6.0  # m from its middle
-AGREEMENT, KNOWN_SHARE = 0.75, 0.5  # share of points that must fit, that must lie on known ground
-NEAR_SHARE = 0.2  # of the points on ground that a given map knows, from which it is looked for there
-SHARP = 0.04  # m: standard deviation of the match in its worst direction
-AGREED, AGREED_YAW = 0.2, math.radians(3.0)  # between two sightings in a row
-CORRECTED, CORRECTED_YAW = 0.06, math.radians(1.0)  # less needs no straightening
+TRY_AFTER, TRUSTED_FOR = 1.0, 5.0  # m until the next attempt; after a place was found where expected
+AROUND = 8  # keyframes before and after that form the local map
+LOCAL_REACH = 6.0  # m from its centre
+AGREEMENT, KNOWN_SHARE = 0.75, 0.5  # share of points that must fit, and that must lie on known ground
+NEAR_SHARE = 0.2  # share of the points on the given map's ground from which a match with it is tried
+SHARP = 0.04  # m: the match's standard deviation in the worst direction
+AGREED, AGREED_YAW = 0.2, math.radians(3.0)  # difference between two sightings in a row
+CORRECTED, CORRECTED_YAW = 0.06, math.radians(1.0)  # smaller corrections need no straightening
 STEP_NOISE, STEP_YAW_NOISE = 0.02, math.radians(0.4)  # between keyframes, per root of a metre
 LOOP_NOISE, LOOP_YAW_NOISE = 0.02, math.radians(0.3)
 
@@ -79,17 +79,17 @@ class LoopCloser:
     def _begin(self, grid: EvidenceGrid | None) -> None:
         """Forget all; ``grid`` has got its first scan, unless it came from elsewhere."""
         self._map = grid
-        self._given = grid.copy() if grid is not None and grid.scans != 1 else None  # what is never moved
-        self._held_at = 0.0  # m driven when the given map was seen last
-        self._near = False  # whether the newest keyframe lies about where the given map is
+        self._given = grid.copy() if grid is not None and grid.scans != 1 else None  # the part that never moves
+        self._held_at = 0.0  # m driven when the given map was last seen
+        self._near = False  # whether the newest keyframe lies near the given map
         self._frames: list[Keyframe] = []
-        self._table: NDArray[np.float64] = np.empty((64, 4))  # x, y, yaw and way of the keyframes, and room for more
+        self._table: NDArray[np.float64] = np.empty((64, 4))  # x, y, yaw and distance of the keyframes, with spare rows
         self._edges: list[Edge] = []
         self._work: Straightening | None = None
         self._last, self._next_try = 0, TRY_AFTER
         self._pending: Sighting | None = None
         self._full = False
-        self.moved: Sequence[tuple[Pose, Pose]] = ()  # keyframes before and after the map was straightened last
+        self.moved: Sequence[tuple[Pose, Pose]] = ()  # keyframe poses before and after the last straightening
 
     @property
     def keyframes(self) -> list[Pose]:
@@ -176,7 +176,7 @@ class LoopCloser:
         self._near = seen.known >= NEAR_SHARE * seen.points
         if seen.agreement < AGREEMENT or seen.known < KNOWN_SHARE * seen.points:
             return
-        if not number or way - self._held_at < WAY_MIN:  # after a longer way the map has to be found again
+        if not number or way - self._held_at < WAY_MIN:  # after a longer distance the map has to be found again
             self._held_at = way
             if number:
                 self._edge(0, number, frame.pose.relative_to(self._frames[0].pose), LOOP_NOISE, LOOP_YAW_NOISE)

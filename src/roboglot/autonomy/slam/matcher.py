@@ -23,28 +23,28 @@ from roboglot.model.geometry import Pose, wrap_angle
 
 ITERATIONS_MAX = 8
 MATCH_POINTS_MAX = 400
-POINTS_MIN = 15  # that must fit before a match is believed
-KNOWN_SHARE = 0.4  # of all points; when fewer lie on known ground, quality suffers
+POINTS_MIN = 15  # that must fit for a match to count
+KNOWN_SHARE = 0.4  # of all points; with fewer on known ground, quality is reduced
 SEARCH_STEP = math.radians(1.0)
 SEARCH_POINTS_MAX = 180
-WIDE = (0.5, math.radians(20.0))  # m, rad that are searched around a place in doubt
-UNKNOWN_SCORE = 50  # of 255, for a point where nothing is known: better than in floor that was seen free
-EDGE_COST = 0.1  # of a perfect score: what a pose at the edge of the window must fit better than one in its middle
-LEAST = np.where(np.eye(3, dtype=bool), SURE, -np.inf)  # variances; covariances may be anything
-FREE = np.diag((0.1**2, 0.1**2, 0.05**2))  # variances that leave the match to the scan
+WIDE = (0.5, math.radians(20.0))  # m, rad searched around a doubtful pose
+UNKNOWN_SCORE = 50  # of 255, for a point on unknown ground: better than on floor seen free
+EDGE_COST = 0.1  # of a perfect score: the advantage that a pose at the window's edge needs over its centre
+LEAST = np.where(np.eye(3, dtype=bool), SURE, -np.inf)  # lower bounds of variances; covariances are unbounded
+FREE = np.diag((0.1**2, 0.1**2, 0.05**2))  # variances of a prior that leaves the result to the scan
 HEADINGS = 240  # tried when the robot may be anywhere
 PYRAMID_LEVELS = 7
 PLACE_POINTS_MAX = 100
 PLACE_SHARE_MIN = 0.35  # of the highest score
-PLACE_AGREEMENT = 0.7  # share of the points that must fit, of those that the map supports or denies
+PLACE_AGREEMENT = 0.7  # share of points that must fit, among those on known ground
 PLACE_SUPPORTED, PLACE_KNOWN = 0.85, 0.75  # … by the map's walls and floor; share of all points that it must explain
-PLACE_HIDDEN = 0.06  # … whose rays may pass through walls
-PLACES_MAX = 5  # that look alike are compared
-PLACES_TRIED = 20  # … before one of several is believed to be the only one
-APART, TURNED = 8, 10  # cells, headings between two of them
-SAME, SAME_YAW = 0.3, math.radians(10.0)  # m, rad: nearer ones are one place
-RIVAL_SCORE, RIVAL_FIT = 0.85, 0.9  # of the best: rough score, points that fit, from which a place is a rival
-RIVAL_SUPPORTED = 0.06  # … and by how much less of it the map may support
+PLACE_HIDDEN = 0.06  # … of rays that may pass through walls
+PLACES_MAX = 5  # alike places that are compared
+PLACES_TRIED = 20  # … before one of several counts as the only one
+APART, TURNED = 8, 10  # cells, headings between two candidates
+SAME, SAME_YAW = 0.3, math.radians(10.0)  # m, rad: closer candidates are one place
+RIVAL_SCORE, RIVAL_FIT = 0.85, 0.9  # of the best: rough score, fitting points, from which a place is a rival
+RIVAL_SUPPORTED = 0.06  # … and how much less of it the map may support
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +116,7 @@ def fit(
         points = np.ascontiguousarray(points[:: math.ceil(len(points) / most)])
     centre = np.array((prior.x - corner.x, prior.y - corner.y, prior.yaw))
     first = centre
-    if start is not None:  # yaws near each other, so that their difference is the turn between them
+    if start is not None:  # near each other, so that their difference is the turn between them
         first = np.array((start.x - corner.x, start.y - corner.y, prior.yaw + wrap_angle(start.yaw - prior.yaw)))
     sensor = np.array((scan.sensor.x, scan.sensor.y))
     found, narrowed, strain, fitting, known = match(
@@ -168,7 +168,7 @@ def places(
     if len(alike) == 1 < len(candidates) and not complete:
         candidates, complete = _candidates(grid, scan, region, PLACES_TRIED)
         alike = _alike(candidates)
-        if not complete:  # there are more of them than are looked at: one may be better
+        if not complete:  # more than are examined: one of the others may be better
             alike = candidates
     if not alike:
         return []
@@ -181,7 +181,7 @@ def _alike(candidates: list[Candidate]) -> list[Candidate]:
     """Return those of ``candidates`` (the best first) that explain the scan about as well as the best."""
     if not candidates:
         return []
-    first = candidates[0].said  # what the map does not know there may be what tells it from a rival
+    first = candidates[0].said  # what distinguishes it from a rival may lie on unknown ground
     least = first.agreement - RIVAL_SUPPORTED - (1.0 - first.known)
     alike = [one for one in candidates if one.match.fit >= RIVAL_FIT * candidates[0].match.fit]
     alike = [one for one in alike if one.said.agreement >= least]

@@ -16,7 +16,7 @@ from roboglot.model.events import Event, LocalizationLost, LocalizationRecovered
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.robot import Description, Robot
 
-RADIUS = 0.3  # m, of a robot whose hull is not known
+RADIUS = 0.3  # m, for a robot of unknown hull
 
 
 @dataclass(frozen=True, slots=True)

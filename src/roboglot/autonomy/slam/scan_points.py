@@ -13,9 +13,9 @@ from roboglot.model.sensing import LaserScan
 
 RAYS_MAX = 8192
 NEARBY = 12.0  # m
-DESKEW_FROM = 0.01  # m or rad of motion during one turn of the lidar from which its rays are set right
-CARRIED_NEAR = 0.09  # m around what is carried, whose echoes say nothing of the world
-ECHO_SHARE_MIN = 0.1  # fewer echoes than this and the lidar is not believed at all
+DESKEW_FROM = 0.01  # m or rad of motion during one turn of the lidar from which rays are corrected
+CARRIED_NEAR = 0.09  # m around the load within which echoes are ignored
+ECHO_SHARE_MIN = 0.1  # share of echoes below which the scan is ignored
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,11 +55,11 @@ class ScanReader:
     """Turns scans of one lidar into points."""
 
     def __init__(self, odometry: Odometry | None = None) -> None:
-        self._odometry = odometry  # says how the robot moves while the lidar turns
+        self._odometry = odometry  # gives the robot's motion while the lidar turns
         self._last: tuple[LaserScan, ScanPoints] | None = None
         self._key: object = None
-        self.carried: NDArray[np.float64] | None = None  # (n, 2) what the robot carries around itself, base_link, m
-        self._directions = (np.empty(0), np.empty(0))  # x and y of each ray
+        self.carried: NDArray[np.float64] | None = None  # (n, 2): the legs of the load around the robot, base_link, m
+        self._directions = (np.empty(0), np.empty(0))  # x and y components of each ray
 
     def read(self, scan: LaserScan) -> ScanPoints:
         """The scan's points, computed once for all who ask; none if hardly a ray came back."""
@@ -82,7 +82,7 @@ class ScanReader:
             return ScanPoints(none, np.empty(0, np.uint8), none, sensor)
         np.putmask(ranges, empty, min(scan.clear_range, scan.range_max))
         ends = np.empty((len(ranges), 2))
-        for axis, offset in enumerate((sensor.x, sensor.y)):  # many short rows take longer
+        for axis, offset in enumerate((sensor.x, sensor.y)):  # many short rows are slower
             np.add(self._directions[axis] * ranges, offset, out=ends[:, axis])
         seconds = scan.time_increment * len(ranges)
         velocity = self._odometry.reading.twist if seconds and self._odometry else STILL

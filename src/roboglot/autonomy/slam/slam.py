@@ -45,28 +45,28 @@ from roboglot.model.sensing import LaserScan
 
 log = logging.getLogger(__name__)
 
-AGREEMENT_MIN = 0.5  # share of the points on known ground that must fit before the pose is corrected
-AGREEMENT_TO_MAP = 0.6  # … before the scan is added to the map
+AGREEMENT_MIN = 0.5  # share of the points on known ground that must fit for the pose to be corrected
+AGREEMENT_TO_MAP = 0.6  # … for the scan to be added to the map
 QUALITY_GAIN = 0.3  # weight of the newest scan in the quality
 SIGMAS = 3.0  # standard deviations of the prior that are searched …
-CATCH, CATCH_YAW = 0.2, math.radians(8.0)  # m, rad: … when they exceed what a match finds by itself
-REACH_MAX, REACH_YAW_MAX = 1.5, math.radians(45.0)  # m, rad that are searched at most after one step
-TRUSTED = 0.75  # agreement from which a match says something of odometry
-KNOWN_SURE = 0.6  # share of known points from which agreement alone is believed
-PROBATION = 3.0  # m to drive without contradiction after a find far away, before anything is painted there
-NEAR, BETTER = 1.5, 0.08  # m; agreement by which a place elsewhere must fit better than the one that is believed
-NEW_GROUND = 0.3  # share of known points below which the scan shows new ground
-GAP_MAX = 0.35  # s between two scans from which odometry's constant errors are learnt
-BLIND = np.diag((0.5**2, 0.5**2, 0.3**2))  # variances after the lidar was silent
-SURE_QUALITY = 0.85  # agreement from which the map need not be asked what it denies
-SILENCE_PERIOD = 0.5  # s between two looks at whether scans come
-STILL, STILL_YAW = 0.002, math.radians(0.1)  # less than this between scans is standing
+CATCH, CATCH_YAW = 0.2, math.radians(8.0)  # m, rad: … when they exceed the range that a match converges from
+REACH_MAX, REACH_YAW_MAX = 1.5, math.radians(45.0)  # m, rad searched at most after one step
+TRUSTED = 0.75  # agreement from which a match is used to judge odometry
+KNOWN_SURE = 0.6  # share of known points from which agreement alone suffices
+PROBATION = 3.0  # m to drive without contradiction after a distant relocalization, before scans are added there
+NEAR, BETTER = 1.5, 0.08  # m; the gain in agreement that a distant place needs over the believed one
+NEW_GROUND = 0.3  # share of known points below which the scan counts as new ground
+GAP_MAX = 0.35  # s between two scans up to which odometry's constant errors are learnt
+BLIND = np.diag((0.5**2, 0.5**2, 0.3**2))  # variances after a gap in the scans
+SURE_QUALITY = 0.85  # agreement from which contradictions of the map need not be checked
+SILENCE_PERIOD = 0.5  # s between two checks for silence of the lidar
+STILL, STILL_YAW = 0.002, math.radians(0.1)  # less motion than this between scans is standing
 STILL_PERIOD = 0.5  # s between two matches while standing
-LOST_QUALITY, LOST_PERIOD = 0.4, 1.0  # below this it looks around, once in so many seconds
-NARROW = (0.2, math.radians(5.0))  # m, rad around the belief that are searched after a doubtful step
-DOUBT_SHARE, DOUBT_SIGMAS = 0.85, 3.0  # a worse fit than usual, or a pose so far from odometry's: match without it
-DISPLACED_QUALITY = 0.15  # of a robot that was shoved, until the next scans
-JUMP, JUMP_YAW = 0.2, math.radians(10.0)  # corrections beyond this are reported as a jump
+LOST_QUALITY, LOST_PERIOD = 0.4, 1.0  # quality below which it searches around, once in so many seconds
+NARROW = (0.2, math.radians(5.0))  # m, rad searched around the believed pose after a doubtful step
+DOUBT_SHARE, DOUBT_SIGMAS = 0.85, 3.0  # a fit worse than usual, or a pose far from odometry's: match without it
+DISPLACED_QUALITY = 0.15  # of a displaced robot, until the next scans
+JUMP, JUMP_YAW = 0.2, math.radians(10.0)  # larger corrections are reported as a jump
 
 
 class Slam:
@@ -76,10 +76,10 @@ class Slam:
         self._robot = robot
         self._belief = belief
         self._matched_odometry: Pose | None = None
-        self._step = Pose()  # what odometry moved since the last match, in base_link then
+        self._step = Pose()  # motion by odometry since the last match, in base_link at that time
         self._matched_at = self._searched_at = -math.inf
         self._agreement = self._known = 1.0
-        self._contradicted = False  # whether the newest match was dropped for what the wheels say
+        self._contradicted = False  # whether the newest match was rejected in favour of odometry
         self._witness = WheelWitness()
         self._newest: ScanTaken | None = None
         self.odometry = OdometryLearner(belief.odometry.noise)
@@ -163,7 +163,7 @@ class Slam:
         self._straighten(odometry, event.stamp)
         if _is_covered(event.scan.ranges):
             belief.quality *= 1.0 - QUALITY_GAIN
-            return  # a covered lidar sends scans that say nothing: as if it sent none
+            return  # a covered lidar sends empty scans: treat it as silent
         if self.whereabouts.hear(event.stamp) and belief.map.scans and belief.localizing:
             belief.covariance = belief.covariance + BLIND
             self._excursions.forget()
@@ -223,7 +223,7 @@ class Slam:
         before = belief.map_to_odom.compose(odometry)
         iterations = ITERATIONS_MAX if belief.localizing else 0
         prior, start = belief.covariance, self._coarse(scan, before, stamp) if belief.localizing else before
-        most = MATCH_POINTS_MAX if start is before else ALL_POINTS  # after a large step each one counts
+        most = MATCH_POINTS_MAX if start is before else ALL_POINTS  # after a large step every point counts
         best = fit(belief.map, scan, before, prior, start=start, iterations=iterations, most=most)
         driven = None
         if belief.localizing:
@@ -253,7 +253,7 @@ class Slam:
 
     def _contested(self, best: Match, scan: ScanPoints, before: Pose, prior: NDArray[np.float64]) -> Match | None:
         """Return the pose by odometry while things that move around would mislead the match."""
-        if self._belief.search or self._belief.in_doubt:  # scans that only fit badly are no reason to ask it less
+        if self._belief.search or self._belief.in_doubt:  # badly fitting scans alone do not justify consulting it less
             self._witness.forget()
             return None
         driven = self._witness.contest(self._belief.map, scan, before, best, prior, self._step)
@@ -360,7 +360,7 @@ class Slam:
 
 def _is_covered(ranges: NDArray[np.float32]) -> bool:
     """True if hardly a ray measured anything."""
-    if not math.isnan(np.minimum.reduce(ranges, initial=np.inf)):  # which no NaN gets past
+    if not math.isnan(np.minimum.reduce(ranges, initial=np.inf)):  # no NaN passes this
         return False
     return bool(np.count_nonzero(np.isnan(ranges)) > (1.0 - ECHO_SHARE_MIN) * len(ranges))
 

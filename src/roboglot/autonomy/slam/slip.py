@@ -13,14 +13,14 @@ from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.sensing import LaserScan
 
 BASELINE = 0.12  # m by odometry between the two scans
-TURN_MAX = math.radians(2.0)  # more turning between them, and nothing is said
+TURN_MAX = math.radians(2.0)  # with more turning between them the check is skipped
 CHANGE_MIN = 0.06  # m by which a range would have to change to count
-STAYED = 0.3  # of that change or less: it stayed
-RAYS_MIN, SHARE_MIN = 8, 0.8  # rays that count, share of them that stayed
-CONTACT = 0.2  # m beyond the hull within which something must stand that holds the robot
-AHEAD = math.radians(50.0)  # from the way it should move
+STAYED = 0.3  # of that change or less: the range stayed
+RAYS_MIN, SHARE_MIN = 8, 0.8  # rays that count; share of them whose range stayed
+CONTACT = 0.2  # m beyond the hull within which an obstacle must stand to hold the robot
+AHEAD = math.radians(50.0)  # from the direction of motion
 NEIGHBOURS = 0.3  # m between echoes that lie on one surface
-STEEP = 0.3  # cosine between ray and surface below which a range says little
+STEEP = 0.3  # cosine between ray and surface below which a range is ignored
 
 
 class SlipWatch:

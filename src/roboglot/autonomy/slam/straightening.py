@@ -17,11 +17,11 @@ from roboglot.kernels.graph import relaxed
 from roboglot.model.geometry import Pose, wrap_angle
 
 ITERATIONS_MAX = 20
-SETTLED = 1e-4  # m, rad: an iteration that moves no pose farther is the last one
-PAINTED_AT_ONCE = 250_000  # cells that rays cross
-COPIED_AT_ONCE = 400_000  # cells of a given map
+SETTLED = 1e-4  # m, rad: iterations end when no pose moves farther
+PAINTED_AT_ONCE = 250_000  # cells crossed by rays, per step
+COPIED_AT_ONCE = 400_000  # cells of a given map, per step
 
-Edge = tuple[int, int, Pose, float, float]  # two keyframes, the second in the first's frame, weights of m and rad
+Edge = tuple[int, int, Pose, float, float]  # two keyframes, the second in the frame of the first, weights of m and rad
 
 
 class Straightening:
@@ -37,7 +37,7 @@ class Straightening:
         self._weights = np.array([(w, w, v) for _, _, _, w, v in edges])
         self._given, self._copied = given, 0
         self._iterations = 0
-        self._painted = -1  # keyframes; below 0: the poses are not settled yet
+        self._painted = -1  # keyframes painted so far; negative while the poses are not settled
         self.after: Sequence[Pose] = ()
         self.grid = EvidenceGrid()
 

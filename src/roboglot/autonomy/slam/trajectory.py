@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.model.geometry import Pose
 
-STEPS_MAX = 500_000  # scans; the older half is forgotten beyond
+STEPS_MAX = 500_000  # scans; beyond this the older half is dropped
 STANDING_PERIOD = 10.0  # s between two steps while standing
 FIELDS = 11  # stamp, keyframe, x, y, yaw, and the covariance's upper triangle
 

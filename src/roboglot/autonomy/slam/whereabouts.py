@@ -15,12 +15,12 @@ from roboglot.model.events import (
     RecoveryMeans,
 )
 
-DENIED_AGREEMENT, DENIED_SHARE = 0.5, 0.3  # the map denies a scan: worse agreement, in so many of its points
-DENIED_HIDDEN = 0.2  # … or so many of its rays pass through walls, which no crowd of people explains
-GOOD_AGREEMENT, GOOD_SHARE = 0.8, 0.6  # the map confirms it
-DOUBTS_MAX, DOUBT_SECONDS = 3, 1.5  # scans in a row that the map denies, and for how long, until the place is lost
-CONFIRMED = 5  # scans in a row that the map confirms, until a place is known again
-BLIND_SECONDS, BLIND_INTERVALS = 2.0, 5.0  # without a scan, and in usual intervals, after which the place is not sure
+DENIED_AGREEMENT, DENIED_SHARE = 0.5, 0.3  # contradiction by the map: agreement below, in so many of the points
+DENIED_HIDDEN = 0.2  # … or so many rays pass through walls, which no crowd of people explains
+GOOD_AGREEMENT, GOOD_SHARE = 0.8, 0.6  # confirmation by the map
+DOUBTS_MAX, DOUBT_SECONDS = 3, 1.5  # contradictions in a row, and their duration, before the pose is lost
+CONFIRMED = 5  # confirmations in a row before the pose is known again
+BLIND_SECONDS, BLIND_INTERVALS = 2.0, 5.0  # s without a scan, and in usual intervals, from which the pose is uncertain
 INTERVAL_GAIN = 0.1
 
 
@@ -29,11 +29,11 @@ class Whereabouts:
 
     def __init__(self, belief: Belief, events: EventStream) -> None:
         self._belief, self._events = belief, events
-        self._interval = math.inf  # s that usually lie between two scans
+        self._interval = math.inf  # s that usually pass between two scans
         self._heard_at = -math.inf
         self._doubts = self._good = 0
         self._doubted_at = self._lost_at = math.inf
-        self._given_at = -math.inf  # s, since when a pose waits to be confirmed that was given, or found after a shove
+        self._given_at = -math.inf  # s: since when a pose is unconfirmed, set by a client or found after a displacement
         self.sure = True  # whether scans may be added to the map
 
     def hear(self, stamp: float) -> bool:

@@ -25,15 +25,15 @@ from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
 from roboglot.model.robot import Robot
 
 BEFORE = 0.3  # m between the hull's circle and the edge
-LOOK_SECONDS, LOOKS_MIN = 1.5, 4  # until a step must have been seen; looks that are gathered standing
+LOOK_SECONDS, LOOKS_MIN = 1.5, 4  # until a step must have been seen; images collected at standstill
 ALIGN_MAX = 30.0  # s from the first step to the end
-BLIND, LOST = 0.3, 1.5  # s without seeing the edge after which it stands, and gives up
+BLIND, LOST = 0.3, 1.5  # s without sight of the edge before the robot stops, and before it gives up
 SPEED, TURN_RATE = 0.15, 0.4  # m/s, rad/s at most
 GAIN, TURN_GAIN = 1.5, 1.5  # 1/s
-CLOSE, CLOSE_YAW = 0.008, math.radians(0.8)  # braked here
-GOOD, GOOD_YAW = 0.02, math.radians(2.0)  # what is good enough once it stands
-SIDE, ASIDE = 0.35, 0.04  # m of the edge to each side that are enough; the difference that is put up with
-SQUARE = math.radians(6.0)  # from where on what is seen to the left and to the right can be compared
+CLOSE, CLOSE_YAW = 0.008, math.radians(0.8)  # offset at which braking begins
+GOOD, GOOD_YAW = 0.02, math.radians(2.0)  # offset accepted at standstill
+SIDE, ASIDE = 0.35, 0.04  # m of the edge required on each side; the difference that is tolerated
+SQUARE = math.radians(6.0)  # angle from which the left and right views can be compared
 
 
 class SeenStairAlignment(StairAlignment):

@@ -14,22 +14,22 @@ from numpy.typing import NDArray
 
 from roboglot.model.geometry import Pose
 
-STEP_MIN, STEP_MAX = 0.04, 0.25  # m that one step leads up or down
-FLOOR = 0.025  # m: what is as high, or as low, is the floor
-REACH = 1.3  # m ahead that are looked at
-WIDE, CORRIDOR = math.radians(50.0), 0.3  # to both sides: rad for the first guess, m beside the straight way to it
-WIDTH_MIN = 0.25  # m of an edge that must be seen
-FACE = 0.015  # m beside its line within which a point lies on a riser
+STEP_MIN, STEP_MAX = 0.04, 0.25  # m: the height of one step, up or down
+FLOOR = 0.025  # m: anything within this height is floor
+REACH = 1.3  # m ahead that are examined
+WIDE, CORRIDOR = math.radians(50.0), 0.3  # to both sides: rad for the first estimate, m beside the straight line to it
+WIDTH_MIN = 0.25  # m of an edge that must be visible
+FACE = 0.015  # m from its line within which a point lies on a riser
 FACE_POINTS_MIN, FLOOR_POINTS_MIN, PASSES_MIN = 16, 8, 6
-STRAY_MAX = 0.25  # of the nearest points may lie elsewhere
-TREAD_MIN = 0.12  # m: what stands up higher behind a riser leaves at least so much room to step on
+STRAY_MAX = 0.25  # share of the nearest points that may lie elsewhere
+TREAD_MIN = 0.12  # m of tread that must lie before anything higher behind a riser
 SLICE = math.radians(3.0)
 TURNS = np.radians(np.arange(-42.0, 42.1, 1.0))
 _COS, _SIN = np.cos(TURNS), np.sin(TURNS)
 _CELL = 0.005
 AWAY = np.arange(0.2, 1.2, _CELL)  # m to the lines that are tried
-OUTLIERS = 2  # points that are put up with before a riser
-STRAYS_MAX = 0.04  # of the points may lie on the wrong side of the edge
+OUTLIERS = 2  # points tolerated in front of a riser
+STRAYS_MAX = 0.04  # share of the points that may lie on the wrong side of the edge
 
 Points = NDArray[np.float64]
 
@@ -79,7 +79,7 @@ def find_riser(points: Points, walls: Points | None) -> StepEdge | None:
 def find_drop(floor: Points, beyond: Points) -> StepEdge | None:
     """Between points (n x 2) of the floor and those (m x 2) where there is none."""
     line = _parting(floor, beyond)
-    if line is None:  # perhaps it is a sheer side that makes a corner of the edge
+    if line is None:  # the points may be a sheer side that forms a corner with the edge
         line = _parting(*(points[np.abs(points[:, 1]) < CORRIDOR] for points in (floor, beyond)))
     if line is None:
         return None
@@ -149,7 +149,7 @@ def _parting(floor: Points, beyond: Points) -> Pose | None:
     wrong = _wrong_sides(floor, beyond)
     if wrong.min() > STRAYS_MAX * (len(floor) + len(beyond)):
         return None
-    # All lines that part them are as likely; their mean is the best guess.
+    # All lines that separate them are equally likely; their mean is the best estimate.
     likely = np.exp(wrong.min() - wrong.astype(np.float64))
     likely /= likely.sum()
     turn, distance = float(TURNS @ likely.sum(axis=1)), float(AWAY @ likely.sum(axis=0))

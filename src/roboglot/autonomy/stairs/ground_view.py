@@ -24,11 +24,11 @@ from roboglot.model.components.sensing.time_of_flight import TimeOfFlight
 from roboglot.model.geometry import Pose, Vector3
 from roboglot.model.robot import Robot
 
-LOOKS_MAX = 15  # that are kept, oldest first to go
-SURE = 0.93  # of an eye's range within which a floor would have come back
-DEEP = 0.04  # m below the floor from where a point is not on it
-HINTS = 4  # points that may belong to a step from which it is worth looking closer
-STEEP = 0.15  # rad below the horizon from where a ray counts that does not come back
+LOOKS_MAX = 15  # kept; the oldest is dropped first
+SURE = 0.93  # of a sensor's range within which floor would have been seen
+DEEP = 0.04  # m below the floor from which a point does not belong to it
+HINTS = 4  # possible points of a step that justify a closer look
+STEEP = 0.15  # rad below the horizon from which a ray without an echo counts
 
 Points = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from roboglot.model.events import ScanTaken
 from roboglot.model.geometry import Point
 from roboglot.model.robot import Robot
 
-HEARD_MAX = 1.0  # s that an announcement counts
+HEARD_MAX = 1.0  # s for which an announcement counts
 HEARD_REACH = 12.0  # m within which announcements matter
 PERIOD = 0.2  # s between two announcements
 
@@ -24,7 +24,7 @@ class Announcer:
     def __init__(self, robot: Robot, belief: Belief) -> None:
         self._robot, self._belief = robot, belief
         self.way: NDArray[np.float64] = np.empty((0, 2))
-        self.inside = False  # whether it is where two robots cannot pass each other
+        self.inside = False  # whether the robot is in a place too narrow for two robots to pass
         self._announced_at = -math.inf
         self._stop = robot.events.listen(ScanTaken, self._announce)
 

@@ -23,15 +23,15 @@ if TYPE_CHECKING:
     from roboglot.autonomy.navigation.route import Route
 
 STANDS = 0.05  # m/s
-RULED_AFTER = 0.6  # s of standing in the way of one that goes first: a plan may lead around meanwhile
-FACED_AFTER, FACED_MORE = 3.0, 4.0  # s of standing before something that may want to come here; more by the name
-FACED_MAX = 10  # times in one drive that it goes aside for what may not want anything
-ASIDE_MAX = 40  # times in one drive
+RULED_AFTER = 0.6  # s of standing in the way of a robot that goes first: a plan may lead around it meanwhile
+FACED_AFTER, FACED_MORE = 3.0, 4.0  # s of standing face to face with what may want to pass; partly by its name
+FACED_MAX = 10  # moves aside per drive for an object that may not want to pass
+ASIDE_MAX = 40  # per drive
 GO_SECONDS, STUCK_SECONDS = 10.0, 2.0
 WAIT_MIN, WAIT_MAX = 0.6, 12.0  # s in the waiting place
 LOOK = 0.2  # s
 THERE = 0.08  # m
-OLD_WAY = 2.5  # m of its way that must be free before it goes on
+OLD_WAY = 2.5  # m of its route that must be free before it continues
 
 Points = NDArray[np.float64]
 

@@ -17,13 +17,13 @@ from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
 from roboglot.kernels.obstacles import unexplained
 from roboglot.model.geometry import Point, Pose
 
-LINK = 0.25  # m between neighbouring echoes of one thing
-WIDE_MAX = 0.9  # m; what is wider is no robot and no person
+LINK = 0.25  # m between neighbouring echoes of one object
+WIDE_MAX = 0.9  # m; anything wider is neither a robot nor a person
 ECHOES_MIN = 3
-HULL = 0.27  # m: the radius that a thing is taken to have, whose back is not seen
-DEPTH = 0.6 * HULL  # m from the middle of the echoes to that of the thing
-SAME = 0.45  # m from where a thing is expected to where it is found
-KEPT = 5  # sightings from which a velocity is made
+HULL = 0.27  # m: the assumed radius of an object whose back is not visible
+DEPTH = 0.6 * HULL  # m from the centre of the echoes to that of the object
+SAME = 0.45  # m between an object's predicted and observed place
+KEPT = 5  # sightings from which a velocity is computed
 FORGOTTEN = 0.5  # s without a sighting
 MOVES = 0.2  # m/s, less is noise
 THINGS_MAX = 32
@@ -41,8 +41,8 @@ class Mover:
     radius: float = HULL
     vx: float = 0.0
     vy: float = 0.0
-    heading: float = 0.0  # rad, where it moved last
-    moved_at: float = -math.inf  # s, when
+    heading: float = 0.0  # rad: direction of the last motion
+    moved_at: float = -math.inf  # s: time of the last motion
     _seen: deque[tuple[float, float, float]] = field(default_factory=lambda: deque(maxlen=KEPT))
 
     @property

@@ -12,9 +12,9 @@ from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
 from roboglot.kernels.distance import distances
 from roboglot.model.geometry import Point
 
-HALF = 0.62  # m: half of what two hulls of 0.27 m need beside each other, with 5 cm around each
-REACH = 16.0  # m around the robot that are looked at: no way is announced farther
-KEPT, MOVED = 5.0, 2.0  # s, m after which the map is looked at anew
+HALF = 0.62  # m: half the width that two hulls of 0.27 m need side by side, with 5 cm around each
+REACH = 16.0  # m around the robot that are examined: no announced route is longer
+KEPT, MOVED = 5.0, 2.0  # s, m after which the map is examined again
 
 
 def narrow(evidence: NDArray[np.int16]) -> NDArray[np.bool_]:

@@ -22,17 +22,17 @@ if TYPE_CHECKING:
     from roboglot.autonomy.traffic.movers import Mover  # it needs the kernels
 
 CLEAR = 0.10  # m kept between two hulls
-CLEAR_MOVING = 0.06  # m kept from where something that moves can come to a stand
-DECELERATION, REACTION = 0.6, 0.2  # m/s2 and s that others are taken to need
-STEP = 0.2  # m between two points of a way that are compared
-SLOW = 0.4  # m/s at least, when it is asked who comes first
-BEFORE, AFTER = 1.0, 2.0  # s that one comes later, or earlier, from which two do not meet
-LEAVES = 1.2  # m within which a path leaves another's way that it begins in
-ALIKE = 0.5  # cosine from which two go the same way
-SIGHT = 2.5  # s that what the lidar sees is taken to go straight on
-THROUGH = 6.0  # m of a narrow place that is looked along
-OUT = 4  # points that one goes on beyond it
-ASIDE = 0.15  # m to its right that something will give way
+CLEAR_MOVING = 0.06  # m kept from the place where a moving object can come to a stop
+DECELERATION, REACTION = 0.6, 0.2  # m/s2 and s assumed for others
+STEP = 0.2  # m between two points of a route that are compared
+SLOW = 0.4  # m/s assumed at least, to decide which robot arrives first
+BEFORE, AFTER = 1.0, 2.0  # s between two arrivals, later or earlier, from which robots do not meet
+LEAVES = 1.2  # m within which a path must leave another robot's route if it begins in it
+ALIKE = 0.5  # cosine from which two directions count as the same
+SIGHT = 2.5  # s for which an object seen by the lidar is extrapolated in a straight line
+THROUGH = 6.0  # m of a narrow place that are examined along the route
+OUT = 4  # points of the route added beyond it
+ASIDE = 0.15  # m to its right to which an object is expected to move
 
 Points = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ class Way:
     radius: float
     outranks: bool  # whether it goes first by rule
     name: str = ""
-    lively: bool = False  # whether it is on its way somewhere, though it may stand now
+    lively: bool = False  # whether it is under way, although it may stand at present
 
     @property
     def seconds(self) -> Points:
@@ -78,7 +78,7 @@ class Meeting:
 
     along: float
     way: Way
-    stands_in_it: bool  # the robot itself is where the other wants to go
+    stands_in_it: bool  # whether the robot itself stands where the other wants to go
 
 
 def rank(announcement: Announcement) -> tuple[bool, int, str]:
@@ -141,7 +141,7 @@ def meetings(path: Points, speed: float, radius: float, ways: Sequence[Way]) -> 
         close &= against
         meets = np.asarray((close & (later > -BEFORE) & (later < AFTER)).any(axis=1))
         stands = bool(close[0].any())
-        if stands:  # one that is on its way out of the other's goes on
+        if stands:  # a robot that is leaving the other's route continues
             clear = np.flatnonzero(~close.any(axis=1))
             leaves = int(clear[0]) if len(clear) else len(mine)
             if leaves * STEP <= LEAVES:

@@ -34,16 +34,16 @@ if TYPE_CHECKING:
     from roboglot.autonomy.traffic.movers import Mover, MoverTracker
     from roboglot.autonomy.traffic.narrow_places import NarrowPlaces
 
-ANNOUNCED = 5.0  # m of the way that are, and what is narrow beyond
-SAME = 0.6  # m between what is seen and what is heard of the same robot
-BEFORE_NARROW = 0.35  # m before a narrow place where it waits
-FACING = 0.27 + 0.5  # m between a hull and the middle of what stands before it
-AROUND = 4.0  # m within which others may be what closes the way
-LIVELY = 8.0  # s after it went somewhere that one is taken to go on
-FAR = 3.0  # m away from which such ones will be elsewhere before the robot is there
-STOPPED = 5.0  # s after which one that stands in a narrow place may go back as well
-IN_IT = 0.9  # m between the middle of such a one and what it closes
-TRAIL = 20  # places that it came by
+ANNOUNCED = 5.0  # m of the route that are announced, plus any narrow place beyond
+SAME = 0.6  # m between the sighting and the announcement of the same robot
+BEFORE_NARROW = 0.35  # m in front of a narrow place where the robot waits
+FACING = 0.27 + 0.5  # m between a hull and the centre of the object in front of it
+AROUND = 4.0  # m within which other robots may be the obstacle
+LIVELY = 8.0  # s after its last motion for which a robot counts as under way
+FAR = 3.0  # m at which such robots will have left before the robot arrives
+STOPPED = 5.0  # s after which a robot standing in a narrow place may reverse, too
+IN_IT = 0.9  # m between the centre of such a robot and the place that it blocks
+TRAIL = 20  # places that were passed
 TRAIL_STEP = 0.2  # m between two of them
 
 Points = NDArray[np.float64]
@@ -55,14 +55,14 @@ class Traffic:
     def __init__(self, robot: Robot, belief: Belief) -> None:
         self._robot, self._belief = robot, belief
         self._announcer = Announcer(robot, belief)
-        self._tracker: MoverTracker | None = None  # once something drives: these two need the kernels
+        self._tracker: MoverTracker | None = None  # set once something drives: these two need the kernels
         self._narrow: NarrowPlaces | None = None
         self._ways: list[Way] = []
-        self._went: dict[str, float] = {}  # when the others that are heard announced a way last, s
+        self._went: dict[str, float] = {}  # time of the last announced route by robot, s
         self._trail: deque[Point] = deque(maxlen=TRAIL)
-        self.meeting: Meeting | None = None  # with one that goes first
-        self.meets = False  # whether another is about to come into the way
-        self.giving_way = False  # it has to leave: no rule holds it up
+        self.meeting: Meeting | None = None  # with a robot that goes first
+        self.meets = False  # whether another robot is about to enter the route
+        self.giving_way = False  # the robot has to leave: no rule holds it up
 
     def close(self) -> None:
         """Fall silent."""

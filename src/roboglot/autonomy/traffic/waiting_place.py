@@ -14,10 +14,10 @@ from roboglot.autonomy.traffic.narrow_places import narrow
 from roboglot.kernels.search import ways_from
 from roboglot.model.geometry import Point
 
-REACH = 6.0  # m around in which it is looked for
-SHUN_COST = 4.0  # what a cell on another's way costs more
+REACH = 6.0  # m around the robot that are searched
+SHUN_COST = 4.0  # extra cost of a cell on another robot's route
 SHUN_POINTS = 40
-NARROW_COST = 60.0  # what waiting in a narrow place costs: as 3 m of open floor
+NARROW_COST = 60.0  # extra cost of waiting in a narrow place: equal to 3 m of open floor
 
 Points = NDArray[np.float64]
 

@@ -32,7 +32,7 @@ OVERLAP = 0.85  # of the hull's width between two lanes
 WIDTH_MIN, WIDTH_MAX = 0.1, 5.0  # m
 AREAS_MAX = 200
 TOLERANCE = 0.05  # m at the ends of the lanes
-LANES_AT_ONCE = 20  # in one drive
+LANES_AT_ONCE = 20  # per drive
 PASSES = 30  # of improving the order of the parts
 
 
@@ -92,7 +92,7 @@ class LaneSweeping(Sweeping):
             raise Unreachable("there is no open floor to sweep")
         with Swept(self._robot, self._course.belief, action, lanes) as swept:
             await self._drive(action, lanes)
-            if left := swept.left():  # what stood there may be gone, and there may be floor before and behind it
+            if left := swept.left():  # the obstacle may be gone, with open floor before and behind it
                 floor, frame = await self._course.open_floor(self._robot[Localization].pose.point)
                 await self._drive(action, [open_ for lane in left for open_ in open_stretches(lane, floor, frame)])
             swept.report(final=True)

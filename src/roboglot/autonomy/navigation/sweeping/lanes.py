@@ -35,7 +35,7 @@ class Stretch:
         return self.start.distance_to(self.end)
 
 
-Part = tuple[Stretch, ...]  # one stretch of each of its lanes, in turn
+Part = tuple[Stretch, ...]  # one stretch of each of its lanes, in order
 
 
 def parts(area: Area, floor: NDArray[np.bool_], frame: Frame, width: float) -> list[Part]:

@@ -18,10 +18,10 @@ from roboglot.model.events import ScanTaken
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.robot import Robot
 
-BESIDE = 0.08  # m from a lane at which driving counts as driving along it
-SPACING = 0.05  # m between the places of a lane that are looked at
-STEP_MAX = 0.3  # m between two scans; more is a correction of where the robot believes to be
-REPORTS = 100  # at most, on the way
+BESIDE = 0.08  # m from a lane within which the robot counts as driving along it
+SPACING = 0.05  # m between the places of a lane that are checked
+STEP_MAX = 0.3  # m between two scans; a larger step is a correction of the estimated pose
+REPORTS = 100  # progress reports per drive, at most
 
 
 class Swept:
@@ -67,7 +67,7 @@ class Swept:
         """Publish how far it is; in the end, what was left out."""
         left_out = sum((stretch.length for stretch in self.left()), 0.0) if final else 0.0
         self._reported = self.done
-        # Crumbs at the ends of lanes are neither worth a drive nor a word.
+        # Remnants at the ends of lanes are neither driven nor reported.
         done = self._total - left_out if final else self._reported
         self._action.report(SweepFeedback(done, self._total, left_out))
 

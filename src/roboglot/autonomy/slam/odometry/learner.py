@@ -14,7 +14,7 @@ from roboglot.autonomy.slam.odometry.noise import Doubt, LearntBias, LearntNoise
 from roboglot.model.components.sensing.odometry import OdometryNoise
 from roboglot.model.geometry import Pose, wrap_angle
 
-LEARNS_AFTER = 1.0  # m after a contradiction from which corrections say something of odometry again
+LEARNS_AFTER = 1.0  # m after a contradiction before corrections are used for learning again
 
 
 @dataclass(frozen=True, slots=True)

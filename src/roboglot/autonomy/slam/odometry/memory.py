@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from roboglot.autonomy.slam.slam import Slam
 
 KEY = "autonomy.odometry"
-PERIOD, WAY = 30.0, 10.0  # s between two looks; m driven from which it is worth writing
+PERIOD, WAY = 30.0, 10.0  # s between two checks; m driven that are worth saving
 
 
 class OdometryMemory:

@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 from roboglot.model.components.sensing.odometry import OdometryNoise
 from roboglot.model.geometry import Pose
 
-RISE, FALL = 0.2, 0.02  # share of a surprise, of a confirmation, that is learnt at once
-UNKNOWN_WHEELS = 3.0  # times the described noise of the way, until matches showed otherwise
-FACTOR_MAX = 100.0  # times the described noise, as a standard deviation
-SURPRISE_MAX = 400.0  # squared ratio: more is no noise but a collision or a hand
-LEARNT_MIN = 0.2  # share of a correction that must come from the scan before it says something
+RISE, FALL = 0.2, 0.02  # weight of a surprise, of a confirmation
+UNKNOWN_WHEELS = 3.0  # times the nominal noise, until matches have shown otherwise
+FACTOR_MAX = 100.0  # times the nominal noise, as a standard deviation
+SURPRISE_MAX = 400.0  # squared ratio: more is a collision or a hand, not noise
+LEARNT_MIN = 0.2  # share of a correction that must come from the scan for it to count
 
-BIAS_GAIN = 0.02  # share of a correction that is learnt at least
-TURN_UNKNOWN, SCALE_UNKNOWN = 0.01, 0.05  # rad/s, share of the way: standard deviations before anything is learnt
-TURN_BIAS_MAX, SCALE_BIAS_MAX = 0.05, 0.25  # rad/s; share of the way
+BIAS_GAIN = 0.02  # weight of a correction, at least
+TURN_UNKNOWN, SCALE_UNKNOWN = 0.01, 0.05  # rad/s, share of the distance: standard deviations before anything is learnt
+TURN_BIAS_MAX, SCALE_BIAS_MAX = 0.05, 0.25  # rad/s; share of the distance
 LEARNT_TURN_MAX, LEARNT_WAY_MAX = math.radians(1.0), 0.05  # rad, m: larger corrections have other reasons
-LEARNT_WAY_MIN = 0.03  # m driven from which a correction says something of the wheels' scale
+LEARNT_WAY_MIN = 0.03  # m driven from which a correction indicates the wheels' scale
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ class LearntNoise:
 
     def __init__(self, described: OdometryNoise) -> None:
         self.described = described
-        self.way_factor, self.yaw_factor = UNKNOWN_WHEELS**2, 1.0  # of the variances
+        self.way_factor, self.yaw_factor = UNKNOWN_WHEELS**2, 1.0  # factors of the variances
         self._described, self._before = (0.0, 0.0), np.zeros((3, 3))
 
     def spread(self, covariance: NDArray[np.float64], way: float, turn: float) -> NDArray[np.float64]:
@@ -109,7 +109,7 @@ def _along(matrix: NDArray[np.float64], c: float, s: float) -> float:
 def _learnt(factor: float, correction: float, prior: float, posterior: float, before: float, described: float) -> float:
     """``factor`` after a correction in one direction; variances of it, and the step's as described."""
     share = 1.0 - posterior / prior
-    if share < LEARNT_MIN:  # the scan does not see this direction
+    if share < LEARNT_MIN:  # the scan does not constrain this direction
         return factor
     surprise = (correction / share) ** 2 - posterior / share - before
     return _followed(factor, min(max(surprise, 0.0) / described, SURPRISE_MAX))
@@ -127,8 +127,8 @@ class LearntBias:
     """
 
     def __init__(self) -> None:
-        self.turn = 0.0  # rad/s that odometry turns too slowly
-        self.scale_x = self.scale_y = 0.0  # share of the way ahead and to the left that it leaves out
+        self.turn = 0.0  # rad/s missing from odometry's rate of turn
+        self.scale_x = self.scale_y = 0.0  # share of the distance, ahead and to the left, missing from odometry
         self._unknown = {"turn": TURN_UNKNOWN**2, "scale_x": SCALE_UNKNOWN**2, "scale_y": SCALE_UNKNOWN**2}
 
     @property
