@@ -31,7 +31,7 @@ class Kind(StrEnum):
     MACHINE = "machine"  # shows a token
     APP = "app"  # shows a client certificate; its common name is the identity
     GUEST = "guest"  # shows a temporary token issued by the program: a pupil who joined a class by its code
-    ADDRESS = "address"  # recognized by address, for clients that cannot show anything
+    ADDRESS = "address"  # recognized by address, for clients without credentials
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,12 +46,12 @@ COMMANDS = {
     "certs": "the certificates that CyberDog clients need",
     "doctor": "what is missing on this machine, and how to get it",
 }
-FLUSH_FAILED = 120  # Python's own status for it
+FLUSH_FAILED = 120  # Python's own exit status for it
 # Commands whose files have a folder of their own.
 FOLDERS = dict.fromkeys(("compare", "export", "fidelity", "record", "replay", "rerun"), "recordings") | dict.fromkeys(
     ("lease", "stop", "reset"), "control"
 )
-# The extra to install for a command whose modules are missing; else the one that brings the module.
+# The extra to install for a command whose modules are missing, unless the module's name leads to one.
 EXTRAS = {"demo": "demo", "mcp": "mcp", "export": "logs"} | dict.fromkeys(
     ("up", "coverage", "capabilities", "fidelity", "doctor", "cloud", "map", "test", "lesson", "campaign"), "up"
 )
@@ -69,14 +69,14 @@ def run_process() -> NoReturn:
         status = end.code if isinstance(end.code, int) else int(end.code is not None)
         if isinstance(end.code, str):
             print(end.code, file=sys.stderr)
-    # No public names, but multiprocessing ends its children in the same way.
+    # These are not public, but multiprocessing ends its children in the same way.
     vars(threading)["_shutdown"]()  # waits for threads
     vars(atexit)["_run_exitfuncs"]()
     try:
         for stream in (sys.stdout, sys.stderr):
             if stream is not None and not stream.closed:
                 stream.flush()
-    except OSError:  # a full disk, or a reader who has gone
+    except OSError:  # a full disk, or a closed pipe
         status = status or FLUSH_FAILED
     os._exit(status & 0xFF)
 
@@ -94,9 +94,9 @@ def main() -> None:
             raise
         _run_with_extra(name, arguments)
         sys.exit(words)
-    except KeyboardInterrupt:  # before the command has handlers of its own
+    except KeyboardInterrupt:  # before the command installs its own handlers
         sys.exit(130)
-    except BrokenPipeError:  # the reader of our output has gone, as with `| head`
+    except BrokenPipeError:  # the reader of our output has closed it, as with `| head`
         sys.stderr.close()
         sys.exit(1)
 
@@ -144,7 +144,7 @@ def loaded(name: str) -> typer.Typer:
 
     folder = f".{FOLDERS[name]}" if name in FOLDERS else ""
     module = importlib.import_module(f"roboglot.cli{folder}.{name}")
-    app: typer.Typer | None = getattr(module, "app", None)  # of commands with commands of their own
+    app: typer.Typer | None = getattr(module, "app", None)  # for commands that have subcommands
     if app is None:
         app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
         app.command(context_settings=getattr(module, "SETTINGS", None))(module.command)

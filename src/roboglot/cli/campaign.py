@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 SEEDS_MAX = 100_000
 OUT = Path("campaign")
-KEPT_MAX = 10  # trials of one scenario that leave recordings, maps, messages
+KEPT_MAX = 10  # trials of a scenario that keep recordings, maps and messages
 
 
 def command(

@@ -24,7 +24,7 @@ from roboglot.protocols.door import DoorType
 from roboglot.storage.database import Database
 
 BODIES = ("universal", "robomaster_ep", "cyberdog2", "hermes")
-# Name to a URL where no robot is, and what the driver announces.
+# For each driver, a URL without a robot and what the driver announces.
 DRIVERS: Mapping[str, tuple[str, Mapping[type[Component], str]]] = {
     f"{kind.scheme}://": (f"{kind.scheme}://127.0.0.1:9" + f"?{kind.example}" * bool(kind.example), kind.announced())
     for kind in DRIVER_TYPES

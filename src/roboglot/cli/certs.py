@@ -21,7 +21,7 @@ def command(
     ensure_certificates(folder)
     try:
         written = export_client(folder, export)
-        (export / ".gitignore").write_text("*\n")  # a private key belongs in no repository
+        (export / ".gitignore").write_text("*\n")  # private keys do not belong in a repository
     except OSError as error:
         sys.exit(f"roboglot certs: {export} cannot be written: {error.strerror}")
     for path in written:

@@ -23,8 +23,8 @@ from roboglot.wire.cyberdog.chapters.motion.motion import Motion
 from roboglot.wire.cyberdog.codes import Feedback
 
 NAMES = ("watch", "status", "stand", "lie", "drive", "map", "go", "charge", "photo", "record", "stop")
-LINE_PERIOD = 0.5  # s between two looks
-FIRST_MAX = 20.0  # s until a map begins to grow
+LINE_PERIOD = 0.5  # s between two lines
+FIRST_MAX = 20.0  # s before a map must begin to grow
 Work = Callable[[CyberDogClient, list[str]], Awaitable[None]]
 SETTINGS = {"ignore_unknown_options": True}  # numbers may be negative
 console = Console(highlight=False)
@@ -51,7 +51,7 @@ def command(
         sys.exit(f"roboglot cyberdog: no certificates: {error}; `roboglot certs --export DIR` writes them")
     try:
         asyncio.run(_at(CyberDogClient(robot, proof, app_port=app_port), WORK[what], words or []))
-    except (ClientError, OSError, ValueError) as error:  # a TimeoutError has no words
+    except (ClientError, OSError, ValueError) as error:  # a TimeoutError has no text
         sys.exit(f"roboglot cyberdog: {str(error) or 'nothing came in time'}")
     except KeyboardInterrupt:
         sys.exit(130)
@@ -136,14 +136,14 @@ async def _map(client: CyberDogClient, words: list[str]) -> None:
     if len(words) != 1:
         raise ValueError("it takes the map's name")
     await client.found()
-    await _stop(client, [])  # a robot that is localized begins no map
+    await _stop(client, [])  # a localized robot does not begin a map
     task = await client.map_surroundings(on_feedback=_print_feedback)
     console.print("mapping; drive about, then press Enter to save")
     begun = asyncio.Event()
     growing = asyncio.ensure_future(_growth(client, begun))
     try:
         await asyncio.to_thread(sys.stdin.readline)
-        await asyncio.wait_for(begun.wait(), FIRST_MAX)  # there is nothing to save before
+        await asyncio.wait_for(begun.wait(), FIRST_MAX)  # nothing can be saved before
         await client.save_map(words[0])
     finally:
         growing.cancel()
@@ -164,7 +164,7 @@ async def _go(client: CyberDogClient, words: list[str]) -> None:
     """Localizes first."""
     goal = _numbers(words, 2, 3)
     await client.found()
-    with contextlib.suppress(CyberDogRefused):  # it is localized already, or navigation will say what is wrong
+    with contextlib.suppress(CyberDogRefused):  # already localized, or navigation will report the problem
         await (await client.relocalise(on_feedback=_print_feedback))
     task = await client.navigate(*goal, on_feedback=_print_feedback)
     try:
@@ -186,7 +186,7 @@ async def _photo(client: CyberDogClient, words: list[str]) -> None:
 
 async def _record(client: CyberDogClient, words: list[str]) -> None:
     (seconds,) = _numbers(words[:1], 1, 1)
-    await client.found()  # a dog that still misses the app before this one would end the recording with it
+    await client.found()  # a dog still looking for its previous app would end the recording
     await client.record()
     await client.clock.sleep(seconds)
     film = await client.stop_recording()

@@ -32,7 +32,7 @@ def command(
         raise MissingExtra(in_words("roboglot demo", missing, "demo"))
     if problem := _obstacle(address, out):
         sys.exit(f"roboglot demo: {problem}")
-    os.environ.setdefault("GRPC_VERBOSITY", "ERROR")  # a robot that hangs up is no news to this phone
+    os.environ.setdefault("GRPC_VERBOSITY", "ERROR")  # gRPC need not report that a robot hung up
     try:
         _compile_kernels()
         sys.exit(asyncio.run(_demo(world, address, out, speed)))

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from roboglot.shards.wishes import Answer, Row, Verb
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, no_args_is_help=True)
-PATIENCE = 120.0  # s for a wish; stopping and starting 100 shards takes its time
+PATIENCE = 120.0  # s for a request; stopping and starting 100 shards takes a while
 MEGABYTE = 1 << 20
 LINES_MAX = 100_000
 HEAD = f"{'shard':6} {'state':9} {'pid':>8} {'robots':>6} {'core':>6} {'MB':>6} {'x real':>7} {'restarts':>8}"
@@ -264,7 +264,7 @@ async def _serve(keeper: Callable[[], Keeper], folder: Path) -> int:
     supervisor = keeper()
     desk, classes = FleetDesk(supervisor, folder), FleetClasses(folder)
     ending = asyncio.ensure_future(stop.wait())
-    await classes.open()  # shards look for it when they start
+    await classes.open()  # shards look for this socket when they start
     starting = asyncio.ensure_future(supervisor.start())
     try:
         await desk.open()

@@ -30,7 +30,7 @@ from roboglot.model.geometry import Pose
 from roboglot.model.robot import Description, Robot
 
 PERIOD = 0.2  # s between two pictures
-CONNECT_SECONDS = 12.0  # that --once waits for the robot; a dog that does not call back is given up after 10
+CONNECT_SECONDS = 12.0  # for --once; a dog that does not call back is given up after 10
 UNKNOWN = Description(maker="", model="", serial="", hardware_version="", software_version="", radius=0.25, height=0.3)
 
 
@@ -63,7 +63,7 @@ async def _once(robot: Robot) -> int:
         async with asyncio.timeout(CONNECT_SECONDS):
             while robot[Link].state is not LinkState.UP:  # noqa: ASYNC110 - a few looks
                 await asyncio.sleep(0.05)
-            await asyncio.sleep(0.5)  # what is pushed comes a little later
+            await asyncio.sleep(0.5)  # pushes arrive a little later
     for name, words in rows(robot):
         print(f"{name:14} {words}")
     return 0 if robot[Link].state is LinkState.UP else 1

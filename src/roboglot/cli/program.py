@@ -29,7 +29,7 @@ from roboglot.protocols.visual.config import VisualConfig
 ROBOT = "ws://127.0.0.1:50053"
 FRAMES, LOG, DEBUG, RUNS = "/programs", "/log", "/debug", "/runs"
 Frame = dict[str, Any]
-Stops = tuple[list[int], bool]  # lines, and whether before the first statement
+Stops = tuple[list[int], bool]  # lines, and whether to stop before the first statement
 
 
 class What(StrEnum):
@@ -206,7 +206,7 @@ async def _run(frames: TextLink, log: TextLink, task: str, condition: str, stepp
     printing = asyncio.create_task(_follow_log(log, task, shown))
     try:
         error = await _follow_blocks(frames, task, stepper)
-        await log.send("")  # answered behind all that was printed before
+        await log.send("")  # its answer follows everything printed before
         await printing
     except asyncio.CancelledError:
         await _ask(frames, "shutdown", task)

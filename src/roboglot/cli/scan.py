@@ -25,7 +25,7 @@ from roboglot.model.clock import RealClock
 ADDRESSES_MAX = 4096
 AT_ONCE_MAX = 64
 PROBE_SECONDS = 1.0
-SLAMWARE_HOTSPOT = "192.168.11.1"  # a Slamware robot's own, in its own network
+SLAMWARE_HOTSPOT = "192.168.11.1"  # a Slamware robot's address in its own network
 CYBERDOG_PORT = 50052
 
 
@@ -114,7 +114,7 @@ async def slamware_at(host: str, port: int = 1448) -> Found | None:
 async def cyberdog_at(host: str, port: int = CYBERDOG_PORT) -> Found | None:
     """Probe for a CyberDog by its certificate; a connection needs one of the same authority."""
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
-    context.check_hostname, context.verify_mode = False, ssl.CERT_NONE  # only to look at it
+    context.check_hostname, context.verify_mode = False, ssl.CERT_NONE  # read without verification
     context.set_alpn_protocols(["h2"])
     try:
         async with asyncio.timeout(PROBE_SECONDS):

@@ -13,14 +13,14 @@ from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import NoReturn
 
-AGAIN = "ROBOGLOT_RUN_AGAIN"  # is set for the second run, which is the last one
+AGAIN = "ROBOGLOT_RUN_AGAIN"  # set for the second run, which is the last
 
 
 def runner() -> list[str]:
     """Return the command that runs one of ours from a requirement, which it takes last; empty if nothing does."""
     if AGAIN in os.environ:
         return []
-    uv = os.environ.get("UV", "")  # uv names itself to what it runs
+    uv = os.environ.get("UV", "")  # uv sets this for its child processes
     if uv and Path(sys.prefix).parent.name.startswith(("archive-", "environments-")):
         return [uv, "tool", "run", "--from"]
     pipx = shutil.which("pipx")

@@ -30,8 +30,8 @@ from roboglot.model.clock import LockstepClock
 from roboglot.protocols import DOORS, sections
 from roboglot.protocols.door import Option
 
-LINE_MAX = 64  # bytes of a line that lockstep reads from standard input
-STEP_MAX = 86_400.0  # s that one line may let pass
+LINE_MAX = 64  # bytes per line of standard input in lockstep
+STEP_MAX = 86_400.0  # s that one line may advance
 
 
 def command(
@@ -217,7 +217,7 @@ async def _serve(config: Config, *, open_console: bool) -> int:
         why = open_files.in_words() if open_files.ran_out(error) else f"{error.strerror or error}{taken}"
         print(f"roboglot up: {why}", file=sys.stderr)
         return 1
-    except RobotError as error:  # what was to be recorded cannot be
+    except RobotError as error:  # nothing can be recorded
         print(f"roboglot up: {error}", file=sys.stderr)
         return 1
     finally:
@@ -247,7 +247,7 @@ async def _lines() -> AsyncIterator[str]:
         while True:
             try:
                 line = await reader.readline()
-            except ValueError:  # longer than LINE_MAX; the reader has dropped it
+            except ValueError:  # longer than LINE_MAX; the reader has discarded it
                 line = b"(a line that is too long)\n"
             if not line:
                 return

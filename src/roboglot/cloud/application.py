@@ -19,9 +19,9 @@ from roboglot.wire.visual.requests import DEBUG, FRAME_MAX, ID_MAX, TARGETS_MAX
 log = logging.getLogger(__name__)
 
 BODY_MAX = 4 * FRAME_MAX  # bytes
-BODY_SECONDS_MAX = 30.0  # s of the machine's clock that a body may take to arrive
+BODY_SECONDS_MAX = 30.0  # s (machine clock) for a body to arrive
 RECORDS_SHOWN = 1000
-STATUS = {CloudCode.MISSING: 400}  # of HTTP, where it is not the code itself
+STATUS = {CloudCode.MISSING: 400}  # HTTP status, where it differs from the code
 
 Scope = Mapping[str, Any]
 Receive = Callable[[], Awaitable[Mapping[str, Any]]]

@@ -31,7 +31,7 @@ class BackEndConnection(HttpToolsProtocol):
 
     def data_received(self, data: bytes) -> None:
         if self._patience is None and self.cycle is not None and self.cycle.response_complete:
-            self._wait()  # also for what is not the begin of a request yet
+            self._wait()  # also for bytes that do not start a request yet
         waiting = self._patience
         super().data_received(data)
         if waiting is not None and self._patience is waiting:
@@ -40,7 +40,7 @@ class BackEndConnection(HttpToolsProtocol):
                 self.transport.close()
 
     def on_message_begin(self) -> None:
-        if self._patience is None:  # right behind the last request
+        if self._patience is None:  # immediately after the last request
             self._wait()
         super().on_message_begin()
 

@@ -206,7 +206,7 @@ class Api:
 
     async def _sent_again(self, name: str, number: str) -> object:
         view = self._desk.view(name)
-        # The door sees a client on this machine, not the person at the page: only ADMIN may do all that it may.
+        # The door sees a local client instead of the person at the page, so this requires ADMIN.
         view.robot.admission.check(CLIENT, "send a request again", Right.ADMIN)
         exchange = view.wire.get(_whole(number))
         with view.robot.admission.noting(CLIENT, "send a request again"):

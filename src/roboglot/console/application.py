@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 P = TypeVar("P", Page, Session)
-QUERY_MAX = 500  # bytes that are passed on to the log-in page
+QUERY_MAX = 500  # bytes passed on to the log-in page
 GOING_AWAY, BAD_DATA, POLICY, TRY_LATER = 1001, 1003, 1008, 1013
 
 
@@ -51,9 +51,9 @@ class Application:
         self._assets = Assets()
         self.pages: set[Page] = set()
         self.sessions: set[Session] = set()
-        self._ending: set[asyncio.Task[None]] = set()  # classes
+        self._ending: set[asyncio.Task[None]] = set()  # classes that are ending
         self._classroom = self._enter_classroom(classroom, page)
-        self._listening: dict[asyncio.Task[None], str] = {}  # and who is at the other end
+        self._listening: dict[asyncio.Task[None], str] = {}  # and the page's client
         self._login = Sessions()
         self._classes = Classes(desk, self._classroom, self._stop, self._listening.values, self._put_out)
         self._api = Api(desk, self._classes)
@@ -61,7 +61,7 @@ class Application:
         self._signing = Signing(desk, self._login, self._classes)
         for robot in desk.robots.values():
             robot.admission.on_lost(self._close_pages_of)
-        self._metrics: Metrics | None = None  # from the first scrape on
+        self._metrics: Metrics | None = None  # from the first scrape onwards
 
     async def close(self) -> None:
         """Hang up on the pages' video calls and the classroom, and stop counting."""
@@ -109,7 +109,7 @@ class Application:
             if await self._signing.serve(scope, receive, send):
                 return
             if scope["path"] != "/metrics" and not scope["path"].startswith("/api/"):
-                await self._serve_file(scope, send)  # everybody may have the pages: they show nothing by themselves
+                await self._serve_file(scope, send)  # anyone may load the pages: they contain no data
                 return
             named = await enter(self._desk, self._login, scope)
             if scope["path"] == "/metrics":
@@ -145,7 +145,7 @@ class Application:
 
     async def _serve_file(self, scope: Scope, send: Send) -> None:
         if scope["path"] in ("/studio", "/studio/") and not await self._knows(scope):
-            asked = scope["query_string"][:QUERY_MAX]  # a class and a name, from the page of another world
+            asked = scope["query_string"][:QUERY_MAX]  # the code of a class and a name, from another world's page
             await answer(send, 303, b"text/plain", b"", [(b"location", b"/?to=studio" + (asked and b"&" + asked))])
             return
         asset = self._assets.find(scope["path"])

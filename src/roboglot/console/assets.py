@@ -25,7 +25,7 @@ TYPES = {
     ".cur": "image/x-icon",
 }
 _COMMENT = re.compile(rb"^(?://.*|/\*\*.*\*/)$", re.MULTILINE)
-STUDIO_FILES = "/studio/files.json"  # what the studio's service worker keeps for the time without a server
+STUDIO_FILES = "/studio/files.json"  # files that the studio's service worker keeps for use without a server
 _INLINE = re.compile(rb'<script type="importmap">(.*?)</script>', re.DOTALL)
 
 
@@ -52,10 +52,10 @@ def _paths() -> dict[str, Path]:
 @cache
 def _read(path: Path) -> Asset:
     plain = path.read_bytes()
-    if path.suffix == ".gz":  # large libraries are stored as they are sent
+    if path.suffix == ".gz":  # large libraries are stored compressed
         packed, plain = plain, gzip.decompress(plain)
         return Asset(TYPES[Path(path.stem).suffix], plain, packed, _tag(plain))
-    if path.suffix == ".js":  # our own modules: what readers of the source need is not sent; lines keep their numbers
+    if path.suffix == ".js":  # comments are stripped from our own modules; line numbers stay
         plain = _COMMENT.sub(b"", plain)
     return Asset(TYPES[path.suffix], plain, gzip.compress(plain, 9, mtime=0), _tag(plain))
 

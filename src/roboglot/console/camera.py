@@ -33,12 +33,12 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 BOUNDARY = b"roboglot-frame"
-SIZE_UNKNOWN = 0xFFFFFFFF  # of a WAV file: players read on
+SIZE_UNKNOWN = 0xFFFFFFFF  # of a WAV file: players read on to the end
 ENDLESS_WAV = struct.pack(  # one channel of 16 bits
     "<4sI4s4sIHHIIHH4sI",
     *(b"RIFF", SIZE_UNKNOWN, b"WAVE", b"fmt ", 16, 1, 1, SAMPLE_RATE, 2 * SAMPLE_RATE, 2, 16, b"data", SIZE_UNKNOWN),
 )
-ENDED = ("failed", "closed", "blind")  # states of a call that is over
+ENDED = ("failed", "closed", "blind")  # states of a finished call
 
 
 async def send_photo(robot: Robot, send: Send) -> None:
@@ -59,7 +59,7 @@ async def send_film(robot: Robot, receive: Receive, send: Send) -> None:
         gone.add_done_callback(lambda _: viewer.close())
         try:
             async for first in viewer:
-                if not robot.admission.may(Right.SEE):  # it was revoked meanwhile
+                if not robot.admission.may(Right.SEE):  # access may have been revoked meanwhile
                     break
                 frame = (viewer.drain() or [first])[-1]
                 picture = await background.beside(partial(jpeg, frame, JPEG_QUALITY))
@@ -79,7 +79,7 @@ async def send_sound(robot: Robot, receive: Receive, send: Send) -> None:
         await send({"type": "http.response.body", "body": ENDLESS_WAV, "more_body": True})
         try:
             async for block in viewer:
-                if not robot.admission.may(Right.SEE):  # it was revoked meanwhile
+                if not robot.admission.may(Right.SEE):  # access may have been revoked meanwhile
                     break
                 await send({"type": "http.response.body", "body": block.samples.tobytes(), "more_body": True})
         finally:
@@ -164,7 +164,7 @@ class Sightings:
         detectors: list[Detector[Any]] = [vision.people, vision.faces, vision.gestures]
         detectors += [vision.markers, vision.robots, vision.tags]
         for detector in detectors:
-            with suppress(Busy):  # the other boxes are drawn all the same
+            with suppress(Busy):  # draw the other boxes anyway
                 self._viewers.append(detector.subscribe())
 
     def close(self) -> None:

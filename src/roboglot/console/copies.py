@@ -12,7 +12,7 @@ from roboglot.model.errors import InvalidGoal
 from roboglot.model.tap import Direction, Exchange
 from roboglot.protocols.door import Endpoint
 
-LABELS = {  # of the endpoint where each door takes requests
+LABELS = {  # names of the endpoint for requests, by door
     "slamware": "Slamware REST",
     "robomaster": "RoboMaster text SDK",
     "cyberdog": "CyberDog 2 gRPC",
@@ -117,7 +117,7 @@ def _text_python(exchange: Exchange, address: str) -> str:
 
 def _grpcurl(exchange: Exchange, endpoint: Endpoint) -> str:
     message = json.dumps({"nameCode": int(exchange.operation or 0), "params": readable(exchange.payload)})
-    tool = endpoint.try_line.partition(" -d ")[0]  # with the certificates of this robot
+    tool = endpoint.try_line.partition(" -d ")[0]  # with this robot's certificates
     return f"{tool} -d {shlex.quote(message)} {endpoint.address} grpcapi.GrpcApp/sendMsg"
 
 
@@ -126,7 +126,7 @@ def _dog_python(exchange: Exchange, endpoint: Endpoint) -> str:
     proof = {word: value for word, value in pairwise(words) if word in ("-cacert", "-key", "-cert", "-authority")}
     opening = f"grpc.insecure_channel({endpoint.address!r})"
     keys = ""
-    if "-authority" in proof:  # the robot's certificate names it, not its address
+    if "-authority" in proof:  # the robot's certificate contains its name, not its address
         files = [proof[word] for word in ("-cacert", "-key", "-cert")]
         keys = (
             f"pem = [pathlib.Path(file).read_bytes() for file in {files!r}]\n"

@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     from roboglot.console.recordings import Recordings
 
 CLIENT = "console"
-COMMAND = "command"  # the kind of inputs that are commands
-TAKE = "take_control"  # a verb of its own: it is about who asks
-assert map_verbs  # registers its verbs
+COMMAND = "command"  # the kind of recorded inputs for commands
+TAKE = "take_control"  # handled apart because it concerns the caller
+assert map_verbs  # importing it registers its verbs
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +56,8 @@ class Desk:
     running: Callable[[], int] = lambda: 0
     recordings: Recordings | None = None
     views: dict[str, RobotView] = field(init=False)
-    pupils: set[str] = field(default_factory=set)  # of the class that is open, by their identities
-    locked: set[str] = field(default_factory=set)  # robots that only a teacher moves
+    pupils: set[str] = field(default_factory=set)  # identities of the pupils in the open class
+    locked: set[str] = field(default_factory=set)  # robots that only a teacher may move
 
     def __post_init__(self) -> None:
         self.views = {name: RobotView(robot, self.stage) for name, robot in self.robots.items()}
@@ -176,7 +176,7 @@ class Desk:
         operation = WORLD_VERBS.get(verb) or CLOCK_VERBS.get(verb)
         if operation is None:
             raise NotFound(f"there is no verb {verb!r} for the world")
-        for robot in self.robots.values():  # a world belongs to all who are in it
+        for robot in self.robots.values():  # everyone in a world shares it
             robot.admission.check(CLIENT, verb, operation.right)
         with self.noting(verb):
             return await self._change_world(operation, values)

@@ -10,7 +10,7 @@ from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
 from roboglot.model.stage import Stage
 
-NAMES = ("display_name", "name", "title")  # of a place, as the doors keep it in its metadata
+NAMES = ("display_name", "name", "title")  # metadata keys under which doors keep a place's name
 
 
 def drawings_of(robot: Robot) -> dict[str, object]:

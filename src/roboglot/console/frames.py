@@ -16,7 +16,7 @@ from roboglot.model.geometry import Path, Pose
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.sensing import LaserScan
 
-FAR = 65_535  # u16: nothing came back
+FAR = 65_535  # u16: no echo
 SCAN_MAX_METERS = 65.0
 UNKNOWN, FREE, OCCUPIED = 0, 1, 2
 

@@ -153,7 +153,7 @@ class Page:
         moment["pace"] = self._desk.pace
         moment["poses"] = motion
         moment["recording"] = self._desk.recordings is not None and self._desk.recordings.on
-        whole = len(visible) == len(self._desk.views)  # the world shows all of them
+        whole = len(visible) == len(self._desk.views)  # the world view shows all robots
         if self._watch.truth and whole and (truth := drawings.truth_of(self._desk.stage)) != self._truth:
             self._truth = moment["truth"] = truth
         await self._tell(moment)
@@ -172,7 +172,7 @@ class Page:
                 await self._send(frame)
 
     async def _show_wire(self, view: RobotView) -> None:
-        first = not self._wire_at  # a page that is opened late gets all that is kept
+        first = not self._wire_at  # a page that is opened late gets the whole history
         new = view.wire.after(self._wire_at, WIRE_MAX if first else BATCH_MAX)
         for batch in (new[start : start + BATCH_MAX] for start in range(0, len(new), BATCH_MAX)):
             if view is not self._watched:
@@ -246,7 +246,7 @@ class Page:
                 pad.drive(velocity, milliseconds())
         except RobotError as error:
             why = str(error)
-        if why != self._refused:  # said once, not at every message
+        if why != self._refused:  # reported once, not for every message
             self._refused = why
             self._reply({"type": "pad", "robot": velocity.robot, "refused": why})
 
@@ -270,7 +270,7 @@ class Page:
         self._reply(answer)
 
     def _reply(self, message: dict[str, object]) -> None:
-        if self._replies.full():  # a page that does not read its answers
+        if self._replies.full():  # the page does not read its answers
             self._replies.get_nowait()
         self._replies.put_nowait(message)
         self._due.set()

@@ -21,11 +21,11 @@ from roboglot.model.events import ActionChanged
 from roboglot.model.robot import Robot
 from roboglot.model.tap import Direction, Exchange
 
-STATUSES_MAX = 64  # words for how a request ended that one door's counters keep apart
+STATUSES_MAX = 64  # distinct outcomes counted per door
 SECONDS = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 10.0)
-NONE, OTHER = "none", "other"  # an operation that no contract has; a status beyond STATUSES_MAX
+NONE, OTHER = "none", "other"  # an operation outside the contract; an outcome beyond STATUSES_MAX
 
-disable_created_metrics()  # type: ignore[no-untyped-call]  # a second series for each, which nothing reads
+disable_created_metrics()  # type: ignore[no-untyped-call]  # a second series for each, which no one reads
 
 
 class Metrics:

@@ -13,7 +13,7 @@ from roboglot.console.verbs.robots import VERBS
 from roboglot.console.verbs.world import WORLD_VERBS
 from roboglot.operations import Operation
 
-assert map_verbs  # registers its verbs
+assert map_verbs  # importing it registers its verbs
 NAME = {"name": "name", "in": "path", "required": True, "schema": {"type": "string"}}
 NUMBER = NAME | {"name": "number"}
 READS = {

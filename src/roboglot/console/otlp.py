@@ -27,7 +27,7 @@ from roboglot.console.metrics import Metrics
 from roboglot.transport.seldom import Seldom
 
 log = logging.getLogger(__name__)
-SECONDS = 5.0  # for the collector to answer
+SECONDS = 5.0  # for the collector's answer
 
 
 class Pusher:

@@ -9,9 +9,9 @@ from roboglot.model.errors import NotFound
 from roboglot.programs.stores import StoredProgram
 
 TASK = "console_script"
-PROGRAM = "program"  # the kind of inputs that are such programs
+PROGRAM = "program"  # the kind of recorded inputs for such programs
 SOURCE_MAX = 64 * 1024  # characters of a program
-LINES_MAX = 200  # newest ones of the log that an answer holds
+LINES_MAX = 200  # newest log lines in an answer
 
 
 async def start(desk: Desk, name: str, source: str) -> dict[str, object]:

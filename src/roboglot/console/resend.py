@@ -14,7 +14,7 @@ from roboglot.model.tap import Direction, Exchange
 from roboglot.protocols.door import Endpoint
 from roboglot.recording.lines import Answers, ClientError, Line, Target
 
-SDK_MODE = b"command"  # the RoboMaster text door hears nothing else before it
+SDK_MODE = b"command"  # must come first on the RoboMaster text door
 _holding: set[asyncio.Task[None]] = set()
 
 

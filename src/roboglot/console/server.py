@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 BACKLOG = 64
-UTF8_MAX = 3  # bytes of a character
+UTF8_MAX = 3  # bytes per character
 LIBRARIES = ("uvicorn.protocols.http.httptools_impl", "uvicorn.protocols.websockets.wsproto_impl")
 
 
@@ -94,7 +94,7 @@ class Console:
             log_config=None,
             access_log=False,
             proxy_headers=False,
-            ws_max_size=STUDIO_MESSAGE_MAX * UTF8_MAX,  # each socket has its own limit besides
+            ws_max_size=STUDIO_MESSAGE_MAX * UTF8_MAX,  # each socket also has its own limit
             ws_per_message_deflate=False,
         )
         config.load()
@@ -175,7 +175,9 @@ def _bound(address: str, first: int) -> socket.socket:
     """A socket that listens on ``first``, or on the next free port. Raises OSError."""
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     for port in range(first, first + (PORTS_TRIED_MAX if first else 1)):
-        listening = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)  # asyncio looks: no delay
+        listening = socket.socket(
+            family, socket.SOCK_STREAM, socket.IPPROTO_TCP
+        )  # IPPROTO_TCP: asyncio sets TCP_NODELAY
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             listening.bind((address, min(port, 65_535)))

@@ -29,7 +29,7 @@ from roboglot.model.components.system.lease import Lease
 from roboglot.model.components.system.link import Link
 from roboglot.model.robot import Robot
 
-PARTS = {  # by which a page decides what panels there are
+PARTS = {  # by which a page chooses its panels
     "arm": Arm,
     "battery": Battery,
     "blaster": Blaster,

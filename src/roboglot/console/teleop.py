@@ -13,7 +13,7 @@ from roboglot.model.components.motion.driving import Driving
 from roboglot.model.geometry import Twist
 from roboglot.model.robot import Robot
 
-PAD = "pad"  # the kind of inputs that come from one
+PAD = "pad"  # the kind of recorded inputs for gamepads
 Share = Annotated[float, msgspec.Meta(ge=-1, le=1)]
 
 

@@ -11,7 +11,7 @@ from roboglot.model.geometry import Pose
 from roboglot.model.maps import OccupancyGrid
 
 UNKNOWN, FREE, OCCUPIED, ROBOT = (0, 0, 0, 0), (226, 232, 240, 255), (30, 41, 59, 255), (37, 99, 235, 255)
-MARK = 3  # pixels from the robot's middle to its edge
+MARK = 3  # pixels from the robot marker's centre to its edge
 
 
 def thumbnail(grid: OccupancyGrid, robot: Pose) -> bytes:

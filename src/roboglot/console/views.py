@@ -34,7 +34,7 @@ class RobotView:
         self.scan: bytes | None = None
         self.map: bytes | None = None
         self.path: bytes = path_frame(robot.id, NO_PATH)
-        self.refusals: list[dict[str, str]] = []  # of other clients, newest last
+        self.refusals: list[dict[str, str]] = []  # refusals to other clients, newest last
         self.anchor: Pose | None = None
         self._path = NO_PATH
         self._revision = -1

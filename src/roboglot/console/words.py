@@ -11,8 +11,8 @@ from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.motion.navigation import NavigationFeedback
 from roboglot.model.geometry import Path, Point, Pose
 
-TEXT_MAX = 300  # characters of a value that has no better form
-ENTRIES_MAX = 50  # of a list
+TEXT_MAX = 300  # characters of a value without a better form
+ENTRIES_MAX = 50  # entries shown of a list
 
 
 def number(value: float) -> float | None:

@@ -24,7 +24,7 @@ from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.sensing import LaserScan
 
 RANGE_MIN, LEAST_NO_ECHO = 0.03, 5.0  # m
-OFFSET_SAME = 0.01  # m, rad: how far a laser fixed to the robot may seem to move by rounding
+OFFSET_SAME = 0.01  # m, rad: apparent motion by rounding of a laser fixed to the robot
 LINE_MAX = 200_000  # characters
 
 
@@ -44,8 +44,8 @@ class _Line:
 class _Log:
     scans: list[_Line] = field(default_factory=list)
     unread: Counter[str] = field(default_factory=Counter)
-    odometry: Pose | None = None  # of the newest ODOM line
-    offset: float = 0.0  # m that the front laser sits ahead, as a PARAM line says
+    odometry: Pose | None = None  # from the newest ODOM line
+    offset: float = 0.0  # m from base_link ahead to the front laser, from a PARAM line
 
 
 def read_carmen(path: Path) -> DriveLog:
@@ -89,7 +89,7 @@ def _scans(log: _Log) -> Sequence[RecordedScan]:
     for line in lines:
         ranges = echoes(line.ranges, nothing_from, RANGE_MIN)
         scan = LaserScan(line.stamp, ranges, line.angle_min, line.increment, RANGE_MIN, reach, mount=mount)
-        # A log that was corrected afterwards has the corrected pose where the laser's pose would stand.
+        # Logs that were corrected afterwards have the corrected pose in place of the laser's.
         reference = None if rigid else line.laser.compose(mount.inverse())
         result.append(RecordedScan(scan, line.robot, reference))
     return result
@@ -128,7 +128,7 @@ def _robotlaser(log: _Log, words: list[str]) -> None:
     angle_min, increment = float(words[2]), float(words[4])
     count = int(words[8])
     ranges, rest = _ranges(words[9:], count), words[9 + count :]
-    rest = rest[1 + int(rest[0]) :]  # how many remissions, and they
+    rest = rest[1 + int(rest[0]) :]  # a count of remissions, then the remissions
     # laser pose, robot pose, tv, rv, forward and side safety distance, turn axis, then the time
     log.scans.append(_Line(_stamp(rest[11:]), ranges, angle_min, increment, _pose(rest[:3]), _pose(rest[3:6])))
 

@@ -14,12 +14,12 @@ from roboglot.model.geometry import ORIGIN, Pose
 from roboglot.model.sensing import LaserScan
 
 STATE_COLUMNS, RAYS = 24, 682
-COLUMNS = (STATE_COLUMNS + RAYS, STATE_COLUMNS + RAYS + 1)  # the last one of some files is empty
+COLUMNS = (STATE_COLUMNS + RAYS, STATE_COLUMNS + RAYS + 1)  # some files have an empty last column
 WHEEL_RADIUS, HALF_AXLE = 0.077, 0.165  # m
 COUNTS_A_TURN = 2000
 FIELD_OF_VIEW = math.radians(240.0)
 LIDAR = Pose(x=0.145)  # in base_link
-TIME_INCREMENT = 0.1 / 1024  # s: ten turns of 1024 steps a second
+TIME_INCREMENT = 0.1 / 1024  # s: ten turns of 1024 steps per second
 RANGE_MIN, RANGE_MAX = 0.02, 5.6  # m
 
 

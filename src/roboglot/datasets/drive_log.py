@@ -14,8 +14,8 @@ from roboglot.model.sensing import LaserScan
 FILE_BYTES_MAX = 4_000_000_000
 SCANS_MAX = 2_000_000
 RAYS_MAX = 8192
-USUAL_SHARE = 0.001  # of all readings: the largest reading must recur at least so often to mean "no echo"
-SICK_NO_ECHO = 80.0  # m, from which these scanners report no distance but a code
+USUAL_SHARE = 0.001  # of all readings: the largest reading means "no echo" if it recurs at least this often
+SICK_NO_ECHO = 80.0  # m, from which these scanners report codes instead of distances
 
 
 class BadDriveLog(ValueError):
@@ -57,7 +57,7 @@ def no_echo(ranges: NDArray[np.float64], *, least: float) -> float:
 
 def echoes(ranges: NDArray[np.float64], nothing_from: float, range_min: float) -> NDArray[np.float32]:
     """``ranges`` as ``LaserScan`` has them: inf from ``nothing_from`` on, NaN below ``range_min``."""
-    with np.errstate(over="ignore"):  # more than a float32 holds is inf
+    with np.errstate(over="ignore"):  # values beyond float32 become inf
         result = ranges.astype(np.float32)
     with np.errstate(invalid="ignore"):
         result[ranges >= nothing_from] = np.inf

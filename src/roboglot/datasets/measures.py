@@ -19,7 +19,7 @@ from roboglot.datasets.drive_log import BadDriveLog
 from roboglot.model.geometry import Pose, wrap_angle
 
 RELATIONS_MAX = 1_000_000
-NEAR_SECONDS = 0.5  # s between a relation's time and the nearest pose
+NEAR_SECONDS = 0.5  # s between a relation's time stamp and the nearest pose
 
 Stamped = Sequence[tuple[float, Pose]]
 

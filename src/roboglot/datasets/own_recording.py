@@ -87,7 +87,7 @@ def _messages(path: Path) -> Iterator[tuple[str, bytes]]:
                 elif isinstance(record, Message) and (kind := channels.get(record.channel_id)) in (SCAN, TRANSFORMS):
                     yield str(kind), record.data
         except (McapError, ValueError, EOFError, KeyError, OverflowError):
-            return  # its program was killed: what there is, is read
+            return  # the program was killed; the complete records count
 
 
 def _keep(found: list[ScanMessage], message: ScanMessage, path: Path) -> None:

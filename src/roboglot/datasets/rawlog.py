@@ -30,12 +30,12 @@ from roboglot.model.geometry import ORIGIN, Pose, wrap_angle
 from roboglot.model.sensing import LaserScan
 
 SCAN, ODOMETRY, MOVEMENT, POSE = "CObservation2DRangeScan", "CObservationOdometry", "CActionRobotMovement2D", "CPose2D"
-NAME_BEGINS = rb"(?:[\x80-\xff](?:mrpt::\w+::)?|[\x05-\x40]\0\0\0)"  # the length: a byte, or four in old files
+NAME_BEGINS = rb"(?:[\x80-\xff](?:mrpt::\w+::)?|[\x05-\x40]\0\0\0)"  # the length takes one byte, or four in old files
 HEADER = re.compile(NAME_BEGINS + b"(" + b"|".join(name.encode() for name in (SCAN, ODOMETRY, MOVEMENT)) + b")")
 POSE_HEADER = re.compile(NAME_BEGINS + POSE.encode())
-POSE_WITHIN = 200  # bytes behind a movement's header in which its mean pose begins
-EPOCH = 11_644_473_600  # s from 1601, where MRPT's time begins, to 1970
-LEVEL = math.radians(5.0)  # a scanner that leans more sees no floor plan
+POSE_WITHIN = 200  # bytes after a movement's header within which its mean pose begins
+EPOCH = 11_644_473_600  # s from 1601, the epoch of MRPT, to 1970
+LEVEL = math.radians(5.0)  # a scanner tilted further sees no floor plan
 LABEL_MAX = 1000  # characters
 RANGE_MIN = 0.03  # m
 
@@ -82,7 +82,7 @@ class _Reader:
 class _Scan:
     label: str
     scan: LaserScan
-    odometry: Pose | None  # of the actions so far; None in files of observations alone
+    odometry: Pose | None  # sum of the actions so far; None in files without actions
 
 
 def read_rawlog(path: Path) -> DriveLog:
@@ -191,7 +191,7 @@ def _mount(reader: _Reader) -> tuple[Pose, bool]:
         x, y, _ = reader.take("3d")
         turned = reader.array("<f8", 9).reshape(3, 3).astype(np.float64)
     else:
-        reader.begin()  # a matrix as an object
+        reader.begin()  # a matrix stored as an object
         matrix = reader.matrix("<f4" if version == 0 else "<f8")
         reader.end()
         if matrix.shape[0] < 3 or matrix.shape[1] < 4:
@@ -228,7 +228,7 @@ def _scan(data: bytes, at: int, odometry: Pose | None) -> _Scan:
     ranges[~valid & (ranges < range_max)] = np.nan
     ranges[ranges >= range_max] = np.inf
     ranges[ranges < RANGE_MIN] = np.nan
-    if bool(leftwards) == flipped:  # from the left to the right as seen from above
+    if bool(leftwards) == flipped:  # from left to right as seen from above
         ranges = ranges[::-1].copy()
     ranges.setflags(write=False)
     scan = LaserScan(stamp, ranges, -aperture / 2, aperture / (count - 1), RANGE_MIN, range_max, mount=mount)

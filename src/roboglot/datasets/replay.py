@@ -9,7 +9,7 @@ from roboglot.model.events import EventStream, ScanTaken
 from roboglot.model.geometry import ORIGIN, STILL, Pose, Twist
 from roboglot.model.sensing import LaserScan, OdometryReading
 
-GAP_MAX = 0.5  # s between two scans from which a speed follows
+GAP_MAX = 0.5  # s between two scans up to which a speed is computed
 
 
 class ReplayedOdometry(Odometry):

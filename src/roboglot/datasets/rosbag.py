@@ -25,7 +25,7 @@ SCAN, ODOMETRY = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry"
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 ODOM_FRAMES, BASE_FRAMES = ("odom",), ("base_link", "base_footprint")
 CHAIN_MAX = 16  # frames between base and laser
-RAY_SECONDS_MAX = 0.01  # s between two rays that can be believed
+RAY_SECONDS_MAX = 0.01  # s between two rays that are plausible
 
 
 class Stamp(Protocol):
@@ -121,7 +121,7 @@ def _assembled(name: str, messages: Iterator[tuple[str, int, Any]]) -> DriveLog:
     """The scans with their odometry, from messages in the order of their arrival."""
     scans: list[ScanMessage] = []
     wheels, tf_wheels = Track(), Track()
-    fixed: dict[str, tuple[str, Pose]] = {}  # frame: the one above it, and where it is in that
+    fixed: dict[str, tuple[str, Pose]] = {}  # frame: its parent and its pose in the parent
     unread: Counter[str] = Counter()
     for kind, _, message in messages:
         if kind == SCAN:
@@ -174,7 +174,7 @@ def _scan(message: ScanMessage, stamp: float, mount: Pose) -> LaserScan:
     ranges = np.array(message.ranges, np.float32)
     with np.errstate(invalid="ignore"):
         ranges[ranges > message.range_max] = np.inf
-        ranges[ranges < message.range_min] = np.nan  # drivers send 0 for what they did not see
+        ranges[ranges < message.range_min] = np.nan  # drivers send 0 for missing echoes
     ranges.setflags(write=False)
     least, most = float(message.range_min), float(message.range_max)
     if not (math.isfinite(most) and 0.0 <= least < most and math.isfinite(message.angle_increment)):

@@ -6,7 +6,7 @@ from bisect import bisect_left
 
 from roboglot.model.geometry import Pose
 
-APART_MAX = 1.0  # s between a scan and the odometry beside it
+APART_MAX = 1.0  # s between a scan and its odometry
 
 
 class Track:

@@ -12,7 +12,7 @@ from roboglot.model.maps import OccupancyGrid
 
 UNKNOWN, FREE, WALL = (205, 209, 214), (250, 250, 248), (43, 48, 56)
 COLOURS = ("#d1495b", "#00798c", "#edae49", "#6a4c93")
-SIDE = 1200  # pixels of the longer side
+SIDE = 1200  # pixels along the longer side
 LEGEND = 46
 INK = "#2b3038"
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from roboglot.model.geometry import Pose, wrap_angle
 
-APART = 0.05  # m that two reports may differ …
-DRIFT = 0.015  # … and so much more per metre driven, since two of them come from odometry, which drifts
+APART = 0.05  # m by which two reports may differ …
+DRIFT = 0.015  # … plus this per metre driven, since two of them come from odometry, which drifts
 APART_DEGREES = 4.0
 
 

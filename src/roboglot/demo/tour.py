@@ -26,16 +26,16 @@ from roboglot.model.geometry import Point, Pose, wrap_angle
 from roboglot.model.maps import OccupancyGrid
 from roboglot.wire.slamware.chapters.slam.explore_map import decode_explore_map
 
-HALF_WIDTH = 0.45  # m that must be free on both sides of the way
-WAY_MAX = 2.5  # m a client drives at most
-AHEAD = 1.2  # m that stay free beyond the goal
-STEP = 0.5  # m that a blind client drives at a time
-LEG_MIN = 0.2  # m, or the client has shown nothing
+HALF_WIDTH = 0.45  # m that must be free on either side of the route
+WAY_MAX = 2.5  # m: the longest drive of a client
+AHEAD = 1.2  # m that must be free beyond the goal
+STEP = 0.5  # m: the steps of a client without sensors
+LEG_MIN = 0.2  # m below which the drive proves nothing
 TRIES = 3
 LOOKS_MAX = 12  # while a person is in the way
-CLEAR = 1.4  # m that must be free before such a step: people walk towards the robot meanwhile
-BEND = 0.4  # m of room that a bend of one rad is worth: straight lines show no wrong signs
-BACK = math.radians(120)  # ways that lead back are only taken if there is no other
+CLEAR = 1.4  # m that must be free before such a step, since people may approach meanwhile
+BEND = 0.4  # m of free room that justify a bend of one rad: straight drives cannot reveal wrong signs
+BACK = math.radians(120)  # routes that lead back are the last choice
 
 WHERE = """
 cyberdog.task.block('where am I');
@@ -100,7 +100,7 @@ class Tour:
                 await drive(angle, distance)
                 if length(track) >= LEG_MIN:
                     break
-            await asyncio.sleep(0.7)  # let the lidar look once more while it stands
+            await asyncio.sleep(0.7)  # wait for another scan at standstill
         finally:
             watching.cancel()
             await asyncio.wait([watching])

@@ -17,7 +17,7 @@ from roboglot.model.events import Event
 from roboglot.model.robot import Robot
 
 T = TypeVar("T")
-ENTRIES_MAX = 10_000  # that are taken over from a robot
+ENTRIES_MAX = 10_000  # taken over from a robot
 
 
 class EntryStore(Protocol[T]):

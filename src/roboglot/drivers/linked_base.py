@@ -13,7 +13,7 @@ from roboglot.model.geometry import STILL, Twist
 class LinkedBase(Base):
     """Takes velocities only; drivers of robots with controllable wheels override ``set_wheel_speeds``."""
 
-    wheels = "the wheels of this robot cannot be turned one by one"  # why they are refused
+    wheels = "the wheels of this robot cannot be turned one by one"  # named in refusals
 
     def __init__(self, link: Link) -> None:
         self._link = link

@@ -19,7 +19,7 @@ log = logging.getLogger(__name__)
 PAUSE_MIN, PAUSE_MAX = 0.5, 10.0  # s between two attempts
 STEADY = 5.0  # s of connection that reset the back-off, so that a flapping link is retried less and less often
 SENDING_MAX = 32  # pending commands sent without waiting
-PARTING_SECONDS = 1.0  # real seconds for the last command: time-outs on a stopped virtual clock never end
+PARTING_SECONDS = 1.0  # real seconds for the last command: time-outs on a stopped virtual clock never expire
 
 
 async def together(*parts: Awaitable[None]) -> None:

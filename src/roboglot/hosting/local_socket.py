@@ -14,7 +14,7 @@ log = logging.getLogger(__name__)
 LINE_MAX = 1024  # bytes of a request
 ANSWER_MAX = 1 << 22  # bytes
 CALLERS_MAX = 8
-PATH_MAX = 107  # bytes of a socket's path, as the system has it
+PATH_MAX = 107  # bytes of a socket's path: the system's limit
 
 
 class LocalServer:
@@ -29,10 +29,10 @@ class LocalServer:
         """Listen. Where that cannot be the program can still be used, and a warning says so."""
         listening = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
-            self._path.unlink(missing_ok=True)  # left by a program that was killed; the folder is ours alone
+            self._path.unlink(missing_ok=True)  # left by a killed program; no other program uses the folder
             if len(bytes(self._path)) > PATH_MAX:
                 raise OSError("its path is too long")
-            os.fchmod(listening.fileno(), 0o600)  # before it has a name, so that no other user ever can
+            os.fchmod(listening.fileno(), 0o600)  # before binding, so that other users never have access
             listening.bind(bytes(self._path))
             self._server = await asyncio.start_unix_server(self._receive, sock=listening, limit=LINE_MAX)
         except OSError as error:
@@ -54,7 +54,7 @@ class LocalServer:
             while len(self._callers) <= CALLERS_MAX and (line := await reader.readline()):
                 writer.write(await self._answer(line) + b"\n")
                 await writer.drain()
-        except (ValueError, OSError):  # a line that is too long; the caller is gone
+        except (ValueError, OSError):  # the line is too long; the caller has gone
             pass
         finally:
             self._callers.discard(writer)

@@ -12,10 +12,10 @@ from typing import Any
 
 log = logging.getLogger(__name__)
 WANTED = 65_536
-OWN, EACH = 64, 11  # what the program itself and a robot need; each client one more
+OWN, EACH = 64, 11  # needed by the program and one robot; by each client
 MORE = "start fewer robots, or allow more with ulimit -n, LimitNOFILE= of systemd, --ulimit nofile of docker"
-PERIOD = 2.0  # s (of the machine) between two looks
-SPARE = 3  # files; with fewer to spare it is full
+PERIOD = 2.0  # s (machine clock) between two checks
+SPARE = 3  # files; below this the program is full
 
 
 def raise_limit() -> None:
@@ -23,7 +23,7 @@ def raise_limit() -> None:
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = WANTED if hard == resource.RLIM_INFINITY else min(hard, WANTED)
     if soft != resource.RLIM_INFINITY and soft < wanted:
-        with contextlib.suppress(ValueError, OSError):  # a container may forbid it
+        with contextlib.suppress(ValueError, OSError):  # containers may forbid it
             resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
 
 
@@ -73,7 +73,7 @@ class OpenFiles:
             loop.default_exception_handler(context)
 
     def _look(self, loop: asyncio.AbstractEventLoop) -> None:
-        # uvloop accepts and drops connections beyond the limit without a word.
+        # Beyond the limit, uvloop accepts connections and drops them silently.
         limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
         try:
             full = limit != resource.RLIM_INFINITY and len(os.listdir("/proc/self/fd")) >= limit - SPARE

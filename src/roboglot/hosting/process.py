@@ -9,7 +9,7 @@ import sys
 import threading
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # of malloc.h
-SWITCH_SECONDS = 0.001  # that other threads (the database's, pictures') may keep the one that answers clients waiting
+SWITCH_SECONDS = 0.001  # for which other threads (database, pictures) may keep the main thread waiting
 LAST_SECONDS = 10.0  # after a signal; closing takes one or two
 
 
@@ -17,7 +17,7 @@ def prepare() -> None:
     """Set up heap, threads and gRPC's log for a process that serves robots."""
     _give_memory_back()
     sys.setswitchinterval(SWITCH_SECONDS)
-    os.environ.setdefault("GRPC_VERBOSITY", "NONE")  # the door logs what matters
+    os.environ.setdefault("GRPC_VERBOSITY", "NONE")  # the door logs the errors that matter
 
 
 def end_in_any_case() -> None:
@@ -29,7 +29,7 @@ def end_in_any_case() -> None:
 
 def _give_memory_back() -> None:
     """Have glibc keep one heap and return large blocks at once, which saves 30 MB as maps come and go."""
-    with contextlib.suppress(OSError, AttributeError):  # another C library has its own ways
+    with contextlib.suppress(OSError, AttributeError):  # other C libraries lack these options
         mallopt = ctypes.CDLL(None).mallopt
         for parameter, value in ((M_ARENA_MAX, 1), (M_MMAP_THRESHOLD, 1 << 17), (M_TRIM_THRESHOLD, 1 << 17)):
             mallopt(parameter, value)

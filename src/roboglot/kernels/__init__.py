@@ -10,7 +10,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-# What mapping and navigation need comes first, what others import, then what takes long to compile.
+# The order: needed by mapping and navigation, imported by others, slow to compile.
 NAVIGATION = (
     "linear",
     "distance",

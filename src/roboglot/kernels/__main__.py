@@ -16,7 +16,7 @@ from roboglot.kernels.ahead import KernelsUnavailable, compile_ahead
 
 def compiler() -> None:
     """Compile each kernel that a line names, and answer with its name."""
-    gc.disable()  # it would take a tenth of the time, and this process lives for seconds
+    gc.disable()  # collection would take a tenth of the time, and this process lives for seconds
     for line in sys.stdin:
         name = line.strip()
         if name not in MODULES:

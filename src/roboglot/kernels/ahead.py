@@ -25,11 +25,11 @@ from weakref import WeakKeyDictionary
 
 from roboglot.kernels import MODULES
 
-LLVM_LEVEL = "1"  # of optimisation: level 3 takes a sixth longer, and the kernels run no faster
-WORKERS_MAX = 4  # compilers at once; each takes up to 350 MB
+LLVM_LEVEL = "1"  # optimisation level: 3 takes a sixth longer and gains nothing
+WORKERS_MAX = 4  # parallel compilers; each needs up to 350 MB
 HERE = Path(__file__).parent
 _turns: WeakKeyDictionary[asyncio.AbstractEventLoop, asyncio.Lock] = WeakKeyDictionary()
-Report = Callable[[str, int, int], None]  # the kernel that is ready, how many are, of how many
+Report = Callable[[str, int, int], None]  # name of the finished kernel, number finished, total
 
 
 class KernelsUnavailable(RuntimeError):
@@ -118,7 +118,7 @@ def _machine() -> str:
         with contextlib.suppress(PackageNotFoundError):
             versions.append(version(package))
     processor = os.uname().machine
-    if chosen := os.environ.get("NUMBA_CPU_NAME"):  # compiled for that one, wherever this runs
+    if chosen := os.environ.get("NUMBA_CPU_NAME"):  # compiled for that processor, wherever this runs
         return f"{sys.version_info} {versions} {processor} {chosen} {os.environ.get('NUMBA_CPU_FEATURES')}"
     with contextlib.suppress(OSError):
         for line in Path("/proc/cpuinfo").read_text("utf-8", "replace").splitlines():
@@ -189,7 +189,7 @@ def _feed(
         try:
             compiler.stdin.write(f"{name}\n")
             answer = compiler.stdout.readline().strip()
-        except (OSError, ValueError):  # killed, because another one failed
+        except (OSError, ValueError):  # killed because another one failed
             answer = ""
         if answer != name:
             with contextlib.suppress(ValueError, OSError):

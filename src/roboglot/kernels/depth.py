@@ -8,9 +8,9 @@ from roboglot.kernels.arrays import FloatArray, Int16Array, SingleArray
 from roboglot.kernels.compiled import kernel
 from roboglot.kernels.obstacles import beside_occupied
 
-LOW, FLOOR = 0.10, 0.04  # m above the floor: what is lower is stepped over; is floor, for sure
-STEEP = 0.7  # rise per way from which a surface is a wall
-NEAR = 2.5  # m from base_link within which depth is precise enough
+LOW, FLOOR = 0.10, 0.04  # m above the floor: lower objects are stepped over; certainly floor
+STEEP = 0.7  # slope from which a surface is a wall
+NEAR = 2.5  # m from base_link within which depth is accurate enough
 
 
 @kernel("Tuple((float64[:,::1], float64[:,::1]))(float64[:,:,::1], float64[:,::1], float64[::1], float64, float64)")
@@ -37,7 +37,7 @@ def sort_out(
                 lying += 1
     for row in range(rows - 1):
         for column in range(columns):
-            here, below = up[row, column], up[row + 1, column]  # each against what is seen right below
+            here, below = up[row, column], up[row + 1, column]  # each pixel against the one below it
             farther = max(away[row, column] - away[row + 1, column], 0.0)
             if here - below > STEEP * farther and LOW < here < height and inner < away[row, column] < NEAR:
                 obstacles[standing, 0] = rays[row, column, 0] * ways[row, column] + eye[0]

@@ -37,8 +37,8 @@ def distances(marked: ByteArray, cap: float) -> SingleArray:
     away = _along_columns(marked, cap)
     height, width = away.shape
     limit, column = np.float32(cap * cap), np.empty(width, np.float32)
-    place = np.empty(width, np.int64)  # columns of the parabolas of the lower envelope
-    border = np.empty(width + 1, np.float64)  # where one gives way to the next
+    place = np.empty(width, np.int64)  # columns of the parabolas in the lower envelope
+    border = np.empty(width + 1, np.float64)  # boundaries between neighbouring parabolas
     for row in range(height):
         count = 0
         for col in range(width):
@@ -59,7 +59,7 @@ def distances(marked: ByteArray, cap: float) -> SingleArray:
             border[count] = start
             count += 1
         border[count] = np.inf
-        # The row's own values are still needed until the sweep is over.
+        # The row's own values are needed until the sweep is complete.
         current = 0
         for col in range(width):
             if count == 0:

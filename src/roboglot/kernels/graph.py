@@ -11,7 +11,7 @@ from roboglot.kernels.arrays import FloatArray, Int32Array
 from roboglot.kernels.compiled import kernel
 from roboglot.kernels.linear import invert
 
-SETTLED = 1e-4  # m, rad: a step in which no pose moves farther ends it
+SETTLED = 1e-4  # m, rad: iterations end when no pose moves farther
 RESIDUAL = 1e-6  # of the linear system, relative
 STEPS_MAX = 500  # of conjugate gradients
 ROBUST = 9.0  # squared standard deviations beyond which an edge loses its influence

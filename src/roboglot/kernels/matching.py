@@ -15,12 +15,12 @@ from roboglot.kernels.occupancy import is_surface
 
 SPREAD = 0.15  # m, within which the cells around a point count
 SIGMA = 0.02  # m, of a point against a surface
-SIGMA_LOOSE = 0.06  # m, where the surface has no clear direction
+SIGMA_LOOSE = 0.06  # m, where the surface has no distinct direction
 ROBUST, ROBUST_START = 0.06, 0.24  # m, beyond which a point loses its influence: at the end, at the start
 INLIER = 0.08  # m
-CELLS = 25  # around a point, its own among them
-MOVED = 0.0002  # m, from which a point's surface is looked up again: no more than what ends the match
-CORRELATION = 0.1  # points are not independent: share of their information that is believed
+CELLS = 25  # around a point, including its own
+MOVED = 0.0002  # m of motion after which a point's surface is looked up again: no more than the match's tolerance
+CORRELATION = 0.1  # share of the points' information that is used, since they are not independent
 
 
 @kernel("int64(float32[:,:,::1], int16[:,::1], int64, int64, float64, float64[:,:,::1], int64)")
@@ -76,7 +76,7 @@ def _line(
     long, short = half + root, half - root
     if long < 0.015 * 0.015 or short > 0.25 * long:
         return x + mean_x, y + mean_y, 0.0, 0.0, total
-    cosine = (xx - yy) / (2.0 * root)  # of twice the surface's direction
+    cosine = (xx - yy) / (2.0 * root)  # of twice the angle of the surface
     along, aside = np.sqrt(max(0.0, (1.0 + cosine) / 2.0)), np.sqrt(max(0.0, (1.0 - cosine) / 2.0))
     return x + mean_x, y + mean_y, (aside if xy < 0.0 else -aside), along, total
 

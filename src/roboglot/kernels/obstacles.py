@@ -8,8 +8,8 @@ from roboglot.kernels.arrays import ByteArray, FloatArray, Int16Array, Int32Arra
 from roboglot.kernels.compiled import kernel
 from roboglot.kernels.distance import distances
 
-CELL_SQUARE = 0.5001  # squared, how far a corner of a cell is from its middle, in cells, and a little more
-FEW = 200  # cells up to which asking each ray for them costs less than following it
+CELL_SQUARE = 0.5001  # squared distance from a cell's centre to its corner, in cells, with a margin
+FEW = 200  # cells up to which testing them against each ray is cheaper than tracing it
 
 
 @kernel("boolean(int16[:,::1], int64, int64)")
@@ -130,7 +130,7 @@ def remember(
         dx, dy = ends[i, 0] - x, ends[i, 1] - y
         if count >= 0 and few < FEW and not _meets(dy, dx, near, few):
             continue
-        steps = int(np.sqrt(dx * dx + dy * dy) / resolution)  # the last cell before the end is left alone
+        steps = int(np.sqrt(dx * dx + dy * dy) / resolution)  # without the last cell before the end
         step_x, step_y = dx / (steps + 1.0) / resolution, dy / (steps + 1.0) / resolution  # in cells
         for k in range(steps):
             col = int(np.floor(x / resolution + k * step_x))

@@ -18,7 +18,7 @@ EVIDENCE_MAX = 1000
 EVIDENCE_MIN = -1000
 HITS_MAX = 5000.0
 FROZEN = -1
-NEIGHBOURS = 0.06  # rad between rays that count as beside each other
+NEIGHBOURS = 0.06  # rad between rays that count as neighbours
 BETWEEN_MAX = 6
 GRAZING = 0.35  # sine of the angle below which a ray passes along a surface
 
@@ -185,7 +185,7 @@ def integrate(
             continue
         if marks[row, col] != scan:
             marks[row, col] = scan
-            if not is_surface(evidence, row, col):  # what was there before is gone
+            if not is_surface(evidence, row, col):  # whatever stood there has gone
                 for part in range(surface.shape[2]):
                     surface[row, col, part] = 0.0
             evidence[row, col] = min(EVIDENCE_MAX, evidence[row, col] + HIT)
@@ -205,8 +205,8 @@ def integrate(
         _clear_between(evidence, surface, marks, scan, ends, i, x, y, resolution)
 
 
-WIDE = 3.0  # cells to either side of a ray that a surface goes on which it passes through
-UNKNOWN, FITTING, HIDDEN, FLOATING, CROSSING = 0, 1, 2, 3, 4  # what the map says of an echo
+WIDE = 3.0  # cells to either side of a ray over which a surface must extend for the ray to cross it
+UNKNOWN, FITTING, HIDDEN, FLOATING, CROSSING = 0, 1, 2, 3, 4  # the map's verdict on an echo
 
 
 @kernel("boolean(int16[:,::1], float64, float64)")

@@ -11,7 +11,7 @@ import numpy as np
 from roboglot.kernels.arrays import ByteArray, FloatArray, Int32Array, IntArray
 from roboglot.kernels.compiled import kernel
 
-STACK_MAX = 64  # three squares wait on each level at most
+STACK_MAX = 64  # at most three squares wait on each level
 
 
 def pyramid(field: ByteArray, levels: int) -> ByteArray:
@@ -135,7 +135,7 @@ def _best_below(
                 score = _bound(fields, level - 1, offsets[heading], r, c, enough)
                 if score == 0:
                     continue
-                at = count  # kept in ascending order: the best is looked at first
+                at = count  # in ascending order: the best is examined first
                 while at > 0 and children[at - 1, 0] > score:
                     for part in range(3):
                         children[at, part] = children[at - 1, part]

@@ -39,7 +39,7 @@ def label(walls: ByteArray, rooms: ByteArray) -> int:
                         rooms[r, c] = count
                         stack[tail, 0], stack[tail, 1] = r, c
                         tail += 1
-    head = 0  # every free cell is on the stack: from there into the walls, breadth first
+    head = 0  # starting from every free cell, into the walls, breadth first
     while head < tail:
         row, column = stack[head, 0], stack[head, 1]
         head += 1

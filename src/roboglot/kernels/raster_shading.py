@@ -14,17 +14,17 @@ from roboglot.kernels.compiled import kernel
 from roboglot.kernels.planes import FIRST
 
 STRIP = 64  # pixels
-BENT = 0.04  # how much the distance may change within a textured strip
+BENT = 0.04  # relative change of distance within a textured strip
 BLOCK = 32
-LEVELS = 8  # 256, 128 ... 2 texels a side
+LEVELS = 8  # 256, 128 ... 2 texels per side
 OFFSETS = np.concatenate(([0], np.cumsum([4 ** (8 - level) for level in range(LEVELS)]))).astype(np.int64)
-ONE = 4294967296.0  # a texture's width in whole numbers: its fraction fills 32 bits
+ONE = 4294967296.0  # a texture's width as an integer: its fraction fills 32 bits
 U, S = np.uint32, np.int32
 WHITE = S(235)
 HALF = S((128 << 16) + (1 << 15))
 PAIR = U(0x00FF00FF)
 FAR = 80.0  # m
-HAZE = 0.045  # 1/m: how fast light fades with the distance from the eye
+HAZE = 0.045  # 1/m: how fast light fades with distance
 DARKEST = 0.35
 
 
@@ -109,7 +109,7 @@ def _paint_textured(
     base, mix = S(light * paints[k, 0] * 65536.0) + S(16 << 16), S(light * paints[k, 3] * 65536.0)
     growth = (light_end - light) / count * 65536.0
     base_step, mix_step = S(growth * paints[k, 0]), S(growth * paints[k, 3])
-    if level > 0:  # far away, where the copies are smooth enough
+    if level > 0:  # far away, where the smaller copies are smooth enough
         for i in range(count):
             mask = S(texels[np.uintp(i)] & U(255))
             value = S(S(S(base + S(S(i) * base_step)) + S(S(mix + S(S(i) * mix_step)) * mask)) >> S(16))
@@ -117,7 +117,7 @@ def _paint_textured(
         return
     u, v = U(np.int64(uv[0] * ONE)), U(np.int64(uv[1] * ONE))
     du, dv = U(np.int64(uv[2] * ONE)), U(np.int64(uv[3] * ONE))
-    for i in range(count):  # mixed of four texels
+    for i in range(count):  # bilinear
         four = texels[np.uintp(i)]
         right, up = U(U(U(u + U(U(i) * du)) >> U(16)) & U(255)), U(U(U(v + U(U(i) * dv)) >> U(16)) & U(255))
         two = U(U(U(four & PAIR) * U(U(256) - right)) + U(U(U(four >> U(8)) & PAIR) * right))
@@ -182,7 +182,7 @@ def _run(seen: Uint16Array, y: int, x: int, limit: int) -> int:
     number, end = seen[y, x], x
     while end + BLOCK <= limit:
         other = np.uint16(0)
-        for i in range(BLOCK):  # without a way out of the loop it becomes a few wide instructions
+        for i in range(BLOCK):  # a loop without an exit compiles to a few vector instructions
             other |= np.uint16(seen[np.uintp(y), np.uintp(end + i)] ^ number)
         if other:
             break

@@ -13,7 +13,7 @@ from roboglot.kernels.arrays import FloatArray
 from roboglot.kernels.compiled import kernel
 
 SPHERE, CAPSULE, CYLINDER, BOX = 2, 3, 5, 6  # as in MuJoCo's mjtGeom
-SPARE = 1e-6  # share of a sphere, and m2, by which a ray must pass it at least to miss what is in it
+SPARE = 1e-6  # share of a sphere, and m2, by which a ray must clear it for its contents to be skipped
 
 
 @kernel("float64(float64, float64, float64)")
@@ -128,7 +128,7 @@ def _reached(
         if square > bound * bound:
             continue
         away, place = math.sqrt(square) - bounds[i], count
-        while place > 0 and nearest[place - 1] > away:  # few are in reach
+        while place > 0 and nearest[place - 1] > away:  # few are in range
             chosen[place], nearest[place] = chosen[place - 1], nearest[place - 1]
             place -= 1
         chosen[place], nearest[place] = i, away
@@ -154,7 +154,7 @@ def _cast_from(
     """Fill ``found``: see ``cast``, of one origin."""
     chosen, nearest = np.empty(len(kinds), np.int64), np.empty(len(kinds))
     count = _reached(kinds, places, bounds, origin, reach, chosen, nearest)
-    local, ahead = np.empty((count, 3)), np.empty((count, 4))  # the origin, seen from each solid; the sphere around it
+    local, ahead = np.empty((count, 3)), np.empty((count, 4))  # the origin, relative to each solid; bounding sphere
     for place in range(count):
         i = chosen[place]
         x, y, z = origin[0] - places[i, 0], origin[1] - places[i, 1], origin[2] - places[i, 2]
@@ -169,7 +169,7 @@ def _cast_from(
                 break
             along = u * ahead[place, 0] + v * ahead[place, 1] + w * ahead[place, 2]
             if ahead[place, 3] > 0.0 and (along < 0.0 or along * along < ahead[place, 3]):
-                continue  # it passes the sphere
+                continue  # misses the sphere
             i = chosen[place]
             dx = turns[i, 0] * u + turns[i, 3] * v + turns[i, 6] * w
             dy = turns[i, 1] * u + turns[i, 4] * v + turns[i, 7] * w

@@ -42,7 +42,7 @@ def _unwritten(maps: str) -> Iterator[tuple[int, int, int]]:
             if region and facts.get("Rss") and not (facts.get("Private_Dirty", 1) or facts.get("Anonymous", 1)):
                 yield *region, facts["Rss"]
             region = None
-        elif not line.split()[0].endswith(":"):  # else one more fact, but no number of kilobytes
+        elif not line.split()[0].endswith(":"):  # other lines contain no size in kilobytes
             span, rights, *_ = line.split()
             ours = line.endswith(LIBRARY) and "w" not in rights
             low, _, high = span.partition("-")

@@ -12,9 +12,9 @@ from roboglot.kernels.arrays import Int8Array, Int32Array, SingleArray
 from roboglot.kernels.compiled import kernel
 
 DIAGONAL = np.sqrt(2.0)
-BUCKET = 0.05  # of cost in one bucket: hardly a cell is taken up twice
-BUCKETS = 4096  # a ring of them
-ENTRIES = 65_536  # waiting cells at the start; grows
+BUCKET = 0.05  # of cost per bucket: cells are rarely expanded twice
+BUCKETS = 4096  # in a ring
+ENTRIES = 65_536  # initial capacity for waiting cells; grows
 
 
 @kernel("int32[:,::1](int8[::1], int64, int64, int64)")
@@ -52,7 +52,7 @@ def _search(
     """Fill ``paid`` (1 + cost; 0: not reached) and ``came`` until the goal's are final; True if it was reached."""
     height, width = cost.shape
     ground, goal = cost.ravel(), goal_row * width + goal_col
-    # The waiting cells: where, for what cost, and the entry below in the same bucket (or in the list of spare ones).
+    # The waiting cells: index, cost, and the next entry in the same bucket (or in the free list).
     places, asked, below = np.empty(ENTRIES, np.int32), np.empty(ENTRIES, np.float32), np.empty(ENTRIES, np.int32)
     heads = np.empty(BUCKETS, np.int32)
     for place in range(BUCKETS):
@@ -90,7 +90,7 @@ def _search(
             paid[other], came[other] = value, steps[k]
             r, c = row + steps[k] // 3 - 1, col + steps[k] % 3 - 1
             estimate = value - 1.0 + _least_cost(r - goal_row, c - goal_col)
-            # What lies beyond the ring is only looked at earlier than need be.
+            # Entries beyond the ring are examined early only if necessary.
             offset = int((estimate - least) * scale) - level
             place = (level + min(max(offset, 0), BUCKETS - 1)) % BUCKETS
             if spare >= 0:
@@ -117,7 +117,7 @@ def shortest_path(cost: SingleArray, start_row: int, start_col: int, goal_row: i
     height, width = cost.shape
     if not (np.isfinite(cost[start_row, start_col]) and np.isfinite(cost[goal_row, goal_col])):
         return np.empty((0, 2), np.int32)
-    # Zeros cost nothing until touched.
+    # Zeroed pages cost nothing until touched.
     paid, came = np.zeros(height * width, np.float32), np.zeros(height * width, np.int8)
     if not _search(cost, start_row, start_col, goal_row, goal_col, paid, came):
         return np.empty((0, 2), np.int32)
@@ -127,7 +127,7 @@ def shortest_path(cost: SingleArray, start_row: int, start_col: int, goal_row: i
 def ways_from(cost: SingleArray, row: int, col: int) -> SingleArray:
     """Return the cost of the cheapest way to each cell (float32, shape of ``cost``); inf: there is none."""
     height, width = cost.shape
-    # The goal lies below the grid, where no way leads: the search ends when all is found.
+    # The goal is below the grid, out of reach: the search ends when every cell has been visited.
     paid, came = np.zeros((height + 1) * width, np.float32), np.zeros(height * width, np.int8)
     if np.isfinite(cost[row, col]):
         _search(cost, row, col, height, 0, paid, came)

@@ -11,7 +11,7 @@ import numpy as np
 from roboglot.kernels.arrays import FloatArray, SingleArray
 from roboglot.kernels.compiled import kernel
 
-GRAZE = 1e-9  # m2: an edge seen along itself; rounding would put it anywhere, even at the eye
+GRAZE = 1e-9  # m2: an edge seen end-on, which rounding could place anywhere, even at the eye
 
 
 @kernel("boolean(float64[::1], float64, float64, float64, float64, float64)")
@@ -30,7 +30,7 @@ def _hidden(ranges: FloatArray, x: float, y: float, sine: float, near: float, st
     angle = 0.5 * math.pi - angle if steep else angle
     angle = math.pi - angle if x < 0.0 else angle
     angle = (-angle if y < 0.0 else angle) + math.pi
-    half = 1.05 * sine + 0.002  # the arc sine of up to a half is at most 1.048 times as much
+    half = 1.05 * sine + 0.002  # the arc sine of values up to a half is at most 1.048 times the value
     begin, end = math.floor((angle - half) / step), math.ceil((angle + half) / step)
     for number in range(begin, end + 1):
         ray = number + rays if number < 0 else number
@@ -85,7 +85,7 @@ def sweep(
         for _ in range(begin, math.floor((first + 2.0 * half + math.pi) / step) + 1):
             ray = ray + 1 if ray + 1 < rays else 0
             if ranges[ray] <= away - radius:
-                continue  # something is before it, as mostly indoors
+                continue  # occluded, as usual indoors
             along = middle_x * directions[ray, 0] + middle_y * directions[ray, 1]
             miss = middle_y * directions[ray, 0] - middle_x * directions[ray, 1]
             ranges[ray] = min(ranges[ray], along - math.sqrt(max(0.0, radius * radius - miss * miss)))

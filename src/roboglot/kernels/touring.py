@@ -7,9 +7,9 @@ import numpy as np
 from roboglot.kernels.arrays import FloatArray, IntArray
 from roboglot.kernels.compiled import kernel
 
-EXACT_MAX = 12  # places besides the start that are ordered exactly
-RUN_MAX = 3  # places that are moved together
-GAIN_MIN = 1e-9  # less is no improvement
+EXACT_MAX = 12  # places besides the start up to which the order is exact
+RUN_MAX = 3  # consecutive places moved together
+GAIN_MIN = 1e-9  # smaller gains do not count
 
 
 @kernel("int64[::1](float64[:,::1], boolean)")
@@ -89,7 +89,7 @@ def _swap_runs(order: IntArray, first: int, second: int, end: int) -> None:
 def _improve(costs: FloatArray, order: IntArray, closed: bool) -> bool:
     """One pass of 2-opt and Or-opt over ``order``, in place; whether anything got better. Costs are symmetric."""
     count, better = order.shape[0], False
-    end = 0 if closed else -1  # what follows the last place
+    end = 0 if closed else -1  # the successor of the last place
     for i in range(1, count - 1):
         for j in range(i + 1, count):
             after = order[j + 1] if j + 1 < count else end

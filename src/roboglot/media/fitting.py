@@ -73,7 +73,7 @@ class FittedPictures:
         planes = np.empty((self.height * 3 // 2, self.width), np.uint8)
         planes[: self.height], planes[self.height :] = BLACK
         fitted = Frame(frame.stamp, planes)
-        # Where the upper edge comes: below 0 where more is there than there is room for.
+        # The offset of the upper edge: negative if the picture is higher than the frame.
         top = 2 * round((self.height - scaled) * self._place / 2)
         _paste(small.luma, fitted.luma, top)
         for small_plane, plane in zip(small.chroma, fitted.chroma, strict=True):

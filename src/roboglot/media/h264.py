@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from av import VideoCodecContext
 
 TIME_BASE = Fraction(1, 90_000)
-RATE_FACTOR = 24  # x264's crf: fine enough for markers to be read
+RATE_FACTOR = 24  # x264's crf: fine enough to read markers
 BITRATE_MAX = 8_000  # kbit/s
 
 
@@ -51,7 +51,7 @@ def _open(width: int, height: int, rate: float) -> VideoCodecContext:
     codec.width, codec.height, codec.pix_fmt = width, height, "yuv420p"
     codec.time_base, codec.framerate = TIME_BASE, Fraction(rate).limit_denominator(1000)
     codec.thread_count = 1
-    # BT.601 in limited range, said aloud: players guess otherwise at this size.
+    # BT.601 in limited range, stated explicitly: players guess otherwise at this size.
     codec.color_range, codec.colorspace, codec.color_primaries, codec.color_trc = 1, 6, 6, 6
     second = max(1, round(rate))
     x264 = {

@@ -29,7 +29,7 @@ log = logging.getLogger(__name__)
 R = TypeVar("R")
 SECONDS_MAX = 600.0
 BYTES_MAX = 600_000_000
-FIRST_PICTURE_MAX = 2.0  # s that ``stop`` waits for one: an encoder takes a moment to begin
+FIRST_PICTURE_MAX = 2.0  # s that ``stop`` waits for one: an encoder takes a moment to start
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class Recorder(Component):
         self._video, self._clock = video, clock
         self._writing: asyncio.Task[Recording] | None = None
         self._viewer: Viewer[VideoPacket] | None = None
-        self._begun = asyncio.Event()  # a first picture came
+        self._begun = asyncio.Event()  # set by the first picture
 
     @property
     def recording(self) -> bool:
@@ -94,7 +94,7 @@ class Recorder(Component):
                         break
             return await beside(self._clock, file.finish)
         finally:
-            self._begun.set()  # or none will come
+            self._begun.set()  # or there will be none
             file.discard()
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from roboglot.model.maps import OccupancyGrid
 
-FREE, OCCUPIED, UNKNOWN = 254, 0, 205  # brightness, as map_server writes it
+FREE, OCCUPIED, UNKNOWN = 254, 0, 205  # grey values of map_server
 
 
 def encode_ros_map(grid: OccupancyGrid, name: str) -> tuple[bytes, bytes]:

@@ -17,10 +17,10 @@ else:
 _A4 = 440.0  # Hz
 _STEPS = {"c": -9, "d": -7, "e": -5, "f": -4, "g": -2, "a": 0, "b": 2}  # semitones from a
 _LOUDEST = 20_000.0  # of a sample
-_RING = 0.35  # s in which a string dies away to a third
+_RING = 0.35  # s in which a string fades to a third
 _PARTIALS = (1.0, 0.5, 0.25, 0.12)  # of a string, by their loudness
 
-# A voice is notes parted by blanks: name, sharp (+), octave, and after a colon how many beats; "-" is silence.
+# A voice is a list of notes separated by blanks: name, sharp (+), octave, and beats after a colon; "-" is a rest.
 _ROMP = (
     "g4:1 c5:1 e5:1 c5:1 d5:1 f5:1 e5:2 g5:1 e5:1 c5:1 e5:1 d5:1 b4:1 c5:2"
     " a4:1 c5:1 f5:1 a5:1 g5:1 e5:1 c5:2 d5:1 e5:1 f5:1 b4:1 c5:3 -:1",

@@ -16,7 +16,7 @@ from roboglot.model.feed import Feed, Viewer
 
 log = logging.getLogger(__name__)
 R = TypeVar("R")
-QUEUE_MAX = 30  # packets: a second; a viewer that is further behind goes on at the next keyframe
+QUEUE_MAX = 30  # packets, one second; a viewer further behind resumes at the next keyframe
 
 
 async def beside(clock: Clock, job: Callable[[], R]) -> R:

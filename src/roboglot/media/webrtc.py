@@ -40,9 +40,9 @@ from roboglot.wire.ice import offer_loopback
 
 log = logging.getLogger(__name__)
 P = TypeVar("P", VideoPacket, AudioPacket)
-KEYFRAME_EVERY = 0.3  # s between two key pictures that one viewer can ask for
-GAP = SAMPLE_RATE // 5  # samples by which sound may come early or late and still be heard without a break
-SECTIONS_MAX = 8  # media sections of an offer: each may cost sockets
+KEYFRAME_EVERY = 0.3  # s between two keyframes requested by one viewer
+GAP = SAMPLE_RATE // 5  # samples by which audio may be early or late without a gap
+SECTIONS_MAX = 8  # media sections per offer: each may open sockets
 H264, RETRANSMISSION = "video/h264", "video/rtx"
 
 
@@ -153,7 +153,7 @@ class VideoCall:
         self, stream: VideoStream, clock: Clock, changed: Callable[[str], None], sound: AudioStream | None = None
     ) -> None:
         offer_loopback()
-        # Without STUN servers: no outside host learns our address.
+        # No STUN servers: no outside host learns our address.
         self._peer = RTCPeerConnection(RTCConfiguration(iceServers=[]))
         self._track = _PictureTrack(stream, clock, lambda: changed("blind"))
         self._sound = _SoundTrack(sound, clock) if sound is not None else None
@@ -170,7 +170,7 @@ class VideoCall:
         known = RTCRtpReceiver.getCapabilities("video")
         codecs = known.codecs if known else []
         transceiver.setCodecPreferences([codec for codec in codecs if codec.mimeType.lower() in (H264, RETRANSMISSION)])
-        # aiortc asks its own encoder for a key picture; we have another one.
+        # aiortc asks its own encoder for a keyframe; we use another one.
         sender._send_keyframe = self._track.request_keyframe  # type: ignore[method-assign]
         if self._sound is not None and "\nm=audio" in offer:
             peer.addTrack(self._sound)
@@ -182,7 +182,7 @@ class VideoCall:
         except BadOffer:
             raise
         except (ValueError, KeyError, IndexError, AttributeError, AssertionError, TypeError) as error:
-            # What its parser raises where a line is not as it thinks.
+            # Raised by its parser for malformed lines.
             raise BadOffer(f"not an SDP: {error!r}") from error
         except (InvalidAccessError, InvalidStateError, OperationError) as error:
             raise BadOffer(str(error)) from error
@@ -205,7 +205,7 @@ class VideoCall:
     async def add_candidate(self, text: str, mid: str | None, index: int | None) -> None:
         """An address of the viewer; empty: there are no more. Raises BadOffer for what is none."""
         if not text:
-            return  # later ones are still welcome
+            return  # later ones are accepted
         try:
             candidate = candidate_from_sdp(text.removeprefix("a=").removeprefix("candidate:"))
             candidate.sdpMid, candidate.sdpMLineIndex = mid, index

@@ -186,7 +186,7 @@ def _used(config: Config, since: float) -> tuple[Mapping[str, set[Right]], float
                 oldest = entry.at if oldest is None else oldest
                 if entry.outcome == "done" and entry.at >= since:
                     right = needed.get((entry.door, entry.operation))
-                    used[entry.who] |= {right} if right else set(Right)  # of what is not known, nothing is claimed
+                    used[entry.who] |= {right} if right else set(Right)  # nothing is claimed about unknown uses
     except (sqlite3.Error, OSError, DatabaseError):
         return used, None
     return used, oldest

@@ -15,7 +15,7 @@ from roboglot.config import default_data_folder
 from roboglot.hosting.local_socket import ask
 from roboglot.protocols.lease_desk import NAME, Answer, Control, Request
 
-PATIENCE = 10.0  # s until the robot should have braked
+PATIENCE = 10.0  # s to wait until the robot has braked
 Data = Annotated[Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="The folder that `roboglot up` uses.")]
 Verb = Literal["look", "take", "give", "release"]
 

@@ -20,10 +20,10 @@ from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap, Layer, encod
 RESOLUTION = 0.05  # m
 MARGIN = 0.5  # m around a floor
 LIDAR = 0.2  # m above the floor
-SURFACE = 0.075  # m of a solid that a lidar marks; what lies behind it is unknown
+SURFACE = 0.075  # m of a solid that a lidar marks; the rest of it is unknown
 FREE, OCCUPIED, UNKNOWN = -100, 100, 0
-RADIUS = 0.25  # m of a middling robot on its dock
-LANDING = 1.2  # m from the car's door to the place before it
+RADIUS = 0.25  # m: a medium-sized robot on its dock
+LANDING = 1.2  # m from the car's door to the waiting place
 BODY_GAP = 0.3  # m of a lift's sill
 
 
@@ -66,7 +66,7 @@ def _grid(floor: Floor, lift: Lift | None) -> OccupancyGrid:
     ]
     for deep in depths:
         cells[deep >= SURFACE] = UNKNOWN
-    for deep in depths:  # surfaces win over what lies behind others
+    for deep in depths:  # surfaces take precedence over hidden space
         cells[(deep >= -RESOLUTION / 2) & (deep < SURFACE)] = OCCUPIED
     return OccupancyGrid(cells, RESOLUTION, origin)
 

@@ -32,7 +32,7 @@ from roboglot.runtime import Runtime
 
 PAGE = Path("docs/fidelity.md")
 PUBLISHED = Path(__file__).with_name("published.toml")
-ADDRESSES = "127.0.211"  # of robots: .1 and so on
+ADDRESSES = "127.0.211"  # robots get .1, .2 and so on
 BODY = {"robomaster": "robomaster_ep", "cyberdog": "cyberdog2", "slamware": "universal", "visual": "universal"}
 SEEDS = 1, 2
 WIDTH = 110

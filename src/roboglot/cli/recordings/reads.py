@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from roboglot.operations import Operation, Right
 from roboglot.protocols import DOORS
 
-LASTING = frozenset({"2002", "4001", "5011", "6010", "6013"})  # of a dog: streams without an end, or other frames
-SENT_AGAIN = frozenset({"GET /api/platform/v1/events"})  # each answer takes events away from the next
+LASTING = frozenset({"2002", "4001", "5011", "6010", "6013"})  # for dogs: endless streams, or answers in other frames
+SENT_AGAIN = frozenset({"GET /api/platform/v1/events"})  # each answer removes events from the next one
 
 
 def reads(door: str) -> set[str]:
@@ -38,7 +38,7 @@ def askable(door: str) -> list[str]:
 def _reading(door: str) -> Iterator[tuple[str, Operation[str] | Operation[int]]]:
     (kind,) = (kind for kind in DOORS if kind.name == door)
     table = kind.table()
-    if door == "visual":  # its table has what programs may call; here it is about frames
+    if door == "visual":  # its table lists functions for programs; frames are meant here
         from roboglot.protocols.visual import dispatch  # noqa: F401 - fills the table
         from roboglot.protocols.visual.table import TABLE
 

@@ -21,7 +21,7 @@ from roboglot.config import default_data_folder
 from roboglot.hosting.local_socket import ask
 from roboglot.protocols.record_desk import NAME, Answer, Request
 
-PATIENCE = 30.0  # s: a long ring takes its time to be written
+PATIENCE = 30.0  # s: a long ring takes a while to write
 EPILOG = "A URL instead of a command records a real robot: roboglot record slamware://192.168.11.1 --listen 127.0.0.9"
 
 

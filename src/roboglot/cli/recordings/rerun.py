@@ -128,5 +128,5 @@ def _line(runtime: Runtime, robot: str, door: str) -> Line:
         folder = config.data / "app"
         if not folder.exists():
             export_client(config.data / FOLDER, folder)
-        line.options = {"certs": str(folder)}  # and no app: what it said is in the recording
+        line.options = {"certs": str(folder)}  # no app: its answers are in the recording
     return line

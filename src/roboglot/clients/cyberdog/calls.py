@@ -15,7 +15,7 @@ from roboglot.model.clock import Clock
 from roboglot.wire.cyberdog.codes import Code, InBandError
 
 T = TypeVar("T")
-TIMEOUT = 10.0  # s for an answer, unless the operation says otherwise
+TIMEOUT = 10.0  # s for an answer, unless the operation has its own
 IN_BAND: Mapping[int, str] = {
     InBandError.TIMEOUT: "the robot's own service did not answer in time",
     InBandError.UNAVAILABLE: "the robot has no such service, or it is not running",
@@ -52,7 +52,7 @@ class Calls:
             if '"error_code"' in text:
                 number = decode(text, _InBand, code).error_code
                 raise CyberDogRefused(code.name, number, IN_BAND.get(number, "unknown"))
-            if name == code or name == 0 or code is Code.UPDATE_PROGRESS:  # that one's answers carry another number
+            if name == code or name == 0 or code is Code.UPDATE_PROGRESS:  # its answers carry another number
                 yield text
 
     async def text(self, code: Code, params: object = None, *, within: float = TIMEOUT) -> str:

@@ -46,8 +46,8 @@ from roboglot.wire.cyberdog.text import NotJson, read_params
 
 log = logging.getLogger(__name__)
 V = TypeVar("V", bound=Value)
-UNREAD_MAX = 256  # pushes that a slow reader may leave; then it loses them and goes on with the newest
-FOUND_MAX = 20.0  # s until the robot has called back
+UNREAD_MAX = 256  # pushes queued for a slow reader, who then gets only the newest
+FOUND_MAX = 20.0  # s to wait for the robot to call back
 
 
 class CyberDogClient(

@@ -27,8 +27,8 @@ from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import (
 )
 
 REDIAL_MAX = 2000  # ms between two attempts to connect
-PUSH_MAX = 5_242_880  # bytes that the app takes in one message
-FOUND_PERIOD = 0.05  # s between two looks at whether the robot has called
+PUSH_MAX = 5_242_880  # bytes per message
+FOUND_PERIOD = 0.05  # s between two checks whether the robot has called
 IN_BAND = re.compile(r'"error_code"\s*:\s*([1-9]\d*)')
 POLITE = "the app sends no heartbeats"
 
@@ -104,7 +104,7 @@ class Link:
         self.clock = clock
         self.heartbeat: Heartbeat | None = None
         self.app_port = app_port
-        self.line: Line | None = None  # what is asked, answered and pushed is noted there
+        self.line: Line | None = None  # records requests, answers and pushes
         self._host, self._port, self._certificates, self._pushed = host, port, certificates, pushed
         self._channel: grpc.aio.Channel | None = None
         self._stub: GrpcAppStub | None = None

@@ -12,8 +12,8 @@ from roboglot.clients.cyberdog.calls import Calls, CyberDogRefused, NoAnswer, de
 from roboglot.clients.errors import ClientError, LinkLost, TimedOut
 from roboglot.wire.cyberdog.codes import Accepted, Code, TaskResult, TaskType
 
-LOST_MAX = 20.0  # s without a stream until waiting for the end fails
-REJOIN_PERIOD = 0.5  # s between two attempts to join it again
+LOST_MAX = 20.0  # s without a stream before waiting fails
+REJOIN_PERIOD = 0.5  # s between two attempts to rejoin it
 STOP_MAX = 65.0  # s: the robot itself gives up after 60
 ACCEPT_MAX = 10.0  # s
 

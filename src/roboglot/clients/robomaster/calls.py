@@ -10,8 +10,8 @@ from roboglot.clients.errors import BadAnswer
 from roboglot.clients.robomaster.errors import RoboMasterRefused
 from roboglot.wire.robomaster.replies import Reply
 
-ANSWER_SECONDS = 2.0  # what an answer may take that comes at once
-MOTION_SECONDS = 65.0  # what an answer may take that comes at the end of a motion
+ANSWER_SECONDS = 2.0  # for answers that come at once
+MOTION_SECONDS = 65.0  # for answers that come at the end of a motion
 REFUSALS = frozenset(Reply) - {Reply.OK, Reply.ALREADY_IN_SDK_MODE} | {"error"}
 
 Ask = Callable[[str, float], Awaitable[str]]

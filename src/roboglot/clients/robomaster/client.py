@@ -59,7 +59,7 @@ class LinkState(StrEnum):
 
     CLOSED = "closed"
     CONNECTED = "connected"
-    LOST = "lost"  # and being sought
+    LOST = "lost"  # and the client is reconnecting
 
 
 class RoboMasterClient:
@@ -187,12 +187,12 @@ class RoboMasterClient:
         return (await self._expect("version")).removeprefix("version ")
 
     async def _expect(self, command: str, *right: str) -> str:
-        answer = await self.ask(command, 5 * ANSWER_SECONDS)  # `quit` answers when the robot stands
+        answer = await self.ask(command, 5 * ANSWER_SECONDS)  # the robot answers `quit` once it has stopped
         if answer in REFUSALS or (right and answer not in right):
             raise RoboMasterRefused(command, answer)
         return answer
 
-    # -- what the robot says by itself ---------------------------------------------------------------------------------
+    # -- pushes and events ---------------------------------------------------------------------------------------------
 
     def listen(self, heard: Callable[[Telemetry], object], *kinds: type[Telemetry]) -> Callable[[], None]:
         """Call ``heard`` with every push and event of ``kinds`` (none: all); returns what ends it. Raises LinkLost.

@@ -13,9 +13,9 @@ from roboglot.clients.robomaster.noting import Noting
 from roboglot.clients.robomaster.pairing import Pairing
 from roboglot.model.clock import Clock
 
-PENDING_MAX = 256  # unanswered commands; more are refused, as the robot does not respond
+PENDING_MAX = 256  # unanswered commands; beyond this the robot counts as unresponsive
 CONNECT_SECONDS_MAX = 5.0
-KEEPALIVE = (1, 1, 3)  # s of silence before the kernel asks, s between its questions, unanswered ones that end it
+KEEPALIVE = (1, 1, 3)  # s of silence before the first probe, s between probes, lost probes that end it
 
 
 class ControlLink(asyncio.Protocol):
@@ -90,10 +90,10 @@ class ControlLink(asyncio.Protocol):
         if self._transport:
             self._transport.abort() if self._transport.get_write_buffer_size() else self._transport.close()
 
-    # -- asyncio's side ------------------------------------------------------------------------------------------------
+    # -- callbacks of asyncio ------------------------------------------------------------------------------------------
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        self._transport = cast(asyncio.Transport, transport)  # uvloop's is one without inheriting from it
+        self._transport = cast(asyncio.Transport, transport)  # uvloop's transport does not inherit from it
         keep_asking(transport.get_extra_info("socket"))
 
     def data_received(self, data: bytes) -> None:
@@ -127,7 +127,7 @@ def keep_asking(connection: socket.socket) -> None:
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     for name, value in (("TCP_KEEPIDLE", idle), ("TCP_KEEPINTVL", interval), ("TCP_KEEPCNT", count)):
-        if hasattr(socket, name):  # not everywhere
+        if hasattr(socket, name):  # not available on every system
             connection.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
     if hasattr(socket, "TCP_USER_TIMEOUT"):
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, (idle + interval * count) * 1000)

@@ -14,7 +14,7 @@ from roboglot.wire.robomaster.telemetry import broadcast_of
 PUSH_PORT = 40924
 BROADCAST_PORT = 40926
 DATAGRAM_MAX = 8192
-BATCH_MAX = 64  # datagrams read before others get their turn
+BATCH_MAX = 64  # datagrams read before other tasks run
 ROBOTS_MAX = 256  # found by one search
 
 Heard = Callable[[bytes], None]
@@ -54,7 +54,7 @@ class PushPort:
         for _ in range(BATCH_MAX):
             try:
                 data, (robot, _) = self._socket.recvfrom(DATAGRAM_MAX) if self._socket else (b"", ("", 0))
-            except OSError:  # nothing more, or an ICMP message
+            except OSError:  # no more data, or an ICMP error
                 return
             for heard in tuple(self._listeners.get(robot, ())):
                 heard(data)
@@ -83,7 +83,7 @@ async def discover(
                 data, (sender, _) = ear.recvfrom(DATAGRAM_MAX)
                 if sender in passing_over:
                     return
-                if broadcast_of(data) == sender and len(found) < ROBOTS_MAX:  # not for another address
+                if broadcast_of(data) == sender and len(found) < ROBOTS_MAX:  # addressed to another robot
                     found[sender] = None
                     if first and not enough.done():
                         enough.set_result(None)
@@ -103,7 +103,7 @@ def _bound(host: str, port: int, hint: str) -> socket.socket:
     try:
         bound.setblocking(False)
         if port == BROADCAST_PORT:
-            bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # broadcasts reach all who listen
+            bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # every listener receives broadcasts
         bound.bind((host, port))
     except OSError as error:
         bound.close()

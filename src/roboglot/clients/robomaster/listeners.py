@@ -8,7 +8,7 @@ from roboglot.clients.robomaster.noting import Noting
 from roboglot.model.feed import Feed, Viewer
 from roboglot.wire.robomaster.telemetry import Telemetry, hear
 
-QUEUE_MAX = 512  # pushes and events that wait for a slow watcher, who then loses them
+QUEUE_MAX = 512  # pushes and events queued for a slow watcher; further ones are dropped
 
 Listener = Callable[[Telemetry], object]
 

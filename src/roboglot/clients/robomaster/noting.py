@@ -9,7 +9,7 @@ from roboglot.model.tap import LOST, Line
 from roboglot.wire.contracts import contract
 from roboglot.wire.robomaster.commands import Malformed, parse
 
-BEYOND = frozenset({"version", "version ?"})  # commands that robots know and the manual does not list
+BEYOND = frozenset({"version", "version ?"})  # commands that robots know although the manual does not list them
 
 
 class Noting:

@@ -22,10 +22,10 @@ class Pairing:
 
     def __init__(self) -> None:
         self._waiting: deque[int] = deque()
-        self._bare: set[int] = set()  # those of them that went out without their number
+        self._bare: set[int] = set()  # those that were sent without a number
         self._text = ""
-        self.wordings: dict[int, str] | None = None  # if it is a dict: answers as they came, by number
-        self.as_robots = False  # whether an answer had the form that real robots' builds give it
+        self.wordings: dict[int, str] | None = None  # the raw answers by number, if it is a dict
+        self.as_robots = False  # whether an answer had the format of real robots' builds
 
     def __len__(self) -> int:
         return len(self._waiting)
@@ -61,13 +61,13 @@ class Pairing:
         self._text = tail
         wording = f"{head};"
         if (found := _NUMBERED.fullmatch(head.strip())) is None:
-            self.as_robots = self.as_robots or head.endswith(" ")  # behind a number every build may have a blank
+            self.as_robots = self.as_robots or head.endswith(" ")  # any build may put a blank after a number
             return [(self._keep(self._next(), wording), head.strip())]
         number = int(found[2])
         if number not in self._waiting:
             return []
         while self._next() != number:
-            pass  # those before it will not be answered any more
+            pass  # earlier ones will not be answered any more
         return [(self._keep(number, wording), found[1].strip())]
 
     def _endless(self, head: str) -> list[tuple[int, str]] | None:

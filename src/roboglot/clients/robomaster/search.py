@@ -10,7 +10,7 @@ from roboglot.clients.errors import ClientError
 from roboglot.model.clock import Clock
 
 log = logging.getLogger(__name__)
-BACK_OFF = (0.5, 1.0, 2.0, 5.0)  # s between attempts to connect again; the last one goes on
+BACK_OFF = (0.5, 1.0, 2.0, 5.0)  # s between attempts to reconnect; the last value repeats
 
 
 class Search:

@@ -27,7 +27,7 @@ from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap, decode_stcm,
 P = ParamSpec("P")
 T = TypeVar("T")
 TIMEOUT = 5.0  # s for an answer
-TRANSFER_TIMEOUT = 60.0  # s for a map or a package
+TRANSFER_TIMEOUT = 60.0  # s for maps and packages
 BINARY_IN: Mapping[object, Callable[[bytes], object]] = {
     bytes: bytes,
     ExploreMap: decode_explore_map,
@@ -79,7 +79,7 @@ def call(key: str) -> Callable[[Callable[P, Awaitable[T]]], Callable[P, Coroutin
             answer: T = await _ask(chapter, key, plan[0], bound.arguments)
             return answer
 
-        ask.key = key  # type: ignore[attr-defined] # lets tests compare the client with the contract
+        ask.key = key  # type: ignore[attr-defined]  # lets tests compare the client with the contract
         return ask
 
     return make

@@ -40,7 +40,7 @@ from roboglot.model.tap import Line
 from roboglot.wire.slamware.chapters.motion import ActionInfo, ActionRequest
 
 PORT = 1448
-PREFIX = "slamtec.agent.actions."  # of the names of firmware 3 to 5; 6 has a shorter one
+PREFIX = "slamtec.agent.actions."  # of action names in firmware 3 to 5; firmware 6 uses shorter ones
 
 
 class SlamwareClient(

@@ -17,8 +17,8 @@ from roboglot.model.clock import Clock
 from roboglot.model.tap import Line
 
 CONNECTIONS_MAX = 6
-HEAD_MAX = 32 * 1024  # bytes before an answer's body
-BODY_MAX = 256 << 20  # bytes of an answer
+HEAD_MAX = 32 * 1024  # bytes of an answer's status line and headers
+BODY_MAX = 256 << 20  # bytes of an answer's body
 CONNECT_SECONDS_MAX = 3.0
 
 
@@ -44,7 +44,7 @@ class _Connection(asyncio.Protocol):
         self._head_bytes = 0
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        self.transport, self.open = cast(asyncio.Transport, transport), True  # uvloop's is no subclass
+        self.transport, self.open = cast(asyncio.Transport, transport), True  # uvloop's does not inherit from it
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._fail(LinkLost(f"the connection broke: {exc}" if exc else "the robot hung up"))
@@ -121,7 +121,7 @@ class HttpLink:
 
     def __init__(self, host: str, port: int, clock: Clock) -> None:
         self.host, self.port = host, port
-        self.line: Line | None = None  # what is asked and answered is noted there
+        self.line: Line | None = None  # records requests and answers
         self._clock = clock
         self._idle: list[_Connection] = []
         self._all: set[_Connection] = set()

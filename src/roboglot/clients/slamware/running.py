@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from roboglot.clients.slamware.chapters.motion import Motion
 
 PERIOD = 0.1  # s between two polls
-LOST_MAX = 5.0  # s without an answer until waiting for it fails
+LOST_MAX = 5.0  # s without an answer before waiting fails
 GONE = 404
 
 
@@ -38,7 +38,7 @@ class RunningAction:
     ) -> None:
         self._motion, self._clock, self._on_progress = motion, clock, on_progress
         self.id, self.name = begun.action_id, begun.action_name
-        self.info = begun  # the latest report while it ran
+        self.info = begun  # the latest report of the running action
         self.state = begun.state
         self._progress(begun)
 

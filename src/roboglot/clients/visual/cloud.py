@@ -10,7 +10,7 @@ from roboglot.clients.errors import BadAnswer, LinkLost, TimedOut
 from roboglot.model.clock import Clock, RealClock
 from roboglot.wire.visual.cloud import ANSWER_MAX, ROBOT_HEADER, BadCloudAnswer, CloudAnswer, parse_answer
 
-TIMEOUT = 3.0  # s for one exchange, as in the vendor's robot
+TIMEOUT = 3.0  # s per exchange, as in the vendor's robot
 CHUNK = 65_536  # bytes
 
 

@@ -13,8 +13,8 @@ from roboglot.clients.errors import BadAnswer, LinkLost
 if TYPE_CHECKING:
     from websockets.asyncio.client import ClientConnection
 
-ANSWER_MAX = 256 * 1024 * 1024  # bytes of one text: lists of ten thousand tasks with their editor's texts are long
-BROKEN = frozenset({1002, 1007, 1009})  # close codes with which this end leaves a robot that breaks the protocol
+ANSWER_MAX = 256 * 1024 * 1024  # bytes of one text: lists of ten thousand tasks with their editor texts are long
+BROKEN = frozenset({1002, 1007, 1009})  # close codes for a robot that violates the protocol
 
 
 class TextLink:

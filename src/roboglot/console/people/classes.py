@@ -24,7 +24,7 @@ from roboglot.model.errors import Forbidden, NotFound, Refused, RobotError
 
 MINUTES_MAX = 600
 NAME_MAX = 30  # characters of a pupil's name
-TEACHER = f"{CLIENT} teacher"  # who has control of a robot that is locked
+TEACHER = f"{CLIENT} teacher"  # the holder of a locked robot
 Name = Annotated[str, msgspec.Meta(max_length=class_wishes.NAME_MAX)]
 
 
@@ -45,7 +45,7 @@ class Seat:
     robot: str
     code: str
     proof: Proof | None
-    studio: bool  # the class was opened there
+    studio: bool  # whether the class was opened in the studio
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +85,7 @@ class Classes:
         self._desk, self._room, self._stop = desk, room, stop
         self._present, self._put_out, self._now = present, put_out, now
         self._lesson: Lesson | None = None
-        self._studio: dict[str, Lesson] = {}  # classes that were opened in the studio, here or in another world
+        self._studio: dict[str, Lesson] = {}  # classes opened in the studio, in this world or another
 
     # -- pupils --------------------------------------------------------------------------------------------------------
 
@@ -195,7 +195,7 @@ class Classes:
             raise Refused(f"class {self._lesson.code} is open")
         code = "".join(secrets.choice(classroom.CODE_LETTERS) for _ in range(classroom.CODE_LENGTH))
         self._lesson = Lesson(code, wish.name.strip(), self._now() + wish.minutes * 60.0)
-        await self._room.open(code, wish.name.strip())  # the studio's page joins by the same code
+        await self._room.open(code, wish.name.strip())  # the studio's page uses the same code to join
 
     async def _do_with(self, do: str, name: str) -> None:
         robot, locked = self._desk.robots[name], self._desk.locked

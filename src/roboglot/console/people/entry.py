@@ -8,7 +8,7 @@ from roboglot.console.people.sessions import Sessions, cookie_name, read_cookie
 from roboglot.model.admission import NO_PROOF, Admission, LockedOut, Proof, ProofKind, Unknown
 from roboglot.model.client_context import ask_for
 
-CHALLENGE = (b"www-authenticate", b'Bearer realm="roboglot"')  # not Basic: browsers would ask in a window of their own
+CHALLENGE = (b"www-authenticate", b'Bearer realm="roboglot"')  # not Basic: browsers would open their own prompt
 
 
 def admission_of(desk: Desk) -> Admission | None:
@@ -44,7 +44,7 @@ async def enter(desk: Desk, sessions: Sessions, scope: Scope) -> str:
         except LockedOut:
             raise
         except Unknown:
-            if session is not None:  # what was shown once no longer counts
+            if session is not None:  # a session replaces earlier proofs
                 sessions.end(cookie_of(scope))
             raise
     named = who if shown and admission is not None else session.name if session is not None else ""

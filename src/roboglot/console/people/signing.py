@@ -55,10 +55,10 @@ class Signing:
         except msgspec.ValidationError as error:
             raise Problem(400, str(error)) from None
         token, answer = await self._sign_in(address_of(scope), shown)
-        if not token:  # the pupil's world is another
+        if not token:  # the pupil belongs to another world
             await answer_json(send, answer)
             return True
-        self._sessions.end(cookie_of(scope))  # a session that others may know is not carried on
+        self._sessions.end(cookie_of(scope))  # a session that others may know is not continued
         await answer_json(send, answer, 200, [set_cookie(name, token, secure=secure)])
         return True
 

@@ -39,12 +39,12 @@ from roboglot.wire.visual.requests import BODY_MAX, FRAME_MAX, ID_MAX
 
 log = logging.getLogger(__name__)
 
-MESSAGE_MAX = FRAME_MAX + 64 * 1024  # characters of one message of a page
+MESSAGE_MAX = FRAME_MAX + 64 * 1024  # characters per message from a page
 MESSAGES_PER_SECOND_MAX = 50
 PENDING_MAX = 16  # messages of one page that are being answered
-LIGHT_EVERY = 0.02  # s: a page is shown the newest block at most so often
-DRAW_EVERY = 2.0  # s between two maps of a pupil's robot for the teacher
-WAITING_MAX = 2000  # messages that wait for a page that reads slowly; beyond, the oldest insights are dropped
+LIGHT_EVERY = 0.02  # s: minimum between two highlighted blocks on a page
+DRAW_EVERY = 2.0  # s between two maps of a pupil's robot shown to the teacher
+WAITING_MAX = 2000  # messages queued for a slow page; beyond this the oldest insights are dropped
 _BLOCK = re.compile(r'"block": \{"type": "(begin|end)"')
 Send = Callable[[str], Awaitable[None]]
 Id = Annotated[str, msgspec.Meta(max_length=ID_MAX)]
@@ -54,7 +54,7 @@ class Open(msgspec.Struct, tag="open", tag_field="type"):
     """Robot that the page programs from now on, and the program shown: of others it hears only begin and end."""
 
     robot: str
-    program: Id = ""  # of all
+    program: Id = ""  # in all messages
 
 
 class Frame(msgspec.Struct, tag="frame", tag_field="type"):
@@ -104,13 +104,13 @@ class Session:
     def __init__(self, desk: Desk, classroom: Room, send: Send, codes: Limiter) -> None:
         """``codes``: how many wrong codes of classes an address may try."""
         self._desk, self._send, self._codes = desk, send, codes
-        self._showed = ""  # the address that showed a code, until it is known to be right
+        self._showed = ""  # the address that sent a code, until the code proves right
         self._programs: Programs | None = None
-        self._shown = ""  # the program; empty: all
+        self._shown = ""  # the program shown; empty: all
         self._leaving: list[Callable[[], None]] = []
         self._waiting: deque[dict[str, object]] = deque()
         self._due = asyncio.Event()
-        self._light: dict[str, object] | None = None  # of the last begin of a block, while it waits
+        self._light: dict[str, object] | None = None  # the last block that began, while it waits
         self._pending: set[asyncio.Task[None]] = set()
         self._trial = Trial(self.tell)
         self._seat = classroom.seat(self.tell)
@@ -139,7 +139,7 @@ class Session:
         if self._showed and message["type"] in ("joined", "elsewhere", "grid"):
             self._codes.give_back(self._showed)
             self._showed = ""
-        if message["type"] in ("variables", "grid", "map"):  # only the newest counts
+        if message["type"] in ("variables", "grid", "map"):  # only the newest is sent
             kind = [message.get(key) for key in ("type", "task", "name")]
             same = (m for m in self._waiting if [m.get(key) for key in ("type", "task", "name")] == kind)
             if (old := next(same, None)) is not None:
@@ -164,7 +164,7 @@ class Session:
         if (block := _BLOCK.search(text)) is None:
             self.answer(text)
         elif self._shown and f'"target_id": "{self._shown}"' not in text:
-            pass  # the page that shows it lights it
+            pass  # the page highlights it by itself
         elif block[1] == "begin":
             if self._light is None or self._waiting[-1] is not self._light:
                 self._light = {"type": "frame"}
@@ -246,7 +246,7 @@ class Session:
                 self._trial.close()
 
     async def _take_class(self, wish: Member) -> None:
-        if wish.do == "join" and (who := identity()) in self._desk.pupils:  # signed in by a code: as that pupil
+        if wish.do == "join" and (who := identity()) in self._desk.pupils:  # a code signs in as one pupil
             name, _, code = who.rpartition("@")
             wish = msgspec.structs.replace(wish, name=name, code=code)
         elif wish.code and wish.do in ("join", "open"):

@@ -22,7 +22,7 @@ from roboglot.programs.rehearsing import Played, Spot
 
 TEXT_MAX = 500
 PLACES_MAX = 20
-HULL, MARGIN = 0.25, 0.015  # m: the dog's radius, and how near counts as touching
+HULL, MARGIN = 0.25, 0.015  # m: the dog's radius; the distance that counts as touching
 Metres = Annotated[float, msgspec.Meta(ge=-200, le=200)]
 Text = Annotated[str, msgspec.Meta(max_length=TEXT_MAX)]
 Place = tuple[Metres, Metres]

@@ -14,7 +14,7 @@ import msgspec
 T = TypeVar("T")
 log = logging.getLogger(__name__)
 CLASS = "class.json"
-CLASSES_MAX, BAGS_MAX, FILE_MAX = 20, 60, 4_000_000  # folders, files of one, bytes of a file that are read
+CLASSES_MAX, BAGS_MAX, FILE_MAX = 20, 60, 4_000_000  # folders; files in each; bytes read of a file
 
 
 class Bag(msgspec.Struct):
@@ -25,7 +25,7 @@ class Bag(msgspec.Struct):
     program: str = ""
     style: str = ""
     handed: str = ""
-    stars: int = 0  # when it was handed in
+    stars: int = 0  # of the handed-in program
     all_stars: int = 0
 
 

@@ -19,8 +19,8 @@ from roboglot.model.errors import NotFound, Refused, RobotError
 log = logging.getLogger(__name__)
 LINE_MAX = 4 << 20  # bytes
 ADMIT_SECONDS = 10.0
-ADMITTING_MAX = 64  # who wait for the answer
-AGAIN = 1.0  # s until the other end is tried anew
+ADMITTING_MAX = 64  # requests to join that await an answer
+AGAIN = 1.0  # s between two attempts to connect
 
 
 class Hello(msgspec.Struct, tag=True, frozen=True):

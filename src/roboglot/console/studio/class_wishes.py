@@ -30,4 +30,4 @@ class Member(msgspec.Struct, tag="class", tag_field="type"):
     name: Annotated[str, msgspec.Meta(max_length=NAME_MAX)] = ""
     doing: Doing = Doing()
     style: Annotated[str, msgspec.Meta(max_length=STYLE_MAX)] = ""
-    carry: bool = False  # the page has come from another world, and wants the program that was last seen
+    carry: bool = False  # a page that comes from another world brings the program seen last

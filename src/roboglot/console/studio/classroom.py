@@ -23,9 +23,9 @@ from roboglot.model.errors import NotFound, Refused
 log = logging.getLogger(__name__)
 CODE_LETTERS, CODE_LENGTH = "ABCDEFGHJKLMNPQRSTUVWXYZ23456789", 6
 CLASSES_MAX, PUPILS_MAX = 20, 60
-NOWHERE = "-"  # the world of who has none yet
+NOWHERE = "-"  # the world of pupils who have none yet
 GRID_EVERY = 0.1  # s between two grids of one class
-OPEN_SECONDS = 90 * 60.0  # from a teacher's coming: so long its code lets pupils in where others are asked who they are
+OPEN_SECONDS = 90 * 60.0  # after a teacher's visit, for which the code admits pupils where access is controlled
 Tell = Callable[[dict[str, object]], None]
 
 
@@ -214,7 +214,7 @@ class Classroom:
         if self._files is None or not (pupil.bag.style or pupil.bag.handed):
             return
         try:
-            async with self._writing:  # one after the other, so that the newest stays
+            async with self._writing:  # in order, so that the newest stays
                 await asyncio.to_thread(self._files.keep, code, pupil.bag)
         except OSError as error:
             log.error("cannot keep what %s handed in: %s", pupil.name, error)

@@ -11,7 +11,7 @@ _PLACE = re.compile(r" \((?:module (?P<module>\w+), )?line (?P<line>\d+): ", re.
 _FIELD = re.compile(r"'(\w+)' object has no attribute '(\w+)'")
 _NAME = re.compile(r"'(\w+)'")
 
-# By the error's type, and words that its message has: what it means, and what to do.
+# Explanation and advice, by the error's type and by words in its message.
 _SENTENCES: tuple[tuple[str, str, str, str], ...] = (
     ("ZeroDivisionError", "", "Something is divided by zero.", "出现了除以零。"),
     ("NameError", "", "{0} has no value yet: give it one before it is used.", "{0} 还没有值：使用之前先给它赋值。"),

@@ -16,7 +16,7 @@ from roboglot.model.geometry import Point, Pose, Twist
 from roboglot.programs.rehearsing import Step, Tried
 
 STEPS_MAX = 20
-PATH_MAX = 200  # points of an answer
+PATH_MAX = 200  # points per answer
 
 
 class GoTo(msgspec.Struct, tag="go_to", tag_field="do", forbid_unknown_fields=True):

@@ -15,7 +15,7 @@ from roboglot.programs.functions.senses.sensors import TIMEOUT_MAX
 
 RELATIVE = ("relatively_force_control_attitude", "relatively_position_control_attitude")
 ATTITUDES = ("absolute_attitude", "transition_standing", *RELATIVE)
-STRIDE_MAX, DANCES_MAX = 0.065, 10  # of the choreographer, which cuts what is beyond
+STRIDE_MAX, DANCES_MAX = 0.065, 10  # of the choreographer, which clips larger values
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ OWN: dict[tuple[str, str], Limit] = {
     ("push_up", "frequency"): Limit(10, 60, 30),
     ("push_up", "number"): Limit(1, DANCES_MAX, 2),
 }
-WALK = Limit(WALK_DURATION.minimum, WALK_DURATION.maximum)  # any other duration is a walk's
+WALK = Limit(WALK_DURATION.minimum, WALK_DURATION.maximum)  # all other durations belong to walks
 
 _EYES = tuple(name for name in ENUMS["LedConstraint"] if "mini" in name and "effect" in name)
 CHOICES: dict[str, tuple[str, tuple[str, ...]]] = {

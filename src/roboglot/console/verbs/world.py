@@ -196,7 +196,7 @@ async def inject_fault(
     given = options or {}
     try:
         return [fault.number for fault in stage.inject_fault(kind, robot, duration=duration, **given)]
-    except TypeError as error:  # an option of another type than the fault's function takes
+    except TypeError as error:  # the type of an option does not fit the fault's function
         raise ValueError(f"{kind} does not take these options: {error}") from None
 
 

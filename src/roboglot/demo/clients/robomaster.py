@@ -6,7 +6,7 @@ import asyncio
 import math
 from typing import Any
 
-STILL = 5  # equal positions in a row that mean it stands
+STILL = 5  # equal positions in a row that mean standstill
 PATIENCE = 60.0
 
 

@@ -159,7 +159,7 @@ class CyberDogDriver(Driver):
         except ClientError as error:
             log.info("%s is not localized: %s", self.link.address, error)
             return
-        task.leave()  # it goes on; pose pushes show its end
+        task.leave()  # the task continues; pose pushes show when it ends
 
     async def serve(self) -> None:
         try:
@@ -173,7 +173,7 @@ class CyberDogDriver(Driver):
                 self._probe(),
             )
         finally:
-            await self._client.link.close()  # a new channel and certificates next time
+            await self._client.link.close()  # connect with a new channel and certificates next time
             self._open = False
 
     async def _read(self, kind: type[values.Value], take: Callable[[values.Value], None]) -> None:

@@ -19,7 +19,7 @@ else:
 LAG = 0.15  # s time constant of a new velocity
 STEP_MAX = 0.05  # s of one step of dead reckoning
 FRAME_GOOD = 0.2  # s for which a dog walks on after a servo frame
-RECKONED_MAX = 5.0  # s of dead reckoning in one call at most
+RECKONED_MAX = 5.0  # s: the longest dead reckoning in one call
 
 
 def _nothing() -> OccupancyGrid:

@@ -9,7 +9,7 @@ from roboglot.drivers.driver_type import DriverType, Target, Workshop
 from roboglot.model.components.component import Component
 from roboglot.model.robot import Robot
 
-BOUNDED = "move"  # how an EP is driven, unless ``drive=speed``
+BOUNDED = "move"  # the way to drive an EP, unless ``drive=speed``
 PORT_OPTIONS = ("event", "video", "audio", "push")
 
 

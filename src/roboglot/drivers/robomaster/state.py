@@ -22,4 +22,4 @@ class ReportedState:
     flags: MotionFlags = field(default_factory=MotionFlags)
     battery: BatteryState = field(default_factory=lambda: BatteryState(0.0, 0.0, 0.0, 0.0, False, 0))
     gimbal: GimbalAngles = field(default_factory=GimbalAngles)
-    latency: float = 0.0  # s of a round trip, smoothed
+    latency: float = 0.0  # s: round trip, smoothed

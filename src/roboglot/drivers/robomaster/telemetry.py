@@ -58,7 +58,7 @@ class TelemetryListener:
             refreshed,
         )
         self._forget: Callable[[], None] = lambda: None
-        self._yaw = 0.0  # of the position less that of the attitude
+        self._yaw = 0.0  # yaw of the position minus that of the attitude
         self._pushed = False  # whether this connection has received any push
         self.has_gimbal = True
 
@@ -87,7 +87,7 @@ class TelemetryListener:
             count += 1
             if count % PARTS_EVERY == 0:
                 for refresh in self._refreshed:
-                    with contextlib.suppress(RefusedByRobot):  # unplugged: its last reading ages
+                    with contextlib.suppress(RefusedByRobot):  # the sensor is unplugged: its last reading ages
                         await refresh()
             if count % HEADING_EVERY == 0 and abs(self._reported.twist.yaw) < STEADY:
                 await self._ask_heading()

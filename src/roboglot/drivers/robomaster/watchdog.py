@@ -18,7 +18,7 @@ from pathlib import Path
 
 log = logging.getLogger(__name__)
 
-PATIENCE = 0.25  # s without a sign of life while a robot is driven, until its connection ends
+PATIENCE = 0.25  # s without a sign of life, while a robot is driven, before its connection is cut
 PERIOD = 0.05  # s between two signs of life
 SCRIPT = Path(__file__).with_name("watchdog_process.py")
 
@@ -90,7 +90,7 @@ def _start() -> socket.socket:
         process = subprocess.Popen(
             [sys.executable, "-I", "-S", str(SCRIPT), str(PATIENCE)],
             stdin=far.fileno(),
-            stdout=subprocess.DEVNULL,  # the program's own pipes must not stay open for it
+            stdout=subprocess.DEVNULL,  # keeps the program's own pipes from staying open
             stderr=subprocess.DEVNULL,
             start_new_session=True,
         )

@@ -38,7 +38,7 @@ from roboglot.model.components.system.link import OTHERS, US
 from roboglot.model.robot import Robot
 
 PORT = 1448
-TIMEOUT = 0.8  # s that the robot may take to answer before the link counts as lost
+TIMEOUT = 0.8  # s for an answer before the link counts as lost
 LEASE_PERIOD = 0.25  # s between two checks of the client that moves the robot
 # Components to withdraw, by the topic that a robot without them does not report.
 BY_TOPIC: dict[str, tuple[type[Component], ...]] = {
@@ -114,7 +114,7 @@ class SlamwareDriver(Driver):
         async for _ in self.robot.clock.every(LEASE_PERIOD):
             action = self._reported.action
             if action is not None and self._runner.beginning:
-                continue  # it may be ours, with its id still on the way
+                continue  # it may be ours, with its id not known yet
             ours = action is not None and self._runner.is_ours(action)
             self.link.held_by(US if ours else OTHERS if action is not None else "")
 

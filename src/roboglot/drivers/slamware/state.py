@@ -35,10 +35,10 @@ class ReportedState:
     localizing: bool = True
     mapping: bool = True
     closes_loops: bool = True
-    grid: OccupancyGrid = field(init=False)  # not there without numpy, as no map is read then
+    grid: OccupancyGrid = field(init=False)  # missing without numpy, as no map is read then
     revision: int = 0
     home: Pose | None = None
-    latency: float = 0.0  # s of a round trip, smoothed
+    latency: float = 0.0  # s: round trip, smoothed
     action: int | None = None  # the id of the current action
 
     def __post_init__(self) -> None:

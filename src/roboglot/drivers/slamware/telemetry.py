@@ -28,9 +28,9 @@ else:
 log = logging.getLogger(__name__)
 JUMP = 0.5  # m or rad between localization and odometry from which the pose counts as set by hand
 SMOOTHING = 0.2  # share of a new latency in the mean
-ABSENT = (404, 500, 501)  # how robots refuse what they lack
+ABSENT = (404, 500, 501)  # statuses for features that the robot lacks
 NO_ARRAYS = in_words("that", ["numpy"], "slamware")
-ARRAYS = frozenset({"scan", "map"})  # topics whose values are numpy's
+ARRAYS = frozenset({"scan", "map"})  # topics whose values are numpy arrays
 
 
 class TelemetryPoller:
@@ -104,7 +104,7 @@ class TelemetryPoller:
                 if what not in self._optional:
                     raise
             except SlamwareRefused:
-                continue  # the robot sleeps or loads a map; the age of the data shows it
+                continue  # the robot sleeps or loads a map; the age of the data shows that
 
     async def _odometry(self) -> None:
         asked = self._clock.time()

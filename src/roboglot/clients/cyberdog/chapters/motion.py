@@ -12,9 +12,9 @@ from roboglot.clients.errors import LinkLost
 from roboglot.wire.cyberdog.chapters.motion.motion import CommandType, Motion, MotionCode
 from roboglot.wire.cyberdog.codes import Code
 
-FRAME_PERIOD = 0.1  # s; the robot stands still after 0.2 without one
+FRAME_PERIOD = 0.1  # s; the robot stops after 0.2 without one
 MOTION_MAX = 25.0  # s: the robot itself answers within 20
-STEP = (0.05, 0.05)  # m, front and rear feet
+STEP = (0.05, 0.05)  # m: of the front and the rear feet
 
 
 class _Outcome(msgspec.Struct):

@@ -18,7 +18,7 @@ FEEDBACK_MAX = 60.0  # s
 class Programs(Calls):
     """A frame and the feedback that carries its id."""
 
-    frames: Feed[object]  # pushes of 2001
+    frames: Feed[object]  # pushes of code 2001
     _numbers = itertools.count(1)
 
     async def send_frame(self, frame: Mapping[str, object]) -> None:

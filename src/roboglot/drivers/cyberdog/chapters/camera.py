@@ -25,7 +25,7 @@ else:
     np = lazy("numpy")
 
 log = logging.getLogger(__name__)
-WIDTH, HEIGHT, RATE = 1280, 720, 30.0  # what comes in another size is made to fit
+WIDTH, HEIGHT, RATE = 1280, 720, 30.0  # pictures of other sizes are scaled
 FOV = 1.2217  # rad; not reported
 FORWARD, ABOVE, PITCH = 0.25, 0.34, -0.1  # m and rad above the ground of a standing dog; not reported
 PIXELS_MAX = 50_000_000  # of a photo

@@ -26,11 +26,11 @@ from roboglot.model.geometry import STILL, Twist
 SPEED, YAW_SPEED = 3.5, math.radians(600)  # the manual's limits of a move
 ACCELERATION, YAW_ACCELERATION = 2.0, 6.0  # m/s2, rad/s2: not in the manual; only used to plan
 REMINDER = 0.06  # s until an unchanged velocity is sent again
-SPARE = 0.18  # s that a move lasts beyond that; it slows down in the last sixth of a second
-SLOWING = 1.6  # a robot brakes in time to stand at the end; its deceleration is at least this over twice ACCELERATION's
-SLOWEST, SLOWEST_TURN = 0.1, math.radians(10)  # m/s, rad/s: moves of real robots' builds are no slower
-LATENCY_MIN = 0.02  # s of a round trip, below which a push is later than an answer
-DELAYS = 1.5  # round trips: a command waits for the one before it, goes there, and what came of it comes back
+SPARE = 0.18  # s added to a move's duration; it slows down in the last sixth of a second
+SLOWING = 1.6  # a robot brakes in time to stop at the end; it decelerates at least this many times ACCELERATION / 2
+SLOWEST, SLOWEST_TURN = 0.1, math.radians(10)  # m/s, rad/s: moves of real builds are no slower
+LATENCY_MIN = 0.02  # s of a round trip, below which pushes take longer than answers
+DELAYS = 1.5  # round trips until a command's result is known: it waits for the previous one, then travels both ways
 WHEEL_RPM = 1000
 
 
@@ -125,7 +125,7 @@ class RoboMasterBase(LinkedBase):
         period = max(REMINDER, self._reported.latency)
         way = _reach(twist.speed, slowest, ACCELERATION, period)
         angle = _reach(abs(twist.yaw), slowest_turn, YAW_ACCELERATION, period)
-        bend = twist.yaw * period / 2  # half of what it turns until then: the way goes straight, the robot on an arc
+        bend = twist.yaw * period / 2  # half of the turn until then: the route goes straight, the robot in an arc
         ahead = Twist(
             twist.x * math.cos(bend) - twist.y * math.sin(bend), twist.x * math.sin(bend) + twist.y * math.cos(bend)
         )
@@ -149,5 +149,5 @@ class RoboMasterMotionStatus(MotionStatus):
 def _reach(speed: float, slowest: float, acceleration: float, period: float) -> float:
     """Return the seconds of motion in one move: enough not to slow down before its renewal after ``period`` s."""
     if speed < slowest:
-        return period  # it waits at the end
+        return period  # wait at the end
     return period + max(SPARE, speed / (SLOWING * acceleration))

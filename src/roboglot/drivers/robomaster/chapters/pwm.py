@@ -8,7 +8,7 @@ from roboglot.model.components.system.pwm import FREQUENCY_MAX, PwmPorts, PwmSig
 from roboglot.model.errors import InvalidGoal, NotFound
 
 COUNT = 6
-AT_REST = PwmSignal(0.075, 50.0)  # where robots leave their outputs when a session ends
+AT_REST = PwmSignal(0.075, 50.0)  # the robot's outputs after a session
 
 
 class RoboMasterPwm(PwmPorts):

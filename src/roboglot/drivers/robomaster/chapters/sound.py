@@ -28,7 +28,7 @@ else:
     np = lazy("numpy")
 
 QUEUE_MAX = 25  # packets: half a second
-RUNS_MAX = 20  # of claps that a listener may lag behind
+RUNS_MAX = 20  # runs of claps that a listener may lag behind
 
 AudioFeed = PacketFeed[AudioPacket]
 

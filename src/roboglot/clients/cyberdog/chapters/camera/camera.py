@@ -15,7 +15,7 @@ from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 
 PHOTO, RECORD, STOP = 1, 2, 3
 FILE_MAX = 2**32 - 1  # bytes: the largest size that the protocol can express
-CHUNK_WAIT = 30.0  # s until the next part must come
+CHUNK_WAIT = 30.0  # s to wait for the next chunk
 Progress = Callable[[float], object]
 
 

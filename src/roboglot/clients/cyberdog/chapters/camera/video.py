@@ -49,7 +49,7 @@ class Picture:
 class Video(Calls):
     """Image transmission."""
 
-    signals: Feed[object]  # what is pushed under 4001
+    signals: Feed[object]  # pushes of code 4001
 
     async def signal(self, signal: Signal) -> None:
         """4001: one message of signalling; the robot's own come in ``signals``."""
@@ -94,7 +94,7 @@ class Video(Calls):
             try:
                 await self.end_video(uid)
             except LinkLost:
-                pass  # the robot is gone
+                pass  # the robot has disconnected
             finally:
                 await peer.close()
 

@@ -8,7 +8,7 @@ from roboglot.clients.cyberdog.values import Region
 from roboglot.wire.cyberdog.codes import Code, TaskType
 
 CHOICE_MAX = 35.0  # s: the robot itself gives up after 30
-AUTO, BEHIND, LEFT, RIGHT = 200, 201, 202, 203  # where to keep by whom one follows
+AUTO, BEHIND, LEFT, RIGHT = 200, 201, 202, 203  # the side of the person on which to walk
 
 
 class Following(Tasks):

@@ -13,7 +13,7 @@ from roboglot.clients.cyberdog.values import UpdateProgress, UpdateStatus
 from roboglot.clients.errors import LinkLost
 from roboglot.wire.cyberdog.codes import Accepted, Code
 
-OnUpdate = Callable[[str, float], object]  # the state, and how much of it is done, 0..1
+OnUpdate = Callable[[str, float], object]  # the state and the progress, 0..1
 
 
 class _Time(msgspec.Struct):

@@ -13,7 +13,7 @@ from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.geometry import Path, Point, Pose
 
 GOALS_MAX, POSITION_MAX = 100, 10_000.0
-FRESH = 1.0  # s that a pose may be old for the dog to count as localized
+FRESH = 1.0  # s: maximum age of a pose for the dog to count as localized
 
 
 class CyberDogNavigation(Navigation):

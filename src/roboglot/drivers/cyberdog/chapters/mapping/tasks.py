@@ -30,7 +30,7 @@ class Skills:
 
     def __init__(self, robot: Robot, client: CyberDogClient, link: Link, reported: ReportedState) -> None:
         self.robot, self.client, self.link, self.reported = robot, client, link, reported
-        self._orphan: TaskType | None = None  # still runs after the link was lost
+        self._orphan: TaskType | None = None  # still running since the link was lost
 
     def start(
         self, name: str, begins: Sequence[Begin], *, goal: object, source: str, on_busy: OnBusy, resource: str = BASE
@@ -81,7 +81,7 @@ class Skills:
 
     async def _localize(self) -> None:
         try:
-            (await self.client.relocalise()).leave()  # pose pushes show its end
+            (await self.client.relocalise()).leave()  # pose pushes show when it ends
         except ClientError as error:
             log.info("%s is not localized: %s", self.link.address, error)
 
@@ -123,6 +123,6 @@ class Skills:
         try:
             self.link.require()
             await task.cancel()
-        except (ClientError, Unconnected):  # without a link the task goes on until it is back
+        except (ClientError, Unconnected):  # without a link the task continues until the link is back
             task.leave()
             self._orphan = task.kind

@@ -42,7 +42,7 @@ HEIGHTS = {Posture.STANDING: 0.22, Posture.LYING: 0.05, Posture.LIMP: 0.05}  # m
 LIMITS = LegLimits(
     lowest=0.10, highest=0.30, angle=0.45, shift=0.10, reach=0.15
 )  # beyond these the dog refuses by itself, too
-LONG_MAX = 90.0  # s: the longest dance, and some to spare
+LONG_MAX = 90.0  # s: the longest dance, with some margin
 LOOK = 0.5  # s between two heartbeats
 POSE = 211  # absolute, in a given time
 
@@ -57,7 +57,7 @@ class CyberDogLegs(Legs):
         self._body = BodyPose()
         self._gait: Gait | None = None
         self._lift = FootLift(*STEP)
-        self._changing = 0  # our motions under way
+        self._changing = 0  # our motions in progress
         self.choreography = Choreography()
 
     @property

@@ -12,7 +12,7 @@ from roboglot.model.geometry import Point
 
 SIDES = {FollowSide.BEHIND: 201, FollowSide.LEFT: 202, FollowSide.RIGHT: 203}
 DISTANCE_MIN, DISTANCE_MAX = 0.5, 5.0  # m
-SEEN_WITHIN = 10.0  # s until the one to be followed is in the picture
+SEEN_WITHIN = 10.0  # s for the person to appear in the picture
 
 
 class CyberDogFollowing(Following):

@@ -30,7 +30,7 @@ MARKERS = (
 PERSON, ACROSS = 1.72, 0.6  # m: height; width with arms, used when head or feet are cut off
 MARKER, ROBOT = 0.17, 0.27  # m: height
 EDGE = 0.01  # of the picture
-SAME = 0.25  # of the picture between two boxes of one person
+SAME = 0.25  # of the picture between two boxes that belong to one person
 
 
 class Locator:
@@ -41,7 +41,7 @@ class Locator:
 
     def distance(self, box: Box, height: float, width: float = 0.0) -> float:
         """Return the distance from the lens in m; uses ``width`` if the box is cut off above or below."""
-        across = 2 * math.tan(self._camera.fov / 2)  # the picture's width, a metre ahead
+        across = 2 * math.tan(self._camera.fov / 2)  # the picture's width at a distance of one metre
         if width and (box.y - box.height / 2 < EDGE or box.y + box.height / 2 > 1 - EDGE):
             return width / max(box.width * across, 1e-3)
         return height / max(box.height * across * self._camera.height / self._camera.width, 1e-3)

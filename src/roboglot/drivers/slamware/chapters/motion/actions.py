@@ -140,7 +140,7 @@ class ActionRunner:
         ours, self._ours = self._ours, []
         with contextlib.suppress(ClientError):
             if orphan is not None:
-                self._ours = [orphan.id]  # as long as it brakes
+                self._ours = [orphan.id]  # until it has braked
                 await orphan.cancel()
             elif unanswered:
                 now = await self._client.get_current_action()

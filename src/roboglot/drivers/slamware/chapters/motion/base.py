@@ -25,13 +25,13 @@ from roboglot.model.robot import Robot
 from roboglot.wire.slamware.chapters.motion import Direction, MoveByOptions
 from roboglot.wire.slamware.chapters.system.devices import Parameter
 
-PULSE = 0.4  # s that the robot goes on without a new pulse
+PULSE = 0.4  # s for which the robot continues without a new pulse
 RENEWAL = 0.1  # s between two pulses
 SPEED, YAW_SPEED = 0.5, 1.0  # m/s, rad/s: assumed before the robot reports its limits
 ACCELERATION, YAW_ACCELERATION = 0.5, 1.5  # m/s2, rad/s2: not reported; only used to plan
 YAW_PARAMETER = "base.max_angular_speed"
 SPEED_MIN = 0.02  # m/s; robots refuse a lower limit
-CATCH_UP = 2.5  # of an arc's speeds: each has less than half of the time
+CATCH_UP = 2.5  # for the speeds of an arc, each of which gets less than half of the time
 SPEED_STEP = 0.02  # m/s: a smaller change of speed is not sent
 
 
@@ -51,7 +51,7 @@ class SlamwareBase(LinkedBase):
         self._still.set()
         self._pulsing: asyncio.Task[None] | None = None
         self._last: RunningAction | None = None
-        self._limit: float | None = None  # set by us; None: the robot's own
+        self._limit: float | None = None  # our limit; None: the robot's own
         self._turns: ArcSplitter | None = None  # of an arc
         self.error: Exception | None = None  # why the last pulse could not be sent
 
@@ -90,7 +90,7 @@ class SlamwareBase(LinkedBase):
                 await self._send(self._target)
                 with contextlib.suppress(TimeoutError):
                     await self._clock.wait_for(self._changed.wait(), RENEWAL)
-                if await self._runner.taken_over():  # a further pulse would take the robot back
+                if await self._runner.taken_over():  # a further pulse would take control back
                     self.error, self._target = Busy("another client of the robot took over"), STILL
         except ClientError as error:
             self.error, self._target = error, STILL
@@ -125,7 +125,7 @@ class SlamwareBase(LinkedBase):
         if abs(speed - limit) < SPEED_STEP and (speed == own) == (limit == own):
             return
         await self._limit_restore.remember(own)
-        with contextlib.suppress(SlamwareRefused):  # then it drives at its own speed
+        with contextlib.suppress(SlamwareRefused):  # otherwise the robot uses its own speed
             await self._client.set_system_parameter(Parameter(PARAMETER, f"{speed:.3f}"))
         self._limit = speed
 

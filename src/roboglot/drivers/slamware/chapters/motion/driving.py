@@ -27,7 +27,7 @@ GOOD, GOOD_YAW = 0.005, math.radians(0.4)  # m, rad: tolerance of the goal; the 
 LEAD = 0.09  # s that braking takes
 SLOW, SLOW_YAW = 0.03, 0.06  # m/s, rad/s: speeds of the last centimetres
 GAIN, GAIN_YAW = 1.2, 1.8  # 1/s: of the way left
-PATIENCE = 3.0  # s without progress
+PATIENCE = 3.0  # s without progress before giving up
 SETTLED = 0.3  # s of standstill before the result counts, as odometry is delayed
 TRIES_MAX = 4
 REST_SPEED, REST_YAW_RATE, REST_MAX = 0.01, 0.03, 3.0
@@ -122,7 +122,7 @@ class SlamwareDriving(Driving):
     async def _rest(self) -> None:
         """Brake and wait until the robot reports standstill or goes silent."""
         await self._base.stop()
-        if isinstance(self._base.error, Busy):  # another client moves it now
+        if isinstance(self._base.error, Busy):  # another client is moving the robot
             return
         clock = self._robot.clock
         deadline, settled = clock.time() + REST_MAX, clock.time() + SETTLED

@@ -36,8 +36,8 @@ else:
 
 GOALS_MAX, PLACES_MAX, POSITION_MAX = 1000, 500, 10_000.0
 MODES = {Tracks.FREE: 0, Tracks.STRICT: 1, Tracks.PREFERRED: 2}
-HERE = 0.5  # m from the robot within which a path may begin: its search begins where it is
-PRECISE = 0.1  # m of tolerance at or below which the precise flag is set
+HERE = 0.5  # m from the robot within which a path may begin: robots search from where they stand
+PRECISE = 0.1  # m of tolerance up to which the precise flag is set
 TOUR_PASSES = 30
 
 
@@ -92,7 +92,7 @@ class SlamwareNavigation(Navigation):
             remaining = Path.through((await self._client.get_remaining_path()).path_points)
             milestones = (await self._client.get_remaining_milestones()).path_points
             seconds = await self._client.get_remaining_time()
-        except SlamwareRefused:  # it has no path at the moment
+        except SlamwareRefused:  # there is no path at the moment
             return NavigationFeedback(stage="planning", remaining=Path(), milestones=(), time_to_goal=0.0)
         return NavigationFeedback(
             stage="driving" if remaining.points else "planning",

@@ -16,7 +16,7 @@ STROKE = 0.06  # m; not reported
 LOWEST, HIGHEST = 31, 26_000_001  # counts of the drive at the ends, as seen on robots
 STAGES = {2: JackStage.DOWN, 3: JackStage.MOVING, 4: JackStage.STOPPED, 5: JackStage.UP}
 PERIOD = 0.1  # s between two polls
-BEGUN_WITHIN = 1.0  # s until it must move
+BEGUN_WITHIN = 1.0  # s until it must have begun to move
 
 
 class SlamwareJack(Jack):
@@ -99,4 +99,4 @@ class SlamwareJack(Jack):
         try:
             await self._client.set_jack_req("Stop")
         except ClientError:
-            return  # gone, or it stands already
+            return  # removed, or already at rest

@@ -48,7 +48,7 @@ class SlamwareLight(ReportedLight):
         match state.effect:
             case LightEffect.FLASH:
                 control.bright_ms = control.off_ms = round(period / 2)
-            case LightEffect.BREATH:  # up from the first colour to the second in steps of one part, and down again
+            case LightEffect.BREATH:  # from the first colour to the second in steps of one, and back
                 control.color, control.brightness_end_color = LightColour(), _parts(colour)
                 steps = 2 * max(colour.red, colour.green, colour.blue, 1)
                 control.bright_ms = max(1, round(period / steps))
