@@ -175,9 +175,7 @@ def _bound(address: str, first: int) -> socket.socket:
     """A socket that listens on ``first``, or on the next free port. Raises OSError."""
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     for port in range(first, first + (PORTS_TRIED_MAX if first else 1)):
-        listening = socket.socket(
-            family, socket.SOCK_STREAM, socket.IPPROTO_TCP
-        )  # IPPROTO_TCP: asyncio sets TCP_NODELAY
+        listening = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)  # asyncio then sets TCP_NODELAY
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             listening.bind((address, min(port, 65_535)))

@@ -50,16 +50,16 @@ class Action:
         self.name = name
         self.goal = goal
         self.resources = resources
-        self.source = source  # who asked for it, e.g. the door's name; for the log and for what ends with its client
-        self.client = client()  # the very one, as its door names it
-        self.connection = connection()  # over which it was asked; empty: over none that is known
-        self.identity = identity()  # who it showed to be, where that is asked
+        self.source = source  # the requester, e.g. the door's name; for the log, and to end actions with their client
+        self.client = client()  # the individual client, as its door names it
+        self.connection = connection()  # the connection of the request; empty if unknown
+        self.identity = identity()  # the identity that the client proved, where one is required
         self.status = ActionStatus.ACCEPTED
         self.feedback: object = None
         self.error: RobotError | None = None
         self.paused = False
-        self.hands_over = False  # what takes its place goes on from its motion: it need not stand still first
-        self.brakes_hard = False  # it is cancelled because no one minds it any more: as fast as the base can
+        self.hands_over = False  # the next action continues this motion: no stop in between
+        self.brakes_hard = False  # cancelled because its client is gone: brake as fast as possible
         self.started_at = self.ended_at = owner.clock.time()
         self._failure: RobotError | None = None  # why it is being aborted from outside
         self._owner = owner

@@ -92,7 +92,7 @@ class Actions:
             case _:
                 action.error, status = RobotError(f"internal error: {error}"), ActionStatus.ABORTED
                 log.error("%s #%d broke", action.name, action.id, exc_info=error)
-        forget_stack(error)  # it is kept for a while; what it ran through must not be
+        forget_stack(error)  # errors are kept for a while; the frames that they passed through must not be
         action._task = None
         del self._running[action.id]
         self._history.append(action)

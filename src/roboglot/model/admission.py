@@ -50,7 +50,7 @@ class Admission:
     """For one robot: this one lets everybody in who reaches its doors, and everybody may do everything."""
 
     asks = False
-    connections_max = 0  # of one address at once, where ``asks``
+    connections_max = 0  # per address, where ``asks``
 
     def known(self, address: str, proof: Proof = NO_PROOF) -> str | None:
         """Return who the client at ``address`` ("10.0.0.7:40312") is, if that needs no work; None: ask ``admit``."""

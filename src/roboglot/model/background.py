@@ -14,7 +14,7 @@ from functools import cache
 from typing import TypeVar
 
 R = TypeVar("R")
-NICENESS = 10  # of the threads: a tenth of a core where the event loop wants it, too
+NICENESS = 10  # of the threads: they get a tenth of a core while the event loop is busy
 
 
 async def beside(job: Callable[[], R]) -> R:
@@ -31,7 +31,7 @@ async def load(job: Callable[[], R]) -> R:
     result: Future[R] = Future()
 
     def work() -> None:
-        result.set_running_or_notify_cancel()  # from here on it cannot be cancelled
+        result.set_running_or_notify_cancel()  # no cancelling from here on
         modules = len(sys.modules)
         try:
             found = job()
@@ -54,5 +54,5 @@ def _pool(_process: int) -> ThreadPoolExecutor:
 
 def _give_way() -> None:
     if hasattr(os, "setpriority"):
-        identifier = threading.get_native_id()  # on Linux a thread has a priority of its own
+        identifier = threading.get_native_id()  # on Linux each thread has its own priority
         os.setpriority(os.PRIO_PROCESS, identifier, max(NICENESS, os.getpriority(os.PRIO_PROCESS, identifier)))

@@ -15,10 +15,10 @@ else:
     np = lazy("numpy")
 
 WINDOW = 240  # samples: 5 ms
-BEFORE, AFTER = 30, 14  # windows around a burst that are compared with it: 150 ms and 70 ms
+BEFORE, AFTER = 30, 14  # windows around a burst for comparison: 150 ms and 70 ms
 LOUDEST_FIRST = 4  # windows within which a burst must have reached its peak: 20 ms
-THRESHOLD = 0.01 * 32767  # root mean square below which nothing is a clap
-RISE, FALL = 5.0, 0.3  # a burst is so many times louder than before; and so much of it is left afterwards
+THRESHOLD = 0.01 * 32767  # root mean square below which no sound counts as a clap
+RISE, FALL = 5.0, 0.3  # factors by which a burst exceeds the sound before it, and by which it decays
 GAP_MIN, GAP_MAX = 0.1, 0.8  # s between the claps of a run
 
 
@@ -58,5 +58,5 @@ class ClapCounter:
         peak = burst.max()
         if peak < THRESHOLD or burst[0] < 0.5 * peak:
             return False
-        # The last window before may hold the burst's first moment.
+        # The last window before it may contain the burst's onset.
         return bool(peak > RISE * max(before[:-1].mean(), before[-2]) and after[-2:].mean() < FALL * peak)

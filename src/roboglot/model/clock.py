@@ -21,9 +21,9 @@ from roboglot.model.clock_base import HOLD_MAX, Clock, Timer
 __all__ = ["LEAD", "LOCKSTEP_EPOCH", "Clock", "LockstepClock", "PatientClock", "RealClock", "Timer"]
 YIELD_AFTER = 0.5  # s of lockstep time
 ROUNDS_MAX = 200  # of the event loop
-LEAD = 0.1  # s that a patient clock goes further than the world
-STANDING = 0.002  # real s between two looks at a patient clock that stands still
-LOCKSTEP_EPOCH = 1_767_225_600.0  # 2026-01-01T00:00:00Z: lockstep traces carry no real date
+LEAD = 0.1  # s by which a patient clock may be ahead of the world
+STANDING = 0.002  # real s between two checks of a patient clock that stands still
+LOCKSTEP_EPOCH = 1_767_225_600.0  # 2026-01-01T00:00:00Z: lockstep traces contain no real date
 
 
 class _RealTimer:
@@ -64,7 +64,7 @@ class RealClock(Clock):
     """
 
     def __init__(self, speed: float = 1.0) -> None:
-        self._anchor = time.monotonic(), 0.0  # a real instant and the robot time that belonged to it
+        self._anchor = time.monotonic(), 0.0  # a real instant and the corresponding robot time
         self._epoch = time.time()
         self._until = math.inf  # robot time at which the clock stops
         self._timers: set[_RealTimer] = set()
@@ -153,7 +153,7 @@ class PatientClock(RealClock):
         return min(super().time(), self._reach)
 
     def reached(self, stamp: float) -> None:
-        if super().time() > self._reach:  # it stood there, and goes on from there
+        if super().time() > self._reach:  # it stood there and continues from there
             self._anchor = time.monotonic(), self._reach
         self._reach = stamp + LEAD
 
@@ -190,7 +190,7 @@ class LockstepClock(Clock):
 
     def __init__(self) -> None:
         self._now = 0.0
-        self._held: dict[object, float] = {}  # until when, on the loop's clock
+        self._held: dict[object, float] = {}  # until when, by the loop's clock
         self._released: asyncio.Future[None] | None = None
         self._order = itertools.count()
         self._heap: list[tuple[float, int, _LockstepTimer]] = []
@@ -248,9 +248,9 @@ class LockstepClock(Clock):
             self._set(max(self._now, when))
             self._turn += 1
             callback()
-            if ready or self._held or self._arrived:  # mostly there is nothing
+            if ready or self._held or self._arrived:  # the usual case: nothing to run
                 await self._settle()
-            if self._now - yielded >= YIELD_AFTER:  # nothing else may have been ready for long; sockets want a turn
+            if self._now - yielded >= YIELD_AFTER:  # callbacks may keep becoming ready; let sockets be polled
                 yielded = self._now
                 await asyncio.sleep(0)
 

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from typing import Protocol, TypeVar
 
 T = TypeVar("T")
-HOLD_MAX = 5.0  # s of the machine that lockstep time waits for work outside of the event loop
+HOLD_MAX = 5.0  # s (machine clock) that lockstep time waits for work outside the event loop
 
 
 class Timer(Protocol):
@@ -116,7 +116,7 @@ class Clock(ABC):
         try:
             return await task
         except asyncio.CancelledError:
-            # A waiter that is cancelled in the very moment of the time-out must not go on.
+            # A waiter that is cancelled at the moment of the time-out must not continue.
             if expired and not (waiter and waiter.cancelling() > cancelled_before):
                 raise TimeoutError(f"nothing within {timeout} s") from None
             task.cancel()

@@ -17,8 +17,8 @@ from roboglot.model.robot import Robot
 EQUATOR = 6_378_137.0  # m, WGS-84
 FLATTENING = 1 / 298.257223563
 SIGMAS = 3.0  # standard deviations that a search allows for
-BASELINE = 6.0  # accuracies that fixes must lie apart until north can be computed from them
-SLACK = 2.0  # m more that a search goes: the robot's own size, a map that is a little bent
+BASELINE = 6.0  # accuracies that fixes must be apart before north can be computed
+SLACK = 2.0  # m added to a search: the robot's own size, a slightly bent map
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ class GlobeAnchor:
         reach = self._reach(fix)
         x, y = self.point.x, self.point.y
         if self.north is None:
-            reach += math.hypot(east, north)  # it is that far away, in whatever direction
+            reach += math.hypot(east, north)  # the distance counts in every direction
         else:
             c, s = math.cos(self.north), math.sin(self.north)
             x, y = x + c * north + s * east, y + s * north - c * east
@@ -108,7 +108,7 @@ def anchor(samples: Iterable[tuple[Point, GpsReading]]) -> GlobeAnchor | None:
     latitude = sum(fix.latitude for _, fix in good) / count
     longitude = good[0][1].longitude + sum(_east_of(good[0][1], fix) for _, fix in good) / count
     middle = Point(sum(point.x for point, _ in good) / count, sum(point.y for point, _ in good) / count)
-    accuracy = max(fix.accuracy for _, fix in good)  # errors of neighbouring fixes are alike: a mean does not help
+    accuracy = max(fix.accuracy for _, fix in good)  # errors of neighbouring fixes are correlated
     along = across = spread = 0.0
     for point, fix in good:
         east, north = offset(latitude, longitude, fix.latitude, fix.longitude)

@@ -18,8 +18,12 @@ else:
     np = lazy("numpy")
 
 CELLS_MAX = 25_000_000
-POINTS_MAX = 1500  # of the other map's walls, for finding where they fit
-STEPS = ((1.0, 0.1, 0.15, 0.05), (0.1, 0.05, 0.05, 0.01), (0.05, 0.025, 0.01, 0.0025))  # m around, m; rad around, rad
+POINTS_MAX = 1500  # of the other map's walls, used to find the fit
+STEPS = (
+    (1.0, 0.1, 0.15, 0.05),
+    (0.1, 0.05, 0.05, 0.01),
+    (0.05, 0.025, 0.01, 0.0025),
+)  # m around, step; rad around, step
 SURE = 127
 
 

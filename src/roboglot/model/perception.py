@@ -59,7 +59,7 @@ class Emotion(StrEnum):
 class Gesture(StrEnum):
     """Hand gestures of people; left and right are the person's own."""
 
-    PULL = "pull"  # a hand, or two fingers, pulled towards oneself
+    PULL = "pull"  # a hand, or two fingers, pulled towards the body
     PUSH = "push"
     UP = "up"
     DOWN = "down"

@@ -28,7 +28,7 @@ class Description:
     serial: str
     hardware_version: str
     software_version: str
-    radius: float  # m, of the circle around base_link that holds the hull
+    radius: float  # m: radius of the circle around base_link that contains the hull
     height: float  # m
 
 
@@ -44,7 +44,7 @@ class Robot:
     tap: Tap = field(init=False)
     outside: Outside = field(init=False)
     admission: Admission = field(default_factory=Admission)
-    stand_in: StandIn | None = None  # who answers at its doors in its place
+    stand_in: StandIn | None = None  # answers at the doors in the robot's place
     _components: dict[type[Component], Component] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -77,7 +77,7 @@ class OdometryReading:
     stamp: float
     pose: Pose
     twist: Twist
-    distance: float  # m travelled since start, turning on the spot not counted
+    distance: float  # m travelled since start, without turns in place
 
 
 class Supply(StrEnum):

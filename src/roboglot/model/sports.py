@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from roboglot.model.perception import JOINTS, SkeletonSeen, Sport
 
-GAP_MAX = 1.0  # s without a usable skeleton after which a repetition that was begun does not count
+GAP_MAX = 1.0  # s without a usable skeleton after which an unfinished repetition is discarded
 _INDEX = {name: number for number, name in enumerate(JOINTS)}
 
 
@@ -17,7 +17,7 @@ class _Figure:
 
     def __init__(self, skeleton: SkeletonSeen) -> None:
         self._joints, self._aspect = skeleton.joints, skeleton.aspect
-        # The longer of torso and shoulders: one of them is foreshortened, whichever way the person is turned.
+        # The longer of torso and shoulders: one of them is foreshortened, whatever the person's orientation.
         torso = math.dist(self._at("shoulder"), self._at("hip"))
         shoulders = math.dist(self._one("left_shoulder"), self._one("right_shoulder"))
         self.measure = max(torso, 1.3 * shoulders, 1e-6)

@@ -17,15 +17,15 @@ from roboglot.model.client_context import client, connection
 from roboglot.model.clock import Clock
 from roboglot.model.feed import Feed, Viewer
 
-QUEUE_MAX = 4096  # exchanges that wait for one viewer; then they are dropped and counted
+QUEUE_MAX = 4096  # exchanges queued per viewer; beyond this they are dropped and counted
 _SECRET = re.compile(rb"""("\w*[Pp]assword"\s*:\s*)(?:"(?:[^"\\]|\\.)*(?:"|\Z)|[^\s",{\[][^,}\]]*)""", re.DOTALL)
-# The same in JSON that is a text in JSON.
+# The same for JSON inside a JSON string.
 _SECRET_IN_TEXT = re.compile(
     rb"""(\\"\w*[Pp]assword\\"\s*:\s*\\")(?:[^"\\]|\\\\.)*""", re.DOTALL
-)  # JSON in a JSON text
-LOST = "lost"  # the status where a real robot's answer does not come
-DRIVER = "driver/"  # with which the name begins that stands for a driver where doors have theirs
-PAYLOAD_MAX = 8 * 1024 * 1024  # bytes of one exchange that are kept
+)  # JSON inside a JSON string
+LOST = "lost"  # the outcome when a real robot does not answer
+DRIVER = "driver/"  # prefix of the names of drivers, where doors have their own
+PAYLOAD_MAX = 8 * 1024 * 1024  # bytes kept of one exchange
 
 
 def without_secrets(data: bytes) -> bytes:
@@ -41,7 +41,7 @@ class Direction(StrEnum):
     PUSH = "push"
 
 
-class Exchange(NamedTuple):  # made for each message: a frozen dataclass takes five times as long
+class Exchange(NamedTuple):  # created for each message: a frozen dataclass takes five times as long
     """One message of one door, or of the driver of a real robot, in either direction.
 
     ``stamp``: robot time in s. ``connection``: the other end's address ("127.0.0.1:40312"), or a name where there is

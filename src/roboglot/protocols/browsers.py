@@ -23,8 +23,8 @@ log = logging.getLogger(__name__)
 
 ANY = "*"
 ORIGIN_MAX = 2048  # characters of a Host, an Origin or a Referer
-VERDICTS_MAX = 256  # kept, so that a client's next request costs a look-up
-WARNINGS_MAX = 64  # different refusals that are logged as warnings; those after them only with --verbose
+VERDICTS_MAX = 256  # cached, so that a client's next request costs one look-up
+WARNINGS_MAX = 64  # different refusals logged as warnings; later ones only with --verbose
 _HOST = re.compile(r"(?:\[([0-9A-Fa-f:.]+)\]|([A-Za-z0-9._-]+))(?::\d{1,5})?")
 _ORIGIN = re.compile(r"[a-z][a-z0-9+.-]*://[^/?#@\s]+")
 
@@ -37,7 +37,7 @@ class Headers:
     origin: str | None = None
     referer: str | None = None
     site: str = ""  # Sec-Fetch-Site
-    opens_page: bool = False  # a GET that a person began by a link, a bookmark or the address line
+    opens_page: bool = False  # a navigation by link, bookmark or address bar
 
 
 class Browsers:
@@ -87,7 +87,7 @@ class Browsers:
             )
         page = headers.origin
         if page is None and headers.site == "cross-site" and not headers.opens_page:
-            page = _origin_of(headers.referer)  # pictures and scripts of other pages come without an Origin
+            page = _origin_of(headers.referer)  # pictures and scripts on other pages are requested without an Origin
         if page is None or self._welcomes(page, host):
             return ""
         return f"it comes from a web page of {page!r}{self._hint('origins', 'lets pages of other hosts in')}"
@@ -154,7 +154,7 @@ def _is_address(host: str) -> bool:
         ip_address(host)
     except ValueError:
         try:
-            socket.inet_aton(host)  # as people write it: 127.1
+            socket.inet_aton(host)  # the short form of an address: 127.1
         except OSError:
             return False
     return True

@@ -20,8 +20,8 @@ from roboglot.transport.seldom import Seldom
 from roboglot.transport.tls import Tls, TlsPort
 
 log = logging.getLogger(__name__)
-BACKLOG = 2048  # connections that wait to be taken
-OPEN_MAX = 1024  # connections of all clients to the ports of one door
+BACKLOG = 2048  # connections waiting to be accepted
+OPEN_MAX = 1024  # connections of all clients to one door's ports
 
 Factory = Callable[[], asyncio.Protocol]
 
@@ -39,7 +39,7 @@ class Gate:
 
     def __init__(self, admission: Admission, tls: Tls | None = None) -> None:
         self._admission, self._tls = admission, tls
-        self._open: dict[asyncio.Transport, str] = {}  # who it is
+        self._open: dict[asyncio.Transport, str] = {}  # identity by connection
         self._seldom = Seldom(log)
         self._leave: Callable[[], None] | None = None
 
@@ -94,7 +94,7 @@ class Gate:
 
         if port.right is not None:
             try:
-                copy_context().run(check, port.right)  # the loop's own context stays without a client
+                copy_context().run(check, port.right)  # the loop's own context stays free of clients
             except Forbidden:
                 return None
         if not port.connections.enter(peer[0], admission.connections_max):

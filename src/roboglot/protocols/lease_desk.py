@@ -20,7 +20,7 @@ from roboglot.model.robot import Robot
 from roboglot.model.stage import Stage
 
 NAME = "lease.sock"  # in the data folder
-LEASE = "lease"  # the kind of inputs that come from here
+LEASE = "lease"  # the kind of recorded inputs from this socket
 
 
 class Request(msgspec.Struct, forbid_unknown_fields=True):
@@ -82,7 +82,7 @@ class LeaseDesk:
     async def _grant(self, request: Request) -> None:
         if request.all:
             wishes = (self.do(request, robot) for robot in self._robots.values())
-            ends = await asyncio.gather(*wishes, return_exceptions=True)  # one that refuses holds up no other
+            ends = await asyncio.gather(*wishes, return_exceptions=True)  # a refusal does not delay the others
             for name, end in zip(self._robots, ends, strict=True):
                 if isinstance(end, BaseException):
                     raise LookupError(f"robot {name}: {end}") from end

@@ -13,7 +13,7 @@ from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
 
-FAR = 1e6  # m, m/s: what is beyond is a mistake
+FAR = 1e6  # m, m/s: larger values are mistakes
 
 
 def drive(robot: Robot, wish: Twist, dead_man: float, source: str) -> None:

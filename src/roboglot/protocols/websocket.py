@@ -31,7 +31,7 @@ log = logging.getLogger(__name__)
 LIBRARY = "websockets.server"
 """Loaded in the background once the port is open, so that the door starts as fast as without it."""
 CONNECTIONS_MAX = 32
-PENDING_MAX = 16  # texts of one connection that are being answered
+PENDING_MAX = 16  # texts of one connection in progress
 REASON_BYTES_MAX = 123  # of a close frame
 GOING_AWAY, UNSUPPORTED, NOT_UTF8, POLICY, TRY_LATER = 1001, 1003, 1007, 1008, 1013  # close codes of RFC 6455
 
@@ -100,21 +100,21 @@ class Connection(asyncio.Protocol):
         self._transport: asyncio.Transport | None = None
         self._host = ""
         self._name = ""  # host and port
-        self.identity = ""  # of the account, where admission asks for one
-        self.subprotocol = ""  # the one of the channel's that was agreed on
+        self.identity = ""  # the account's, where admission requires one
+        self.subprotocol = ""  # the agreed one of those that the channel offers
         self.writer = Writer()
         self._opening = Opening(server.entrance, self.writer, self._wait_for, self._begin)
-        self._protocol: ServerProtocol | None = None  # once it is open
+        self._protocol: ServerProtocol | None = None  # set once open
         self._pieces = bytearray()
         self._channel: Channel | None = None
         self._session: Session | None = None
-        self._binary = False  # the message that comes in pieces
+        self._binary = False  # a message that arrives in pieces
         self._pending: set[asyncio.Future[None]] = set()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Count the connection in, or abort it where there are too many."""
         self._transport = cast(asyncio.Transport, transport)
-        peer = transport.get_extra_info("peername") or ("", 0)  # none: it is gone already
+        peer = transport.get_extra_info("peername") or ("", 0)  # None: already disconnected
         self._host = peer[0]
         self._name = f"{peer[0]}:{peer[1]}"
         self.writer.connect(self._transport, self._name)

@@ -64,8 +64,8 @@ class Opening:
         self._entrance, self._writer, self._wait_for, self._opened = entrance, writer, wait_for, opened
         self._host = self._name = ""
         self._head = bytearray()
-        self._early = b""  # received after the request, before it was accepted
-        self._protocol: ServerProtocol | None = None  # once the request is complete
+        self._early = b""  # received after the request, before the connection was accepted
+        self._protocol: ServerProtocol | None = None  # set once the request is complete
         self._timer = asyncio.get_running_loop().call_later(OPENING_SECONDS_MAX, writer.abort)
 
     def begin(self, host: str, name: str) -> None:

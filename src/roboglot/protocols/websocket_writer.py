@@ -11,9 +11,9 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-UNSENT_MAX = 16 * 1024 * 1024  # bytes waiting for a slow reader; at the next text it is disconnected
-ROOM = 256 * 1024  # bytes waiting for a slow reader before programs wait for it
-STALLED_SECONDS_MAX = 10.0  # in which such a reader takes nothing at all; then it is disconnected
+UNSENT_MAX = 16 * 1024 * 1024  # bytes queued for a slow reader; the next text disconnects it
+ROOM = 256 * 1024  # bytes queued for a slow reader before programs wait for it
+STALLED_SECONDS_MAX = 10.0  # for which such a reader may take nothing before it is disconnected
 
 
 class Writer:

@@ -83,9 +83,7 @@ class LiftFloors(Floors):
             return
         waiting, inside = self._places
         lift, belief = self.robot[LiftClient], self.belief
-        aboard = (
-            belief.pose.distance_to(inside) < waiting.distance_to(inside) / 2
-        )  # still in the car since the last try
+        aboard = belief.pose.distance_to(inside) < waiting.distance_to(inside) / 2  # still there from the last try
         if floor == self._current and not aboard:
             return
         if not aboard:

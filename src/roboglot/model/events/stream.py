@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-QUEUE_MAX = 256  # what a slow reader may leave unread before the oldest is dropped
+QUEUE_MAX = 256  # unread events per reader, beyond which the oldest is dropped
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,7 +73,7 @@ class EventStream:
     def __init__(self) -> None:
         self._subscriptions: list[Subscription[Event]] = []
         self._listeners: list[tuple[type[Event], Callable[[Event], None]]] = []
-        self._receivers: dict[type[Event], tuple[Callable[[Event], None], ...]] = {}  # by what was published before
+        self._receivers: dict[type[Event], tuple[Callable[[Event], None], ...]] = {}  # by the type of a published event
 
     def publish(self, event: Event) -> None:
         """Deliver ``event`` at once: listeners are called, subscriptions get it queued."""

@@ -16,8 +16,8 @@ from typing import NamedTuple
 from roboglot.model.client_context import client, connection
 from roboglot.model.clock import Clock
 
-ANSWER = "answer"  # the kind of what someone answers whom the robot called
-PATIENCE = 2.0  # s of the machine that lockstep time waits for such an answer
+ANSWER = "answer"  # the kind of answers from outside that the robot asked for
+PATIENCE = 2.0  # s (machine clock) that lockstep time waits for such an answer
 _carried_out: ContextVar[bool] = ContextVar("carried_out", default=False)
 
 
@@ -49,8 +49,8 @@ class Outside:
         self._listeners: list[Listener] = []
         self._playing = False
         self._asked: Counter[str] = Counter()
-        self._waiting: dict[tuple[str, int], asyncio.Future[str]] = {}  # by name, and the how manieth of that name
-        self._answers_come = True  # the last one asked was no longer than PATIENCE about it
+        self._waiting: dict[tuple[str, int], asyncio.Future[str]] = {}  # by name and its running number
+        self._answers_come = True  # the last request took no longer than PATIENCE
 
     @property
     def watched(self) -> bool:
@@ -82,7 +82,7 @@ class Outside:
         finally:
             _carried_out.reset(before)
 
-    # -- answers of others ---------------------------------------------------------------------------------------------
+    # -- answers from outside ------------------------------------------------------------------------------------------
 
     async def ask(self, name: str, work: Callable[[], Awaitable[str]]) -> str:
         """Return what ``work`` hears from someone out there, in a word; its end is an input.

@@ -110,7 +110,7 @@ class Calls:
 
     def go_on(self) -> None:
         """Send the answer that was kept back, if there is one, and keep none back from here on."""
-        self.keeps_last = False  # the program may come to that answer later
+        self.keeps_last = False  # the program may read that answer later
         kept, self._kept = self._kept, b""
         if kept and not self._host.over:
             self._host.write(kept)
@@ -124,7 +124,7 @@ class Calls:
             return
         if call.name not in self._names:
             raise ProtocolViolation(f"a call of '{call.name[:NAME_MAX]}', which was not offered")
-        self._waiting = Call(call.id, call.name, (), {}, 0)  # its values are still to be read
+        self._waiting = Call(call.id, call.name, (), {}, 0)  # its values have not been read yet
         values = call.values()
         if size <= SHORT:
             self._deliver(call, size, drained(values))

@@ -229,7 +229,7 @@ class Engine:
         """End every run and the zygote; nothing of theirs is left. Idempotent."""
         self._closed = True
         if self._background is not None:
-            self._background.cancel()  # a zygote that is still loading has nothing to lose
+            self._background.cancel()  # a zygote that is still loading has no state to lose
             await asyncio.gather(self._background, return_exceptions=True)
         for run in list(self._runs):
             run.end(ExitReason.LOST, "EngineLost", "the program engine was closed")
@@ -241,7 +241,7 @@ class Engine:
         await asyncio.gather(*self._reaping)
         launcher, self._launcher = self._launcher, None
         if launcher is not None:
-            await launcher.close()  # and all workers that are left
+            await launcher.close()  # and all remaining workers
         await asyncio.gather(*ends, *self._asked, return_exceptions=True)
         await asyncio.to_thread(self._group.close)
 
@@ -299,7 +299,7 @@ class Engine:
             ours.setblocking(False)
             transport, _ = await asyncio.get_running_loop().create_unix_connection(lambda: protocol, sock=ours)
         except BaseException:
-            ours.close()  # a worker that was born sees its host gone and ends
+            ours.close()  # a worker already forked notices that its host is gone and exits
             if worker is None:
                 self._release()
             raise

@@ -25,7 +25,7 @@ class Inbox:
         self._events: deque[Event] = deque()
         self._pieces: list[str] = []
         self._size = self._unread = 0
-        self._reader: asyncio.Future[None] | None = None  # the one who waits; a future is cheaper than an Event
+        self._reader: asyncio.Future[None] | None = None  # the waiting reader; a future is cheaper than an Event
         self.closed = False
 
     @property

@@ -79,7 +79,7 @@ class Output:
     text: str
 
 
-class Call(msgspec.Struct, frozen=True):  # one a call: a frozen dataclass takes six times as long to make
+class Call(msgspec.Struct, frozen=True):  # one per call: a frozen dataclass takes six times as long to create
     """The program waits for ``reply`` or ``fail`` with this id. The name is one the prelude offers; the values are
     unchecked.
 

@@ -120,7 +120,7 @@ class Journal:
 
     async def _flush(self) -> None:
         async with self._order:
-            while self._pending and self.kept:  # more may come while this is written
+            while self._pending and self.kept:  # more may arrive during the write
                 entries, self._pending = self._pending, []
                 try:
                     if self._seq > CALLS_MAX or self._size > BYTES_MAX:

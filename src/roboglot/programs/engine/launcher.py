@@ -30,7 +30,7 @@ sys.path.insert(0, sys.argv[1])
 from roboglot.programs.worker import zygote
 zygote.main(int(sys.argv[2]), filter_required=sys.argv[3] == "filter")
 """
-# With an environment of our own these are -I, except that the hash seed can be fixed: two runs of a program then
+# With our own environment these are equivalent to -I, but allow a fixed hash seed: two runs of a program then
 # iterate its sets in the same order.
 _FLAGS = ["-s", "-S", "-P", "-B"]
 _ENVIRONMENT = {"PYTHONHASHSEED": "0"}
@@ -138,7 +138,7 @@ class Launcher:
         self._control = ours
         try:
             with theirs:
-                # Not left in the middle: the zygote would get whatever is open under that number by then.
+                # Never cancelled halfway: the zygote would receive any file that reuses the number.
                 starting = asyncio.ensure_future(
                     asyncio.to_thread(_start_process, theirs.fileno(), self._filter_required)
                 )
@@ -150,9 +150,9 @@ class Launcher:
             self._loop.add_reader(ours.fileno(), self._receive)
             return await self._ready
         except BaseException:
-            self._ready.cancel()  # no one asks any more
+            self._ready.cancel()  # the caller has stopped waiting
             if self._process is not None:
-                self._process.kill()  # it has no workers yet, and may take seconds until it looks at its socket
+                self._process.kill()  # it has no workers yet and may not read its socket for seconds
             await self.close()
             raise
 
@@ -165,7 +165,7 @@ class Launcher:
         worker = Worker(self._numbers, self._loop.create_future(), self._loop.create_future())
         self._workers[worker.number] = worker
         request = {"run": worker.number, "memory": memory_limit, "cpu": cpu_limit}
-        # Copies: the caller may be cancelled and close its own before the message has left.
+        # Duplicates: the caller may be cancelled and close its own before the message is sent.
         self._outbox.append((msgspec.json.encode(request), [os.dup(connection.fileno()), os.dup(memory)]))
         self._flush()
         try:
@@ -255,7 +255,7 @@ class Launcher:
             worker._end(Death(None))
             if not worker.born.done():
                 worker.born.set_exception(EngineError("the program zygote has ended"))
-                worker.born.exception()  # its waiter may have gone
+                worker.born.exception()  # the waiter may be gone
         if not self._ready.done():
             self._ready.set_exception(SandboxUnavailable("the program zygote ended before it was ready"))
 
@@ -268,7 +268,7 @@ def _start_process(descriptor: int, filter_required: bool) -> subprocess.Popen[b
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         pass_fds=[descriptor],
-        start_new_session=True,  # a Ctrl-C at the terminal is the server's to handle
+        start_new_session=True,  # Ctrl-C at the terminal is for the server
     )
 
 

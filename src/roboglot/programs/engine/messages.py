@@ -18,7 +18,7 @@ NAME_MAX = 200
 """Characters of a call's or an error type's name."""
 ARGUMENTS_MAX = 64
 """Arguments of one call, and as many with names."""
-VALUES_MAX = SEPARATORS_MAX + 2  # with the brackets around the arguments
+VALUES_MAX = SEPARATORS_MAX + 2  # including the brackets around the arguments
 
 
 VariableName = Annotated[str, msgspec.Meta(max_length=VARIABLE_NAME_MAX)]

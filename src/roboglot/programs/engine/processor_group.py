@@ -72,7 +72,7 @@ class ProcessorGroup:
                 (folder / file).write_text(value)
                 self._folder = folder
             else:
-                folder.rmdir()  # this hierarchy does not weigh processors
+                folder.rmdir()  # the controller for processor time is not available here
 
     def _remove_abandoned(self, parent: Path) -> None:
         """Groups of servers that were killed; the kernel refuses to remove one that is in use."""

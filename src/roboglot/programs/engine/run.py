@@ -154,7 +154,7 @@ class Run:
         """Wait until the process is gone and its last event can be read."""
         await asyncio.shield(self._ended)
 
-    # For the engine and the socket.
+    # Used by the engine and the socket.
 
     def attach(self, worker: Worker) -> None:
         """Take the process that was forked for this run. On a busy machine the run may be over by then."""
@@ -245,4 +245,4 @@ class Run:
         if self._ending is None:
             self._ending = ending
             if self._worker:
-                self._worker.signal(signal.SIGKILL)  # even a worker that says it has finished could stay
+                self._worker.signal(signal.SIGKILL)  # a worker that reports its end may still not exit

@@ -96,7 +96,7 @@ class Account:
         """Do ``work`` when it is this program's turn, after everything else that is ready."""
 
         def turn() -> None:
-            self._paid_until = self._loop.time() - STEP / LIGHT  # a step is free
+            self._paid_until = self._loop.time() - STEP / LIGHT  # a step costs nothing
             work()
 
         self._share.queue(turn)
@@ -134,7 +134,7 @@ class Meter:
 
     def _begin(self) -> None:
         self._began = time.thread_time()
-        self._until = time.perf_counter() + STEP  # a cheaper clock; which thread has the processor does not matter here
+        self._until = time.perf_counter() + STEP  # a cheaper clock; it does not matter which thread runs here
 
 
 @coroutine

@@ -14,7 +14,7 @@ from roboglot.programs.language.places import WORD, Places, Step
 
 SEARCHED_MAX = 256 * 1024
 """Places that are searched; later ones count as unknown. A longer search would hold up the server."""
-STEP_BITS, ORDERS = 2, 64  # an order of a step is one byte
+STEP_BITS, ORDERS = 2, 64  # the order in a step is one byte
 FOUND_MAX = 4096
 """Addresses whose places are remembered: a program calls from the same few lines again and again."""
 
@@ -24,7 +24,7 @@ class Page:
 
     def __init__(self, memory: int, places: Places) -> None:
         self._memory = mmap.mmap(memory, places.memory())
-        # Whole words: in bytes, a worker could make a search that finds something at every second one.
+        # Aligned words: in bytes, a worker could craft a pattern that matches at every second one.
         self._words: NDArray[np.uint64] = np.frombuffer(self._memory, np.uint64, 1 + min(places.count, SEARCHED_MAX))
         self._places = places
         self._found: dict[int, int] = {}
@@ -39,7 +39,7 @@ class Page:
         words = self._words
         address = words.item(0)
         number = self._found.get(address, 0)
-        if not number or words.item(1 + number) != address:  # not seen yet, or a hostile worker has moved it
+        if not number or words.item(1 + number) != address:  # not written yet, or moved by a hostile worker
             number = self._search(address)
             if len(self._found) < FOUND_MAX:
                 self._found[address] = number
@@ -64,7 +64,7 @@ class Page:
         number = self._places.number(unit, line)
         if not number:
             raise ValueError(f"there is no line {line}")
-        # As long as the worker has not read the program, there are no marks; it moves the stop by itself then.
+        # Until the worker has read the program there are no marks; it then moves the stop itself.
         self._set(self._places.next_marked(number, self._marked) or number, 1)
 
     def clear_stops(self) -> None:
@@ -75,7 +75,7 @@ class Page:
     def close(self) -> None:
         """The worker is gone."""
         self._last = self.place
-        self._words = self._words[:0].copy()  # nothing may point into memory that is given back
+        self._words = self._words[:0].copy()  # no view may remain of memory that is released
         self._memory.close()
 
     def _search(self, address: int) -> int:

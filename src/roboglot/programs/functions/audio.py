@@ -19,8 +19,8 @@ from roboglot.programs.worker.values import Record
 
 PLAYED, FAILED = 0, 1  # AudioPlaySeviceResponse.response.status
 UNCHANGED = -1
-BARKS = {4000: 620.0, 4001: 260.0}  # Hz at which they begin
-PIECES: Mapping[int, Callable[[], Sound]] = {6000: cache(romp), 6001: cache(evening_waltz)}  # a tenth of a second each
+BARKS = {4000: 620.0, 4001: 260.0}  # Hz of their first tone
+PIECES: Mapping[int, Callable[[], Sound]] = {6000: cache(romp), 6001: cache(evening_waltz)}  # of a tenth of a second
 
 
 @ABILITIES.on("cyberdog.audio.play", needs=(Speaker,))

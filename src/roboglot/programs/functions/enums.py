@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from roboglot.programs.functions.results import StateCode
 
-# GestureType counts from 1 in this order; the shipped firmware's last four are ordered otherwise.
+# GestureType counts from 1 in this order; the shipped firmware orders its last four differently.
 GESTURES = (
     "pulling_hand_or_two_fingers_in",
     "pushing_hand_or_two_fingers_away",
@@ -25,7 +25,7 @@ SPORTS = ("squat", "highknees", "situp", "pressup", "plank", "jumpjack")  # Skel
 # LedConstraint: the manual gives the names, the firmware the numbers.
 LED_TARGETS = {"target_head": 1, "target_tail": 2, "target_mini": 3}
 LINE_EFFECTS = ("on", "blink", "blink_fast", "breath", "breath_fast", "one_by_one", "one_by_one_fast")  # from 1
-SYSTEM_COLOURS = ("red", "blue", "yellow")  # from 161, each with all line effects
+SYSTEM_COLOURS = ("red", "blue", "yellow")  # from 161; each supports all line effects
 LINE_OFF, LINE_FIRST = 160, 161
 EYE_EFFECTS = {"effect_mini_circular_breath": 48, "effect_mini_circular_ring": 49}
 EYE_SYSTEM_EFFECTS = {

@@ -24,7 +24,7 @@ from roboglot.programs.worker.values import Record
 
 STALE_AFTER = 3.0  # s without a new reading
 
-# The part that each group works with; without it the group fails.
+# The component that each group needs.
 PARTS: dict[str, type[Component]] = {
     "network": Network,
     "follow": Vision,

@@ -55,7 +55,7 @@ async def call_cut_off(session: Session, name: str, args: Sequence[object], kwar
     if found is None or not isinstance(result, Record):
         remember(session, name, error)
         raise error
-    if found.fields["code"] != StateCode.SUCCESS:  # its own words are those of a robot that is not there
+    if found.fields["code"] != StateCode.SUCCESS:  # the robot's own refusal already has a code
         result = outcome if result is found else Record(result.type, {**result.fields, "state": outcome})
     remember(session, name, result)
     log_call(session, SPELLINGS.get(name, name), args, kwargs, result)

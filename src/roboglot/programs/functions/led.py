@@ -41,8 +41,8 @@ _LOOKS: dict[str, Look] = {
 _COLOURS = {"red": Colour(255, 0, 0), "blue": Colour(0, 0, 255), "yellow": Colour(255, 255, 0)}
 _DARK = (LightEffect.OFF, 1.0)
 EYE_COLOUR = Colour(255, 255, 255)
-FIRST_HUE = Colour(255, 0, 0)  # of figures whose hue goes round
-FIGURES = 0.5  # Hz at which the eyes' figures go round
+FIRST_HUE = Colour(255, 0, 0)  # of figures with a circling hue
+FIGURES = 0.5  # Hz of the eyes' figures
 
 LINE: dict[int, Look] = {number: _LOOKS[name] for number, name in enumerate(LINE_EFFECTS, 1)}
 EYES: dict[int, Look] = {

@@ -34,7 +34,7 @@ _RESPONSES: dict[str, dict[str, object]] = {
     "SportsRecognizedResponse": {"result": 0, "algo_switch": 3, "sport_type": 0, "counts": 0, "duration": 0},
 }
 RECORDS: dict[str, RecordType] = {
-    # Some of the manual's examples read ``.state.code`` of what is a State itself.
+    # Some of the manual's examples read ``.state.code`` of a State itself.
     "State": RecordType({"code": 0, "describe": "success"}, {"state": ""}),
     "Time": RecordType(_fields("sec nanosec", 0)),
     "Header": RecordType({"stamp": Record("Time"), "frame_id": ""}),

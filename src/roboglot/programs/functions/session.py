@@ -56,9 +56,9 @@ class Session:
         self.task = task
         self.host = host
         self.source = f"visual:{task}"
-        self.states: dict[str, Record] = {}  # by group: how its last call went
+        self.states: dict[str, Record] = {}  # by group: the result of its last call
         self.logging: set[str] = set()  # groups whose calls go to the log
-        self.last_state = state()  # of the last call of an ability, for the block's frames
+        self.last_state = state()  # of the last call, for the block's frames
         self._parts: dict[type[Part], Part] = {}
         self._going_on = asyncio.Event()
         self._going_on.set()

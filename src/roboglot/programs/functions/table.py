@@ -15,10 +15,10 @@ from roboglot.programs.worker.values import Record
 ABILITIES: OperationTable[str] = OperationTable("visual", Right.PROGRAM)
 TIME: OperationTable[str] = OperationTable("time", Right.PROGRAM)  # Python's own module, on the robot's clock
 
-ATTRIBUTES = (".state", ".data", ".params")  # read without a call
-NO_ABILITIES = (*ATTRIBUTES, ".set_log")  # they say nothing about how the robot does
+ATTRIBUTES = (".state", ".data", ".params")  # read without calling
+NO_ABILITIES = (*ATTRIBUTES, ".set_log")  # they are no abilities of the robot
 
-# What the manual's examples call things that its interface tables name otherwise, and the firmware's keywords.
+# Names in the manual's examples that differ from its interface tables, and the firmware's keywords.
 SPELLINGS = {
     "cyberdog.motion.stand_up": "cyberdog.motion.resume_standing",
     "cyberdog.stand_up": "cyberdog.motion.resume_standing",
@@ -45,7 +45,7 @@ _KINDS = {
     "object": "a dictionary", "null": "None",
 }  # fmt: skip
 
-JOINED = frozenset({"cyberdog.audio.play", "cyberdog.audio.instantly_play"})  # one of the examples gives several texts
+JOINED = frozenset({"cyberdog.audio.play", "cyberdog.audio.instantly_play"})  # one of the examples passes several texts
 
 
 async def call(session: Session, name: str, args: Sequence[object], kwargs: Mapping[str, object]) -> object:
@@ -60,7 +60,7 @@ async def call(session: Session, name: str, args: Sequence[object], kwargs: Mapp
     if operation is None:
         raise NotImplementedError(f"{name} is not built yet")
     try:
-        if session.robot.admission.asks and identity():  # a program without a client is the robot's own
+        if session.robot.admission.asks and identity():  # a program without a client belongs to the robot
             session.robot.admission.check("visual", operation.key, operation.right)
         result = await operation.handler(session, **bind(operation, args, kwargs))
     except RobotError as error:

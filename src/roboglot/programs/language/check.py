@@ -36,7 +36,7 @@ def check(source: str, names: Names | None = None) -> list[Problem]:
     try:
         problems = list(violations(tree))
         if names is not None:
-            problems += islice(unknown_names(tree, names), _LOOKED_AT_MAX)  # each costs a search for what was meant
+            problems += islice(unknown_names(tree, names), _LOOKED_AT_MAX)  # each requires a search for similar names
     except RecursionError:
         return [_too_deep()]
     if not problems:
@@ -92,7 +92,7 @@ def _parse(source: str) -> tuple[ast.Module | None, Problem | None]:
         return None, from_syntax_error(error.msg, error.lineno or 1, max(1, error.offset or 1))
     except (RecursionError, MemoryError):
         return None, _too_deep()
-    except ValueError as error:  # null bytes; lone surrogates come as UnicodeEncodeError, a ValueError too
+    except ValueError as error:  # null bytes; lone surrogates raise UnicodeEncodeError, also a ValueError
         return None, from_syntax_error("null bytes" if "null" in str(error) else "invalid character '?'", 1, 1)
 
 

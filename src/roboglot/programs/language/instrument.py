@@ -19,7 +19,7 @@ METHODS = {"format": "$format", "has_key": "$has_key"}
 Dictionaries know ``has_key`` here.
 """
 
-# Statements that take no time and cannot fail: a program never waits there.
+# Statements that take no time and cannot fail: programs never wait in them.
 _INSTANT = (ast.Break, ast.Continue, ast.Global, ast.Nonlocal)
 _BLOCKS = ("body", "orelse", "finalbody")
 

@@ -70,7 +70,7 @@ def unknown_names(tree: ast.Module, names: Names) -> Iterator[Problem]:
                 yield _unknown(node, name, "", known)
             case ast.Attribute():
                 chain = _chain(node)
-                # Only the whole chain's misspelt part is reported: the shorter chains inside it are visited on their
+                # Report only the misspelt part of the whole chain: the shorter chains inside it are visited on their
                 # own.
                 if chain and chain[0] in roots and chain[0] not in bound:
                     owner, part = ".".join(chain[:-1]), chain[-1]

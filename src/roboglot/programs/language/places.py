@@ -31,7 +31,7 @@ class Places:
     __slots__ = ("_starts", "count")
 
     def __init__(self, units: Sequence[str]) -> None:
-        # Generous: whatever Python takes for the end of a line contains one of these.
+        # A superset: every line ending that Python recognizes contains one of these.
         lengths = [unit.count("\n") + unit.count("\r") + 2 for unit in units]
         self._starts = list(accumulate(lengths, initial=1))
         self.count = self._starts.pop()

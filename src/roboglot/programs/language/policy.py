@@ -33,7 +33,7 @@ _FORBIDDEN: dict[str, tuple[str, str]] = {
     "TypeAlias": ("'type' statements are not part of the robot language.", "机器人语言不支持 'type' 语句。"),
 }
 
-# Methods a class may define, and the few of them that may be called by name.
+# Methods that a class may define, and the few of them that may be called by name.
 _METHODS = words("""
 __init__ __repr__ __str__ __len__ __iter__ __next__ __contains__ __getitem__ __setitem__ __delitem__ __call__ __bool__
 __hash__ __eq__ __ne__ __lt__ __le__ __gt__ __ge__ __add__ __radd__ __iadd__ __sub__ __rsub__ __isub__ __mul__
@@ -43,17 +43,17 @@ __float__ __index__ __round__ __reversed__
 """)
 _READABLE = frozenset({"__init__", "__name__", "__enter__", "__exit__", "__len__", "__str__", "__repr__", "__eq__"})
 
-# Ways from a value to the frames and code behind it, and to text formatting that reaches attributes by itself.
+# Attributes that lead from a value to its frames and code, and text formatting that reaches attributes.
 _BLOCKED = words("""
 ag_await ag_code ag_frame co_code co_consts cr_await cr_code cr_frame gi_code gi_frame gi_yieldfrom tb_frame tb_next
 f_back f_builtins f_code f_generator f_globals f_lasti f_lineno f_locals f_trace format_map mro with_traceback
 """)
 
-# Class patterns read attributes named by the class (__match_args__): only types whose list is known and empty are let
-# through.
+# Class patterns read attributes named by the class (__match_args__): allowed only for types whose list is known and
+# empty.
 _PATTERN_TYPES = words("bool bytearray bytes dict float frozenset int list set str tuple")
 
-# Where a node keeps identifiers that are not nodes themselves.
+# Fields of nodes that hold identifiers as plain text.
 _IDENTIFIERS: dict[type[ast.AST], tuple[str, ...]] = {
     ast.Name: ("id",),
     ast.arg: ("arg",),

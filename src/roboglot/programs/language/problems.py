@@ -34,7 +34,7 @@ class Problem:
     chinese: str
 
 
-# The parser's message (a regular expression), then the pupil's sentences; {0} is the first group. The first match wins.
+# The parser's message (a regular expression), then the pupil's sentences; {0} is the first group. First match wins.
 _SENTENCES = r"""'(.)' was never closed
 This '{0}' is never closed.
 这个 '{0}' 没有配对的右括号。

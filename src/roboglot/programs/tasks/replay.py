@@ -14,7 +14,7 @@ from roboglot.programs.tasks.block_stops import MARKS
 from roboglot.programs.tasks.run_host import RunHost
 from roboglot.programs.worker.values import unpack
 
-_REMEMBERED_MAX = 16 * 1024  # bytes of an answer; the state of a longer one (measurements, lists) is not kept
+_REMEMBERED_MAX = 16 * 1024  # bytes of an answer; states of longer ones (measurements, lists) are not kept
 
 
 class Replay:

@@ -13,7 +13,7 @@ from roboglot.programs.engine.share import Meter
 from roboglot.programs.stores import LOG_MAX, LOG_TEXT_MAX, LogEntry
 from roboglot.programs.tasks.reports import Pace
 
-LINE_MAX = 64 * 1024  # characters that are printed without an end of the line, before they are taken for one
+LINE_MAX = 64 * 1024  # characters printed without a line end before they count as a line
 
 
 class RunLog:
@@ -23,8 +23,8 @@ class RunLog:
         self.pace = pace
         self._clock, self._run, self._logged = clock, run, logged
         self._entries: deque[LogEntry] = deque(maxlen=LOG_MAX)
-        self._line = ""  # printed, and not ended yet
-        self._catching_up: asyncio.Future[None] | None = None  # readers, while the program waits for them
+        self._line = ""  # printed without a line end so far
+        self._catching_up: asyncio.Future[None] | None = None  # readers for which the program is waiting
 
     async def print(self, text: str) -> None:
         """Write whole lines, as fast as the program's share of the server allows."""

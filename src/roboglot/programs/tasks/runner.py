@@ -207,7 +207,7 @@ class Runner:
                 task, run, self._robot, listeners=listeners, journal=journal, replaying=replaying, stops=stops
             )
         except BaseException:
-            await run.kill()  # no one would ever hear of it
+            await run.kill()  # no client could learn about it
             raise
         self.runs[task.id] = living
         return living
@@ -236,7 +236,7 @@ class Runner:
             step()
         with self._robot.clock.holding():
             await self._store.set_state(run.task.id, run.state)
-        # First: a program that goes on may begin a block, and halt there, before this one is asked again.
+        # First: a program that continues may begin a block and halt there before this one is asked.
         self.reports.publish(done(TaskOperation.RECOVER, run.task.id, run.state))
         await run.resume()
 

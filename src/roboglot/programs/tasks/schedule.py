@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 from roboglot.model.clock import Clock, Timer
 
-LOOK_AFTER = 3600.0  # s; far instants are looked at again, so that no timer is longer than the loop's clock is good for
+LOOK_AFTER = 3600.0  # s; distant times are checked again, so that no timer exceeds what the loop supports
 
-STALE_MAX = 64  # entries that nothing waits for any more
+STALE_MAX = 64  # obsolete entries
 
 
 class Schedule:
@@ -46,14 +46,14 @@ class Schedule:
             self._timer.cancel()
             self._timer = None
         while self._heap and self._due.get(self._heap[0][1]) != self._heap[0][0]:
-            heapq.heappop(self._heap)  # dropped, or set anew
+            heapq.heappop(self._heap)  # removed or rescheduled
         if self._heap:
             left = self._heap[0][0] - self._clock.epoch()
             self._timer = self._clock.call_later(min(max(0.0, left), LOOK_AFTER), self._look)
 
     def _look(self) -> None:
         self._timer = None
-        now = self._clock.epoch() + 1e-6  # calendar times are large: a timer can be this much early
+        now = self._clock.epoch() + 1e-6  # calendar times are large numbers: a timer can fire this much early
         while self._heap and self._heap[0][0] <= now:
             due, id = heapq.heappop(self._heap)
             if self._due.get(id) == due:

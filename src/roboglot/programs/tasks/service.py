@@ -61,7 +61,7 @@ class ProgramService:
         self._store = stores.tasks
         self._journals = stores.journals
         self._inspector = Inspector(engine, ability_set())
-        # Changes of state happen one after the other; what takes long (checking a body) happens before.
+        # Changes of state happen one at a time; slow work (checking a body) is done before.
         self._lock = asyncio.Lock()
         self._timetable = Timetable(robot.clock, zone, lambda id, _: self._fires.add(self._fire(id), f"fire {id}"))
         self.library = ModuleLibrary(stores.modules, self._inspector, self._lock, partial(check_mode, robot))
@@ -114,7 +114,7 @@ class ProgramService:
 
     async def log(self, id: str) -> list[LogEntry]:
         """Return the log of a task up to this moment, oldest entry first."""
-        async with self._lock:  # a run that has just ended may still be written down
+        async with self._lock:  # a run that has just ended may still be writing its record
             if (run := self._runs.get(id)) is not None:
                 await self._store.append_log(id, run.log.take())
             entries = await self._store.log(id)
@@ -163,7 +163,7 @@ class ProgramService:
                 replace(task, id=DEBUG, mode="single", condition="now", owner=identity()),
                 TaskOperation.DEBUG,
                 correct=not problems,
-                uses=(),  # a debug run must not block the deletion of a module
+                uses=(),  # a debug run must not prevent deleting a module
             )
             refuse_wrong(problems)
             await self._runner.start(kept, uses)
@@ -176,7 +176,7 @@ class ProgramService:
             assert task is not None, "the table refuses to run what does not exist"
             task = replace(task, mode=mode or task.mode, condition=condition or task.condition, owner=identity())
             due = self._timetable.due(task)
-            if state is TaskState.RUN:  # no second instance; what changed counts the next time
+            if state is TaskState.RUN:  # no second instance; changes apply to the next run
                 await self._store.put(task)
                 self._timetable.drop(id)
                 if task.mode == "cycle":
@@ -297,7 +297,7 @@ class ProgramService:
         else:
             task = await self._store.get(id)
             state = TaskState(task.state) if task else TaskState.NULL
-            if state.alive and id not in self._turns.lost:  # its end could not be written down
+            if state.alive and id not in self._turns.lost:  # its end could not be recorded
                 state = TaskState.SHUTDOWN
         if next_state(state, operation) is None:
             words = f"The current operation({operation}) is illegal: {id} is in {state}."

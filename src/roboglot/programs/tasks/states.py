@@ -44,7 +44,7 @@ class TaskOperation(StrEnum):
 
 
 # Two results: for save and debug (body is wrong, body is right); for shutdown and stop (cycle task, single task).
-# An operation that a row does not name is illegal there.
+# An operation that a row does not contain is illegal in that state.
 _TABLE: dict[str, dict[str, str]] = {
     "null": {"inquiry": "null", "save": "error wait_run", "delete": "null", "debug": "error run_wait"},
     "error": {"inquiry": "error", "save": "error wait_run", "delete": "null", "debug": "error run_wait"},

@@ -100,7 +100,7 @@ class TaskRun:
         self.log = RunLog(robot.clock, run, listeners.log_pace, lambda entry: listeners.logged(task.id, entry))
         self.host = RunHost(task.id, self.log, listeners.report, self._ask_to_halt)
         self._at_breakpoint = listeners.at_breakpoint
-        self._halts = False  # after the answer that is due
+        self._halts = False  # after the pending answer
         self._session = self.host.session = Session(robot, task.id, self.host)
         self._clock = robot.clock
         self._began = robot.clock.time()
@@ -293,7 +293,7 @@ class TaskRun:
     async def _answer(self, request: Call) -> None:
         try:
             value = await self._value(request)
-            if self._halts:  # first: it must not go on by the answer, which belongs to what was done before
+            if self._halts:  # first: the answer belongs to an earlier command and must not resume the program
                 with self._clock.holding():
                     await self._run.suspend()
             self._run.calls.reply(request.id, value)

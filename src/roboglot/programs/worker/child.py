@@ -33,7 +33,7 @@ _OWN_DEPTH = 16
 def main(descriptor: int, whereabouts: Whereabouts) -> int:
     """Serve the one request on the socket; the exit code. The jail is already closed."""
     link = Link(descriptor)
-    reserve = bytearray(_RESERVE)  # given back when memory runs out, so that the report can still be written
+    reserve = bytearray(_RESERVE)  # released when memory runs out, so that the report can still be written
     try:
         request = link.receive()
         if request["t"] == "check":
@@ -45,7 +45,7 @@ def main(descriptor: int, whereabouts: Whereabouts) -> int:
             link.send(_run(link, request, whereabouts))
     except MemoryError as error:
         unit, number = _place(error)
-        error.__traceback__ = None  # its frames hold what filled the memory
+        error.__traceback__ = None  # its frames hold the data that filled the memory
         whereabouts.forget()
         del reserve
         gc.collect()
@@ -63,7 +63,7 @@ def probe(whereabouts: Whereabouts) -> int:
             result = attempt()
         except PermissionError:
             continue
-        if attempt is os.getppid and result == -1:  # this one cannot raise
+        if attempt is os.getppid and result == -1:  # this one cannot fail
             continue
         return 1
     return 0
@@ -102,7 +102,7 @@ def _run(link: Link, request: dict[str, Any], whereabouts: Whereabouts) -> dict[
         whereabouts.settle()
     scope = _globals(link, request, variables.before(link.call) if request["watched"] else link.call)
     variables.hide(scope)
-    # Modules first, the program (unit 0) last; all share one set of names, as the vendor's programs expect.
+    # Modules first, the program (unit 0) last; all share one namespace, as the vendor's programs expect.
     sys.setrecursionlimit(request["recursion"] + _OWN_DEPTH)
     try:
         for code in [*units[1:], units[0]]:

@@ -17,7 +17,7 @@ from roboglot.programs.language.instrument import METHODS
 from roboglot.programs.language.names import BUILTINS
 from roboglot.programs.language.policy import attribute_allowed
 
-# CPython itself imports these from inside int(), str() and strptime(), through whatever __import__ the program has;
+# CPython itself imports these inside int(), str() and strptime(), using the program's __import__;
 # the checker refuses them in a program's text.
 _INTERNAL = frozenset({"_pylong", "_strptime"})
 
@@ -83,7 +83,7 @@ def _exit(code: object = None) -> None:
 def _checked(name: object) -> str:
     if not isinstance(name, str):
         raise TypeError("attribute name must be string")
-    plain = str.__str__(name)  # a subclass could answer differently each time it is asked
+    plain = str.__str__(name)  # a subclass could return different text each time
     if not attribute_allowed(plain):
         raise AttributeError(f"'.{plain}' cannot be used in robot programs")
     return plain

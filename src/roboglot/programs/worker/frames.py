@@ -31,7 +31,7 @@ class FrameReader:
     def feed(self, data: bytes) -> list[bytes]:
         """The bodies completed by this piece; raises FrameTooLong as soon as a header announces too much."""
         if not self._pending and len(data) == HEADER + int.from_bytes(data[:HEADER], "big") <= HEADER + self._limit:
-            return [data[HEADER:]]  # one whole frame: by far the most frequent
+            return [data[HEADER:]]  # one whole frame: the usual case
         self._pending += data
         bodies: list[bytes] = []
         start = 0

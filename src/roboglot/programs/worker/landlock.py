@@ -8,7 +8,7 @@ import struct
 
 _CREATE_RULESET, _RESTRICT_SELF = 444, 446  # the same numbers on every architecture
 _VERSION_QUERY = 1
-# Rights a kernel of each ABI version knows: file rights, network rights, scopes.
+# Rights by ABI version of the kernel: files, network, scopes.
 _FILE_BITS = {1: 13, 2: 14, 3: 15, 4: 15, 5: 16}
 _NETWORK, _SCOPES = 0b11, 0b11
 

@@ -25,13 +25,13 @@ EXIT_LOST, EXIT_MEMORY = 0, 71
 """Exit codes when the host has gone, and when memory runs out where nothing can be said any more."""
 
 _READ = 64 * 1024
-# json's own encoder builds this anew for each text; packed values have nothing else in them.
+# The C encoder, built once: json's own wrapper builds it anew for each text; packed values contain nothing else.
 _pieces = json.encoder.c_make_encoder(  # type: ignore[attr-defined]  # not in the type stubs
     None, None, json.encoder.encode_basestring, None, ":", ",", False, False, True
 )
 _scan = json.JSONDecoder().scan_once  # type: ignore[attr-defined]  # the host's messages have nothing around them
 _quote = json.encoder.encode_basestring  # in C
-_NOTHING = b'{"t":"value","value":null}'  # what most calls are answered
+_NOTHING = b'{"t":"value","value":null}'  # the answer to most calls
 _TEXT = re.compile(r'"(?:[^"\\]|\\.)*"')
 _ESCAPES = {character: f"\\u{character:04x}" for character in SEPARATORS}
 _HEADROOM = 100
@@ -85,7 +85,7 @@ class Link:
     def call(self, name: str, /, *args: object, **kwargs: object) -> object:
         """Ask the host; returns its value or raises its error."""
         limit = sys.getrecursionlimit()
-        sys.setrecursionlimit(limit + _HEADROOM)  # a program at its depth limit must not break off inside a call
+        sys.setrecursionlimit(limit + _HEADROOM)  # a program at its depth limit must not fail in the middle of a call
         try:
             body = self._ask(name, args, kwargs)
             if body == _NOTHING:
@@ -111,7 +111,7 @@ class Link:
         try:
             return self._body()
         except MemoryError:
-            os._exit(EXIT_MEMORY)  # the reply is lost: program and host would talk past each other from here on
+            os._exit(EXIT_MEMORY)  # the reply is lost: program and host would be out of step from here on
 
     def _json(self, values: tuple[Any, ...]) -> str:
         """Most arguments are short numbers and texts: those are written without the detour over ``pack``."""

@@ -73,7 +73,7 @@ def confine_program(libc: ctypes.CDLL, parent: int, used: int, quota: Quota, cod
     if os.getppid() != parent:  # the zygote died before the line above took effect
         os._exit(1)
     with contextlib.suppress(OSError):
-        os.nice(_NICENESS)  # behind the server and the zygote, which has to fork and report whatever programs do
+        os.nice(_NICENESS)  # below the server and the zygote, which must fork and report whatever programs do
     _prctl(libc, _PR_SET_NO_NEW_PRIVS, 1)
     _prctl(libc, _PR_SET_DUMPABLE, 0)
     limits = {

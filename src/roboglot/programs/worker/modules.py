@@ -38,7 +38,7 @@ def _public(module: object) -> dict[str, object]:
     return {name: getattr(module, name) for name in dir(module) if not name.startswith("_")}
 
 
-# Found once, in the process that programs are forked from.
+# Collected once, in the process from which programs are forked.
 _MATH = _public(math)
 _NUMBERS = {name: getattr(numbers, name) for name in numbers.__all__}
 _RANDOM = tuple(_public(random.Random()))

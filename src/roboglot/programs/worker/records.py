@@ -135,7 +135,7 @@ class Records:
         def initialise(self: ProgramRecord, **fields: object) -> None:
             for field in defaults:
                 given = fields.pop(field, _MISSING)
-                # The default is made anew each time: nothing is shared between two records.
+                # The default is created anew each time: two records share nothing.
                 setattr(self, field, enrich(copy.deepcopy(defaults[field])) if given is _MISSING else enrich(given))
             if fields:
                 raise TypeError(f"{name} has no field '{next(iter(fields))}'")

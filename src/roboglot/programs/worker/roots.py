@@ -65,7 +65,7 @@ class _Namespace:
         object.__setattr__(self, "_Namespace__name", name)
         object.__setattr__(self, "_Namespace__members", members)
         object.__setattr__(self, "_Namespace__call", call)
-        # Found without a detour over ``__getattr__``, which is left with what is fetched and what is not there.
+        # Found directly, without ``__getattr__``, which handles lazily fetched and missing names.
         self.__dict__.update({key: member for key, member in members.items() if not isinstance(member, _Attribute)})
 
     def __getattr__(self, part: str) -> Any:

@@ -20,13 +20,13 @@ _SECCOMP_MODE_FILTER = 2
 _KILL_PROCESS, _ERRNO, _ALLOW = 0x80000000, 0x00050000, 0x7FFF0000
 _PROT_EXEC = 4
 
-# Offsets in struct seccomp_data: number, architecture, then the arguments (their low halves come first: both machines
+# Offsets in struct seccomp_data: number, architecture, then the arguments (low halves first: both machines
 # are little-endian).
 _NUMBER, _ARCHITECTURE, _ARGUMENTS = 0, 4, 16
 
 _LOAD, _EQUAL, _BITS, _RETURN = 0x20, 0x15, 0x45, 0x06  # BPF: LD|W|ABS, JMP|JEQ|K, JMP|JSET|K, RET|K
 
-# name: (x86_64, aarch64); None where the machine has no such call.
+# name: (x86_64, aarch64); None where the architecture lacks the call.
 _FREE: dict[str, tuple[int | None, int | None]] = {
     "munmap": (11, 215),
     "brk": (12, 214),

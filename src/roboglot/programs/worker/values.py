@@ -103,7 +103,7 @@ def unpack(packed: object, join: Join = Record) -> Any:
     The other end may be hostile.
     """
     if type(packed) in _PLAIN or (type(packed) is int and -_SMALL < packed < _SMALL):
-        return packed  # by far the most frequent
+        return packed  # the usual case
     return drained(unpacking(packed, join))
 
 
@@ -122,7 +122,7 @@ def unpacking(packed: object, join: Join = Record, depth: int = 0) -> Generator[
     if depth > DEPTH_MAX:
         raise ValueError("nested too deeply")
     kind = type(packed)
-    if kind in _PLAIN or kind is float:  # no match here: a frame can hold tens of thousands of values
+    if kind in _PLAIN or kind is float:  # no match statement here: a frame can hold tens of thousands of values
         return packed
     if isinstance(packed, int):
         if packed.bit_length() > _INT_BITS_MAX:

@@ -31,10 +31,10 @@ class Whereabouts:
         self._watched: Watched | None = None
         self.cell: list[object] = [None]
         nowhere = self._marked(0)
-        ctypes.pythonapi.Py_IncRef(ctypes.py_object(nowhere))  # the item's own, given up by the first store
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(nowhere))  # the reference that the first store releases
         self._table[0] = id(nowhere)
         ctypes.c_void_p.from_address(id(self.cell) + _ITEMS).value = ctypes.addressof(self._table)
-        ctypes.pythonapi.Py_IncRef(ctypes.py_object(self))  # to free the list would be to free memory that is not its
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(self))  # or freeing the list would free memory that it does not own
 
     def lay_out(self, places: Places) -> None:
         """The program's texts are known now."""
@@ -92,8 +92,8 @@ class Watched:
     ) -> None:
         self._cell, self._numbers, self._stops, self._halt = cell, numbers, stops, halt
         self._order = 0
-        self._frame: FrameType | None = None  # of the mark before
-        self._origin: FrameType | None = None  # where the order of a step was given
+        self._frame: FrameType | None = None  # of the last mark
+        self._origin: FrameType | None = None  # where the step was ordered
 
     def __setitem__(self, item: int, mark: object) -> None:
         self._cell[item] = mark

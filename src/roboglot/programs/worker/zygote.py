@@ -43,7 +43,7 @@ class Zygote:
         self._control, self._filter_required = control, filter_required
         self._libc = lockdown.open_libc()
         self._filter = self._find_filter()
-        self._memory = os.open("/proc/self/statm", os.O_RDONLY)  # readable later only through this descriptor
+        self._memory = os.open("/proc/self/statm", os.O_RDONLY)  # later reads are possible only through this descriptor
         self._runs: dict[int, int] = {}
         self._wake, wake = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         signal.signal(signal.SIGCHLD, _ignore)
@@ -55,7 +55,7 @@ class Zygote:
         if self._filter:
             try:
                 self._probe()
-            except SeccompUnavailable:  # any other error says nothing of the filter
+            except SeccompUnavailable:  # other errors do not concern the filter
                 if self._filter_required:
                     raise
                 self._filter = b""

@@ -14,7 +14,7 @@ from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import GrpcAppStub
 
 log = logging.getLogger(__name__)
-DONE, CLOSED, UNUSABLE = "ok", "closed", "unusable"  # beside the names of gRPC's statuses
+DONE, CLOSED, UNUSABLE = "ok", "closed", "unusable"  # outcomes besides the names of gRPC statuses
 BROKEN = frozenset({"unavailable", "cancelled", CLOSED, UNUSABLE})
 Credentials = Callable[[], grpc.ChannelCredentials] | None
 
@@ -61,7 +61,7 @@ class AppLine:
         except grpc.aio.UsageError as error:
             log.debug("%s to %s failed: %s", what, self._target, error)
             return UNUSABLE
-        except asyncio.CancelledError:  # the channel was closed under it; or its task is cancelled
+        except asyncio.CancelledError:  # the channel was closed meanwhile, or the task is cancelled
             if (task := asyncio.current_task()) and task.cancelling():
                 raise
             log.debug("%s to %s failed: the app was lost", what, self._target)

@@ -29,7 +29,7 @@ from roboglot.wire.cyberdog.text import write
 log = logging.getLogger(__name__)
 WILDCARDS = ("0.0.0.0", "::")
 EARLY_MAX = 0.75
-REDIAL_FIRST, REDIAL_MAX = 1.0, 16.0  # s between two attempts: doubled from the first to the longest
+REDIAL_FIRST, REDIAL_MAX = 1.0, 16.0  # s between two attempts: first, then doubled up to the maximum
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,13 +76,13 @@ class AppLink:
         self._outside = outside or Outside("", clock)
         self._target = self._configured or (f"{last}:{app_port}" if last else "")
         self._host, self._on_host = last, on_host
-        self._news = asyncio.Event()  # the address changed, or a client called: worth dialling at once
+        self._news = asyncio.Event()  # set when the address changes or a client calls: dial at once
         self._line: AppLine | None = None
         self._ended = False
         self._outboxes: dict[int, Outbox] = {}
         self._beats = Beats()
         self._task: asyncio.Task[None] | None = None
-        self._asking: list[asyncio.Future[bool]] = []  # who waits for the next heartbeat
+        self._asking: list[asyncio.Future[bool]] = []  # waiting for the next heartbeat
 
     def start(self) -> None:
         """Begin to dial whatever address is known."""
@@ -100,7 +100,7 @@ class AppLink:
     def seen(self, peer: str) -> None:
         """A request came from ``peer`` (as gRPC writes it): the app may be there."""
         if self.connected and self._target:
-            return  # another client's calls must not take the app's place
+            return  # calls of other clients must not take the app's place
         if self._configured:
             self._target = self._configured
         elif host := host_of(peer):
@@ -253,7 +253,7 @@ async def _route_to(target: str) -> str:
     host, _, port = target.rpartition(":")
     loop = asyncio.get_running_loop()
     try:
-        # Connecting a datagram socket sends nothing; it only asks the system for a route.
+        # Connecting a datagram socket sends nothing; it only looks up a route.
         transport, _ = await loop.create_datagram_endpoint(
             asyncio.DatagramProtocol, remote_addr=(host.strip("[]"), int(port))
         )

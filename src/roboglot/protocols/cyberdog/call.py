@@ -13,7 +13,7 @@ from roboglot.wire.cyberdog.codes import Accepted, InBandError
 Answer = TypeVar("Answer")
 
 
-@dataclass(slots=True)  # not frozen: one is made for every request, and frozen ones take four times as long
+@dataclass(slots=True)  # not frozen: one is created for every request, and frozen ones take four times as long
 class Call:
     """One request under way.
 
@@ -22,11 +22,11 @@ class Call:
     """
 
     code: int
-    text: str  # params as it came
+    text: str  # the raw params
     context: Context
     reply: Callable[[object], Awaitable[None]]
-    why: str = ""  # it was refused, in plain words
-    began: float | None = None  # when those who follow heard of it, robot time
+    why: str = ""  # the reason for a refusal, in plain words
+    began: float | None = None  # robot time at which followers were notified
 
     def refused(self, answer: Answer, why: str) -> Answer:
         """Return ``answer``, which says no; ``why`` is for the log and who watches the exchange."""

@@ -102,7 +102,7 @@ class CertificateStore:
         apps = self._folder / APPS / CA_CERT
         try:
             return tuple(file.stat().st_mtime_ns for file in (*files, *([apps] if apps.exists() else [])))
-        except OSError:  # they are about to be replaced
+        except OSError:  # they are about to be replaced anyway
             return ()
 
 
@@ -199,7 +199,7 @@ def _make(tls: Path) -> None:
         draft.rename(tls)
     except OSError:
         shutil.rmtree(draft, ignore_errors=True)
-        if not tls.exists():  # otherwise another robot was faster: theirs is as good
+        if not tls.exists():  # another robot was faster: its certificates serve as well
             raise
 
 

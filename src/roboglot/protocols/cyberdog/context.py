@@ -42,16 +42,16 @@ class Context:
     files: CameraFiles
     transfers: Transfers
     video: Transmission
-    address: str  # where clients reach the robot
+    address: str  # the robot's address for clients
     relay: FrameRelay | None = None
-    frames: FrameQueue | None = None  # programs' frames on their way to the app
-    played: PlayedPushes | None = None  # what a recorded robot pushes
+    frames: FrameQueue | None = None  # frames of programs, queued for the app
+    played: PlayedPushes | None = None  # pushes of a recorded robot
     stored_map: str = ""
-    map_deleted: bool = False  # the map in use was deleted: it stands in for none that is stored
+    map_deleted: bool = False  # the map in use was deleted: do not let it replace a missing stored map
     profile: Profile = Profile.SPEC
-    owner: str = ""  # who the app showed to be, where that is asked
-    survey: Survey = field(default_factory=Survey)  # of the map that is made now
-    pursuit: Pursuit | ThingPursuit | None = None  # while a person or a thing is followed, or to be chosen
+    owner: str = ""  # the app's identity, where one is required
+    survey: Survey = field(default_factory=Survey)  # of the map being made
+    pursuit: Pursuit | ThingPursuit | None = None  # while a person or an object is followed or to be chosen
 
     def map_replaced(self) -> None:
         """Another map is in use now, no matter who began it: neither its name nor localization in it is known."""

@@ -15,7 +15,7 @@ from roboglot.protocols.cyberdog.chapters.camera import camera, video  # noqa: F
 from roboglot.protocols.cyberdog.chapters.mapping import labels, tasks  # noqa: F401
 from roboglot.protocols.cyberdog.chapters.motion import motion, stairs  # noqa: F401
 
-# The chapters register their handlers and pushes when they are imported.
+# Chapters register their handlers and pushes on import.
 from roboglot.protocols.cyberdog.chapters.people import audio, faces, members  # noqa: F401
 from roboglot.protocols.cyberdog.chapters.system import (  # noqa: F401
     bluetooth,
@@ -33,7 +33,7 @@ from roboglot.wire.cyberdog.text import NotJson, fitting, misfits, read_params, 
 
 log = logging.getLogger(__name__)
 DOOR = "cyberdog"
-SILENT = "silent"  # the status of a request that gets no answer at all
+SILENT = "silent"  # outcome of a request that gets no answer
 _NAMES = {int(row.key): row.name for row in contract("cyberdog")}
 KNOWN = (_NAMES.keys() | UNPUBLISHED) - TEXT_ONLY
 

@@ -18,7 +18,7 @@ class ErrorCodes:
     navigation: Feedback
 
 
-# The first row whose class fits counts.
+# First match wins.
 CODES: tuple[tuple[type[errors.RobotError], ErrorCodes], ...] = (
     (errors.ComponentMissing, ErrorCodes(InBandError.UNAVAILABLE, MotionCode.UNSUPPORTED, Feedback.ACTIVATION_FAILED)),
     (errors.InvalidGoal, ErrorCodes(InBandError.BAD_PARAMETERS, MotionCode.PARAMETERS, Feedback.NO_PATH)),

@@ -16,15 +16,15 @@ from roboglot.model.clock import Clock
 
 log = logging.getLogger(__name__)
 
-NEWS_IN_FLIGHT_MAX = 8  # what a program does: so many are sent before the first is acknowledged
-IN_FLIGHT_MAX = 12  # answers included
-ALONE = 32 * 1024  # bytes: a longer frame could be overtaken on the way, so it is sent by itself
-ROOM = 32  # news that wait before programs have to
-NEWS_MAX = 4096  # that wait for an app which answers nothing; then the oldest go
-ANSWERS_MAX = 8 * 1024 * 1024  # bytes of answers that wait before further requests have to
+NEWS_IN_FLIGHT_MAX = 8  # program events sent before the first is acknowledged
+IN_FLIGHT_MAX = 12  # including answers
+ALONE = 32 * 1024  # bytes: a longer frame could be overtaken on the way, so it is sent alone
+ROOM = 32  # queued events before programs must wait
+NEWS_MAX = 4096  # events queued for an app that acknowledges nothing; beyond this the oldest are dropped
+ANSWERS_MAX = 8 * 1024 * 1024  # bytes of queued answers before further requests must wait
 ANSWERS_KEPT_MAX = 4 * ANSWERS_MAX  # bytes of answers for an app that is away
-KEPT_SECONDS = 30.0  # that answers are kept for an app that is away
-TRIES_MAX = 20  # of one frame, while the app's heartbeats come through
+KEPT_SECONDS = 30.0  # for which answers are kept for an absent app
+TRIES_MAX = 20  # per frame, while the app's heartbeats arrive
 RETRY_SECONDS = 0.2
 
 
@@ -65,7 +65,7 @@ class FrameQueue:
         self._waiting: list[_Frame] = []
         self._sending: dict[asyncio.Task[None], _Frame] = {}
         self._numbers = 0
-        self._news = self._answers = 0  # that wait: how many, and how many bytes
+        self._news = self._answers = 0  # of events, of answers; bytes of answers
         self._there = self._silent = self._holding = False
         self._wanted_until = 0.0
         self._has_room, self._has_room_for_answers = asyncio.Event(), asyncio.Event()
@@ -141,7 +141,7 @@ class FrameQueue:
             log.info("a program frame %s; %d dropped", why, len(dropped))
             for frame in dropped:
                 self._count(frame, -1)
-            self._waiting = sorted(frame for frame in self._waiting if not unwanted(frame))  # sorted, it is a heap
+            self._waiting = sorted(frame for frame in self._waiting if not unwanted(frame))  # a sorted list is a heap
 
     def _go_on(self) -> None:
         """Send as much as may be under way, and let the waiting sender go on."""

@@ -16,15 +16,15 @@ from roboglot.protocols.cyberdog.app_link import host_of
 
 log = logging.getLogger(__name__)
 TABLES = (Path("/proc/self/net/tcp"), Path("/proc/self/net/tcp6"))
-FIELDS = 12  # of a line, at least
+FIELDS = 12  # per line, at least
 LISTENS, ESTABLISHED = "0A", "01"  # states of a connection
 IPAddress = ipaddress.IPv4Address | ipaddress.IPv6Address
-LATER = 1.0  # s, outside time, until a handshake is over
-QUIET = 10.0  # s between two lines about one host
-LOOK_PERIOD = 0.1  # s between two looks at the table
+LATER = 1.0  # s (machine clock) after which a handshake should be complete
+QUIET = 10.0  # s between two log lines about one host
+LOOK_PERIOD = 0.1  # s between two reads of the table
 TABLE_MAX = 128 * 1024  # bytes of it that are read
-WATCHED_MAX = 256  # connections whose handshake is under way, and hosts that were logged
-ASKED_MAX = 2048  # connections that are remembered for having asked for something
+WATCHED_MAX = 256  # connections in the handshake, and hosts already logged
+ASKED_MAX = 2048  # connections known to have made a request
 
 
 class Handshakes:
@@ -37,7 +37,7 @@ class Handshakes:
         self._watched: set[str] = set()
         self._looked = -LOOK_PERIOD
         self._asked: dict[str, None] = {}  # oldest first
-        self._told: dict[str, float] = {}  # host: when
+        self._told: dict[str, float] = {}  # time by host
         self._looks: set[asyncio.TimerHandle] = set()
 
     def begun(self) -> None:
@@ -112,7 +112,7 @@ def _peers(own: IPAddress | None, port: int) -> dict[str, str]:
         except OSError:
             continue
         for line in lines:
-            if len(fields := line.split()) < FIELDS:  # the last may be cut off
+            if len(fields := line.split()) < FIELDS:  # the last line may be cut off
                 continue
             _, local, remote, state, *_ = fields
             here, _, at = local.partition(":")

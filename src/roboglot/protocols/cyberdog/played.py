@@ -18,7 +18,7 @@ from roboglot.protocols.cyberdog.frame_queue import KEPT_SECONDS
 from roboglot.wire.cyberdog.chapters.system import HEARTBEAT, ticks_of
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 
-WAITING_MAX = 4096  # of one code; then the oldest go
+WAITING_MAX = 4096  # per code; beyond this the oldest are dropped
 CODES_MAX = 256
 
 

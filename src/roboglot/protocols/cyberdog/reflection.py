@@ -14,7 +14,7 @@ from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 
 VERSIONS = ("grpc.reflection.v1", "grpc.reflection.v1alpha")  # the same messages under two names
-QUESTIONS_MAX = 1000  # of one call
+QUESTIONS_MAX = 1000  # per call
 NOT_FOUND = grpc.StatusCode.NOT_FOUND.value[0]
 STRING, INT32, BYTES, MESSAGE = 9, 5, 12, 11  # as FieldDescriptorProto numbers them
 # Message: its fields as (name, number, kind or message, repeated).
@@ -37,7 +37,7 @@ MESSAGES: dict[str, tuple[tuple[str, int, int | str, bool], ...]] = {
         ("error_response", 7, "ErrorResponse", False),
     ),
 }
-# Fields of which at most one is there; their presence is explicit.
+# Fields of which at most one is set; their presence is explicit.
 CHOICES = frozenset({"file_by_filename", "file_containing_symbol", "list_services"})
 
 

@@ -59,9 +59,9 @@ from roboglot.wire.cyberdog.text import NotJson, read_params, write
 from roboglot.wire.visual.relay import FrameRelay
 
 log = logging.getLogger(__name__)
-CALLS_MAX = 512  # under way at once, over all connections
-FRAME = 64  # bytes of a message beside its text, and some to spare
-CHARACTERS_MAX = (MESSAGE_MAX - FRAME) // 4  # that fit into a message whatever they are
+CALLS_MAX = 512  # at the same time, over all connections
+FRAME = 64  # bytes of a message besides its text, with a margin
+CHARACTERS_MAX = (MESSAGE_MAX - FRAME) // 4  # that fit into a message, whatever their encoding
 FOLDER = "cyberdog"  # in the data folder
 
 
@@ -344,7 +344,7 @@ def _greet(context: Context) -> None:
     """A dog that lies about gets up when its app connects for the first time, unless it hangs on a cable."""
     robot = context.robot
     if Legs in robot and robot[Legs].posture is Posture.LYING and not status_of(context).wired_charging:
-        with contextlib.suppress(RobotError):  # not now: it gets up on command
+        with contextlib.suppress(RobotError):  # it gets up on the next command
             robot[Legs].stand(source=SOURCE)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 
-UNREAD_MAX = 64  # messages that a slow reader may leave unread before the oldest is dropped
+UNREAD_MAX = 64  # unread messages per reader, beyond which the oldest is dropped
 Reader = asyncio.Queue[object]  # None ends it
 
 

@@ -24,8 +24,8 @@ class Push:
 
 
 pushes: dict[int, Push] = {}
-files: set[int] = set()  # what ``getFile`` serves beside the requests
-unread: set[int] = set()  # requests whose params another module reads, JSON or not
+files: set[int] = set()  # files that ``getFile`` serves besides requests
+unread: set[int] = set()  # requests whose params another module parses, JSON or not
 
 
 def push(code: int, *, depth: int = 10, partial: str = "") -> Push:

@@ -24,7 +24,7 @@ from roboglot.protocols.cyberdog.chapters.motion.motion_table import WALKS
 ALL_FEET = 0x0F
 STRAIGHT_DOWN = 2  # ``value`` of a servo frame
 TOED_IN = 0.02  # m
-LASER_MIN = 0.05  # m: nearer returns are the body itself and are left out
+LASER_MIN = 0.05  # m: closer returns are from the body itself and are omitted
 
 
 def wifi_strength(signal: float) -> int:
@@ -74,7 +74,7 @@ def laser_of(scan: LaserScan, pose: Pose) -> list[dict[str, float]]:
     lidar = pose.compose(scan.mount)
     ranges, angles = scan.ranges[seen].astype(float), scan.angles[seen] + lidar.yaw
     xs, ys = lidar.x + ranges * np.cos(angles), lidar.y + ranges * np.sin(angles)
-    # Millimetres are finer than any lidar, and a third of the text.
+    # Millimetres are finer than any lidar, at a third of the text.
     return [{"px": x, "py": y} for x, y in zip(xs.round(3).tolist(), ys.round(3).tolist(), strict=True)]
 
 
@@ -86,7 +86,7 @@ def label_of(label: Label) -> dict[str, object]:
 def twist_of(motion: int, vel_des: Sequence[float]) -> Twist:
     """``vel_des`` [x, y, yaw] cut to what the walk ``motion`` can do; another length counts as standing still."""
     x, y, yaw = vel_des if len(vel_des) == 3 else (0.0, 0.0, 0.0)
-    return GAITS[WALKS.get(motion, Gait.TROT_SLOW)].clamp(Twist(x, y, yaw))  # a user's own gait is a slow walk
+    return GAITS[WALKS.get(motion, Gait.TROT_SLOW)].clamp(Twist(x, y, yaw))  # a user-defined gait counts as a slow walk
 
 
 def body_of(pos_des: Sequence[float], rpy_des: Sequence[float]) -> BodyPose:

@@ -29,8 +29,8 @@ from roboglot.wire.foxglove.messages import (
 log = logging.getLogger(__name__)
 CAPABILITIES = ("clientPublish", "parameters", "parametersSubscribe", "time")
 PLAYED = ("parameters", "parametersSubscribe", "time", "playbackControl")  # of a recorded robot
-UNSENT_MAX = 1 << 20  # bytes that wait for a slow client; what comes then is dropped
-DROPS_PERIOD = 10.0  # s between two words about it
+UNSENT_MAX = 1 << 20  # bytes queued for a slow client; further messages are dropped
+DROPS_PERIOD = 10.0  # s between two log lines about that
 
 
 class Published(msgspec.Struct, rename="camel"):
@@ -47,15 +47,15 @@ class Context:
 
     def __init__(self, robot: Robot, carrier: Carrier, config: FoxgloveConfig, topics: Source | None = None) -> None:
         self.robot, self.config, self.topics = robot, config, topics
-        self.subscriptions: dict[int, int] = {}  # the client's number by the channel's
+        self.subscriptions: dict[int, int] = {}  # the client's subscription number by channel
         self.published: dict[int, Published] = {}
-        self.watched: dict[str, object] = {}  # parameters whose changes it wants, as it knows them
-        self.source = f"{DOOR} {carrier.name}"  # of the actions that it starts
+        self.watched: dict[str, object] = {}  # parameters that it watches, with the last values sent
+        self.source = f"{DOOR} {carrier.name}"  # of the actions that this client starts
         self._carrier = carrier
         self._dropped = 0
         self._warned_at = -DROPS_PERIOD
         self._following: set[asyncio.Task[None]] = set()
-        self.joined = asyncio.Event()  # once ``topics`` is there, or cannot be had
+        self.joined = asyncio.Event()  # set when ``topics`` is ready, or failed
         session = f"{robot.id}-{int(robot.clock.epoch() * 1e3)}"
         model = robot.description.model
         recorded = robot.stand_in.recorded if robot.stand_in is not None else None
@@ -94,7 +94,7 @@ class Context:
         """Report how an action that the client started ends, unless all is well."""
 
         async def report() -> None:
-            ask_for("")  # no client asked for the end
+            ask_for("")  # not on behalf of a client
             if await action.done() is not ActionStatus.SUCCEEDED:
                 end = action.status.name.lower()
                 self.status(Level.WARNING, f"{action.name} {end}: {action.reason or 'another command came'}")
@@ -103,7 +103,7 @@ class Context:
         self._following.add(task)
         task.add_done_callback(self._following.discard)
 
-    # -- what topics call ----------------------------------------------------------------------------------------------
+    # -- called by topics ----------------------------------------------------------------------------------------------
 
     def advertise(self, channels: Sequence[Channel]) -> None:
         """Announce further topics."""

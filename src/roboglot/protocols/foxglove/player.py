@@ -27,7 +27,7 @@ log = logging.getLogger(__name__)
 BEAT = 0.1  # s between two looks at the time
 SELDOM = 10  # beats
 NANO = 1e9
-# Schemas of which the last message before a moment says how things stand then.
+# Schemas whose last message before a moment gives the state at that moment.
 STATES = frozenset(
     f"foxglove.{name}" for name in ("Grid", "SceneUpdate", "PoseInFrame", "FrameTransforms", "LaserScan")
 ) | {"roboglot.Battery", "roboglot.Pressure", "roboglot.State"}
@@ -39,7 +39,7 @@ class Player:
     def __init__(self, robot: Robot, recorded: Recorded, reel: Reel) -> None:
         self._clock, self._reel, self._recorded = robot.clock, reel, recorded
         foreign = tuple(f"{start}/{other}/" for other in recorded.others for start in ("", "/truth"))
-        self._channels: Mapping[int, Channel] = {  # by their place in the reel
+        self._channels: Mapping[int, Channel] = {  # by index in the reel
             place: Channel(
                 place + 1, topic.name, topic.encoding, topic.schema, topic.schema_encoding, topic.schema_data
             )
@@ -47,15 +47,15 @@ class Player:
             if not topic.name.startswith(foreign)
         }
         self._listeners: list[Listener] = []
-        self._newcomers: list[tuple[Listener, int, int]] = []  # with channel and subscription: they lack the last one
+        self._newcomers: list[tuple[Listener, int, int]] = []  # with channel and subscription: they need the last one
         self._beating: asyncio.Task[None] | None = None
         self._playing: asyncio.Task[None] | None = None
         self._showing: asyncio.Task[None] | None = None
         self._reading: asyncio.Future[Sequence[Shot]] | None = None
-        self._broken = ""  # why the file cannot be read any more
+        self._broken = ""  # why the file can no longer be read
         self._rewind()
 
-    # -- who listens ---------------------------------------------------------------------------------------------------
+    # -- clients -------------------------------------------------------------------------------------------------------
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -96,7 +96,7 @@ class Player:
         if self._showing is None or self._showing.done():
             self._showing = self._begin(self._show_newcomers(), "foxglove newcomers")
 
-    # -- what they want ------------------------------------------------------------------------------------------------
+    # -- their requests ------------------------------------------------------------------------------------------------
 
     def control(self, listener: Listener, wish: Wish) -> None:
         """Play on, pause, jump. Raises NotReady: the file has become unreadable."""
@@ -114,11 +114,11 @@ class Player:
         for other in tuple(self._listeners):
             other.played(replace(state, request=wish.request) if other is listener else state)
 
-    # -- how it runs ---------------------------------------------------------------------------------------------------
+    # -- playing -------------------------------------------------------------------------------------------------------
 
     def _rewind(self) -> None:
         self._status, self._speed, self._broken = PlayStatus.PAUSED, 1.0, ""
-        self._at = self._next = self._recorded.first  # where it stood at ``_since``; what has not been sent yet
+        self._at = self._next = self._recorded.first  # position at ``_since``; the next message to send
         self._since = self._clock.time()
 
     def _now(self) -> int:
@@ -141,7 +141,7 @@ class Player:
         return asyncio.get_running_loop().create_task(work, name=name)
 
     async def _play(self, *, sought: bool) -> None:
-        ask_for("")  # it is not for the one client that began it
+        ask_for("")  # not on behalf of the client that started it
         try:
             if sought:
                 await self._show(self._at)
@@ -190,7 +190,7 @@ class Player:
                 if (subscription := listener.wants(channel.id)) is not None:
                     listener.deliver(subscription, shot.at, shot.data)
 
-    # -- how things stood ----------------------------------------------------------------------------------------------
+    # -- the state at a moment -----------------------------------------------------------------------------------------
 
     async def _show(self, at: int) -> None:
         """Send all clients how things stood just before that moment."""

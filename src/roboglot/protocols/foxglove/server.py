@@ -25,7 +25,7 @@ from roboglot.wire.foxglove.messages import SUBPROTOCOLS, Level
 
 log = logging.getLogger(__name__)
 CLIENTS_MAX = 16
-# With libraries of an extra, loaded for the first client; their ``open_source`` takes the robot.
+# They need the libraries of an extra, loaded for the first client; their ``open_source`` takes the robot.
 LIVE, RECORDED = "roboglot.protocols.foxglove.topics", "roboglot.protocols.foxglove.player"
 
 

@@ -6,7 +6,7 @@ from roboglot.operations import OperationTable
 
 TABLE: OperationTable[str] = OperationTable("foxglove")
 SENT = frozenset({"serverInfo", "status", "advertise", "messageData", "time", "parameterValues", "playbackState"})
-REFUSALS = frozenset({"serviceCallFailure"})  # sent, and whole: there is no other service
+REFUSALS = frozenset({"serviceCallFailure"})  # the door sends these; there is no other service
 
 
 def implemented() -> set[str]:

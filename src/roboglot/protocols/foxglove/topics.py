@@ -18,7 +18,7 @@ from roboglot.recording.sampler import POSE_PERIOD, STATE_BEATS, Sampler, Stamps
 
 CHANNELS_MAX = 200
 CAMERA = "camera"
-# Kinds of a recording of which newcomers get the last one.
+# Kinds of recorded values whose last one is sent to new clients.
 KEPT = frozenset({"battery", "pressure", "state", "grid", "scene", "pose", "transforms", "scan"})
 
 

@@ -7,7 +7,7 @@ from roboglot.protocols.door import Contract, Door, DoorType, Implementation, Op
 from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.wire.contracts import contract
 
-EXPLANATION_PORT = 40928  # of `--explain`; no RoboMaster client knows it
+EXPLANATION_PORT = 40928  # for `--explain`; RoboMaster clients do not use it
 
 
 def _open(config: RoboMasterConfig, site: Site) -> Door:

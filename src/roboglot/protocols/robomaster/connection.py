@@ -35,8 +35,8 @@ class ControlConnection(asyncio.Protocol):
     transport: asyncio.Transport
     host: str
     driver: Driver
-    _name: str  # host and port: who commands
-    _shown: str  # in the log: who it is, where that is known, and its host
+    _name: str  # host and port of the client
+    _shown: str  # in the log: its identity if known, and its host
 
     def __init__(
         self,
@@ -50,20 +50,20 @@ class ControlConnection(asyncio.Protocol):
         self._context = context
         self._connections = connections
         self._explain = explain
-        self._lenient = lenient  # text that came without its `;` is run at once
-        self._line_end = line_end  # after each answer; serial lines have one
+        self._lenient = lenient  # text without a final `;` is executed at once
+        self._line_end = line_end  # sent after each answer; used on serial lines
         self._splitter = LineSplitter()
         self._greeting = Greeting()
         self._commands: deque[str | None] = deque()
-        self._resting: asyncio.TimerHandle | None = None  # while nothing is read
+        self._resting: asyncio.TimerHandle | None = None  # while reading is paused
         self._worker: asyncio.Task[None] | None = None
         self._writable = asyncio.Event()
         self._writable.set()
         self._explained = 0
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        self.transport = transport = cast(asyncio.Transport, transport)  # uvloop's is one without inheriting from it
-        peer = transport.get_extra_info("peername")  # None: it is gone already
+        self.transport = transport = cast(asyncio.Transport, transport)  # uvloop's transport does not inherit from it
+        peer = transport.get_extra_info("peername")  # None: already disconnected
         self.host = peer[0] if peer else ""
         self._name = f"{peer[0]}:{peer[1]}" if peer else ""
         who = self._context.robot.admission.known(self._name) if peer else None
@@ -76,7 +76,7 @@ class ControlConnection(asyncio.Protocol):
         self._connections.add(self)
         transport.set_write_buffer_limits(high=OUTPUT_MAX)
         probe_for_life(transport)
-        self._greeting.known = transport.get_extra_info("sockname") is None  # a serial line: no browser gets there
+        self._greeting.known = transport.get_extra_info("sockname") is None  # a serial line: browsers cannot reach it
         log.info("robomaster: %s connected", self._shown)
 
     def data_received(self, data: bytes) -> None:

@@ -79,7 +79,7 @@ class Context:
         self._undo: dict[str, Callable[[], object]] = {}
         self._members: dict[Hashable, str] = {}
         self._numbers = itertools.count(1)
-        self._name = ""  # each session has its own, the first part of the source of what it starts
+        self._name = ""  # each session has its own: the first part of the source of its actions
 
     @property
     def source(self) -> str:
@@ -120,7 +120,7 @@ class Context:
         for undo in (lambda: self.set_mode(FollowMode.CHASSIS_LEAD), *self._undo.values()):
             try:
                 undo()
-            except RobotError as error:  # a real robot that is gone; it has ended its own session
+            except RobotError as error:  # a real robot that is gone has ended the session itself
                 log.info("robomaster: cannot restore a setting: %s", error)
         self._undo.clear()
         self._members.clear()

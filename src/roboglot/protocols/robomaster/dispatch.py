@@ -83,7 +83,7 @@ async def answer(context: Context, text: str | None) -> Answer:
     stand_in = context.robot.stand_in
     result = await (_answered(context, text, asked) if stand_in is None else _stood_in(context, stand_in, text, asked))
     if tap.watched:
-        if asked.began is None:  # it was refused before it was understood
+        if asked.began is None:  # refused before it was parsed
             asked.began = tap.request(DOOR, asked.key, text or "")
         reply = result.reply
         status = reply.decode("utf-8", "replace").rstrip(" ;") if result.explain else "ok"
@@ -117,7 +117,7 @@ async def _answered(context: Context, text: str | None, asked: _Asked) -> Answer
     match result:
         case None:
             return Answer(context.profile.result(Reply.OK, seq))
-        case str():  # a Reply, or a text of its own
+        case str():  # a Reply, or free text
             return Answer(context.profile.result(result, seq))
         case _:
             return Answer(context.profile.values(result, seq))

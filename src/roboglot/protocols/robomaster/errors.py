@@ -3,7 +3,7 @@
 from roboglot.model.errors import RobotError
 from roboglot.wire.robomaster.replies import Reply
 
-# The text protocol knows one answer for everything that a well-formed command can't do; the log says why.
+# The text protocol has one answer for well-formed commands that cannot be done; the log gives the reason.
 REPLIES: dict[type[RobotError], Reply] = {RobotError: Reply.FAIL}
 
 

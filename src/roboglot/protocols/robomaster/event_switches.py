@@ -12,7 +12,7 @@ from roboglot.model.events import AdapterLevelChanged, ArmorHit
 from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.vocabulary import ARMOR, HITS
 
-CLAPS_MIN = 2  # a single bang is no applause
+CLAPS_MIN = 2  # one bang is not applause
 
 
 class EventSwitches:

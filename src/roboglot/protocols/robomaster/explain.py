@@ -15,7 +15,7 @@ from roboglot.operations import BadParameters
 from roboglot.protocols.robomaster.shapes import Shape
 from roboglot.wire.robomaster.commands import QUERY, Command, Value
 
-EXCLUSIVE_STEP = 0.1  # how far beyond an excluded end a suggested number lies
+EXCLUSIVE_STEP = 0.1  # distance of a suggested number from an excluded bound
 
 
 def nearest_command(command: Command, keys: typing.Iterable[str]) -> str:
@@ -107,7 +107,7 @@ def _nearest(kind: Any, value: Value) -> Value | None:
         return (difflib.get_close_matches(str(value).lower(), texts, n=1, cutoff=0.3) or texts)[0]
     limits = _limits(kind)
     if limits is None:
-        return "all" if kind is str else None  # the only word that may be any is which lamps are meant
+        return "all" if kind is str else None  # the only free-form word is the choice of lamps
     low = limits.ge if limits.ge is not None else (limits.gt or 0) + EXCLUSIVE_STEP
     high = limits.le if limits.le is not None else low
     number = value if isinstance(value, int | float) and not isinstance(value, bool) else max(low, min(high, 1))

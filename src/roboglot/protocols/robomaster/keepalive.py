@@ -14,7 +14,7 @@ def probe_for_life(transport: asyncio.Transport) -> None:
     """Have the kernel ask a silent peer whether it is still there, and give it up if it isn't."""
     connection = transport.get_extra_info("socket")
     if connection is None:
-        return  # a serial line, or a tunnel, which looks after its clients itself
+        return  # a serial line, or a tunnel, which monitors its clients itself
     idle, interval, count = DEAD_CLIENT_PROBES
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, idle)

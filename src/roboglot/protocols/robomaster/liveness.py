@@ -25,7 +25,7 @@ _TCP_INFO = struct.Struct("=3xB20xI28xI")  # of struct tcp_info: probes, unacked
 _ECHO = struct.pack("!BBHHH", 8, 0, 0, 0, 0) + b"roboglot"  # the kernel fills in checksum and identifier
 _REPLY_MAX = 64  # bytes
 REPLIES_MAX = 64  # echoes read at a time
-GREETINGS = 3  # requests to a host before its client drives
+GREETINGS = 3  # requests sent to a host before its client drives
 
 
 class Echoes:
@@ -64,7 +64,7 @@ class Driver:
     def __init__(self, name: str, host: str, connection: socket.socket | None) -> None:
         self.name, self.host = name, host
         self._connection = connection
-        self._echoes = False  # whether its host ever answered: many do not
+        self._echoes = False  # whether its host has ever answered: many do not
         self._misses = 0
         self._greetings = GREETINGS
 
@@ -92,10 +92,10 @@ class Driver:
             probes, unacknowledged, silent = _TCP_INFO.unpack(
                 self._connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _TCP_INFO.size)
             )
-            if probes:  # have the kernel repeat it at once: a single one may get lost
+            if probes:  # let the kernel repeat it at once: a single one may get lost
                 self._connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, 1)
         except OSError:
-            return False  # closed: that has been noticed otherwise
+            return False  # closed: noticed elsewhere
         asked = self._echoes or probes > 0 or unacknowledged > 0
         self._echoes = self._echoes or echoed
         alive = echoed or silent < elapsed * 1000

@@ -11,7 +11,7 @@ from roboglot.model.clock import Clock
 from roboglot.wire.robomaster.replies import Number, Profile
 
 RATE = 5  # Hz, by default
-ROBOTS_TICK = 50  # Hz at which robots sample; what has another rate goes out every so many ticks
+ROBOTS_TICK = 50  # Hz at which robots sample; other rates are sent every few ticks
 
 Read = Callable[[], tuple[Number, ...]]
 
@@ -30,7 +30,7 @@ class _Beat:
     """Attributes that go out on one clockwork: alone, or all of a module together as robots have it."""
 
     attributes: list[_Attribute]
-    running: tuple[int, ...] = ()  # the rates under way
+    running: tuple[int, ...] = ()  # the rates in use
     task: asyncio.Task[None] | None = None
 
 

@@ -73,7 +73,7 @@ def gimbal_attitude(robot: Robot) -> tuple[float, float]:
     return -math.degrees(gimbal.attitude.pitch), -math.degrees(gimbal.angles.yaw)
 
 
-# What can be pushed, by module, in the manual's order. The position push carries no angle.
+# Values that can be pushed, by module, in the manual's order. The position push carries no angle.
 PUSHED: dict[str, dict[str, Callable[[ReadingSource], tuple[Number, ...]]]] = {
     "chassis": {
         "position": lambda source: position(source)[:2],

@@ -29,9 +29,9 @@ from roboglot.wire.robomaster.replies import PROFILES
 
 __all__ = ["RoboMasterDoor", "implemented"]
 
-# Where a robot is that makes its own Wi-Fi, or hangs on a USB cable: everybody knows, so it announces nothing.
+# Where a robot stands that provides its own Wi-Fi or hangs on a USB cable: clients know it, so it announces nothing.
 CONNECTIONS_MAX = {"video": MEDIA_CONNECTIONS_MAX, "audio": MEDIA_CONNECTIONS_MAX, "pilot": PILOTS_MAX}
-PORT_RIGHTS = {"pilot": Right.DRIVE}  # of those who connect; all others need sight
+PORT_RIGHTS = {"pilot": Right.DRIVE}  # required to connect; all other ports require SEE
 KNOWN_ADDRESSES = frozenset({"192.168.2.1", "192.168.42.2"})
 
 
@@ -121,7 +121,7 @@ class RoboMasterDoor:
     def endpoints(self) -> Sequence[Endpoint]:
         """The control port first, then the others, the serial line, and where datagrams go."""
         ports = {name: server.sockets[0].getsockname()[1] for name, server in self._servers.items()}
-        # bash and coreutils are everywhere; nc isn't, and its options differ.
+        # bash and coreutils exist everywhere; nc does not, and its options differ.
         trial = (
             f'bash -c "exec 3<>/dev/tcp/{self._address}/{ports["text SDK"]}; '
             "printf 'command;chassis position ?;quit;' >&3; timeout 1 cat <&3\""
@@ -139,7 +139,7 @@ class RoboMasterDoor:
             listed.append(Endpoint("RoboMaster serial line", str(self._serial_link)))
         return (*listed, Endpoint("RoboMaster pushes", f"udp to the client's port {self._config.push_port}"))
 
-    # -- where the session's words go ----------------------------------------------------------------------------------
+    # -- output of the session -----------------------------------------------------------------------------------------
 
     def push(self, datagram: bytes, host: str) -> None:
         """A datagram to the client's host, from the robot's own address; or down the serial line."""
@@ -147,7 +147,7 @@ class RoboMasterDoor:
         self._note(datagram, place)
         if self._serial and host == str(self._serial_link):
             self._serial.write(datagram + LINE_END)
-        elif self._datagrams and admission.carries_datagrams(place):  # a tunnel takes its own from the tap
+        elif self._datagrams and admission.carries_datagrams(place):  # a tunnel takes its copies from the tap
             self._datagrams.send(datagram, host, self._config.push_port)
 
     def tell(self, event: bytes) -> None:
@@ -161,7 +161,7 @@ class RoboMasterDoor:
         """Send what a stand-in pushes: events to who reads them, the rest to every client's host."""
         if operation.endswith(" event"):
             self.tell(message)
-        elif operation != "> robot ip":  # this robot is elsewhere, and says so itself
+        elif operation != "> robot ip":  # this robot is elsewhere and reports it itself
             for host in {connection.host for connection in self._connections}:
                 self.push(message, host)
 

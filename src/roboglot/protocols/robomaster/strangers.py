@@ -11,7 +11,7 @@ import re
 
 log = logging.getLogger(__name__)
 
-HEAD_MAX = 32  # bytes within which a protocol shows itself
+HEAD_MAX = 32  # bytes within which a foreign protocol can be recognized
 _TLS = 0x16  # the first byte of a handshake; no command begins with a control character
 _METHODS = (
     b"get", b"post", b"put", b"head", b"delete", b"options", b"patch", b"trace", b"connect", b"pri",
@@ -28,7 +28,7 @@ class Greeting:
 
     def __init__(self) -> None:
         self._head = b""
-        self.known = False  # whether the connection has shown that it may go on
+        self.known = False  # whether the connection has proved to be a client's
 
     def check(self, data: bytes) -> bytes:
         """The bytes that may be read as this port's own: none while the head could still be a stranger's.

@@ -6,7 +6,7 @@ from roboglot.operations import OperationTable
 from roboglot.wire.contracts import contract
 
 TABLE: OperationTable[str] = OperationTable("robomaster")
-SENT = "> "  # how the contract marks what the robot sends by itself
+SENT = "> "  # the contract's mark of messages that the robot sends unasked
 MESSAGES = frozenset(
     {
         "> chassis push",
@@ -18,7 +18,7 @@ MESSAGES = frozenset(
         "> robot ip",
         "> game_msg push",
     }
-)  # those that this door really sends
+)  # those that this door implements
 
 
 def implemented() -> set[str]:

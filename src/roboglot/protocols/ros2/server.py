@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from roboglot.recording.sampler import Sampler
 
 log = logging.getLogger(__name__)
-PENDING_MAX = 32  # messages that wait to be done; then they are dropped, and the log says so
+PENDING_MAX = 32  # messages queued for handling; beyond this they are dropped and logged
 PICTURE_PERIOD = 0.2  # s
 JPEG_QUALITY = 80
 NODE = "roboglot"
@@ -53,12 +53,12 @@ class Ros2Door:
         self._namespace = config.namespaces.get(robot.id, robot.id)
         self._session: zenoh.Session | None = None
         self._node: Node | None = None
-        self._tokens: list[object] = []  # what is announced, for as long as they are kept
+        self._tokens: list[object] = []  # announcements, which end when they are released
         self._publishers: dict[str, zenoh.Publisher | AdvancedPublisher] = {}
         self._numbers = 0
         self._sequence = 0
         self._gid = uuid.uuid4().bytes
-        self._room = threading.BoundedSemaphore(PENDING_MAX)  # taken in threads of Zenoh's
+        self._room = threading.BoundedSemaphore(PENDING_MAX)  # taken in Zenoh's threads
         self._tasks: set[asyncio.Task[None]] = set()
         self._sampler: Sampler | None = None
         self._battery: Entry | None = None
@@ -75,7 +75,7 @@ class Ros2Door:
 
     @property
     def _words(self) -> Ros2Words:
-        assert self._translator is not None  # made when the door opens
+        assert self._translator is not None  # set when the door opens
         return self._translator
 
     @property
@@ -236,7 +236,7 @@ class Ros2Door:
 
     def _put(self, entry: Entry) -> None:
         """Publish what a recording would keep, as far as ROS has a type for it."""
-        if entry.kind == "battery":  # a recording has its changes; ROS wants it now and then
+        if entry.kind == "battery":  # a recording contains changes only; ROS expects it periodically
             self._battery = entry
         if entry.kind in SHOWN:
             self._show(entry)

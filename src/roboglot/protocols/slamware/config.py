@@ -18,6 +18,6 @@ class SlamwareConfig:
     port: Port = 1448
     action_prefix: str = "slamtec.agent.actions."  # firmware 6 says "agent.actions."; both are always understood
     keep_events: bool = False
-    cloud: str = ""  # a folder that plays the maker's cloud, with a folder for each robot; "": no cloud has the robots
+    cloud: str = ""  # a folder that simulates the maker's cloud, with one folder per robot; "": no cloud
     origins: tuple[str, ...] = ()
     hosts: tuple[str, ...] = ()

@@ -24,7 +24,7 @@ from roboglot.operations import BadParameters, Operation, Right
 from roboglot.protocols.browsers import Browsers, of_rows
 from roboglot.protocols.slamware.bodies import ClientGone, Receive, Scope
 
-# Every chapter registers its operations.
+# Each chapter registers its operations.
 from roboglot.protocols.slamware.chapters import industry  # noqa: F401
 from roboglot.protocols.slamware.chapters.artifact import landmarks, lines_and_areas, points_of_interest  # noqa: F401
 from roboglot.protocols.slamware.chapters.delivery import (  # noqa: F401
@@ -66,7 +66,7 @@ from roboglot.protocols.slamware.table import NO_CONTENT, TABLE, Text
 from roboglot.wire.contracts import Row, contract
 
 log = logging.getLogger(__name__)
-LOGGED_MAX = 200  # characters of a path or a refusal in the log
+LOGGED_MAX = 200  # characters of a path or a refusal in a log line
 
 Send = Callable[[dict[str, object]], Awaitable[None]]
 Headers = list[tuple[bytes, bytes]]
@@ -82,7 +82,7 @@ PREFLIGHT: Headers = [
     (b"access-control-allow-private-network", b"true"),
     (b"access-control-max-age", b"86400"),
 ]
-FRAMES = (b"content-security-policy", b"frame-ancestors 'self'")  # no other page shows ours and catches its clicks
+FRAMES = (b"content-security-policy", b"frame-ancestors 'self'")  # against clickjacking by other pages
 
 
 class Application:
@@ -107,7 +107,7 @@ class Application:
         why = ""
         try:
             shared = self._admit(scope)
-            if self._admission.asks and scope["method"] != "OPTIONS":  # browsers show nothing in a preflight
+            if self._admission.asks and scope["method"] != "OPTIONS":  # browsers send no credentials in a preflight
                 await self._enter(scope, peer)
             status, headers, body = await self._answer(scope, receive)
         except ClientGone:
@@ -167,7 +167,7 @@ class Application:
             if who is None:
                 who = await self._admission.admit(address, proof)
         except Unknown as unknown:
-            more = (CHALLENGE, CLOSE) if isinstance(unknown, LockedOut) else (CHALLENGE,)  # what follows is not read
+            more = (CHALLENGE, CLOSE) if isinstance(unknown, LockedOut) else (CHALLENGE,)  # the body is not read
             raise HttpError(401, "Unauthorized", str(unknown), more) from None
         ask_for(f"slamware {who}", address, who)
 
@@ -179,7 +179,7 @@ class Application:
             return 200, [*PREFLIGHT, (b"allow", allowed(match.methods).encode())], b""
         if (row := match.methods.get("GET" if method == "HEAD" else method)) is None:
             raise not_allowed(match.methods)
-        # Nothing but events is changed by being read; the server leaves the body of an answer to HEAD away.
+        # Only events change by being read; the server omits the body of an answer to HEAD.
         with self._context.events.kept() if method == "HEAD" else nullcontext():
             return await self._carry_out(row, match, scope, receive)
 
@@ -256,7 +256,7 @@ class Application:
         scope["began"] = self._tap.request("slamware", scope["operation"], _wire_form(scope))
 
     def _note_reply(self, scope: Scope, status: int, body: bytes, why: str) -> None:
-        if "began" not in scope:  # it was refused before it was understood
+        if "began" not in scope:  # refused before it was parsed
             scope.setdefault("operation", "")
             self._note_request(scope)
         self._tap.reply("slamware", scope["operation"], body, str(status), why, scope["began"])

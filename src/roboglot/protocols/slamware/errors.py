@@ -24,7 +24,7 @@ from roboglot.model.errors import (
 REASON_MAX = 160  # characters of a reason phrase
 
 
-@dataclass(eq=False)  # not frozen: contextlib writes the traceback into exceptions that pass
+@dataclass(eq=False)  # not frozen: contextlib writes the traceback into exceptions that pass through
 class HttpError(Exception):
     """A status, the text of the reason phrase, what more the body can tell, and further headers."""
 
@@ -39,7 +39,7 @@ class HttpError(Exception):
         return f"{self.text}: {self.detail}" if self.detail else self.text
 
 
-# The first class that fits decides.
+# First match wins.
 STATUSES: dict[type[RobotError], tuple[int, str]] = {
     ComponentMissing: (501, "Not Implemented"),
     InvalidGoal: (400, "Bad Request"),
@@ -54,7 +54,7 @@ STATUSES: dict[type[RobotError], tuple[int, str]] = {
     RobotError: (500, "Internal Server Error"),
 }
 
-# The manual's words for 400, by operation; all others say "Bad Request".
+# The manual's reasons for 400, by operation; all others are "Bad Request".
 BAD_REQUESTS = {
     "POST /api/core/motion/v1/actions": "Can not create action",
     "PUT /api/core/slam/v1/localization/pose": "Invalid Argument",

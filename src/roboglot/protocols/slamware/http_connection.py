@@ -13,13 +13,13 @@ import httptools
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 CONNECTIONS_MAX = 2048
-HEAD_MAX = 32 * 1024  # bytes of a request before its body
+HEAD_MAX = 32 * 1024  # bytes of a request's line and headers
 PIECE = 1 << 20  # bytes of a body
-REQUEST_SECONDS_MAX = 10.0  # for a request (or a piece of its body) to arrive, and for a new connection to begin one
+REQUEST_SECONDS_MAX = 10.0  # for a request (or a piece of its body) to arrive, and for a new connection's first one
 WRITE_SECONDS_MAX = 30.0  # for a client that does not read its answer
 KEEP_ALIVE_SECONDS = 75
 
-REASON = b"reason-phrase"  # a header of the application for this file; it never reaches the wire
+REASON = b"reason-phrase"  # an internal header for this file, which never reaches the wire
 _REASON_LINE = b"\r\n" + REASON + b": "
 _STATUS = b"HTTP/1.1 "
 _CODE_END = len(_STATUS) + 4
@@ -67,14 +67,14 @@ class HttpConnection(HttpToolsProtocol):
     """Closes connections that are too many, too slow or too long-winded."""
 
     _patience: asyncio.TimerHandle | None = None
-    _deadline: float | None = None  # on the loop's clock; None: all is well
+    _deadline: float | None = None  # by the loop's clock; None: no deadline
     _receiving = False  # between the first byte of a request and its last
     _in_head = False
-    _head_bytes = 0  # that came while the head was not whole
-    _body_bytes = 0  # since the time was last counted anew
-    _parsed_bytes = 0  # of it that were understood: a long head may come whole
+    _head_bytes = 0  # received while the headers are incomplete
+    _body_bytes = 0  # since the deadline was last extended
+    _parsed_bytes = 0  # of these, parsed: long headers may arrive at once
     _reading: bytes | memoryview = b""
-    _unread: Sequence[bytes | memoryview] = ()  # to be read before all else
+    _unread: Sequence[bytes | memoryview] = ()  # received, to be parsed first
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(ReasonTransport(transport))
@@ -162,7 +162,7 @@ class HttpConnection(HttpToolsProtocol):
 
     def on_body(self, body: bytes) -> None:
         self._body_bytes += len(body)
-        if self._body_bytes >= PIECE:  # packages may take their time, as long as they come
+        if self._body_bytes >= PIECE:  # uploads may be slow as long as data arrives
             self._body_bytes = 0
             self._guard(REQUEST_SECONDS_MAX)
         super().on_body(body)
@@ -182,7 +182,7 @@ class HttpConnection(HttpToolsProtocol):
 
     def _guard(self, seconds: float | None) -> None:
         """Drop the connection after ``seconds`` from now; None: all is well."""
-        # One timer stays armed however many requests come: two timers a request cost as much as its answer.
+        # One timer stays armed, however many requests arrive: two timers per request cost as much as its answer.
         self._deadline = None if seconds is None else self.loop.time() + seconds
         if self._deadline is None or (self._patience is not None and self._patience.when() <= self._deadline):
             return

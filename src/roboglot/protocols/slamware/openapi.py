@@ -17,7 +17,7 @@ from roboglot.protocols.slamware.routes import ALIASES, BEYOND, SHORTHANDS
 from roboglot.protocols.slamware.table import TABLE, NoContent, Text
 from roboglot.wire.contracts import contract
 
-BODIES = (bytes, Upload)  # what is no JSON
+BODIES = (bytes, Upload)  # not JSON
 REFERENCE = "#/components/schemas/{name}"
 BINARY = {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}}
 Schema = dict[str, Any]
@@ -99,7 +99,7 @@ class _Schemas:
                 continue
             place = "path" if f"{{{field.name}}}" in path else "query"
             schema = self.of(field.type)
-            if place == "query" and not field.required:  # "?status=" is as good as nothing
+            if place == "query" and not field.required:  # an empty "?status=" counts as absent
                 schema = {"anyOf": [schema, {"type": "string", "maxLength": 0}]}
             parameters.append({"name": field.name, "in": place, "required": field.required, "schema": schema})
         if parameters:

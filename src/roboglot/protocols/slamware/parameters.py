@@ -19,7 +19,7 @@ BODY_MAX = 1 << 20  # bytes of a JSON body
 UPLOAD_MAX = 64 << 20  # bytes of a binary body
 UPLOADS_MAX = 4  # at a time
 QUERY_FIELDS_MAX = 32
-WHOLE_MAX = 2.0**53  # beyond it floats leave integers out
+WHOLE_MAX = 2.0**53  # beyond it floats cannot represent every integer
 
 
 class Parameters:

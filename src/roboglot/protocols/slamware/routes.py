@@ -9,16 +9,16 @@ from urllib.parse import unquote
 from roboglot.wire.contracts import Row
 
 PATH_MAX = 1024  # characters
-# Paths beyond the manual that clients in the field use, and the operations that they mean.
+# Paths outside the manual that clients in the field use, with the operations that they mean.
 ALIASES = {
     "GET /api/delivery/v1/tasks/stage": "GET /api/delivery/v1/stage",  # of 2021
     "GET /api/delivery/v1/events": "GET /api/platform/v1/events",  # of 2021
     "POST /api/multi-floor/motion/v1/gohomeaction": "POST /api/core/motion/v1/actions",
     "POST /api/multi-floor/motion/v1/movetoaction": "POST /api/core/motion/v1/actions",
 }
-# Operations beyond the manual that clients in the field use.
+# Operations outside the manual that clients in the field use.
 BEYOND = (Row("POST /api/industry/v1/generate_landing_pose", "industry", "generateLandingPose"),)
-# Of these the body is the options, which may be left out; the action is known.
+# For these the body contains the options, which may be absent; the path names the action.
 SHORTHANDS = {
     "/api/multi-floor/motion/v1/gohomeaction": "MultiFloorBackHomeAction",
     "/api/multi-floor/motion/v1/movetoaction": "MultiFloorMoveAction",

@@ -36,7 +36,7 @@ from roboglot.protocols.slamware.http_connection import CONNECTIONS_MAX, KEEP_AL
 from roboglot.transport.tls import Tls
 from roboglot.wire.slamware.chapters.platform import GeneralEvent
 
-GOODBYE_SECONDS = 0.3  # for answers under way when the door closes
+GOODBYE_SECONDS = 0.3  # for answers in progress when the door closes
 
 
 class SlamwareDoor:

@@ -15,7 +15,7 @@ from roboglot.wire.slamware.geometry import Pose2D, Pose3D
 
 PREFIXES = ("slamtec.agent.actions.", "agent.actions.")  # firmware up to 5, firmware 6: both are understood
 
-# Reasons that clients have seen on robots; other errors have plain words.
+# Reasons that clients have received from robots; other errors have plain words.
 REASONS: dict[type[RobotError], str] = {
     Unreachable: "CANNOT_REACH_TARGET",
     Blocked: "PATH_OCCUPIED",
@@ -31,7 +31,7 @@ RIDE_STAGES = {
     RideStage.LEAVING: "GOING_OUT_OF_ELEVATOR",
     RideStage.ARRIVED: "",
 }
-DOCKING_STAGES = {"approaching": "GOING_TO_LANDING_POINT"}  # while it creeps onto the contacts the stage is empty
+DOCKING_STAGES = {"approaching": "GOING_TO_LANDING_POINT"}  # empty while the robot creeps onto the contacts
 
 
 MARK_STAGES = {"approaching": "MOVE_TO_LANDING_POINT", "looking": "DETECT_MARKER", "docking": "LANDING"}

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from roboglot.config import Port
 
-LEVEL_MAX = 128  # characters of a level of a topic
+LEVEL_MAX = 128  # characters per level of a topic
 
 
 @dataclass(frozen=True, slots=True)

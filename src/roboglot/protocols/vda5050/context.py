@@ -32,7 +32,7 @@ from roboglot.wire.vda5050.versions import ErrorKind, Level, Version
 
 log = logging.getLogger(__name__)
 SOURCE = DOOR
-START_REACH = 0.5  # m from the first node of an order that still count as there
+START_REACH = 0.5  # m from an order's first node that count as being there
 
 
 class Context:
@@ -47,10 +47,10 @@ class Context:
         self.book = OrderBook(measure=self._metres)
         self.instant: dict[str, ActionState] = {}
         self.paused = False
-        self.hibernating = False  # heard by the door: no states, and nothing is taken but stopHibernation
-        self.alarm: asyncio.Future[None] | None = None  # wakes the robot at the time that was given
-        self.leaving = False  # the robot switches off: the door takes leave of the broker
-        self.load: dict[str, str] = {}  # what fleet control said of the load that was picked
+        self.hibernating = False  # this door hibernates: no states, and only stopHibernation is accepted
+        self.alarm: asyncio.Future[None] | None = None  # wakes the robot at the given time
+        self.leaving = False  # the robot is switching off: the door disconnects from the broker
+        self.load: dict[str, str] = {}  # fleet control's description of the picked load
         self.changed = asyncio.Event()
         self.errors = ErrorBook(robot, version, self.changed)
         self._trigger = asyncio.Event()
@@ -110,7 +110,7 @@ class Context:
         self.errors.forget_kind(ErrorKind.INSTANT_ACTION)
         for action in message.actions:
             if action.action_id in self.instant:
-                continue  # sent again
+                continue  # already known
             if self.hibernating and action.action_type != "stopHibernation":
                 log.info("robot %s hibernates: refused %s", self.robot.id, action.action_type)
                 continue

@@ -40,7 +40,7 @@ async def _refusal(context: Context, name: str, data: bytes) -> Rejected | None:
         await operation.call(context, {"payload": data})
     except Rejected as rejected:
         return rejected
-    except Exception as error:  # one message must not end the link to fleet control
+    except Exception as error:  # one message must not end the connection to fleet control
         log.exception("robot %s: %s broke", context.robot.id, name)
         return Rejected(ErrorKind.NOT_AVAILABLE, f"{name} broke: {error}")
     return None

@@ -12,7 +12,7 @@ from roboglot.model.map_loading import known_dock, load_map
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.robot import Robot
 
-LOOK_PERIOD = 2.0  # s of robot time: how old the list of kept maps may be
+LOOK_PERIOD = 2.0  # s of robot time: maximum age of the list of stored maps
 
 
 class Maps:
@@ -23,7 +23,7 @@ class Maps:
         self.in_use = own
         self._names: tuple[str, ...] = ()
         self._looked_at = float("-inf")
-        self._loads = 0  # of our own, that MapReplaced has not come of yet
+        self._loads = 0  # our own loads whose MapReplaced is still to come
 
     async def look(self) -> None:
         """Read the names of the kept maps, if that is long ago."""

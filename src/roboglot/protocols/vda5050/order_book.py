@@ -13,7 +13,7 @@ from roboglot.protocols.vda5050.errors import Rejected
 from roboglot.wire.vda5050.orders import Action, Edge, Node, Order, Part
 from roboglot.wire.vda5050.versions import ErrorKind
 
-ACTIONS_KEPT_MAX = 1000  # action states; the oldest ended ones go first
+ACTIONS_KEPT_MAX = 1000  # action states; the oldest finished ones are dropped first
 
 
 class ActionStatus(StrEnum):
@@ -23,7 +23,7 @@ class ActionStatus(StrEnum):
     INITIALIZING = "INITIALIZING"
     RUNNING = "RUNNING"
     PAUSED = "PAUSED"
-    RETRIABLE = "RETRIABLE"  # 3.0: failed, and waits for retry or skipRetry
+    RETRIABLE = "RETRIABLE"  # 3.0: failed, waiting for retry or skipRetry
     FINISHED = "FINISHED"
     FAILED = "FAILED"
 
@@ -53,12 +53,12 @@ class OrderBook:
     actions: dict[str, ActionState] = field(default_factory=dict)
     last_node: str = ""
     last_sequence: int = 0
-    decision: Node | None = None  # the last released node of all messages so far
+    decision: Node | None = None  # the last released node in all messages so far
     cancelled: bool = False
     canceling: bool = False
     last: Order | None = None
-    measure: Callable[[], float] = lambda: 0.0  # m that the robot has driven in its life
-    placed_at: float | None = None  # what it measured at the last node
+    measure: Callable[[], float] = lambda: 0.0  # returns the robot's total distance in m
+    placed_at: float | None = None  # that distance at the last node
 
     @property
     def idle(self) -> bool:

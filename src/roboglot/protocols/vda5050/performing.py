@@ -49,7 +49,7 @@ class Performer:
 
     def __init__(self, context: Performing) -> None:
         self._context = context
-        self._asked: dict[str, asyncio.Future[bool]] = {}  # actions in RETRIABLE: True for another try
+        self._asked: dict[str, asyncio.Future[bool]] = {}  # actions in RETRIABLE: True to try again
 
     async def perform(self, state: ActionState, operation: Operation[str], *, instant: bool = False) -> None:
         """Do ``state``'s action until it has ended; one that may be retried waits after a failure for what comes."""
@@ -97,7 +97,7 @@ class Performer:
         except Rejected as rejected:
             state.status, state.result = ActionStatus.FAILED, str(rejected)
             references = {**rejected.references, "actionId": action.action_id}
-            own = instant and rejected.kind is ErrorKind.INSTANT_ACTION  # those go with the next instant actions
+            own = instant and rejected.kind is ErrorKind.INSTANT_ACTION  # those leave with the next instant actions
             context.errors.report(rejected.kind, rejected.level, str(rejected), references, order=not own)
         except (RobotError, BadParameters, ValueError) as error:
             state.status, state.result = ActionStatus.FAILED, str(error)

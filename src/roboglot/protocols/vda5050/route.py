@@ -24,9 +24,9 @@ from roboglot.wire.vda5050.orders import Action, Edge, Node
 from roboglot.wire.vda5050.versions import ErrorKind, Level, Version
 
 log = logging.getLogger(__name__)
-TOLERANCE = 0.05  # m: as near as the robot goes where the order allows no deviation
-STANDS = ("SOFT", "HARD")  # blocking types of actions that the robot stands for
-ALONE = ("SINGLE", "HARD")  # those that no other action runs beside
+TOLERANCE = 0.05  # m: tolerance where the order allows no deviation
+STANDS = ("SOFT", "HARD")  # blocking types of actions that require standstill
+ALONE = ("SINGLE", "HARD")  # blocking types of actions that exclude all others
 
 
 @dataclass(slots=True)

@@ -26,13 +26,13 @@ from roboglot.transport.seldom import Seldom
 from roboglot.wire.vda5050.versions import VERSIONS
 
 log = logging.getLogger(__name__)
-RETRY = 2.0  # s between two tries to reach the broker
-LOOK_PERIOD = 0.2  # s of robot time between two looks whether the state changed by itself
-STATE_PERIOD = 30.0  # s after which the state is sent in any case
-QUEUE_MAX = 64  # messages that wait to be read; then they are dropped, and the log says so
-LINK_SECONDS = 5.0  # for the broker to answer
-KEEPALIVE = 15  # s after which the broker says that the robot is gone
-CLOSING = 1.0  # s to take leave of the broker
+RETRY = 2.0  # s between two attempts to connect
+LOOK_PERIOD = 0.2  # s of robot time between two checks for changes of the state
+STATE_PERIOD = 30.0  # s after which the state is sent even if unchanged
+QUEUE_MAX = 64  # messages waiting to be read; beyond this they are dropped and logged
+LINK_SECONDS = 5.0  # for an answer from the broker
+KEEPALIVE = 15  # s after which the broker reports that the robot is gone
+CLOSING = 1.0  # s to disconnect from the broker
 
 
 HEARD = {"v2": ("order", "instantActions"), "v3": ("order", "instantActions", "zoneSet", "responses")}  # topics
@@ -56,7 +56,7 @@ class Vda5050Door:
         self._task: asyncio.Task[None] | None = None
         self._client: Any = None
         self._seldom = Seldom(log)
-        self._sent: object = None  # the last state, coarsely, and when it was sent (robot time)
+        self._sent: object = None  # the last state sent, rounded, and when (robot time)
         self._sent_at = 0.0
         self._rests = False  # hibernation was announced
 

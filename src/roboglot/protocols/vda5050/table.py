@@ -7,7 +7,7 @@ from typing import Any
 from roboglot.operations import OperationTable
 
 TABLE: OperationTable[str] = OperationTable("vda5050")
-# Which version has an action, where only one has, and where it may stand, where not at both.
+# The version of an action that only one has, and its scope where it is restricted.
 ONLY_IN: dict[str, str] = {
     "initPosition": "v2",
     "initializePosition": "v3",

@@ -24,8 +24,8 @@ from roboglot.wire.vda5050.versions import Version
 
 JACK_POSITION = "jack"  # the one load handling device, and the one load position
 SHELF = "shelf"  # the one station type for loads
-NUMBERS = ("x", "y", "theta", "height", "depth")  # parameters of actions that are no text
-STILL = 0.01  # m/s and rad/s below which the robot does not drive
+NUMBERS = ("x", "y", "theta", "height", "depth")  # parameters of actions that are not text
+STILL = 0.01  # m/s and rad/s below which the robot counts as standing
 DOOR = "vda5050"
 
 
@@ -229,7 +229,7 @@ def _described(name: str, new: bool) -> dict[str, object]:
         | {"isOptional": not operation.requires(key)}
         for key in operation.names
     ]
-    # Version 2.1's schema wants a word in blockingTypes where its text wants an array, so there it is left out.
+    # Version 2.1's schema wants a string in blockingTypes, its text an array, so the field is omitted.
     more = {
         "pauseAllowed": False,
         "cancelAllowed": name in AT_NODES,

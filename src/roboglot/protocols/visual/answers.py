@@ -40,7 +40,7 @@ class Answers:
     ) -> None:
         self._request = request
         self._tap = tap
-        self._began = began  # when it was noted for those who follow
+        self._began = began  # when it was reported to followers
         self._outlet = outlet
         self._note = note
 

@@ -28,8 +28,8 @@ from roboglot.wire.visual.requests import BadFrame, Kind, Request, parse_request
 
 log = logging.getLogger(__name__)
 
-PENDING_MAX = 64  # frames being answered at once
-# These wait for nothing but the start of the same task; in lockstep, where time waits, for all that came before them.
+PENDING_MAX = 64  # frames in progress
+# These only wait for the start of the same task; in lockstep, where time waits, for everything before them.
 URGENT = frozenset({"suspend", "recover", "shutdown"})
 
 
@@ -80,7 +80,7 @@ class Dispatch:
         if self._service.robot.stand_in is not None:
             await self._ask_stand_in(self._service.robot.stand_in, request, text, answers, began)
             return
-        # A task of its own: what is begun is brought to its end even if the carrier loses its client.
+        # A separate task: whatever was begun is completed even if the client disconnects.
         starting = {id for pending in self._pending.values() if pending.operate == "run" for id in pending.targets}
         urgent = request.operate in URGENT and not self._service.robot.clock.repeats
         in_order = not urgent or not starting.isdisjoint(request.targets)
@@ -115,7 +115,7 @@ class Dispatch:
             except StoreError as error:
                 log.warning("cannot store %s of %s: %s", request.operate, request.kind, error)
                 answers.refuse(state_of(error), f"the list of programs can't be used: {error}")
-            except Exception as error:  # a fault of ours must not leave a front end without an answer
+            except Exception as error:  # an internal error must not leave a front end without an answer
                 log.exception("%s of %s failed", request.operate, request.kind)
                 answers.refuse(state_of(error), f"the robot could not do it: {error}")
 
@@ -123,7 +123,7 @@ class Dispatch:
         if self._cloud is not None and request.operate == "inquiry" and not request.targets:
             await self._fetch(self._cloud, request.kind)
         operation = TABLE.get(key_of(request))
-        assert operation is not None  # parse_request lets no other frame pass
+        assert operation is not None  # parse_request rejects all other frames
         await operation.handler(Context(self._service, request, answers))
 
     async def _fetch(self, cloud: CloudMirror, kind: Kind) -> None:

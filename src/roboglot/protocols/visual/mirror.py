@@ -18,7 +18,7 @@ from roboglot.wire.visual.requests import BadFrame, Request, parse_request
 log = logging.getLogger(__name__)
 
 RETRY_FIRST, RETRY_MAX = 1.0, 60.0  # s
-PASSES_MAX = 10  # over an answer whose programs call each other
+PASSES_MAX = 10  # over an answer whose programs depend on each other
 AGAIN = frozenset({CloudCode.TIMED_OUT, CloudCode.BROKEN, CloudCode.UNAUTHORISED, CloudCode.REFUSED})
 """Codes after which the same frame may be taken later; the others never take it."""
 
@@ -93,7 +93,7 @@ class CloudMirror:
                 continue
             if item.get("type") == kind and request.targets[0] not in known:
                 waiting.append(request)
-        for _ in range(PASSES_MAX):  # a module that others call may come after them
+        for _ in range(PASSES_MAX):  # a module may follow the programs that call it
             before = len(waiting)
             waiting = [request for request in waiting if not await save(request)]
             if not waiting or len(waiting) == before:

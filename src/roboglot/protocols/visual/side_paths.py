@@ -19,7 +19,7 @@ from roboglot.protocols.visual.answers import DOOR
 from roboglot.wire.visual.requests import ID_MAX
 
 LOG, WHERE, RUNS, DEBUG = "/log", "/where", "/runs", "/debug"
-READERS = "log readers"  # the other end of what programs print, in the tap
+READERS = "log readers"  # the tap's name for readers of programs' output
 
 
 class SidePaths:

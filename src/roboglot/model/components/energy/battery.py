@@ -11,7 +11,7 @@ from roboglot.model.sensing import BatteryState
 class Battery(Component):
     """Drains by what the robot does; publishes ``BatteryChanged``."""
 
-    low: float = 0.15  # charge from which the robot counts as low
+    low: float = 0.15  # charge below which the robot's battery is low
 
     @property
     @abstractmethod

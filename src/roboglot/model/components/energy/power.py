@@ -16,8 +16,8 @@ class PowerMode(StrEnum):
 
     AWAKE = "awake"
     WAKING_UP = "waking up"
-    LOW_POWER = "low power"  # lies, motors off, still talks
-    ASLEEP = "asleep"  # and the sensors are off
+    LOW_POWER = "low power"  # lying, motors off, still responding
+    ASLEEP = "asleep"  # with the sensors off as well
     OFF = "off"
 
 

@@ -6,7 +6,7 @@ from abc import abstractmethod
 
 from roboglot.model.components.component import Component
 
-BEADS_MAX = 8  # in one shot
+BEADS_MAX = 8  # per shot
 
 
 class Blaster(Component):

@@ -35,15 +35,15 @@ class LightEffect(StrEnum):
     OFF = "off"
     SOLID = "solid"
     FLASH = "flash"  # on for the first half, dark for the second
-    PULSE = "pulse"  # full at once, then fading away
+    PULSE = "pulse"  # full brightness at once, then fading
     BREATH = "breath"  # swelling and fading evenly
-    SCROLLING = "scrolling"  # one lamp of the ring after the other
-    FILLING = "filling"  # one more lamp after the other, until all shine
-    BOUNCING = "bouncing"  # one lamp runs there and back
-    RAINBOW = "rainbow"  # its hue goes round the colour wheel
-    CORNERS = "corners"  # four lamps of the ring, a quarter apart, whose hue goes round
-    BAND = "band"  # a band across the middle of the ring, whose hue goes round
-    TRIAD = "triad"  # three lamps of the ring, a third apart, that breathe
+    SCROLLING = "scrolling"  # lamps of the ring in turn
+    FILLING = "filling"  # lamps are added one by one until all are lit
+    BOUNCING = "bouncing"  # one lamp runs back and forth
+    RAINBOW = "rainbow"  # the hue circles the colour wheel
+    CORNERS = "corners"  # four lamps of the ring, a quarter apart, with a circling hue
+    BAND = "band"  # a band across the middle of the ring with a circling hue
+    TRIAD = "triad"  # three breathing lamps of the ring, a third apart
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ class ZoneState:
 class Light(Component):
     """Every zone has its own colour and effect; the momentary colour follows from the clock."""
 
-    zones: Mapping[str, int]  # how many lamps each zone has
+    zones: Mapping[str, int]  # number of lamps per zone
 
     @abstractmethod
     def shine(

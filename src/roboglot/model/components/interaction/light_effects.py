@@ -19,10 +19,10 @@ from roboglot.model.components.interaction.light import (
 )
 from roboglot.model.errors import InvalidGoal, NotFound
 
-FADING = 4.0  # how many times a pulse falls to 1/e within its period
-TAIL = 3  # lamps that a running light draws behind it
+FADING = 4.0  # pulses fall to 1/e this many times per period
+TAIL = 3  # lamps that trail a running light
 COLOURFUL = frozenset({LightEffect.RAINBOW, LightEffect.CORNERS, LightEffect.BAND})
-FIGURES = {LightEffect.CORNERS: 4, LightEffect.TRIAD: 3}  # into how many parts they cut the ring
+FIGURES = {LightEffect.CORNERS: 4, LightEffect.TRIAD: 3}  # number of parts of the ring for each
 RUNNING = frozenset({LightEffect.SCROLLING, LightEffect.FILLING, LightEffect.BOUNCING, LightEffect.BAND, *FIGURES})
 BAND = 0.5  # of the ring's radius: half the width of a band
 

@@ -7,7 +7,7 @@ from enum import IntEnum
 
 from roboglot.model.components.component import Component
 
-REMOTE = "remote control"  # the source of what its stick commands
+REMOTE = "remote control"  # the source of actions that its sticks command
 
 
 class Gear(IntEnum):

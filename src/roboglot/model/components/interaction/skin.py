@@ -36,11 +36,11 @@ class SkinPattern(StrEnum):
 
     DARK = "dark"
     LIGHT = "light"
-    REARWARD = "rearward"  # all turn light, from the front to the rear, then dark in the same way, and so on
+    REARWARD = "rearward"  # patches turn light from front to rear, then dark in the same order, and so on
     FORWARD = "forward"  # the same from the rear to the front
-    FLASH = "flash"  # all at once, light and dark in turn
-    RANDOM = "random"  # each as chance has it, drawn anew every time
-    FOOTFALLS = "footfalls"  # the legs that stand show one shade, all else the other
+    FLASH = "flash"  # all at once, alternating light and dark
+    RANDOM = "random"  # at random, redrawn each time
+    FOOTFALLS = "footfalls"  # standing legs show one shade, everything else the other
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ from roboglot.model.errors import InvalidGoal, Refused
 
 TRUNK = (Patch.FRONT, Patch.MIDDLE, Patch.REAR)
 LEGS: Mapping[Patch, Foot] = dict(zip(tuple(Patch)[len(TRUNK) :], Foot, strict=True))
-FROM_FRONT: Mapping[Patch, int] = {  # in which third of the body a patch is
+FROM_FRONT: Mapping[Patch, int] = {  # the third of the body in which a patch lies
     **{patch: third for third, patch in enumerate(TRUNK)},
     Patch.RIGHT_FRONT_LEG: 0,
     Patch.LEFT_FRONT_LEG: 0,
@@ -73,7 +73,7 @@ class ShownSkin(ElectronicSkin):
     def _is_light(self, pattern: SkinPattern, patch: Patch, turns: float) -> bool:
         """``turns``: how many cycles have gone by."""
         whole = int(turns)
-        reached = 3.0 * (turns - whole)  # how many thirds of the body a wave has run over
+        reached = 3.0 * (turns - whole)  # thirds of the body that the wave has passed
         match pattern:
             case SkinPattern.LIGHT:
                 return True

@@ -12,7 +12,7 @@ from roboglot.model.components.component import Component
 TRAINING = "training"  # the resource that teaching holds
 WORDS_MAX = 100
 TRIGGER_MAX, VALUE_MAX = 64, 64  # characters
-REPEATS = 3  # times that a word must be said to be learnt
+REPEATS = 3  # utterances of a word needed to learn it
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,15 +15,15 @@ class OrderKind(StrEnum):
     """Kind of a delivery order, by what is done at the target."""
 
     TAKEOUT = "takeout"  # people take their parcels out of boxes, one box after the other
-    DISTRIBUTE = "distribute"  # all boxes open, people help themselves
+    DISTRIBUTE = "distribute"  # all boxes open; people help themselves
     FOOD = "food"  # people take food from the tray
     RECYCLE = "recycle"  # people put dishes onto the tray
     GUIDE = "guide"  # a person follows the robot
-    RETURN = "return"  # just be there
-    STATION = "station"  # a cabinet, the first stop, fills the boxes; then as a takeout
-    ROUND = "round"  # from point to point, with some waiting at each
+    RETURN = "return"  # go to the place without a task
+    STATION = "station"  # a cabinet, the first stop, fills the boxes; continues as TAKEOUT
+    ROUND = "round"  # from place to place, with a pause at each
     DISINFECT = "disinfect"
-    COLLECT = "collect"  # the robot's own: reception takes back what was not collected
+    COLLECT = "collect"  # created by the robot: reception takes back uncollected parcels
 
 
 class OrderStatus(StrEnum):
@@ -50,7 +50,7 @@ class OrderStage(StrEnum):
     DRIVING = "driving"
     AT_TARGET = "at target"  # waits for ``start_pickup``, or for ``end_pickup`` where there is no box
     DRIVING_TO_CABINET = "driving to cabinet"
-    AT_CABINET = "at cabinet"  # waits until it has filled the boxes
+    AT_CABINET = "at cabinet"  # waits until the cabinet has filled the boxes
     HANDING_OVER = "handing over"  # a person is at the boxes
 
 
@@ -87,9 +87,9 @@ class Phase(StrEnum):
 class WorkMode(StrEnum):
     """Range of orders that people may give at the robot itself."""
 
-    DISPATCH = "dispatch"  # none: only from afar
-    RECYCLE = "recycle"  # only collecting dishes
-    MANUAL = "manual"  # any
+    DISPATCH = "dispatch"  # controlled remotely only
+    RECYCLE = "recycle"  # only collects dishes
+    MANUAL = "manual"  # accepts any order
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,10 +145,10 @@ class Order:
     request: OrderRequest
     status: OrderStatus = OrderStatus.READY
     stage: OrderStage = OrderStage.DRIVING
-    stop: str = ""  # the one to which the robot drives or at which it stands
+    stop: str = ""  # the stop to which the robot is driving or at which it stands
     failure: Failure | None = None
     results: tuple[PickUp, ...] = ()
-    untaken: tuple[Untaken, ...] = ()  # of a COLLECT: whose boxes these were
+    untaken: tuple[Untaken, ...] = ()  # for COLLECT: whose parcels these were
     began_at: float = 0.0  # s since 1970; 0 before it began
     changed_at: float = 0.0
 
@@ -170,7 +170,7 @@ class Policy:
     speed_ratio: float = 1.0
     tracks: Tracks = Tracks.FREE
     retries: int = 0
-    yaw: float | None = None  # rad in map, at every target; None: as the place is turned
+    yaw: float | None = None  # rad in map, at every target; None: the heading of the place
     pickup_seconds: float = 300.0
     door_seconds: float = 90.0
     collect_seconds: float = 300.0
@@ -180,7 +180,7 @@ class Policy:
     level_home: int = 10
     level_no_cloud: int = 20
     level_no_takeout: int = 30
-    words: Mapping[str, object] = field(default_factory=dict)  # JSON of a door, kept beside what it stands for
+    words: Mapping[str, object] = field(default_factory=dict)  # a door's JSON, kept with the object that it describes
 
 
 class Delivery(Component):

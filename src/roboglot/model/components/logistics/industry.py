@@ -14,8 +14,8 @@ from roboglot.model.components.logistics.delivery import OrderStatus
 class CallKind(StrEnum):
     """Kind of a call: to come, or to do the round of a template."""
 
-    PLAIN = "plain"  # come here
-    BY_TEMPLATE = "by template"  # do the round that a template describes
+    PLAIN = "plain"  # come to the calling station
+    BY_TEMPLATE = "by template"  # do the round described by a template
 
 
 @dataclass(frozen=True, slots=True)

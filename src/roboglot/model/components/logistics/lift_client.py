@@ -40,7 +40,7 @@ class LiftClient(Component):
     Every method raises Refused while the radio is out of reach or the lift out of service.
     """
 
-    floors: tuple[str, ...]  # the names of its stops, from the lowest
+    floors: tuple[str, ...]  # names of its stops, lowest first
 
     @property
     @abstractmethod

@@ -14,7 +14,7 @@ from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import PointOfInterest
 
 LINES_MAX, AREAS_MAX, MARKS_MAX = 10_000, 2_000, 2_000
-CURVE_STEP = 0.1  # m between the points that a curve is made of
+CURVE_STEP = 0.1  # m between the points that make up a curve
 CURVE_POINTS_MAX = 1000
 
 
@@ -28,13 +28,13 @@ class LineKind(StrEnum):
 class AreaKind(StrEnum):
     """Meaning of an area."""
 
-    FORBIDDEN = "forbidden"  # no robot enters; one that stands inside may leave
+    FORBIDDEN = "forbidden"  # robots may not enter; one that is inside may leave
     ELEVATOR = "elevator"
     DANGEROUS = "dangerous"  # not faster than ``speed_max``
     COVERAGE = "coverage"  # to be swept or disinfected
-    MAINTENANCE = "maintenance"  # if there is any, the map changes inside them only
-    SENSOR_DISABLE = "sensor disable"  # what ``sensors`` say does not count inside
-    RESTRICTED = "restricted"  # not more than ``robots_max`` robots at a time
+    MAINTENANCE = "maintenance"  # if there are any, the map changes only inside them
+    SENSOR_DISABLE = "sensor disable"  # readings of ``sensors`` are ignored inside
+    RESTRICTED = "restricted"  # at most ``robots_max`` robots at a time
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from roboglot.model.components.component import Component
 from roboglot.model.events import LostReason
 from roboglot.model.geometry import Pose
 
-LOCALIZATION = "localization"  # the resource that searching for the robot's place holds
+LOCALIZATION = "localization"  # the resource held while searching for the robot's pose
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
 
-ARM = "arm"  # the resource that everything holds which moves the arm
+ARM = "arm"  # the resource of all actions that move the arm
 
 
 @dataclass(frozen=True, slots=True)

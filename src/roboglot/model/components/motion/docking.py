@@ -8,7 +8,7 @@ from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.component import Component
 from roboglot.model.geometry import Pose
 
-BEFORE_DOCK = 0.6  # m from where a robot stands docked to the place in front of the dock from where it backs up
+BEFORE_DOCK = 0.6  # m from the docked pose to the place in front of the dock from which the robot backs up
 
 
 class Docking(Component):

@@ -9,7 +9,7 @@ from roboglot.model.components.component import Component
 from roboglot.model.components.motion.base import WheelSpeeds
 from roboglot.model.geometry import Pose, Twist
 
-BASE = "base"  # the resource that everything holds which moves the robot over the floor
+BASE = "base"  # the resource of all actions that move the robot over the floor
 
 
 class Driving(Component):

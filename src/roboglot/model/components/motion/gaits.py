@@ -18,8 +18,8 @@ class Gait(StrEnum):
     TROT_MEDIUM = "medium trot"
     TROT_FAST = "fast trot"
     TROT_ADAPTIVE = "adaptive trot"
-    TROT_PASSIVE = "passive trot"  # gives way to a pull: walking on a leash
-    BOUND = "bound"  # fore legs, then hind legs
+    TROT_PASSIVE = "passive trot"  # yields to a pull: walking on a leash
+    BOUND = "bound"  # front legs, then hind legs
     PRONK = "pronk"  # all four legs at once
     HOP = "hop"
     THREE_LEGS = "three legs"

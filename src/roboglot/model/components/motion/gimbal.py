@@ -9,15 +9,15 @@ from enum import StrEnum
 from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
 
-GIMBAL = "gimbal"  # the resource that everything holds which turns the gimbal
+GIMBAL = "gimbal"  # the resource of all actions that turn the gimbal
 
 
 class FollowMode(StrEnum):
     """Coupling of the yaw of gimbal and chassis."""
 
     FREE = "free"  # independent: the gimbal keeps its heading in the world while the chassis turns
-    CHASSIS_LEAD = "chassis_lead"  # the gimbal comes back to the chassis' front; yaw commands do nothing
-    GIMBAL_LEAD = "gimbal_lead"  # the chassis turns until its front is where the gimbal looks
+    CHASSIS_LEAD = "chassis_lead"  # the gimbal returns to the chassis' front; yaw commands have no effect
+    GIMBAL_LEAD = "gimbal_lead"  # the chassis turns its front to where the gimbal points
 
 
 class Frame(StrEnum):

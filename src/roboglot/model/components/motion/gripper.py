@@ -8,7 +8,7 @@ from enum import StrEnum
 from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
 
-GRIPPER = "gripper"  # the resource that everything holds which moves the jaws
+GRIPPER = "gripper"  # the resource of all actions that move the jaws
 LEVEL_MAX = 4
 
 
@@ -16,7 +16,7 @@ class GripperStatus(StrEnum):
     """Position of the jaws."""
 
     CLOSED = "closed"
-    BETWEEN = "between"  # on the way, stopped, or closed around something
+    BETWEEN = "between"  # moving, stopped, or closed around an object
     OPEN = "open"
 
 

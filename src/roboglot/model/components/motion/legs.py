@@ -21,7 +21,7 @@ from roboglot.model.geometry import LEVEL, STILL, Orientation, Point, Twist
 
 __all__ = ["LEGS", "STEPS_MAX", "BodyPose", "Choreography", "FootLift", "LegLimits", "Legs", "Posture", "Step"]
 
-LEGS = "legs"  # the resource that posture changes and motions hold together with BASE; body poses hold it alone
+LEGS = "legs"  # the resource of posture changes and motions, together with BASE, and of body poses alone
 STEPS_MAX = 1000  # of a choreography
 CENTRED = Point()
 
@@ -91,7 +91,7 @@ class Legs(Component):
     """Postures and motions take time and hold the base meanwhile; driving needs STANDING."""
 
     limits: LegLimits
-    choreography: Choreography  # what was danced last; without steps before the first
+    choreography: Choreography  # the last dance; empty before the first
 
     @property
     @abstractmethod

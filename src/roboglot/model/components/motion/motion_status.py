@@ -16,8 +16,8 @@ class MotionFlags:
     uphill: bool = False  # driving up a slope
     downhill: bool = False  # driving down a slope
     sliding: bool = False  # moving down a slope without being driven
-    picked_up: bool = False  # the wheels touch nothing
-    slipping: bool = False  # body and wheels disagree about the speed
+    picked_up: bool = False  # the wheels have no contact
+    slipping: bool = False  # body and wheels disagree on the speed
     impact_x: bool = False  # a blow along the body's x, y, z
     impact_y: bool = False
     impact_z: bool = False

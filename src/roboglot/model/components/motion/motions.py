@@ -188,8 +188,8 @@ def _dance(duration: float = 120.0) -> MotionSpec:
 
 
 # Durations are the CyberDog 2's: the sum of the steps where its motion list is published and short (sitting down,
-# swaying, shaking hands, stretching, squats, push-ups), else the longest that its motion service waits for the end.
-# How far the flips land, and how high, is the simulation's assumption where the name does not say it.
+# swaying, shaking hands, stretching, squats, push-ups), otherwise the time-out of its motion service.
+# The distance and height of the flips are the simulation's assumptions where the name does not state them.
 MOTIONS: Mapping[Motion, MotionSpec] = {
     Motion.GET_UP_FAST: _get_up(5.0),
     Motion.GET_UP: _get_up(5.0),

@@ -11,7 +11,7 @@ from roboglot.model.components.component import Component
 class Motors(Component):
     """Every motor by name ("left front hip"), in the body's order."""
 
-    hot: float = 85.0  # Celsius from which a motor is too hot to go on
+    hot: float = 85.0  # Celsius from which a motor is too hot to continue
 
     @property
     @abstractmethod

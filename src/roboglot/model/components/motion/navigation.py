@@ -15,9 +15,9 @@ from roboglot.model.geometry import Path, Point
 class Tracks(StrEnum):
     """Meaning of the map's tracks for one drive."""
 
-    FREE = "free"  # nothing: any way will do
-    PREFERRED = "preferred"  # worth some way round
-    STRICT = "strict"  # the only way, but for a little at start and goal; no way around what stands on them
+    FREE = "free"  # any route
+    PREFERRED = "preferred"  # preferred, even with a detour
+    STRICT = "strict"  # required, except for short ways at start and goal; obstacles on them are not driven around
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,5 +9,5 @@ class Posture(StrEnum):
     STANDING = "standing"
     SITTING = "sitting"
     LYING = "lying"
-    LIMP = "limp"  # motors without torque after an emergency stop; only getting up leads out
+    LIMP = "limp"  # motors without torque after an emergency stop; the only way out is to get up
     CHANGING = "changing"  # between postures, or performing a motion

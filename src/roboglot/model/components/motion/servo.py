@@ -7,7 +7,7 @@ from abc import abstractmethod
 from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
 
-SERVO = "servo "  # the resources of servos begin so
+SERVO = "servo "  # prefix of the servos' resources
 
 
 def servo_resource(number: int) -> str:
@@ -19,7 +19,7 @@ class Servos(Component):
     """Numbered from 1. An unknown number raises NotFound everywhere."""
 
     count: int
-    limit: float  # rad to both sides that a servo can be sent to
+    limit: float  # rad to either side
     speed: float  # rad/s at most
 
     @abstractmethod

@@ -14,10 +14,10 @@ from roboglot.model.geometry import ORIGIN, Point, Pose
 class Mark(StrEnum):
     """A mark to dock at, by the sensor that finds it."""
 
-    PRINTED = "printed"  # an AprilTag or QR code, which the camera reads
-    BOARD = "board"  # a flat board 0.36 m wide that stands free (a dock's front is one), by its shape in the scan
-    REFLECTORS = "reflectors"  # strips that the lidar's light comes back from
-    SHELF = "shelf"  # four legs around room for the robot
+    PRINTED = "printed"  # an AprilTag or QR code, read by the camera
+    BOARD = "board"  # a free-standing flat board 0.36 m wide, such as a dock's front, found by its shape in the scan
+    REFLECTORS = "reflectors"  # strips that reflect the lidar's light
+    SHELF = "shelf"  # four legs with room for the robot between them
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

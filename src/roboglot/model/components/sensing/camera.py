@@ -73,7 +73,7 @@ class Camera(Component):
 
     width: int
     height: int
-    rate: float  # pictures per second for those who subscribe
+    rate: float  # pictures per second for subscribers
     fov: float
 
     @property

@@ -53,7 +53,7 @@ class DepthCamera(Component):
     """Takes an image when asked for one, at most ``rate`` a second."""
 
     rate: float
-    connected: bool = True  # whether it answers; there is no image from one that doesn't
+    connected: bool = True  # whether it responds; without a response there is no image
 
     @property
     @abstractmethod

@@ -13,8 +13,8 @@ class GpsFix(IntEnum):
     """Kind of a satellite fix."""
 
     NONE = 0
-    PLANE = 2  # latitude and longitude
-    SPACE = 3  # and altitude
+    PLANE = 2  # latitude and longitude only
+    SPACE = 3  # with altitude
 
 
 @dataclass(frozen=True, slots=True)

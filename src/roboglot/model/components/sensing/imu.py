@@ -12,7 +12,7 @@ from roboglot.model.sensing import ImuReading, RawImu
 class Imu(Component):
     """Gyro and accelerometer with their noise; yaw is integrated and drifts."""
 
-    averages = False  # whether an acceleration is the mean since the reading before, which can be integrated
+    averages = False  # whether an acceleration is the mean since the last reading, and can be integrated
 
     @property
     @abstractmethod

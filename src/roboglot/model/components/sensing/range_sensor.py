@@ -30,7 +30,7 @@ class RangeSensors(Component):
     """All sensors of the robot by name, in the order of the body's description."""
 
     names: tuple[str, ...]
-    silent: frozenset[str] = frozenset()  # those that answer no more
+    silent: frozenset[str] = frozenset()  # sensors that no longer respond
 
     @property
     @abstractmethod

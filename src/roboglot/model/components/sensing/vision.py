@@ -20,9 +20,9 @@ class Vision(Component):
     """One detector for each kind of thing. Choosing (a colour, the nearest) is the viewers' business."""
 
     people: Detector[PersonSeen]
-    faces: Detector[FaceSeen]  # named after the robot's members
+    faces: Detector[FaceSeen]  # with the names of the robot's members
     gestures: Detector[GestureSeen]
-    skeletons: Detector[SkeletonSeen]  # see ``sports`` for counting
+    skeletons: Detector[SkeletonSeen]  # for counting, see ``sports``
     markers: Detector[MarkerSeen]
     lines: Detector[LineSeen]
     robots: Detector[RobotSeen]

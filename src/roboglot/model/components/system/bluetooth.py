@@ -10,7 +10,7 @@ from enum import StrEnum
 from roboglot.model.action import Action
 from roboglot.model.components.component import Component
 
-BLUETOOTH = "bluetooth"  # the resource that scanning, connecting and updating hold
+BLUETOOTH = "bluetooth"  # the resource of scanning, connecting and updating
 SCAN_SECONDS_MAX = 60.0
 
 

@@ -10,7 +10,7 @@ from enum import StrEnum
 from roboglot.model.action import Action
 from roboglot.model.components.component import Component
 
-FIRMWARE = "firmware"  # the resource that updates and reboots hold
+FIRMWARE = "firmware"  # the resource of updates and reboots
 PACKAGE_BYTES_MAX = 4 * 1024**3
 MODULES_MAX = 64
 
@@ -18,7 +18,7 @@ MODULES_MAX = 64
 class Module(StrEnum):
     """A part of the firmware that can be restarted while the rest goes on."""
 
-    SOFTWARE = "software"  # whatever maps and plans
+    SOFTWARE = "software"  # mapping, planning and everything above the drive
     BASE = "base"  # the drive's controller
 
 
@@ -29,7 +29,7 @@ class FirmwareState(StrEnum):
     DOWNLOADING = "downloading"
     DOWNLOADED = "downloaded"
     INSTALLING = "installing"
-    INSTALLED = "installed"  # needs a reboot to become the running version
+    INSTALLED = "installed"  # becomes the running version at the next reboot
     REBOOTING = "rebooting"
     FAILED = "failed"
 

@@ -12,7 +12,7 @@ from roboglot.model.events import EventStream, FaultCleared, FaultRaised
 
 __all__ = ["FAULTS_MAX", "MOTOR_ALARM", "REMINDER", "Fault", "FaultLevel", "Health"]
 
-MOTOR_ALARM = "motor alarm"  # the name of the fault that a motor does not turn
+MOTOR_ALARM = "motor alarm"  # the fault of a motor that does not turn
 REMINDER = 10.0  # s after which a dismissed fault comes back if its cause persists
 FAULTS_MAX = 100
 

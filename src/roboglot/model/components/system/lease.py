@@ -33,8 +33,8 @@ from roboglot.model.robot import Robot
 log = logging.getLogger(__name__)
 PERSON = "a person"
 ITSELF = "the robot itself"
-ERRAND = "errand"  # the resource of actions that move the robot by other actions, one after the other
-MOVING = (BASE, LEGS, ARM, GRIPPER, GIMBAL, JACK, ERRAND)  # the resources, and those of servos, that control is about
+ERRAND = "errand"  # the resource of actions that move the robot by a sequence of other actions
+MOVING = (BASE, LEGS, ARM, GRIPPER, GIMBAL, JACK, ERRAND)  # the resources that control covers, besides those of servos
 TAKEN, OUTSIDE = "control taken", "moved by another client"  # the faults' names
 KEPT = "control.taken_by"  # the setting
 NAME_MAX = 80  # characters
@@ -58,7 +58,7 @@ class Lease(Component):
         self._taken_by = str(robot[Settings].get(KEPT, "")) if Settings in robot else ""
         self._last = Holder("", "", self._clock.time())
         self._outside_since: float | None = None
-        self._fence: Callable[[], str] = str  # no reason
+        self._fence: Callable[[], str] = str  # no fence: every client may drive
         self._logged_at = -math.inf
         robot.actions.guard(self._admit)
         robot.events.listen(ActionChanged, lambda event: self._look() if moves(event.action) else None)

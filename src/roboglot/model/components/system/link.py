@@ -17,7 +17,7 @@ __all__ = ["FAULT", "OTHERS", "STALE_AFTER", "US", "Link", "LinkState", "require
 
 FAULT = "link lost"
 US, OTHERS = "us", "another client"
-STALE_AFTER = 0.5  # s without news after which what is known counts as old
+STALE_AFTER = 0.5  # s without an update after which values count as old
 
 
 class Link(Component):

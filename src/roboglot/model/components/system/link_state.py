@@ -10,5 +10,5 @@ class LinkState(StrEnum):
 
     CONNECTING = "connecting"  # for the first time
     UP = "up"
-    LOST = "lost"  # it was up; tried again with growing pauses
-    CLOSED = "closed"  # for good
+    LOST = "lost"  # lost after it was up; retried at growing intervals
+    CLOSED = "closed"  # permanently

@@ -10,7 +10,7 @@ from enum import StrEnum
 from roboglot.model.action import Action
 from roboglot.model.components.component import Component
 
-WIFI = "wifi"  # the resource that joining a network holds
+WIFI = "wifi"  # the resource of joining a network
 SSID_MAX = 32  # bytes
 PASSWORD_MIN, PASSWORD_MAX = 8, 63  # characters; "" is an open network
 APN_MAX = 100  # characters
@@ -20,8 +20,8 @@ KNOWN_MAX = 32  # networks that the robot remembers
 class NetworkMode(StrEnum):
     """Mode of the Wi-Fi card."""
 
-    STATION = "station"  # joins a network that it knows
-    ACCESS_POINT = "access_point"  # is a network of its own; others join
+    STATION = "station"  # joins a known network
+    ACCESS_POINT = "access_point"  # provides a network that others join
     OFF = "off"
 
 
@@ -77,8 +77,8 @@ class Network(Component):
     Setting methods return when the setting is safe on disk; the link follows within seconds of robot time.
     """
 
-    signal_min: float = -88.0  # dBm below which no connection holds
-    delay: float = 0.0  # s by which everything that the robot sends comes late, now
+    signal_min: float = -88.0  # dBm below which every connection breaks
+    delay: float = 0.0  # s by which everything that the robot sends is late at present
 
     @property
     def connected(self) -> bool:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
 
-SYSTEM_LOG = "system log"  # the resource that an upload holds
+SYSTEM_LOG = "system log"  # the resource of an upload
 LINES_MAX = 2000
 LINE_MAX = 300  # characters
 

@@ -78,7 +78,7 @@ async def relatively_position_control_attitude(
     wrong = wrong or outside(fulcrum_x=fulcrum_x, fulcrum_y=fulcrum_y, fulcrum_z=fulcrum_z)
     attitude = _attitude(roll, pitch, yaw)
     fulcrum = (fulcrum_x, fulcrum_y, fulcrum_z)
-    # What turns about a fulcrum that stays where it is moves its middle by the fulcrum less the turned fulcrum.
+    # A turn about a fixed fulcrum moves the centre by the fulcrum minus the turned fulcrum.
     x, y, z = (was - is_now for was, is_now in zip(fulcrum, _turned(fulcrum, attitude), strict=True))
     body = BodyPose(centroid_z + z, attitude, Point(centroid_x + x, centroid_y + y))
     return await result(session, RELATIVE_POSITION, _hold(session, body, duration, relative=True), wrong)

@@ -18,14 +18,14 @@ from roboglot.programs.functions.moving.attitudes import held
 from roboglot.programs.functions.session import Session
 from roboglot.programs.functions.table import ABILITIES
 
-ROCK = 0.08  # rad by which the body leans from side to side in a moonwalk
-SINK = 0.02  # m by which it is held lower meanwhile
-BEAT = 0.24  # s of a step on the spot
+ROCK = 0.08  # rad by which the body rocks in a moonwalk
+SINK = 0.02  # m by which the body is lowered meanwhile
+BEAT = 0.24  # s per step in place
 BEAT_MIN, BEAT_MAX = 0.12, 1.0  # s
-SLIDING = 0.015  # m that its feet are lifted
-SWING, SWING_MAX = 0.8, 0.5  # of a step's time that the pair is in the air, and s at most
-PAIRS = (frozenset({Foot.LEFT_FRONT, Foot.RIGHT_REAR}), frozenset({Foot.RIGHT_FRONT, Foot.LEFT_REAR}))  # who stands
-ENDS = 0.4  # s to get into position, and out of it
+SLIDING = 0.015  # m by which its feet are lifted
+SWING, SWING_MAX = 0.8, 0.5  # share of a step for which a pair is in the air; s at most
+PAIRS = (frozenset({Foot.LEFT_FRONT, Foot.RIGHT_REAR}), frozenset({Foot.RIGHT_FRONT, Foot.LEFT_REAR}))  # stand in turn
+ENDS = 0.4  # s to get into position and out of it
 DEPTH = 0.08  # m that a push-up goes down
 
 

@@ -17,8 +17,8 @@ from roboglot.programs.worker.values import Record
 
 DISTANCE_MIN, DISTANCE_DEFAULT, DISTANCE_MAX = 0.5, 1.0, 5.0  # m
 PERIOD = 0.1  # s
-GIVE_UP_AFTER = 30.0  # s without a sight
-LOST = 15.0  # s of these for which the skill itself goes on searching where they were
+GIVE_UP_AFTER = 30.0  # s without seeing a person
+LOST = 15.0  # s of that, during which the skill itself searches where they were
 
 
 class FollowedMember:
@@ -84,7 +84,7 @@ class FollowedMember:
         others = self._session.robot.actions.running(BASE)
         if not others or any(action.source != self._session.source for action in others):
             return "somebody else moves the robot", False
-        for action in others:  # what the program itself drives comes first
+        for action in others:  # the program's own drives take precedence
             await action.done()
         return "", False
 

@@ -13,7 +13,7 @@ class Range:
     default: float
     maximum: float
     unit: str
-    open_end: bool = False  # the maximum itself is outside
+    open_end: bool = False  # the maximum itself is excluded
 
     def __contains__(self, value: float) -> bool:
         return self.minimum <= value < self.maximum or (value == self.maximum and not self.open_end)
@@ -22,12 +22,12 @@ class Range:
         return f"{self.minimum:g} to {self.maximum:g} {self.unit}"
 
 
-WALK_DURATION_MAX = 3600.0  # s; the table says 6, the manual's own examples walk for 10 and the firmware for an hour
+WALK_DURATION_MAX = 3600.0  # s; the table states 6, yet the manual's examples walk for 10 and the firmware for an hour
 
 LIMITS: dict[str, Range] = {
     "centroid_x": Range(-0.4, 0.0, 0.4, "m"),
     "centroid_y": Range(-0.3, 0.0, 0.3, "m"),
-    "centroid_z": Range(0.1, 0.2, 0.3, "m"),  # the table's default 0 lies outside of its own range
+    "centroid_z": Range(0.1, 0.2, 0.3, "m"),  # the table's default of 0 lies outside its own range
     "fulcrum_x": Range(-0.5, 0.0, 0.5, "m"),
     "fulcrum_y": Range(-0.5, 0.0, 0.5, "m"),
     "fulcrum_z": Range(-0.5, 0.0, 0.5, "m"),
@@ -43,7 +43,7 @@ LIMITS: dict[str, Range] = {
     "duration": Range(0.0, 1.0, 6.0, "s"),
     "delta": Range(0.1, 10.0, 100.0, "per"),
 }
-# Of what moves by so much from where it is, and of the gaits that jump: listed in no MotionParams.
+# For relative motions and for gaits that jump; not part of any MotionParams.
 OTHERS: dict[str, Range] = {
     "x_jump_velocity": Range(-0.25, 0.0, 0.15, "m/s"),
     "y_jump_velocity": Range(-0.1, 0.0, 0.1, "m/s"),

@@ -25,13 +25,13 @@ from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.worker.values import Record
 
 SUCCESS, UNAVAILABLE, FAILED, REFUSED, CANCELLED = 0, 2, 3, 4, 5  # NavigationActionResponse.response.result
-GOOD_FIT = 0.5  # of localization, from which the robot knows where it is
+GOOD_FIT = 0.5  # quality of localization from which the pose counts as known
 COORDINATE_MAX = 10_000.0  # m
-SAME_WALLS = 0.5  # share of a stored map's walls that the map in use has, too, if both have one origin
+SAME_WALLS = 0.5  # share of a stored map's walls also present in the current map, if both have the same origin
 WALL = 20  # log odds from which a cell counts as a wall
 NEAR = 2  # cells by which walls may differ
-HELP_SECONDS = 60.0  # s for a person to bring the robot to where it knows its way
-ASKED_EVERY = 20.0  # s between two requests
+HELP_SECONDS = 60.0  # s for a person to push the robot to a place that it recognizes
+ASKED_EVERY = 20.0  # s between two calls for help
 REQUEST = "I do not know where I am. Please take me to a place that I know"
 
 

@@ -19,9 +19,9 @@ from roboglot.programs.functions.results import StateCode, state
 from roboglot.programs.functions.session import Session
 from roboglot.programs.worker.values import Record
 
-PROTECTED_UP_TO = 0.20  # charge at which the robot spares its legs
+PROTECTED_UP_TO = 0.20  # charge up to which the robot protects its legs
 TOO_EMPTY, MOTOR_FAULTY = 3026, 3032
-ALWAYS = frozenset({0, 101, 111})  # stopping, lying down and standing up are refused to no robot by its state
+ALWAYS = frozenset({0, 101, 111})  # no state of the robot forbids stopping, lying down or standing up
 
 _CODES: tuple[tuple[type[RobotError], int], ...] = (
     (ComponentMissing, 3008),

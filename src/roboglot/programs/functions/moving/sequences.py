@@ -32,9 +32,9 @@ from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.worker.values import Record
 
 SEQUENCE = 400  # MotionId
-GAIT_UNIT = 0.03  # s: the robot counts a gait's duration in these, whatever the manual says
+GAIT_UNIT = 0.03  # s: the robot's unit for a gait's duration, contrary to the manual
 NAME_MAX = 128  # characters
-LANDING_GAIN_MAX = 1.5  # the manual says 1, its own examples 1.5
+LANDING_GAIN_MAX = 1.5  # the manual states 1; its own examples use 1.5
 FEET = {
     Foot.RIGHT_FRONT: "right_forefoot",
     Foot.LEFT_FRONT: "left_forefoot",

@@ -21,11 +21,11 @@ from roboglot.programs.functions.session import Session
 from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.worker.values import Record
 
-SINGLE_COMMAND = 0.2  # s that one command of a walk lasts when neither distance nor duration is given
+SINGLE_COMMAND = 0.2  # s of a walk without distance and duration
 LOOK_EVERY = 0.02  # s
-STUCK_AFTER = 2.0  # s without a centimetre
+STUCK_AFTER = 2.0  # s without a centimetre of progress
 
-# The firmware's number of each walk (response.motion_id), and the gait behind it.
+# The firmware's number of each walk (response.motion_id) and its gait.
 VARIABLE = 304
 WALKS = {
     "trot_walking": (303, Gait.TROT_SLOW),

@@ -14,8 +14,8 @@ from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.worker.values import Record
 
 FULL = 0.995  # charge
-TOPPED = 0.97  # a charger that has finished rests as long as the charge stays above this
-# power_supply and status: the manual names them, and no numbers. These are ours.
+TOPPED = 0.97  # a finished charger stays off while the charge is above this
+# power_supply and status: the manual gives names without numbers. The numbers are ours.
 SUPPLIES = {Supply.NONE: 0, Supply.WIRE: 1, Supply.CONTACTS: 2, Supply.WIRELESS: 3}
 IN_USE, CHARGING, CHARGED, LOCKED = range(4)
 

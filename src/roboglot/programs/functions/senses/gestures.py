@@ -14,10 +14,10 @@ from roboglot.programs.functions.session import Session
 from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.worker.values import Record
 
-DURATION_MIN, DURATION_MAX = 30, 300  # s that recognition may be on
+DURATION_MIN, DURATION_MAX = 30, 300  # s for which recognition may stay on
 SENSITIVITY_MAX = 60  # s
 LOOK_EVERY = 0.04  # s
-HELD = 1.0  # s for which a gesture counts after it was seen
+HELD = 1.0  # s for which a sighting counts
 
 KINDS: dict[Gesture, str] = dict(
     zip(

@@ -19,10 +19,10 @@ from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.worker.values import Record
 
 LOOK_EVERY = 0.04  # s
-HEARD_MAX = 100  # utterances that are remembered
+HEARD_MAX = 100  # utterances kept
 SENSITIVITY_MAX = 60  # s
-EMOTIONS = tuple(Emotion)  # the number of a face's emotion is its place here, as at the app's door
-# What a robot understands that was taught nothing: end, hold and continue the tasks.
+EMOTIONS = tuple(Emotion)  # a face's emotion is its index here, as at the app's door
+# Commands that an untrained robot understands: end, pause and continue the tasks.
 WORDS = tuple(
     TrainedWord(*word) for word in (("终止任务", "shutdown"), ("暂停任务", "suspend"), ("继续任务", "recover"))
 )

@@ -13,11 +13,11 @@ from roboglot.programs.functions.session import Session
 from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.worker.values import Record
 
-# SingleTofPayload.tof_position, and what the model calls the sensor there.
+# SingleTofPayload.tof_position, and the model's name of the sensor.
 TOF_POSITIONS = {"head left": 0, "head right": 1, "rear left": 2, "rear right": 3}
 ULTRASONIC = "ultrasonic"
 ULTRASOUND = 0  # radiation_type
-GPS_EPOCH = 315_964_800  # of the calendar, s
+GPS_EPOCH = 315_964_800  # s since 1970
 LEAP_SECONDS = 18
 WEEK = 604_800  # s
 

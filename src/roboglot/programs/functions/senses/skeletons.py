@@ -91,7 +91,7 @@ class ExerciseWatch:
     def _end(self, why: Switch) -> None:
         self._switch = why
         if self._viewer:
-            self._viewer.close()  # which ends the watching, too
+            self._viewer.close()  # this also ends the search
 
 
 @ABILITIES.on("cyberdog.skeleton.turn_on_recognition", needs=(Vision,))

@@ -54,7 +54,7 @@ async def publish(context: Context, *, channel: int, data: bytes) -> None:
         raise InvalidGoal(f"a message has at most {MESSAGE_MAX} bytes")
     try:
         TOPICS[_name(context, published.topic)](context, data)
-    except (msgspec.DecodeError, RecursionError) as error:  # a ValidationError is one, too
+    except (msgspec.DecodeError, RecursionError) as error:  # includes ValidationError
         raise InvalidGoal(f"{published.topic}: {error}") from None
 
 

@@ -22,9 +22,9 @@ from roboglot.wire.robomaster.replies import Number
 
 Numbers = tuple[Number, ...]
 ROBOTS_NAMES = {"person": "people", "gesture": "pose"}
-GROUPS = (("person", "gesture", "marker", "robot"), ("line",))  # one of each at most
+GROUPS = (("person", "gesture", "marker", "robot"), ("line",))  # at most one of each
 CURVATURE_MAX = 10.0
-LOOKING = 0.04  # s between looks whether a detector has something new; detectors are slower
+LOOKING = 0.04  # s between two checks for detections; detectors are slower
 
 
 class Ai:
@@ -37,7 +37,7 @@ class Ai:
         self._task: asyncio.Task[None] | None = None
         self.line_colour: str | None = None  # None: any
         self.marker_colour = "red"
-        self.marker_distance = 0.0  # m; nearer ones do not count
+        self.marker_distance = 0.0  # m; closer markers do not count
 
     def switch(self, wanted: dict[str, bool]) -> None:
         """All of it or nothing. Raises Refused if two of a group would be on, ComponentMissing without vision."""
@@ -76,7 +76,7 @@ class Ai:
                     self._told[name] = sighting.stamp
                     word = ROBOTS_NAMES.get(name, name) if profile.as_robots else name
                     attributes.append((word, self._numbers(name, sighting.seen)))
-            if profile.as_robots and attributes:  # one datagram, and no `;` between the kinds
+            if profile.as_robots and attributes:  # in one datagram, without `;` between the kinds
                 self._context.send(profile.push("AI", *attributes, separator=" "))
             elif attributes:
                 for attribute in attributes:

@@ -23,7 +23,7 @@ def _scale(context: Context) -> tuple[float, ArmPosition]:
     """Metres per unit, and the origin."""
     if context.profile.as_robots:
         return MILLIMETRE, ArmPosition()
-    return CENTIMETRE, context.robot[Arm].home  # where it is at power-on
+    return CENTIMETRE, context.robot[Arm].home  # its position at power-on
 
 
 def _go(context: Context, goal: ArmPosition, command: str, start: ArmPosition) -> Action:

@@ -9,7 +9,7 @@ from roboglot.protocols.robomaster.event_switches import EventSwitches
 from roboglot.protocols.robomaster.ranges import OnOff, Sensitivity
 from roboglot.protocols.robomaster.table import TABLE
 
-SENSITIVITY = 5  # the default, and what it is again when the session ends
+SENSITIVITY = 5  # the default, restored when the session ends
 
 
 @TABLE.on("armor sensitivity", right=Right.DRIVE, needs=(Armor,))

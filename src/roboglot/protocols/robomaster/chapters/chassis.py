@@ -30,7 +30,7 @@ from roboglot.protocols.robomaster.table import TABLE
 from roboglot.protocols.robomaster.vocabulary import offset_of, twist_of, wheels_of, without_yaw
 from roboglot.protocols.robomaster.waiting import ended
 
-LET_GO_AFTER = 0.5  # s that a command to stand still keeps hold of the base, so that a joystick's zero makes no gap
+LET_GO_AFTER = 0.5  # s for which a stop command keeps the base, so that a joystick's zero leaves no gap
 
 
 def _drive(context: Context, command: Twist | WheelSpeeds) -> None:
@@ -77,7 +77,7 @@ async def move(
     wait_for_complete: bool = False,
 ) -> None:
     """Move by x, y m and z degrees; answers at once, or with ``wait_for_complete true`` at the end (3.2.3.3)."""
-    turn = 0.0 if context.mode is FollowMode.GIMBAL_LEAD else z  # the chassis turns after the gimbal there
+    turn = 0.0 if context.mode is FollowMode.GIMBAL_LEAD else z  # there the chassis follows the gimbal
     action = context.robot[Driving].move_by(
         offset_of(x, y, turn), speed=vxy, yaw_speed=math.radians(vz), source=context.source
     )

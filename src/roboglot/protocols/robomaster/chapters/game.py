@@ -11,10 +11,10 @@ from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.limits import KEYS_MAX
 from roboglot.protocols.robomaster.table import TABLE
 
-PERIOD = 0.1  # s between two datagrams while nothing changes; a change is sent at once
-KEYS_AND_MOUSE = 0  # cmd_id; others carry a match's score, and there is no match
+PERIOD = 0.1  # s between two datagrams without changes; a change is sent at once
+KEYS_AND_MOUSE = 0  # cmd_id; the others carry a match's score, which does not exist here
 BUTTONS = {MouseButton.RIGHT: 1, MouseButton.LEFT: 2, MouseButton.MIDDLE: 4}
-# Codes as clients of 2024's robots read them; the manual prints a single one, 199 for w, that none of them knows.
+# Codes as clients of 2024 read them from robots; the manual prints only 199 for w, which none of them accepts.
 KEYS = {"space": 8, "tab": 9, "shift": 16, "ctrl": 17, "alt": 18, "caps": 20}
 
 

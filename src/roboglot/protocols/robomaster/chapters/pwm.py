@@ -8,7 +8,7 @@ from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.ranges import Hertz, Percent, PortMask
 from roboglot.protocols.robomaster.table import TABLE
 
-ROBOTS_DUTY = 0.075  # where robots leave their outputs when a session ends
+ROBOTS_DUTY = 0.075  # the robot's outputs after a session
 
 
 def _ports(context: Context, mask: int) -> list[int]:

@@ -8,7 +8,7 @@ from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.wire.robomaster.replies import Reply
 
-OUTSIDE_SDK_MODE = frozenset({"command", "quit", "version", "version ?"})  # the only ones understood before `command`
+OUTSIDE_SDK_MODE = frozenset({"command", "quit", "version", "version ?"})  # all that is understood before `command`
 
 
 @TABLE.on("command", right=Right.SEE)
@@ -18,7 +18,7 @@ async def command(context: Context) -> Reply | None:
         return Reply.ALREADY_IN_SDK_MODE
     context.begin()
     if Camera in context.robot:
-        context.robot[Camera].prepare()  # clients want the first picture within a second of `stream on`
+        context.robot[Camera].prepare()  # clients expect the first picture within a second of `stream on`
     return None
 
 

@@ -9,7 +9,7 @@ from roboglot.protocols.robomaster.event_switches import EventSwitches
 from roboglot.protocols.robomaster.ranges import AdapterId, AdapterPort, OnOff
 from roboglot.protocols.robomaster.table import TABLE
 
-RAW_MAX = 1023  # what robots' converters say at full scale
+RAW_MAX = 1023  # full scale of the robot's converters
 
 
 @TABLE.on("sensor_adapter adc ?", right=Right.SEE, needs=(SensorAdapters,))

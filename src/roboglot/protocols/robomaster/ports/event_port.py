@@ -53,7 +53,7 @@ class _Reader(asyncio.Protocol):
         self._greeting = Greeting()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        self.transport = transport = cast(asyncio.Transport, transport)  # uvloop's is one without inheriting from it
+        self.transport = transport = cast(asyncio.Transport, transport)  # uvloop's transport does not inherit from it
         if len(self._transports) >= EVENT_CONNECTIONS_MAX:
             transport.abort()
             return

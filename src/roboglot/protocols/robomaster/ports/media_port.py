@@ -81,7 +81,7 @@ class _Watcher(asyncio.Protocol):
         self.writable.set()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        self.transport = transport = cast(asyncio.Transport, transport)  # uvloop's is one without inheriting from it
+        self.transport = transport = cast(asyncio.Transport, transport)  # uvloop's transport does not inherit from it
         if not self._port.admit(self):
             transport.abort()
             return

@@ -68,7 +68,7 @@ class _Pilot(asyncio.Protocol):
         self._tail = b""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        self.transport = transport = cast(asyncio.Transport, transport)  # uvloop's is one without inheriting from it
+        self.transport = transport = cast(asyncio.Transport, transport)  # uvloop's transport does not inherit from it
         if len(self._pilots.transports) >= PILOTS_MAX:
             transport.abort()
             return

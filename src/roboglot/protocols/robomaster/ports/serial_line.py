@@ -27,10 +27,10 @@ class SerialLine(asyncio.Transport):
         self._master, slave = os.openpty()
         tty.setraw(slave)
         os.set_blocking(self._master, False)
-        self._slave = slave  # kept open, or the line would end with the first program that closes it
+        self._slave = slave  # kept open, or the line would close with the first program
         self._closing = False
         if link.is_symlink():
-            link.unlink()  # of a run that ended badly
+            link.unlink()  # left by a run that ended badly
         link.symlink_to(os.ttyname(slave))
         self._protocol = protocol()
         self._protocol.connection_made(self)

@@ -22,9 +22,9 @@ from roboglot.wire.slamware.chapters.cloud import CloudTask
 from roboglot.wire.slamware.chapters.delivery import VoicePackage
 
 log = logging.getLogger(__name__)
-UNBOUND = "slamware.unbound"  # the setting that says that the robot left its cloud
-LOOK = 5.0  # s between two looks for tasks
-TASKS_MAX, TASK_MAX = 20, 64 << 10  # files a look, bytes of one
+UNBOUND = "slamware.unbound"  # the setting that records that the robot left its cloud
+LOOK = 5.0  # s between two checks for tasks
+TASKS_MAX, TASK_MAX = 20, 64 << 10  # files per check; bytes per file
 VOICE_MAX, MAP_MAX = 1 << 20, 64 << 20  # bytes
 CLOUD_KINDS = {**KINDS, "STATION_TAKEOUT": OrderKind.STATION, "DISINFECT": OrderKind.DISINFECT}
 
@@ -106,7 +106,7 @@ class CloudFolder:
             data = self._read(f"tasks/{path.name}", TASK_MAX)
             request = request_of(msgspec.json.decode(data or b"", type=CloudTask), path.stem)
             delivery = self._robot[Delivery]
-            if request.number not in {order.number for order in delivery.orders}:  # taken before a crash
+            if request.number not in {order.number for order in delivery.orders}:  # accepted before a crash
                 await delivery.accept(request)
             _mark(path)
         except (RobotError, msgspec.DecodeError, RecursionError) as error:

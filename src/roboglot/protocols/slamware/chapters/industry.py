@@ -52,7 +52,7 @@ KINDS = {
     CallKind.PLAIN: "CARRY_CALLING",
     CallKind.BY_TEMPLATE: "CARRY_CALLING_BY_TEMPLATE",
 }
-OWN_MADE = 0  # the only template type that the manual shows
+OWN_MADE = 0  # the only template type shown in the manual
 INDUSTRY = "INDUSTRY"
 STAGES = {
     OrderStage.DRIVING_TO_STOP: "GOING_TO_TASK_POINT",

@@ -20,9 +20,9 @@ from roboglot.protocols.vda5050.performing import ended
 from roboglot.protocols.vda5050.table import TABLE
 from roboglot.wire.vda5050.orders import Text
 
-LOOKING = 3.0  # s of robot time in which an object must come into the picture
+LOOKING = 3.0  # s of robot time for an object to appear in the picture
 LOOK = 0.1
-REPORTS = "vda5050/log-"  # what the names of reports begin with
+REPORTS = "vda5050/log-"  # prefix of report names
 REPORTS_MAX = 10
 
 
@@ -36,7 +36,7 @@ class Thing(StrEnum):
     MARKER = "marker"
 
 
-# What the result says of the nearest one, after the object's name.
+# Fields of the result that describe the nearest one, after the object's name.
 _WORDS: dict[Thing, Callable[[Any], str]] = {
     Thing.PERSON: lambda seen: f"{seen.distance:.2f} m away",
     Thing.FACE: lambda seen: f"{seen.name or 'unknown'}, {seen.distance:.2f} m away",

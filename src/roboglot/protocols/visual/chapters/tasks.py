@@ -52,7 +52,7 @@ async def control(context: Context) -> None:
             answers.refuse(state_of(refusal), str(refusal), id)
     if legal:
         await answers.accept(legal[0])
-    if operation is TaskOperation.SHUTDOWN:  # none of them goes on while another one is waited for
+    if operation is TaskOperation.SHUTDOWN:  # no task may continue while another is awaited
         for id, late in (await service.shutdown(legal)).items():
             answers.refuse(state_of(late), str(late), id)
         return
@@ -60,7 +60,7 @@ async def control(context: Context) -> None:
     for id in legal:
         try:
             await obey(id)
-        except ProgramError as late:  # it ended between the first feedback and now
+        except ProgramError as late:  # it ended after the first feedback
             answers.refuse(state_of(late), str(late), id)
 
 

@@ -26,7 +26,7 @@ class CameraFiles:
 
     def __init__(self, robot: Robot, folder: Path) -> None:
         self._robot, self._folder = robot, folder
-        self._recording = ""  # the name of the file in the making
+        self._recording = ""  # name of the file being written
         for name in self.names():
             self._take(name)
 

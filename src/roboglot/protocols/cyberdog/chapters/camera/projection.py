@@ -31,7 +31,7 @@ class CameraView:
     def __init__(self, camera: Camera) -> None:
         mount = camera.mount
         self._at, self._pitch = Pose(mount.x, mount.y, mount.yaw), mount.pitch
-        self._across = 0.5 / math.tan(camera.fov / 2.0)  # focal length in widths of the picture
+        self._across = 0.5 / math.tan(camera.fov / 2.0)  # focal length in picture widths
         self._down = self._across * camera.width / camera.height
 
     def nearest(self, box: Box, scan: LaserScan) -> Point | None:
@@ -41,7 +41,7 @@ class CameraView:
         lidar = scan.mount.relative_to(self._at)
         x = lidar.x + ranges * np.cos(angles + lidar.yaw)
         y = lidar.y + ranges * np.sin(angles + lidar.yaw)
-        # Level with the camera, a column of the picture is a direction.
+        # At the camera's height, a column of the picture is a direction.
         right, left = ((0.5 - edge) / self._across for edge in (box.x + box.width / 4, box.x - box.width / 4))
         with np.errstate(invalid="ignore", divide="ignore"):
             slope = y / (x * math.cos(self._pitch))

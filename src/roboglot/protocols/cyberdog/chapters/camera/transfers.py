@@ -21,9 +21,9 @@ from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 log = logging.getLogger(__name__)
 LEFT_FILES = push(Code.LEFT_FILES)
 DISK_LOW = push(Code.DISK_LOW)
-CHUNK = 4_000_000  # bytes: with the fields around it still a message that every client takes
+CHUNK = 4_000_000  # bytes: with the other fields still a message that every client accepts
 TRANSFERS_MAX = 6
-OFFER_AFTER = 2.75  # s of heartbeats in a row until files left behind are offered: the sixth
+OFFER_AFTER = 2.75  # s of uninterrupted heartbeats before unfetched files are offered: the sixth
 ERRORS: tuple[tuple[type[RobotError], FileError], ...] = (
     (Busy, FileError.BUSY),
     (Refused, FileError.STATE),
@@ -89,12 +89,12 @@ class Transfers:
 
     def _found(self) -> None:
         self._offering = asyncio.get_running_loop().create_task(self._offer(), name="offer files")
-        if Disk in self._robot and (free := self._robot[Disk].free) < LOW:  # no app heard of it
+        if Disk in self._robot and (free := self._robot[Disk].free) < LOW:  # no app was notified
             self._app.push(DISK_LOW, {"remain_size": free})
 
     async def _offer(self) -> None:
         await self._robot.clock.sleep(OFFER_AFTER)
-        if self._keeping:  # an app may be back before its film is written
+        if self._keeping:  # an app may return before its film is written
             await asyncio.wait([self._keeping])
         if names := self._files.names():
             self._app.push(LEFT_FILES, {"file_name": names})

@@ -36,10 +36,10 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 SIGNAL = push(Code.VIDEO, depth=20)
-PATIENCE = 10.0  # s, outside time, until a way to the app must be found
-PEERS_MAX = 16  # apps that look, or begin to, at once
-EARLY_MAX = 32  # candidates of one app that came before its offer
-SCREEN_WIDTH = 640  # of pictures for a screen that was reported
+PATIENCE = 10.0  # s (machine clock) to find a way to the app
+PEERS_MAX = 16  # apps that watch or connect at the same time
+EARLY_MAX = 32  # candidates of one app that arrived before its offer
+SCREEN_WIDTH = 640  # width of pictures for a screen of unknown size
 PLACES = {Alignment.TOP: 0.0, Alignment.MIDDLE: 0.5, Alignment.BOTTOM: 1.0}
 
 
@@ -150,7 +150,7 @@ class Transmission:
         key = (height, screen.alignment)
         if key not in self._streams:
             if len(self._streams) >= PEERS_MAX:
-                self._streams = {}  # those who look at one keep it
+                self._streams = {}  # viewers of a stream keep it open
             clock, camera = self._robot.clock, self._robot[Camera]
             pictures = FittedPictures(camera, clock, SCREEN_WIDTH, height, PLACES[screen.alignment])
             self._streams[key] = VideoStream(pictures, clock)

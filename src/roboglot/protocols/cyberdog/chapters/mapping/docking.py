@@ -16,7 +16,7 @@ from roboglot.protocols.cyberdog.context import Context
 from roboglot.wire.cyberdog.codes import Feedback, TaskResult
 
 log = logging.getLogger(__name__)
-MOVED = 0.05  # m from where the stored map has the dock: from when on the map is stored anew
+MOVED = 0.05  # m from the dock's place on the stored map beyond which the map is stored again
 
 
 async def dock(context: Context, task: Task) -> TaskResult:

@@ -21,7 +21,7 @@ from roboglot.wire.cyberdog.channel import MESSAGE_MAX
 from roboglot.wire.cyberdog.codes import Code
 
 MAP_ID_MAX = 2**64 - 1
-CELLS_MAX = MESSAGE_MAX // len("0,")  # of a map that may fit into an answer
+CELLS_MAX = MESSAGE_MAX // len("0,")  # of a map, so that it fits into an answer
 LABELS_MAX = 256  # on one map
 NAME_MAX = 128  # characters
 
@@ -109,7 +109,7 @@ async def set_labels(
     try:
         labels = msgspec.convert(locationLabelInfo or [], list[WireLabel])
     except msgspec.ValidationError as error:
-        # Taken as left out, a label list that does not fit would have the whole map deleted.
+        # If taken as absent, a label list of the wrong type would delete the whole map.
         raise BadParameters(str(error)) from None
     names = [label.labelName for label in labels]
     try:

@@ -15,7 +15,7 @@ from roboglot.protocols.cyberdog.context import Context
 from roboglot.wire.cyberdog.codes import Feedback, TaskResult
 
 log = logging.getLogger(__name__)
-FIX_PERIOD = 1.0  # s between two looks at the satellites
+FIX_PERIOD = 1.0  # s between two checks for satellites
 
 
 async def build_map(context: Context, task: Task, *, outdoor: bool) -> TaskResult:

@@ -23,9 +23,9 @@ from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.errors import codes_of
 from roboglot.wire.cyberdog.codes import Feedback, TaskResult
 
-GOOD_FIT = 0.5  # localization's quality from which the robot counts as localized
+GOOD_FIT = 0.5  # quality of localization from which the robot counts as localized
 GIVE_UP_AFTER = 120.0  # s
-NEAR = 0.5  # m around where the robot believes to be that are looked at first
+NEAR = 0.5  # m around the believed pose that are searched first
 LOOK_AT_MOST = 1.5  # s
 PATH_PERIOD = 1.0  # s between two paths
 
@@ -48,11 +48,11 @@ async def relocalize(context: Context, task: Task, *, outdoor: bool) -> TaskResu
     robot = context.robot
     task.feedback(Feedback.LOCALIZATION_CHECKING_MAP)
     stored = await newest_map(context, outdoor=outdoor)
-    other = stored is not None and stored.name != context.stored_map  # saved in an earlier life
+    other = stored is not None and stored.name != context.stored_map  # saved by an earlier run of the program
     if stored is not None and other and stored.grid.width * stored.grid.height > 0:
         load_map(robot, stored, Pose())
         context.stored_map = stored.name
-    # Without a stored one the map in memory will do, unless it is of the other kind, or was deleted.
+    # Without a stored map the one in memory serves, unless it is of the other kind or was deleted.
     if not has_map(robot) or (stored is None and (outdoor or context.stored_map or context.map_deleted)):
         task.feedback(Feedback.LOCALIZATION_MAP_UNUSABLE)
         return TaskResult.FAILED
@@ -103,14 +103,14 @@ async def _search(robot: Robot, task: Task, place: GlobeAnchor | None) -> bool:
             await action.succeeded()
             if sky is None or sky.allows(robot[Localization].pose.point):
                 return True
-            task.feedback(Feedback.LOCALIZATION_TRYING)  # it looks like this elsewhere, too
+            task.feedback(Feedback.LOCALIZATION_TRYING)  # other places look the same
             await robot.clock.sleep(LOOK_AT_MOST)
         except asyncio.CancelledError:
             action.cancel("the door closes")
             raise
         except NotLocalized:
             task.feedback(Feedback.LOCALIZATION_TRYING)
-        except RobotError:  # another client searches now
+        except RobotError:  # another client has started a search
             task.feedback(Feedback.LOCALIZATION_FAILED)
             return False
         finally:

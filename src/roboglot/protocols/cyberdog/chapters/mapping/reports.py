@@ -20,9 +20,9 @@ MAP = push(Code.MAP, depth=2)
 POSE = push(Code.POSE, depth=2)
 PATH = push(Code.PATH, depth=2)
 LASER = push(Code.LASER, depth=1)
-CELLS_MAX = PUSH_MAX // len("0,")  # of a map that may fit into a push
+CELLS_MAX = PUSH_MAX // len("0,")  # of a map, so that it fits into a push
 PERIOD = 0.2  # s between two poses
-MAP_EVERY = 5  # periods between two looks at whether the map has grown
+MAP_EVERY = 5  # periods between two checks whether the map has grown
 MAPPING = frozenset({TaskState.MAPPING, TaskState.OUTDOOR_MAPPING})
 WITH_LASER = frozenset(
     {
@@ -44,7 +44,7 @@ class MapReports:
         self._robot = robot
         self._app = app
         self._state = TaskState.IDLE
-        self._revision = -1  # of the map that the app has
+        self._revision = -1  # of the map that was last sent to the app
         self._scan_at = -1.0
         self._task: asyncio.Task[None] | None = None
 

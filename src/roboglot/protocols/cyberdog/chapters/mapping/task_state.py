@@ -75,7 +75,7 @@ class Task:
         self.kind = kind
         self.stream = Stream()
         self.last: Feedback | None = None
-        self.action: Action | None = None  # what moves the robot for it
+        self.action: Action | None = None  # the action that moves the robot for it
         self.stopping = False
         self.stopped_as = TaskResult.CANCELED  # the result when it is stopped
 
@@ -97,7 +97,7 @@ class Tasks:
 
     def __init__(self) -> None:
         self.state = self._rest = TaskState.IDLE  # now, and when no task runs
-        self._found_again: TaskState | None = None  # what follows when a lost place is found
+        self._found_again: TaskState | None = None  # the state that follows when a lost pose is recovered
         self.current: Task | None = None
         self.on_change: list[Callable[[TaskState], None]] = []
         self._running: asyncio.Task[None] | None = None

@@ -45,7 +45,7 @@ from roboglot.wire.cyberdog.codes import (
 )
 from roboglot.wire.cyberdog.text import Int32
 
-STREAM_MAX = 7200.0  # s that one stream is kept open for its result
+STREAM_MAX = 7200.0  # s for which one stream stays open for its result
 STOP_MAX = 60.0  # s
 NEEDS: Mapping[TaskType, tuple[type[Component], ...]] = {
     TaskType.NAVIGATION: (Navigation, Localization, MappingComponent),
@@ -57,7 +57,7 @@ NEEDS: Mapping[TaskType, tuple[type[Component], ...]] = {
 }
 NEEDS_FOR_THINGS: tuple[type[Component], ...] = (Following, Camera, Lidar)
 FOLLOWS = frozenset({TaskType.VISION_FOLLOWING, TaskType.UWB_FOLLOWING})
-IN_A_MAP = frozenset({TaskType.NAVIGATION, TaskType.MAPPING, TaskType.LOCALIZATION})  # where ``outdoor`` counts
+IN_A_MAP = frozenset({TaskType.NAVIGATION, TaskType.MAPPING, TaskType.LOCALIZATION})  # where ``outdoor`` matters
 LEAVES: Mapping[TaskResult, TaskState] = {
     TaskResult.SUCCESS: TaskState.LOCALIZED,
     TaskResult.FAILED: TaskState.LOCALIZATION_FAILED,
@@ -144,7 +144,7 @@ async def stop_task(call: Call, *, type: Int32, map_name: object = "") -> dict[s
     A map that was being built is saved as ``map_name``. Without a name 5 throws it away; 0 keeps it in memory.
     """
     if not isinstance(map_name, str):
-        raise BadParameters("map_name is a text")  # to take it as left out would throw the map away
+        raise BadParameters("map_name is a text")  # taken as absent, it would discard the map
     try:
         result = await call.context.robot.clock.wait_for(_stop(call.context, type, map_name), STOP_MAX)
     except TimeoutError:

@@ -15,11 +15,11 @@ from roboglot.model.components.sensing.time_of_flight import TimeOfFlight
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
 
-AHEAD = (0.15, 0.8)  # m before base_link that are looked at
+AHEAD = (0.15, 0.8)  # m in front of base_link that are examined
 BESIDE = 0.15  # m
-FLOOR = 0.02  # m above the floor up to which a point is the floor
-PASSED = 1.2  # m after which what was seen ahead lies behind
-ROOM = 0.02  # m that feet are lifted above what they step over
+FLOOR = 0.02  # m above the floor up to which points belong to it
+PASSED = 1.2  # m after which earlier sightings lie behind the robot
+ROOM = 0.02  # m of clearance above what the feet step over
 
 Points = NDArray[np.float32]
 

@@ -43,7 +43,7 @@ from roboglot.wire.cyberdog.chapters.motion.motion import (
 )
 from roboglot.wire.cyberdog.codes import MachineState
 
-DURATION_MAX = 60.0  # s that one walk by a result command may take: only an emergency stop ends it
+DURATION_MAX = 60.0  # s: the longest walk by a result command, which only an emergency stop ends
 NOTHING_SPECIAL = Wish()
 MOVING = 0.01  # m/s or rad/s from which the body counts as walking
 
@@ -65,9 +65,9 @@ class Gaits:
         self._start = MotionStart(robot)
         self._last: int = Motion.STAND_UP  # the motion commanded last
         self._servo: Action | None = None
-        self._rising: Action | None = None  # getting up for a servo
+        self._rising: Action | None = None  # the action that gets up for a servo frame
         self._performing: Action | None = None
-        self._low = 0.0  # m, and when it began to get up
+        self._low = 0.0  # m: the belly's height, and the time, when it began to get up
         self._sequences: set[asyncio.Task[MotionCode]] = set()
 
     @property

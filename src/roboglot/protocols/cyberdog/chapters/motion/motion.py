@@ -18,7 +18,7 @@ from roboglot.wire.cyberdog.text import Int32
 
 SERVO_RESPONSE = push(Code.SERVO_RESPONSE, depth=2)
 CALIBRATION = 4  # ``value`` of a frame
-ANSWER_MAX = 20.0  # s after which the answer is a time-out, whatever the motion still does
+ANSWER_MAX = 20.0  # s after which the answer is a time-out, whether or not the motion continues
 
 
 @TABLE.on(Code.SERVO, right=Right.DRIVE, needs=(Driving,))
@@ -88,5 +88,5 @@ async def motion(
         return {"error_code": int(InBandError.TIMEOUT)}
     motion = (
         call.context.gaits.motion if call.context.profile is Profile.ROBOT else motion_id
-    )  # robots report what they do then
+    )  # what robots then report
     return {"motion_id": int(motion), "result": code is MotionCode.DONE, "code": int(code)}

@@ -17,10 +17,10 @@ from roboglot.protocols.cyberdog.chapters.motion.motion_table import FIGURES, PO
 from roboglot.wire.cyberdog.chapters.motion.motion import Motion
 
 SOURCE = "cyberdog"
-WATCHDOG = 0.2  # s without a servo frame, then the robot stands still
-PASSIVE_TROT = 1.0  # s of that walk by a result command
-POSE_TIME = 0.5  # s into a body pose for which no duration is given
-LOOK = 0.1  # s between two looks ahead
+WATCHDOG = 0.2  # s without a servo frame after which the robot stops
+PASSIVE_TROT = 1.0  # s of passive trot per result command
+POSE_TIME = 0.5  # s to reach a body pose without a duration
+LOOK = 0.1  # s between two checks ahead
 PAW_LIFT = 0.08  # m
 UPRIGHT = BodyPose()
 
@@ -41,9 +41,9 @@ class MotionStart:
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
-        self._body = UPRIGHT  # as the last servo frame wanted it
+        self._body = UPRIGHT  # requested by the last servo frame
         self._ahead = WayAhead(robot)
-        self.standing = 0.0  # m, the belly's height when it stood last
+        self.standing = 0.0  # m: the belly's height when the robot last stood
 
     def walk(self, motion: int, wish: Wish, seconds: float, source: str) -> Action:
         """Walk at the wished velocity for so many seconds."""

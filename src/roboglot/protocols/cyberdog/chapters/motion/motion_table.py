@@ -16,7 +16,7 @@ WALKS: Mapping[int, Gait] = {number: Gait[name] for number, name in WALK_NAMES.i
 FIGURES: Mapping[int, Figure] = {number: Figure[name] for number, name in FIGURE_NAMES.items()}
 NUMBERS: Mapping[Figure, int] = {figure: number for number, figure in FIGURES.items()}
 DANCES = frozenset({140, 176, 177, 178, 501, 502, 503, 504, 505})  # lying down may interrupt them
-# Body poses: whether each adds to how the body is held, and whether a duration must be given.
+# Body poses: whether each is relative to the present one, and whether a duration is required.
 POSES: Mapping[int, tuple[bool, bool]] = {
     201: (False, False),
     202: (True, False),
@@ -26,16 +26,16 @@ POSES: Mapping[int, tuple[bool, bool]] = {
     Motion.POSE_ONE_FOOT: (True, True),
     214: (True, True),
 }
-SERVO_POSES = frozenset({201, 202})  # those that frames of a servo may ask for
-SEEING = frozenset({343, 344, 345})  # walks that lift the feet over what they see ahead
-# States that the board enters by itself: not for clients.
+SERVO_POSES = frozenset({201, 202})  # allowed in servo frames
+SEEING = frozenset({343, 344, 345})  # walks that lift the feet over obstacles ahead
+# States that the board enters by itself; clients cannot request them.
 STATES = frozenset({Motion.LIFTED, Motion.ON_ITS_BACK})
-PRESETS = frozenset(range(180, 200))  # places for gaits that users put on the dog; it comes with none
+PRESETS = frozenset(range(180, 200))  # slots for gaits that users load onto the dog; empty as delivered
 USERS = frozenset({Motion.USER_SEQUENCE, Motion.USER_GAIT})
-DANCED = USERS | {Motion.POSE_ONE_FOOT}  # those that are steps of a choreography here
+DANCED = USERS | {Motion.POSE_ONE_FOOT}  # performed as steps of a choreography here
 WALK_STANDS = frozenset({Motion.WALK_STAND, Motion.WALK_STAND_OTHER})
 POSTURES = WALK_STANDS | {Motion.EMERGENCY_STOP, Motion.LIE_DOWN, Motion.LIE_DOWN_PASSIVE, Motion.STAND_UP}
-# What takes its own time: a duration must not be given.
+# Motions of fixed length: a duration is not allowed.
 FIXED_TIME = POSTURES | FIGURES.keys() | PRESETS | {Motion.TROT_PASSIVE, Motion.USER_SEQUENCE}
 MAY_LAST = WALKS.keys() | POSES.keys() | {Motion.USER_GAIT}
 KNOWN = FIXED_TIME | MAY_LAST | STATES

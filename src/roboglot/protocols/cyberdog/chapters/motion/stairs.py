@@ -21,7 +21,7 @@ from roboglot.wire.cyberdog.chapters.motion.motion import Motion
 from roboglot.wire.cyberdog.codes import Code, InBandError
 
 ANSWER_MAX = 5.0  # s, getting up included
-LOOK = 0.05  # s between two looks at how far it is
+LOOK = 0.05  # s between two checks of the progress
 BEGUN = (AlignmentStage.ALIGNING, AlignmentStage.ALIGNED)
 
 

@@ -19,7 +19,7 @@ from roboglot.wire.cyberdog.codes import Code
 log = logging.getLogger(__name__)
 ENTERED = push(Code.FACE_ENTERED)
 RECOGNISED = push(Code.FACE_RECOGNISED)
-ENTERING_MAX = 30.0  # s until a face must have been seen
+ENTERING_MAX = 30.0  # s for a face to be seen
 AGAIN = 1.0  # s between two reports of the same person
 EMOTIONS = tuple(Emotion)
 
@@ -41,8 +41,8 @@ class Faces:
     """Enters one face or recognises, not both at once. Lives as long as the door is open."""
 
     def __init__(self, robot: Robot, app: AppLink) -> None:
-        self.entering = ""  # the member whose face is awaited
-        self.entered = ""  # the member whose face came last
+        self.entering = ""  # the member whose face is expected
+        self.entered = ""  # the member whose face was recorded last
         self._robot, self._app = robot, app
         self._looking: asyncio.Task[None] | None = None
 

@@ -22,10 +22,10 @@ from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.wire.cyberdog.codes import Code, Feedback, TaskResult
 
-AUTOMATIC = 200  # ``relative_pos`` that leaves it to the robot
+AUTOMATIC = 200  # ``relative_pos`` that leaves the choice to the robot
 SIDES = {AUTOMATIC: FollowSide.BEHIND, 201: FollowSide.BEHIND, 202: FollowSide.LEFT, 203: FollowSide.RIGHT}
-DISTANCE = 1.0  # m, unless the app says
-DISTANCE_MIN, DISTANCE_MAX = 0.5, 5.0  # m: what is asked beyond is cut to this
+DISTANCE = 1.0  # m, unless the app sets one
+DISTANCE_MIN, DISTANCE_MAX = 0.5, 5.0  # m: requests beyond are clipped
 
 
 class Region(msgspec.Struct):
@@ -83,7 +83,7 @@ async def _pursue(
     except NotFound:
         task.feedback(Feedback.TARGET_LOST if task.last is not Feedback.FOLLOW_CHOSEN else Feedback.TARGET_NOT_LOCKED)
     except RobotError:
-        pass  # another client drives now
+        pass  # another client is driving
     finally:
         context.pursuit = None
         watching.cancel()
@@ -118,7 +118,7 @@ async def _tell(context: Context, task: Task, action: Action, followed: Feedback
             return
         if action.feedback != "searching":
             task.feedback(followed)
-        elif searched and task.last is not Feedback.FOLLOW_CHOSEN:  # it takes a picture until anybody is followed
+        elif searched and task.last is not Feedback.FOLLOW_CHOSEN:  # a picture is needed until a person is followed
             task.feedback(searched)
 
     end_watch = context.robot.events.listen(ActionChanged, watch)

@@ -17,9 +17,9 @@ from roboglot.protocols.cyberdog.table import push
 from roboglot.wire.cyberdog.codes import Code
 
 TRACKING = push(Code.TRACKING, depth=2)
-WIDTH, HEIGHT = 640, 480  # pixels of the picture that boxes refer to, whatever the camera's size
+WIDTH, HEIGHT = 640, 480  # pixels: the picture to which boxes refer, whatever the camera's size
 PERIOD = 0.2  # s between two pushes
-OVERLAP_MIN = 0.1  # of the union of two boxes from which one means the other
+OVERLAP_MIN = 0.1  # overlap, as a share of the union, from which two boxes mean the same object
 
 
 class Pursuit:
@@ -64,7 +64,7 @@ class ThingPursuit:
     def __init__(self, robot: Robot, app: AppLink) -> None:
         self.chosen: asyncio.Future[Point] = asyncio.get_running_loop().create_future()
         self._robot, self._app = robot, app
-        self._extent = Extent(0.0, 0.0, 0.0)  # of what was chosen
+        self._extent = Extent(0.0, 0.0, 0.0)  # of the chosen object
 
     def choose(self, x: int, y: int, width: int, height: int) -> bool:
         """Choose the lidar's nearest object in that region (pixels); False if there is none, or one is chosen."""

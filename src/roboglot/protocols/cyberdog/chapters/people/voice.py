@@ -25,8 +25,8 @@ from roboglot.protocols.cyberdog.chapters.system.stored_settings import (
 from roboglot.wire.cyberdog.chapters.motion.motion import Motion, MotionCode
 
 log = logging.getLogger(__name__)
-TRAINING_MAX = 30.0  # s until a person must have spoken
-ATTENTIVE = 8.0  # s that it waits for an order after its wake word
+TRAINING_MAX = 30.0  # s for a person to speak
+ATTENTIVE = 8.0  # s for which it listens for a command after its wake word
 HERE, CANNOT = "我在", "现在不行"
 ORDERS = {
     "站起来": Motion.STAND_UP,
@@ -104,7 +104,7 @@ class Voice:
             log.info("voiceprint of %r: %s", member, error)
             code = UNKNOWN
         finally:
-            if self._learning is asyncio.current_task():  # it was not cancelled
+            if self._learning is asyncio.current_task():  # unless it was cancelled
                 self._learning, self.training = None, ""
                 self._trained(code, voiceprint)
 

@@ -26,7 +26,7 @@ from roboglot.protocols.cyberdog.chapters.system.updates import (
 from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.wire.cyberdog.codes import Accepted, Code
 
-STREAM_MAX = 10_800.0  # s that one stream is kept open for its result
+STREAM_MAX = 10_800.0  # s for which one stream stays open for its result
 ID_MAX = 128  # characters of a goal's id
 Id = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)] | Annotated[str, msgspec.Meta(max_length=ID_MAX)]
 NO_TIME = -2  # s

@@ -20,16 +20,16 @@ Errors = dict[str, int | dict[str, int]]
 
 NOT_YET, GOOD, BROKEN = -1, 0, 1
 LIDAR_ERROR, BATTERY_ERROR = 2109, 1409
-CRITICAL = frozenset({"base", "battery"})  # without these the robot goes nowhere
+CRITICAL = frozenset({"base", "battery"})  # the robot does not move without these
 
-# The parts that the message names, by the component that stands for them.
+# Fields of the message by the component that they describe.
 SHOWN: Mapping[tuple[str, str], type[Component]] = {
     ("motion_manager", ""): Base,
     ("algorithm_manager", ""): Localization,
     ("device", "bms"): Battery,
     ("sensor", "lidar"): Lidar,
 }
-# Where a fault of a component is reported, and as which number; all others are other devices.
+# Field and code for a component's faults; all others belong to "other devices".
 PLACES: Mapping[str, tuple[str, str, int]] = {
     "base": ("motion_manager", "", BROKEN),
     "localization": ("algorithm_manager", "", BROKEN),

@@ -27,7 +27,7 @@ from roboglot.wire.cyberdog.codes import Code, SelfCheck
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.text import write
 
-NO_SERVICE = -255  # a volume of a robot that has no speaker
+NO_SERVICE = -255  # the volume of a robot without a speaker
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +108,7 @@ def _battery(context: Context) -> dict[str, object]:
         "voltage": round(1000.0 * state.voltage),  # mV
         "temperature": round(state.temperature),
         "is_charging": state.charging,
-        "discharge_time": round((state.remaining or 0.0) / 60.0),  # min; 0 while it is fed
+        "discharge_time": round((state.remaining or 0.0) / 60.0),  # min; 0 while connected to power
     }
 
 

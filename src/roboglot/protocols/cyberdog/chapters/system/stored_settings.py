@@ -11,9 +11,9 @@ MICROPHONE, VOICE_CONTROL = "cyberdog.microphone", "cyberdog.voice_control"
 ACCOUNT = "cyberdog.audio_account"
 VOICEPRINTS = "cyberdog.voiceprints"  # as the app sent them
 ENVIRONMENT = "cyberdog.environment"
-APP = "cyberdog.app"  # the address of the app that was connected last
-APP = "cyberdog.app"  # host of the app that was connected last
-UPDATE = "cyberdog.update"  # the version that the robot restarts for
+APP = "cyberdog.app"  # the address of the last connected app
+APP = "cyberdog.app"  # the host of the last connected app
+UPDATE = "cyberdog.update"  # the version for which the robot restarts
 
 
 def kept(robot: Robot, key: str, default: object) -> object:

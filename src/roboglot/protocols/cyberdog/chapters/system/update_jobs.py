@@ -35,7 +35,7 @@ from roboglot.protocols.cyberdog.chapters.system.updates import (
 from roboglot.protocols.cyberdog.stream import Stream
 
 log = logging.getLogger(__name__)
-CODES: tuple[tuple[type[Exception], int], ...] = (  # the first row whose class fits counts
+CODES: tuple[tuple[type[Exception], int], ...] = (  # first match wins
     (BadParameters, ARGUMENTS),
     (InvalidGoal, ARGUMENTS),
     (NotFound, STATE),
@@ -65,7 +65,7 @@ class UpdateJobs:
     """Jobs of updates: at most one goal is under way; it goes on when its stream breaks."""
 
     def __init__(self, robot: Robot, updates: Updates) -> None:
-        self.stream: Stream | None = None  # of the goal under way
+        self.stream: Stream | None = None  # of the goal in progress
         self._robot, self._updates = robot, updates
         self._running: asyncio.Task[None] | None = None
 
@@ -106,7 +106,7 @@ class UpdateJobs:
             self.stream = self._running = None
         stream.end({**named, "code": code, "message": message, "data": data})
 
-    # -- what can be wanted; each returns the result's data ----------------------------------------------------------
+    # -- goals; each returns the result's data -------------------------------------------------------------------------
 
     async def inquire(self, _: Goal) -> dict[str, object]:
         """Return what runs, what is downloaded, what the maker offers."""

@@ -33,7 +33,7 @@ REBOOTS = push(Code.UPDATE_REBOOT)
 RESULT = push(Code.UPDATE_RESULT)
 GOOD, FAILED, STATE, ARGUMENTS, BUSY = 0, 5701, 5703, 5710, 5711  # ``code``
 PROGRESS_FAILED, DISK_FULL = -1, -2
-NOTICE = 3.0  # s between the notice of the reboot and the reboot
+NOTICE = 3.0  # s between announcing the reboot and rebooting
 MODULES_MAX = 16
 PROGRESS_PERIOD = 0.1  # s between two pushes of progress
 WORDS = {
@@ -71,12 +71,12 @@ class Updates:
     """Reports updates to the app, no matter who began them. Lives as long as the door is open."""
 
     def __init__(self, robot: Robot, app: AppLink) -> None:
-        self.digests: frozenset[str] = frozenset()  # of all files of what was downloaded
+        self.digests: frozenset[str] = frozenset()  # of all files in the download
         self._robot, self._app = robot, app
-        self._failed = 0  # what the progress of the last download says after it failed
+        self._failed = 0  # the progress reported after a failed download
         self._word = "idle"
         self._state = FirmwareState.IDLE
-        self._sent: dict[str, int] = {}  # the progress that was pushed last
+        self._sent: dict[str, int] = {}  # the last progress pushed
         self._sent_at = -PROGRESS_PERIOD
         self._working: asyncio.Task[None] | None = None
         self._leave = robot.events.listen(FirmwareChanged, lambda event: self._changed(event.progress))
@@ -195,7 +195,7 @@ def package_of(modules: object) -> tuple[FirmwarePackage, frozenset[str]]:
     files = [file for module in wanted for file in module.latest.packages]
     if not files or len(wanted) > MODULES_MAX:
         raise InvalidGoal(f"an update has files, and at most {MODULES_MAX} modules")
-    # The size of all, and the first file's sum for all: they are installed together.
+    # The total size, and the first file's checksum for all: they are installed together.
     size, versions = sum(file.fileSize for file in files), {module.module: module.latest.version for module in wanted}
     package = FirmwarePackage(wanted[0].latest.version, size, files[0].md5.lower(), versions, url="app")
     return package, frozenset(file.md5.lower() for file in files)

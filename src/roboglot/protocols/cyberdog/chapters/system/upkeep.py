@@ -17,12 +17,12 @@ from roboglot.protocols.cyberdog.chapters.system.stored_settings import ENVIRONM
 from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.wire.cyberdog.codes import Code, InBandError, MachineState, TaskState, UnlockResult
 
-WAKE_MAX = 13.0  # s that leaving low power may take
+WAKE_MAX = 13.0  # s to leave low power
 CALIBRATION_MAX = 10.0  # s
 UPLOAD_MAX = 59.0  # s
 UNLOCK_MAX = 10.0  # s
 ENVIRONMENTS = ("pro", "test")
-LAST_WORDS = 1.0  # s between the answer and the robot's going away
+LAST_WORDS = 1.0  # s between the answer and the shutdown
 
 
 @TABLE.on(Code.LEAVE_LOW_POWER, right=Right.DRIVE, needs=(Power,))

@@ -9,7 +9,7 @@ from roboglot.model.components.logistics.cargo import Cargo
 from roboglot.model.events import ActionChanged
 from roboglot.model.robot import Robot
 
-OPEN, CLOSE = "open box", "close box"  # what cargo calls its actions
+OPEN, CLOSE = "open box", "close box"  # the cargo component's names of its actions
 
 
 class BoxLog:

@@ -58,7 +58,7 @@ KIND_WORDS = {kind: word for word, kind in KINDS.items()} | {
     OrderKind.COLLECT: "COLLECT",
     OrderKind.STATION: "STATION_TAKEOUT",
 }
-NO_TASKS = (OrderKind.ROUND, OrderKind.DISINFECT)  # orders that the manual's list of delivery tasks has no word for
+NO_TASKS = (OrderKind.ROUND, OrderKind.DISINFECT)  # orders without a word in the manual's list of delivery tasks
 STAGES = {
     OrderStage.DRIVING_TO_STOP: "GOING_TO_TASK_POINT",
     OrderStage.AT_STOP: "ARRIVED_AT_TASK_POINT",
@@ -68,7 +68,7 @@ STAGES = {
     OrderStage.AT_CABINET: "ROBOT_OPERATE_CABINET",
     OrderStage.HANDING_OVER: "USER_OPERATE_ROBOT",
 }
-# Those that clients know, where there are any.
+# Types that clients know, where there are any.
 REASONS = {
     Failure.NOT_TAKEN: "NO_PICKUP",
     Failure.DOOR_STUCK: "FAILED_TO_OPEN_DOOR",

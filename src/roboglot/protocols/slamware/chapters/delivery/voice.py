@@ -10,7 +10,7 @@ from roboglot.model.events import DeliveryNews, DeliveryReported
 from roboglot.model.robot import Robot
 
 LANGUAGE, LANGUAGE_AT_FIRST = "slamware.language", "zh-CN"
-# News -> Chinese, English. Every language that does not begin with zh is spoken as English.
+# News -> Chinese, English. Languages that do not begin with zh use English.
 PHRASES = {
     DeliveryNews.ORDER_STARTED: ("开始配送,请让一让", "I am on my way."),
     DeliveryNews.STATION_STARTED: ("去取货", "I am going to the cabinet."),

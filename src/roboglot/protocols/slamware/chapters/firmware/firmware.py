@@ -34,7 +34,7 @@ PROGRESS = {
 }
 
 
-IDLE = (FirmwareState.IDLE, FirmwareState.DOWNLOADED, FirmwareState.FAILED)  # an update may begin then
+IDLE = (FirmwareState.IDLE, FirmwareState.DOWNLOADED, FirmwareState.FAILED)  # states in which an update may begin
 
 
 class Outcome(msgspec.Struct):
@@ -145,7 +145,7 @@ async def install_app(context: Context, body: Upload) -> None:
         app = read_apk(body.file)
         await context.robot[Apps].install(app.name, app.version, body.file)
     except (BadPackage, RobotError) as error:
-        status = 500 if isinstance(error, Refused) else 400  # the manual knows 500 only
+        status = 500 if isinstance(error, Refused) else 400  # the manual only knows 500
         raise HttpError(status, "Failed to install application", str(error)) from None
 
 

@@ -19,7 +19,7 @@ class Updater:
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._task: asyncio.Task[None] | None = None
-        self.failed = False  # the last one
+        self.failed = False  # whether the last update failed
 
     @property
     def busy(self) -> bool:

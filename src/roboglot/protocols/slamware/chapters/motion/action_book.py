@@ -14,7 +14,7 @@ from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.vocabulary import action_word, stage_of, state_of
 from roboglot.wire.slamware.chapters.motion import ActionGravestone, ActionInfo
 
-# Names that the robot's skills give their actions; what is not here is driving by hand.
+# Names of the skills' own actions; all others are manual driving.
 FOREIGN = {
     "dock at mark": "MoveToTagAction",
     "back off from mark": "BackOffFromTagAction",
@@ -30,7 +30,7 @@ class ActionBook:
 
     def __init__(self, robot: Robot, prefix: str) -> None:
         self._robot = robot
-        self.prefix = prefix  # of the names that the robot gives itself
+        self.prefix = prefix  # of action names that the robot chooses itself
         self._named: dict[int, tuple[str, Action]] = {}
 
     def enter(self, name: str, action: Action) -> ActionInfo:

@@ -49,7 +49,7 @@ from roboglot.wire.slamware.chapters.motion import (
 )
 
 API = "/api/core/motion/v1"
-SEARCH_SECONDS = 10.0  # the longest search when the client sets no limit
+SEARCH_SECONDS = 10.0  # s: the longest search unless the client sets a limit
 
 
 @dataclass(frozen=True, slots=True)

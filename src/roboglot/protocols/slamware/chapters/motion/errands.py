@@ -15,8 +15,8 @@ from roboglot.model.errors import Expired
 from roboglot.model.events import ActionChanged
 from roboglot.model.robot import Robot
 
-SOURCE = "slamware"  # of every action that this door's clients ask for
-PART = "slamware part"  # of what errands ask for: clients never see it
+SOURCE = "slamware"  # of every action requested by clients of this door
+PART = "slamware part"  # of actions that an errand requests; invisible to clients
 
 
 class Errand:
@@ -44,7 +44,7 @@ class Errand:
             raise Expired(f"{part.name} took longer than {within:g} s") from None
         except asyncio.CancelledError:
             part.cancel(self._action.reason)
-            if self._action.status is ActionStatus.CANCELING:  # otherwise the loop closes and no clock moves any more
+            if self._action.status is ActionStatus.CANCELING:  # otherwise the loop is closing and no clock moves
                 await part.done()
             raise
         finally:

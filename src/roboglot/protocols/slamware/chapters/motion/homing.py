@@ -21,17 +21,17 @@ from roboglot.protocols.slamware.context import Context
 from roboglot.wire.slamware.chapters.motion import GoHome, GoHomeOptions, MoveOptions, ReturnToParkingOptions
 from roboglot.wire.slamware.chapters.platform import GeneralEvent
 
-PARKING = "PARKING"  # the type of places to park at
+PARKING = "PARKING"  # the type of parking places
 
 
 def go_home(context: Context, options: GoHomeOptions) -> Action:
     """Drive to the landing point, and by default onto the dock, some times over if need be."""
     wanted = options.gohome_options or GoHome()
     how = wanted.move_options or MoveOptions()
-    navigation_options(context.robot, how, None)  # what cannot be done is refused now, not on the way
+    navigation_options(context.robot, how, None)  # refuse impossible requests now rather than on the way
     bound = context.robot[Settings].get(BOUND)
     if bound and bound not in {dock.id for dock in known_docks(context.robot)}:
-        context.events.note(GeneralEvent.DOCK_ID_NOT_FOUND)  # it goes to another one
+        context.events.note(GeneralEvent.DOCK_ID_NOT_FOUND)  # it drives to another one
 
     async def work(errand: Errand) -> None:
         await head_home(errand, wanted)

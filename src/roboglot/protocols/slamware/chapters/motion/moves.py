@@ -31,10 +31,10 @@ from roboglot.wire.slamware.chapters.motion import (
 )
 
 MOVE_BY_SECONDS = 0.5
-MOVE_BY_TWIST = Twist(x=0.4, yaw=0.8)  # how fast a bare direction drives: slow, for there is no obstacle avoidance
+MOVE_BY_TWIST = Twist(x=0.4, yaw=0.8)  # speed for a bare direction: slow, because there is no obstacle avoidance
 SPEED_RATIO_MIN = 0.1
 TRACKS = (Tracks.FREE, Tracks.STRICT, Tracks.PREFERRED)  # by move mode
-OCCUPIED = 0.1  # m from an occupied target, which is near enough
+OCCUPIED = 0.1  # m from an occupied target that suffice
 PRECISE, OCCUPIED_MAX = 0.05, 10.0  # m
 
 

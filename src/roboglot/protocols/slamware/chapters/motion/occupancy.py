@@ -10,7 +10,7 @@ from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
 
-SHARE = 0.5  # of the hull's radius around its middle that must be free
+SHARE = 0.5  # of the hull's radius around its centre that must be free
 CERTAIN = 40  # evidence from which a cell counts as occupied
 
 

@@ -21,9 +21,9 @@ from roboglot.wire.slamware.chapters.motion import (
 )
 from roboglot.wire.slamware.chapters.platform import GeneralEvent
 
-RECOVER_SECONDS = 30.0  # when the client sets no limit
-TURN = math.radians(60)  # before it looks again
-PAUSE_SECONDS = 0.5  # between two looks from the same place, and while it is pushed
+RECOVER_SECONDS = 30.0  # s, unless the client sets a limit
+TURN = math.radians(60)  # between two searches
+PAUSE_SECONDS = 0.5  # between two searches from the same place, and while it is being pushed
 
 
 def recover_localization(context: Context, options: RecoverLocalizationOptions) -> Action:
@@ -46,10 +46,10 @@ def recover_localization(context: Context, options: RecoverLocalizationOptions) 
                 if turns and Driving in robot and not _docked(context) and robot.clock.time() < deadline:
                     await errand.do(robot[Driving].move_by(Pose(yaw=TURN), source=PART))
                 else:
-                    await robot.clock.sleep(PAUSE_SECONDS)  # several places that fit are found at once
+                    await robot.clock.sleep(PAUSE_SECONDS)  # wait: several places fit
         raise NotLocalized(f"no place that fits was found in {seconds:g} s")
 
-    context.actions.abort()  # it looks while it stands
+    context.actions.abort()  # it searches at standstill
     return run_errand(context.robot, "recover localization", work, region)
 
 

@@ -41,7 +41,7 @@ from roboglot.wire.slamware.chapters.motion import (
 )
 from roboglot.wire.slamware.chapters.platform import ElevatorEvent
 
-ENTER_SECONDS = LEAVE_SECONDS = 120.0  # when the client sets no limit
+ENTER_SECONDS = LEAVE_SECONDS = 120.0  # s, unless the client sets a limit
 
 
 def multi_floor_move(context: Context, options: MultiFloorMoveOptions) -> Action:
@@ -122,9 +122,9 @@ async def change_floor(context: Context, errand: Errand, floor: FloorMap) -> Non
     floors.begin_on(_stop(context, maps.current))
     floors.set_lift(lift.waiting(), lift.inside)
     try:
-        await errand.do(floors.ride(goal, redraw=False, source=PART))  # ``enter`` does, of both floors
+        await errand.do(floors.ride(goal, redraw=False, source=PART))  # ``enter`` does this for both floors
     except RobotError:
-        if floors.current == goal:  # it is in the car, up there
+        if floors.current == goal:  # it is in the car on the goal's floor
             await maps.enter(floor.name.building, floor.name.floor, landing.inside)
         raise
     await maps.enter(floor.name.building, floor.name.floor, landing.waiting())

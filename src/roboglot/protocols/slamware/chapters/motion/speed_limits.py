@@ -13,7 +13,7 @@ from roboglot.model.geometry import Twist
 from roboglot.model.robot import Robot
 
 CONFIGURED = "slamware.speed_limits"  # the setting that holds the configured m/s and rad/s, or null
-SPEED_MIN = 0.01  # m/s and rad/s: slower, it would stand
+SPEED_MIN = 0.01  # m/s and rad/s; below this it would not move
 
 
 class SpeedLimits:

@@ -13,7 +13,7 @@ from roboglot.wire.slamware.chapters.motion import Strategy
 
 API = "/api/core/motion/v1/strategies"
 CURRENT = "slamware.strategy"  # the setting
-SHARES = {"default": 1.0, "careful": 0.5}  # of the speed of every way that a client starts
+SHARES = {"default": 1.0, "careful": 0.5}  # of the speed of every drive that a client starts
 
 
 def speed_share(robot: Robot) -> float:

@@ -30,7 +30,7 @@ from roboglot.wire.slamware.chapters.multi_floor import PoseRelation
 from roboglot.wire.slamware.geometry import Pose3D
 
 API = "/api/multi-floor/map/v1/elevators"
-SILL, WAITING = 0.4, 1.0  # m, where the metadata do not say
+SILL, WAITING = 0.4, 1.0  # m, unless the metadata give them
 DISTANCE_MAX = 10.0  # m
 
 

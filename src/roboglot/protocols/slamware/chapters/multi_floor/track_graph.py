@@ -14,7 +14,7 @@ from roboglot.model.components.mapping.annotations import Line
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point
 
-JOIN = 0.1  # m between pieces that belong together
+JOIN = 0.1  # m between pieces that are joined
 PIECES_MAX = 3000
 _Points = NDArray[np.float64]
 

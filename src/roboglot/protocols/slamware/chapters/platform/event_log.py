@@ -40,9 +40,9 @@ from roboglot.protocols.slamware.vocabulary import action_word, milliseconds
 from roboglot.wire.slamware.chapters.delivery import DeliveryEvent
 from roboglot.wire.slamware.chapters.platform import ElevatorEvent, GeneralEvent, RobotEvent
 
-EVENTS_MAX = 256  # the oldest unread ones are dropped beyond this
+EVENTS_MAX = 256  # unread events, beyond which the oldest is dropped
 HOMING = ("GoHomeAction", "MultiFloorBackHomeAction")
-DRIVES = ("navigate to", "dock", "sweep")  # actions that plan ways
+DRIVES = ("navigate to", "dock", "sweep")  # actions that plan routes
 BLOCKED_AFTER = 180.0  # s in one place before ROBOT_BLOCKED
 OCCUPIED_AGAIN = 5.0  # s until the same obstacle is reported again
 SAME_PLACE = 0.5  # m within which it is the same one
@@ -58,10 +58,10 @@ class EventLog:
         self._ring: deque[RobotEvent] = deque(maxlen=EVENTS_MAX)
         self._charging = self._upgrading = False
         self._blocked: tuple[Action, Timer] | None = None
-        self._occupied: PathBlocked | None = None  # the last one that was reported
+        self._occupied: PathBlocked | None = None  # the last one reported
         self._rides = RideEvents()
         self._dock = ChargingWatch(robot, lambda: self.note(GeneralEvent.CHARGING_BASE_FAILED))
-        self._looked = 0  # the drive for which the place where the robot stands was looked at
+        self._looked = 0  # the drive for which the robot's own place has been checked
         self._endings: list[Callable[[], None]] = []
 
     def start(self) -> None:
@@ -167,7 +167,7 @@ class EventLog:
             if stands_in_something(self._robot):
                 self.note(GeneralEvent.CURRENT_POSE_OCCUPIED, event.stamp)
         if action.source == PART:
-            return  # its errand reports it
+            return  # the errand reports it
         if action.status is ActionStatus.ABORTED and action_word(self._actions.name_of(action)) in HOMING:
             match action.error:
                 case DockNotFound():

@@ -29,7 +29,7 @@ from roboglot.wire.slamware.chapters.slam.stcm_layers import AreaEntry, LineEntr
 
 T = TypeVar("T")
 ORDER_MAX = 10_000
-DRAWN_BYTES_MAX = 16 << 20  # of a file's lines, poses, areas: what is read entry by entry
+DRAWN_BYTES_MAX = 16 << 20  # of a file's lines, poses and areas, which are read one by one
 DRAWN_MAX = 100_000  # such entries of a file, on all floors
 DRAWN_USAGES = {
     stcm_layers.WALLS,

@@ -84,7 +84,7 @@ async def reset_localization_status(context: Context) -> bool:
     if Health in robot:
         for fault in robot[Health].faults:
             if fault.name == LOST:
-                robot[Health].dismiss(fault.id)  # it is raised again if it persists
+                robot[Health].dismiss(fault.id)  # raised again if it persists
     return True
 
 
@@ -122,7 +122,7 @@ async def get_imu(context: Context) -> ImuData:
     try:
         raw = imu.raw
     except Refused:
-        raw = None  # this IMU keeps its raw values to itself
+        raw = None  # this IMU does not report raw values
     return imu_data(imu.reading, raw)
 
 

@@ -49,12 +49,12 @@ from roboglot.wire.slamware.chapters.slam.stcm import Layer, decode_stcm, encode
 
 log = logging.getLogger(__name__)
 FILE = "slamware/map.stcm"
-DRAWN = "slamware/drawn.json"  # the file of what is drawn on the floors of that map that the robot is not on
+DRAWN = "slamware/drawn.json"  # the file of drawings on that map's other floors
 NOT_MOVED = (0.0, 0.0)
-FLOOR = "slamware.floor"  # the setting that holds the id of the floor that memory's drawings are of
-NO_FLOOR = ""  # there: of none
-# The setting that holds the files that memory's drawings began with: by digest, by how many m (x, y) the origin was
-# moved since.
+FLOOR = "slamware.floor"  # the setting that holds the id of the floor of the drawings in memory
+NO_FLOOR = ""  # there: no floor
+# The setting that holds the files on which the drawings in memory are based: by digest, the m (x, y) by which the
+# origin has moved since.
 BASIS = "slamware.map_origins"
 
 
@@ -65,7 +65,7 @@ class MapKeeper:
         self._robot, self._cloud, self._synced = robot, cloud, synced
         self._turn = asyncio.Lock()
         self._loading = False
-        self._layers: tuple[Layer, ...] = ()  # of the map in memory, of unknown kinds
+        self._layers: tuple[Layer, ...] = ()  # of the map in memory, of unknown type
         self.status = MapLoadStatus.NOT_LOADED
         self.floors: tuple[FloorMap, ...] = ()  # loaded from disk
         self._loaded = ""  # the digest of that file
@@ -104,7 +104,7 @@ class MapKeeper:
         """Use the map of a file's default floor from now on, in memory only."""
         floor = _start_floor(await self._parse(data))
         async with self._turn:
-            await self._use(floor, pose, self._put_drawings(floor, {}))  # what is drawn now belongs to no file
+            await self._use(floor, pose, self._put_drawings(floor, {}))  # the present drawings belong to no file
 
     async def upload(self, data: bytes) -> None:
         """Keep the file on disk as it is, without loading it. Raises InvalidGoal unless it is a composite map."""
@@ -127,7 +127,7 @@ class MapKeeper:
             settings = {BASIS: {_digest(data): NOT_MOVED}, FLOOR: self.current.map_id}
 
             def edit(now: Drawings) -> Replacement:
-                docks = known_docks(self._robot)  # as the file has them, also the robot's own
+                docks = known_docks(self._robot)  # as in the file, including the robot's own
                 return Replacement(_with_docks(now, docks), settings, {FILE: data, DRAWN: None})
 
             await self._robot[MapMemory].replace(edit)
@@ -257,7 +257,7 @@ class MapKeeper:
 
     async def _turn_over(self, floor: FloorMap, digest: str) -> None:
         """Change from memory's floor to ``floor`` of the map with ``digest``, each with its drawings."""
-        if digest not in self._basis:  # memory is of another map
+        if digest not in self._basis:  # memory holds another map
             await self._put_drawings(floor, {digest: NOT_MOVED})
             return
         others, shift = await self._others(), self._basis[digest]

@@ -29,7 +29,7 @@ from roboglot.wire.slamware.chapters.slam.localization import NewOrigin
 from roboglot.wire.slamware.geometry import COORDINATE_MAX
 
 API = "/api/core/slam/v1"
-REACH_MAX = 0.99 * COORDINATE_MAX  # m from an origin; the robot may drive about there
+REACH_MAX = 0.99 * COORDINATE_MAX  # m from an origin, with room for the robot to drive
 Bound = Annotated[float, msgspec.Meta(ge=-COORDINATE_MAX, le=COORDINATE_MAX)]
 
 

@@ -9,8 +9,8 @@ from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.robot import Robot
 
-TOTALS = "slamware.statistics"  # the setting that holds [metres, seconds] up to the last time they were kept
-KEEP_PERIOD = 30.0  # s; what a crash may cost
+TOTALS = "slamware.statistics"  # the setting that holds the last saved [metres, seconds]
+KEEP_PERIOD = 30.0  # s that a crash may lose
 
 
 class Totals:

@@ -9,8 +9,8 @@ from roboglot.model.components.energy.battery import Battery, DockContact
 from roboglot.model.events import BatteryChanged, DockContactChanged
 from roboglot.model.robot import Robot
 
-PATIENCE = 10.0  # s on the dock until there should be current
-CHARGED = 0.9  # a charge from which no current is needed
+PATIENCE = 10.0  # s on the dock until current must flow
+CHARGED = 0.9  # charge above which no current is expected
 
 
 class ChargingWatch:

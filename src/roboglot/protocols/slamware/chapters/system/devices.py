@@ -22,7 +22,7 @@ from roboglot.wire.slamware.chapters.slam.localization import Switch
 from roboglot.wire.slamware.chapters.system.devices import DisabledSensor, SensorSwitch
 
 SYSTEM, SENSORS = "/api/core/system/v1", "/api/core/sensors/v1"
-MASKED = "slamware.masked_sensors"  # the setting that holds the ids of sensors that stay off after a restart
+MASKED = "slamware.masked_sensors"  # the setting that holds the ids of sensors that stay off across restarts
 LOWEST, HIGHEST = 31, 26_000_001  # counts of the jack's drive at the ends, as seen on robots
 STAGES = {JackStage.DOWN: 2, JackStage.MOVING: 3, JackStage.STOPPED: 4, JackStage.UP: 5}
 

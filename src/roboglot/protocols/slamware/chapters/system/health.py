@@ -67,7 +67,7 @@ async def get_robot_health(context: Context) -> BaseHealthInfo:
         base_error=records,
         has_system_emergency_stop=_stopped(robot),
         has_lidar_disconnected=Lidar not in robot or _has(robot, "lidar lost"),
-        has_sdp_disconnected=Link in robot and robot[Link].state is not LinkState.UP,  # what drives it is not reached
+        has_sdp_disconnected=Link in robot and robot[Link].state is not LinkState.UP,  # its driver's link is down
         has_depth_camera_disconnected=_has(robot, "depth camera lost"),
     )
 

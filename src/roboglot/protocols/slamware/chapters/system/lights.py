@@ -12,7 +12,7 @@ from roboglot.protocols.slamware.errors import HttpError
 from roboglot.protocols.slamware.table import TABLE
 from roboglot.wire.slamware.chapters.system.devices import Channel, Half, LightColour, LightControl, Mode
 
-STEP_MIN = 0.02  # s; faster makes no visible difference
+STEP_MIN = 0.02  # s; shorter steps make no visible difference
 
 
 ZONES = {
@@ -67,7 +67,7 @@ class Show:
         """Up by one every ``brightMs`` until all parts are there, and down again."""
         spans = (high.red - low.red, high.green - low.green, high.blue - low.blue)
         most = max(1, *spans)
-        pace = max(self._wanted.bright_ms, 1) / 1000  # s for each of the steps, some of which may be skipped
+        pace = max(self._wanted.bright_ms, 1) / 1000  # s per step; some may be skipped
         stride = max(1, round(STEP_MIN / pace))
         while True:
             for level in (*range(0, most, stride), *range(most, 0, -stride)):

@@ -29,7 +29,7 @@ async def get_system_parameter(context: Context, param: Annotated[str, msgspec.M
             return Text(f"{context.robot[Base].limits.twist.yaw:.6f}")
         case "docking.docked_register_strategy":
             _ = context.robot[Docking]
-            return Text("when_not_exists")  # that is what it does: only a robot without a dock learns one by touch
+            return Text("when_not_exists")  # the actual behaviour: only a robot without a dock learns one by touch
         case _:
             raise InvalidGoal(f"no parameter {param[:64]}")
 

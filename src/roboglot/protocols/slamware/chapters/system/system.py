@@ -35,7 +35,7 @@ API = "/api/core/system/v1"
 SLEEP_MODES = {
     PowerMode.AWAKE: "awake",
     PowerMode.WAKING_UP: "waking_up",
-    PowerMode.LOW_POWER: "asleep",  # it talks, but its motors are off
+    PowerMode.LOW_POWER: "asleep",  # it responds, but its motors are off
     PowerMode.ASLEEP: "asleep",
     PowerMode.OFF: "asleep",
 }
