@@ -20,10 +20,10 @@ from zoneinfo import ZoneInfo
 
 import msgspec
 
-RECORDING = "recording:"  # with which the body of a robot begins that answers as it was recorded
+RECORDING = "recording:"  # prefix of the body of a recorded robot
 ROBOTS_MAX = 100
 Limit = Annotated[int, msgspec.Meta(ge=1, le=2**40)]
-Port = Annotated[int, msgspec.Meta(ge=0, le=65535)]  # 0: any that is free
+Port = Annotated[int, msgspec.Meta(ge=0, le=65535)]  # 0: any free port
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,7 +225,7 @@ def default_data_folder(environment: Mapping[str, str]) -> Path:
     """Return the user's data folder as the XDG rules have it. Raises ValueError for a user without a home folder."""
     if share := environment.get("XDG_DATA_HOME"):
         return Path(share) / "roboglot"
-    home = environment.get("HOME") or os.path.expanduser("~")  # the user database's, where HOME is not set
+    home = environment.get("HOME") or os.path.expanduser("~")  # from the user database, where HOME is not set
     if home == "~":
         raise ValueError("there is no home folder to keep data in: choose a folder with --data")
     return Path(home) / ".local" / "share" / "roboglot"
@@ -339,7 +339,7 @@ def with_addresses(robots: tuple[RobotConfig, ...]) -> tuple[RobotConfig, ...]:
     for robot in robots:
         address = robot.address or (str(IPv4Address(filled[-1].address) + 1) if filled else "127.0.0.1")
         filled.append(dataclasses.replace(robot, address=address))
-    urls = [r.body for r in filled if r.is_real]  # one owner for each connection
+    urls = [r.body for r in filled if r.is_real]  # one owner per connection
     for what, values in (("name", [r.name for r in filled]), ("address", [r.address for r in filled]), ("URL", urls)):
         if twice := {value for value in values if values.count(value) > 1}:
             raise ValueError(f"two robots have the {what} {twice.pop()}")

@@ -12,7 +12,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from types import ModuleType
 
-# The extra to install for a module; of a module that several extras bring, the one most people miss it for.
+# The extra to install for a module; for a module in several extras, the one most likely missing.
 EXTRA_OF = {
     "aiomqtt": "vda5050",
     "aiortc": "video",
@@ -44,7 +44,7 @@ EXTRA_OF = {
     "zenoh": "ros2",
     "zstandard": "recording",
 }
-# What each extra brings, as modules.
+# The modules in each extra.
 MODULES: dict[str, tuple[str, ...]] = {
     "simulation": ("mujoco", "numba", "numpy", "PIL", "yaml"),
     "slamware": ("numpy", "uvicorn", "uvloop"),
@@ -113,7 +113,7 @@ class _Lazy(ModuleType):
     """Stands for a module until the first of its attributes is used; each attribute is looked up once."""
 
     def __getattr__(self, name: str) -> object:
-        if name.startswith("__"):  # what Python itself asks of modules
+        if name.startswith("__"):  # Python itself asks modules for these
             raise AttributeError(name)
         try:
             module = import_module(self.__name__)

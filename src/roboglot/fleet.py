@@ -55,12 +55,12 @@ from roboglot.storage.transactions import Transactions
 if TYPE_CHECKING:
     from roboglot.recording.files import Origin
 
-UNKNOWN = Description(  # of a real robot until it has reported; the footprint of a medium one
+UNKNOWN = Description(  # of a real robot until its first report; the footprint of a medium one
     maker="", model="", serial="", hardware_version="", software_version="", radius=0.25, height=0.3
 )
-SECRET = re.compile("token|password|secret", re.IGNORECASE)  # names of settings that recordings leave out
-URL_LOGIN = re.compile("(://)[^/@]*@")  # the part of a URL that says who comes
-STEP = 0.1  # s that pass at a time while robots come to a stand on a lockstep clock
+SECRET = re.compile("token|password|secret", re.IGNORECASE)  # names of settings that are omitted from recordings
+URL_LOGIN = re.compile("(://)[^/@]*@")  # the credentials in a URL
+STEP = 0.1  # s per step while robots brake on a lockstep clock
 BREATH = 0.001  # real s for sockets between two steps
 
 
@@ -91,7 +91,7 @@ class Fleet:
 
     async def close(self) -> None:
         """Cancel what the robots do and stop the world."""
-        for autonomy in self._autonomies:  # first, or deliveries go on with the next order
+        for autonomy in self._autonomies:  # first, or deliveries would continue with the next order
             await autonomy.close()
         clock = next(iter(self.robots.values())).clock
         await _settled(clock, *(robot.actions.cancel(reason="shutting down") for robot in self.robots.values()))

@@ -88,7 +88,7 @@ class OperationTable(Generic[K]):
 
     def __init__(self, name: str, right: Right | None = None) -> None:
         self.name = name
-        self._right = right  # of all operations that declare none
+        self._right = right  # for all operations that declare none
         self._operations: dict[K, Operation[K]] = {}
 
     def on(

@@ -45,8 +45,8 @@ from roboglot.storage.database import Database
 log = logging.getLogger(__name__)
 
 ROBOT = "a"
-LOOK = 0.1  # s of robot time between two spots of the path
-QUEUE_MAX = 16  # plays that wait for their turn
+LOOK = 0.1  # s of robot time between two points of the path
+QUEUE_MAX = 16  # rehearsals waiting for their turn
 LIMITS = Limits(cpu=20, wall=120.0)
 HITS_MAX = 20
 R = TypeVar("R")
@@ -121,7 +121,7 @@ class Rehearsals:
 
     def _started(self) -> asyncio.AbstractEventLoop:
         if self._loop is None:
-            loop = self._loop = asyncio.new_event_loop()  # asyncio's own: a lockstep clock has to see that it rests
+            loop = self._loop = asyncio.new_event_loop()  # asyncio's own: the clock must see when it is idle
             self._thread = threading.Thread(target=loop.run_forever, name="rehearsals", daemon=True)
             self._thread.start()
         return self._loop

@@ -57,9 +57,9 @@ if TYPE_CHECKING:
     from roboglot.recording.recorder import Recorder
 
 log = logging.getLogger(__name__)
-LAST_WORDS = 0.2  # s that a robot which switches off has for the answers under way
-RING_FOLDER = "recordings"  # in the data folder: the last minutes before a fault
-CLOSE_SECONDS = 0.5  # what one part may take to close before it is left behind
+LAST_WORDS = 0.2  # s to send outstanding answers before the robot switches off
+RING_FOLDER = "recordings"  # in the data folder: the minutes before a fault
+CLOSE_SECONDS = 0.5  # s for one part to close before it is abandoned
 
 
 class RobotDoors:
@@ -95,7 +95,7 @@ class RobotDoors:
         """Close them for good."""
         for leave in self._leave:
             leave()
-        self._ended = True  # a robot that comes up again just now must not open what is closed for good
+        self._ended = True  # a robot coming up at this moment must not open doors that are closed for good
         await self._shut()
 
     async def _go_away(self) -> None:
@@ -147,7 +147,7 @@ class Runtime:
         )
         self._registry: Transactions | None = None
         self._residence = self._join_registry()
-        self._shared: Transactions | None = None  # what is no single robot's, on the server
+        self._shared: Transactions | None = None  # shared by all robots, on the server
         self.guard = self._build_guard() if config.access.on else None
         self._gateway: Gateway | None = None
         self._tls = self._build_tls()
@@ -320,7 +320,7 @@ class Runtime:
         await self.fleet.start(wait=self.config.lockstep)
         if self._engine is not None:
             self._engine.open_soon()
-        gc.freeze()  # what is there now stays: no collection need walk it again
+        gc.freeze()  # everything loaded stays: the collector need not scan it again
 
     async def close(self) -> None:
         """Stop the robots, close the doors, then the world, the engine and the file, whatever of it takes too long."""
@@ -329,7 +329,7 @@ class Runtime:
         await asyncio.gather(*(doors.close() for doors in self.doors.values()))
         await _in_time("control of the robots", self.leases.close())
         await self._record_desk.close()
-        if self.clock.repeats:  # how much robot time robots take to stand still depends on the machine from here on
+        if self.clock.repeats:  # from here on robot time needed to stop depends on the machine
             await self._close_recorder()
         await _in_time("the fleet", self.fleet.close())
         await self._close_recorder()

@@ -19,11 +19,7 @@ else:
 
 CELLS_MAX = 25_000_000
 POINTS_MAX = 1500  # of the other map's walls, used to find the fit
-STEPS = (
-    (1.0, 0.1, 0.15, 0.05),
-    (0.1, 0.05, 0.05, 0.01),
-    (0.05, 0.025, 0.01, 0.0025),
-)  # m around, step; rad around, step
+STEPS = ((1.0, 0.1, 0.15, 0.05), (0.1, 0.05, 0.05, 0.01), (0.05, 0.025, 0.01, 0.0025))  # m around, by; rad around, by
 SURE = 127
 
 

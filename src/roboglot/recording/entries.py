@@ -10,7 +10,7 @@ from roboglot.model.tap import Exchange
 from roboglot.recording import foxglove, messages
 from roboglot.recording.redaction import Redaction
 
-SCAN_BYTES = 1500  # about what a value of unknown size holds while it waits
+SCAN_BYTES = 1500  # assumed for a queued value of unknown size
 NANO = 1_000_000_000
 
 

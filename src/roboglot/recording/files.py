@@ -18,7 +18,7 @@ from roboglot.recording.standing import REPEATED, Standing
 log = logging.getLogger(__name__)
 LIBRARY = "roboglot"
 SUFFIX = ".mcap"
-CHUNK_BYTES = 4 << 20  # of a second's messages before they are compressed; more make more chunks
+CHUNK_BYTES = 4 << 20  # of a second's messages before compression; more go into further chunks
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ class PartWriter:
         self._schemas: dict[str, int] = {}
         self._sequence = 0
         self.first = at
-        self.size = 0  # bytes so far, without the chunk under way
+        self.size = 0  # bytes so far, without the open chunk
         self.flush()
 
     def write(self, entry: Entry) -> None:

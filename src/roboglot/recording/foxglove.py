@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from google.protobuf.message import Message
     from google.protobuf.timestamp_pb2 import Timestamp
 
-PARTS_A_METRE = 1024.0  # ranges are kept to a millimetre, in a number whose last bits are zero: those compress
-LEVELS = {10: 1, 20: 2, 30: 3, 40: 4, 50: 5}  # of Python's logging
+PARTS_A_METRE = 1024.0  # ranges are rounded to a millimetre, to numbers with trailing zero bits, which compress well
+LEVELS = {10: 1, 20: 2, 30: 3, 40: 4, 50: 5}  # of Python's logging module
 TYPES: dict[str, type[Message]] = {
     "foxglove.CompressedVideo": CompressedVideo_pb2.CompressedVideo,
     "foxglove.FrameTransforms": FrameTransforms_pb2.FrameTransforms,
@@ -103,7 +103,7 @@ def encode_scan(at: int, value: tuple[str, LaserScan]) -> bytes:
     )
     message.pose.orientation.w = 1.0
     _stamp(message.timestamp, at)
-    # The ranges' field is the last one, and packed: its bytes are those of the array.
+    # The ranges' field is the last one, and packed: its bytes are the array's.
     return bytes(message.SerializeToString()) + RANGES + _varint(ranges.nbytes) + ranges.astype("<f8").tobytes()
 
 

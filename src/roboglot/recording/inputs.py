@@ -19,9 +19,9 @@ from roboglot.model.tap import DRIVER, Direction, Exchange
 from roboglot.recording.lines import FrameLine, Line, TextLine
 from roboglot.recording.reader import Asked, Recording, pair
 
-HEARD_SECONDS_MAX = 5.0  # real, until a request must have come in, or an answer that needs no robot time
-LOOK = 0.0005  # real s between two looks
-HANDED_ON = ("ipv4:", "ipv6:", "unix:")  # with which the names of gRPC's connections begin
+HEARD_SECONDS_MAX = 5.0  # real s to wait for a request to arrive, or for an answer that needs no robot time
+LOOK = 0.0005  # real s between two checks
+HANDED_ON = ("ipv4:", "ipv6:", "unix:")  # prefixes of the names of gRPC connections
 AT_ONCE = 1e-9  # s of robot time
 Where = Callable[[str, str], Line]  # robot and door
 Repeat = Callable[[Input], Awaitable[object]]
@@ -44,17 +44,17 @@ class Inputs:
         self._clock, self._where, self._repeat = clock, where, repeat
         asked = [one for one in pair(recording.exchanges)[0] if is_of_client(one.request)]
         due: list[tuple[int, Asked | Input]] = [*recording.inputs, *((one.number, one) for one in asked)]
-        self._due = sorted(due, key=lambda one: one[0])  # an input goes before the exchange with the same number
+        self._due = sorted(due, key=lambda one: one[0])  # an input precedes the exchange with the same number
         replies = enumerate(recording.exchanges)
         self._replies = [(n, one) for n, one in replies if one.direction is Direction.REPLY and is_of_client(one)]
-        self._answered = 0  # of them were to be heard so far
+        self._answered = 0  # exchanges that should have been heard so far
         self._wanted: Counter[tuple[str, str, Direction]] = Counter()
         self._lines: dict[tuple[str, str, str], Line] = {}
         self._tasks: set[asyncio.Task[None]] = set()
         self._heard: Counter[tuple[str, str, Direction]] = Counter()
         self._inputs: Counter[str] = Counter()
         self._patience = HEARD_SECONDS_MAX
-        self.unheard: list[str] = []  # inputs that had no effect, in words
+        self.unheard: list[str] = []  # inputs without effect, described
 
     def hear(self, exchange: Exchange) -> None:
         """Listen to the robots' taps with this."""
@@ -95,7 +95,7 @@ class Inputs:
         deadline = time.monotonic() + self._patience  # noqa: TID251 - robot time stands still
         while not await self._repeat(given):
             if time.monotonic() > deadline:  # noqa: TID251
-                self._patience = LOOK  # what follows goes another way, too
+                self._patience = LOOK  # later inputs will differ as well
                 self.unheard.append(f"{given.robot} was not waiting for an answer to {given.name} at {given.stamp:.3f}")
                 return
             await asyncio.sleep(LOOK)  # noqa: TID251

@@ -164,7 +164,7 @@ class FrameLine(Line):
             frame = await self._next(socket, operation)
             if path != FRAMES or _frame_id(frame) == wanted:
                 found.append((frame, status_of("visual", frame)))
-                if b'"entries"' in frame and path == LOG:  # the last one of that log
+                if b'"entries"' in frame and path == LOG:  # the last frame of that log
                     break
             else:
                 self.pushed("robot block" if b'"block"' in frame else "robot feedback", frame)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-# What a client makes up anew in each session: UUIDs, Unix times; sequence numbers and frame ids in two protocols.
+# Values that a client makes up in each session: UUIDs, Unix times; sequence numbers and frame ids in two protocols.
 _FRESH = rb"[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}|\b1[5-9]\d{8}(?:\d{3}){0,3}\b"
 _any = re.compile(_FRESH, re.IGNORECASE)
 _text = re.compile(rb"(?<=\bseq )\d+")

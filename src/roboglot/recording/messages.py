@@ -20,7 +20,7 @@ from roboglot.model.inputs.outside import Input
 from roboglot.model.tap import Direction, Exchange
 
 DEPTH_MAX = 6
-ITEMS_MAX = 200  # of a list inside an event
+ITEMS_MAX = 200  # of a list in an event
 _encode = msgspec.json.Encoder().encode
 _parsed = msgspec.json.Decoder()
 

@@ -27,9 +27,9 @@ from roboglot.recording.reader import Asked, BadRecording, Recording, pair, read
 from roboglot.recording.timeline import Timeline
 
 log = logging.getLogger(__name__)
-OFF = 0.1  # how far a number of a request may be from the recorded one: absolute
-OFF_SHARE = 0.02  # ... or as a part of it
-MISSING_MAX = 1000  # unrecorded requests that are remembered
+OFF = 0.1  # tolerance of a request's number: absolute
+OFF_SHARE = 0.02  # ... or relative
+MISSING_MAX = 1000  # unrecorded requests that are kept
 DAY = 86_400.0
 IDS_MAX = 10_000
 _inquiry = re.compile(rb'"operate"\s*:\s*"inquiry"')
@@ -42,14 +42,14 @@ class _Door:
 
     timeline: Timeline
     asked: list[tuple[Asked, Normal]] = field(default_factory=list)
-    by_text: dict[str, list[int]] = field(default_factory=lambda: defaultdict(list))  # places in ``asked``
+    by_text: dict[str, list[int]] = field(default_factory=lambda: defaultdict(list))  # indices into ``asked``
     by_form: dict[str, list[int]] = field(default_factory=lambda: defaultdict(list))
     pushes: list[tuple[int, Exchange]] = field(default_factory=list)
     used: set[int] = field(default_factory=set)
-    cursor: int = -1  # place of the last command
+    cursor: int = -1  # index of the last command
     listeners: list[Callable[[str, bytes], None]] = field(default_factory=list)
     ids: dict[bytes, bytes] = field(default_factory=dict)
-    reads: set[str] = field(default_factory=set)  # operations that change nothing
+    reads: set[str] = field(default_factory=set)  # operations without side effects
     scheduled: set[int] = field(default_factory=set)  # numbers of pushes
     begun: bool = False
 
@@ -91,7 +91,7 @@ class Playback(StandIn):
         if not kept.begun or not reads:
             self._schedule(kept, place if not reads else -1, asked.request.stamp, began)
         kept.begun = True
-        in_order = len(kept.used) > used  # not once more
+        in_order = len(kept.used) > used  # not twice
         for index, (number, reply) in enumerate(asked.numbered, 1):
             due = began + max(0.0, reply.stamp - asked.request.stamp)
             await kept.timeline.turn(due, number, in_order=in_order)
@@ -115,7 +115,7 @@ class Playback(StandIn):
         for door in self._doors.values():
             door.timeline.close()
 
-    # -- which recorded request it is ----------------------------------------------------------------------------------
+    # -- matching requests to recorded ones ----------------------------------------------------------------------------
 
     def _find(self, door: _Door, operation: str, live: Normal, *, reads: bool) -> int | None:
         key = f"{operation}\n{live.text}"
@@ -125,7 +125,7 @@ class Playback(StandIn):
         if reads:
             return self._find_read(door, places)
         place = next((p for p in places if p not in door.used and p > door.cursor), None)
-        if place is None:  # out of the session's order, or once more
+        if place is None:  # out of order, or repeated
             place = next((p for p in places if p not in door.used), places[-1])
         door.used.add(place)
         door.cursor = max(door.cursor, place)
@@ -158,7 +158,7 @@ class Playback(StandIn):
         if request.door == "robomaster":
             return not request.payload.rstrip(b" ;").endswith(b"?")
         if request.door == "visual":
-            if request.operation.startswith("/"):  # a path beside that of the frames
+            if request.operation.startswith("/"):  # another path than that of the frames
                 return request.operation == "/debug"
             return not _inquiry.search(request.payload)
         return request.operation not in door.reads
@@ -181,7 +181,7 @@ class Playback(StandIn):
             self.missing.append((door, operation or live.text[:80]))
             log.warning("%s: not in the recording: %s %s", door, operation, live.text[:200])
 
-    # -- what comes by itself ------------------------------------------------------------------------------------------
+    # -- pushes --------------------------------------------------------------------------------------------------------
 
     def _schedule(self, door: _Door, place: int, since: float, now: float) -> None:
         """Let the pushes follow that followed this command, up to the next one; ``since`` then is ``now``."""

@@ -15,7 +15,7 @@ from roboglot.recording.replaying import Replay
 
 ROUNDS = 3
 PERIOD = 0.5  # s between two rounds
-BEFORE = {"robomaster": ("command",)}  # what a session begins with
+BEFORE = {"robomaster": ("command",)}  # first requests of a session
 
 
 def questions(door: str, operations: Iterable[str], rounds: int = ROUNDS) -> list[Exchange]:

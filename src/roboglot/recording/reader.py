@@ -22,9 +22,17 @@ from roboglot.recording.messages import decode_exchange, decode_input
 from roboglot.recording.standing import REPEATED
 
 log = logging.getLogger(__name__)
-RECORD_MAX = 1 << 30  # bytes of one record of the file
+RECORD_MAX = 1 << 30  # bytes per record
 EXCHANGES_MAX = 2_000_000
-DAMAGE = (struct.error, zstandard.ZstdError, ValueError, KeyError, EOFError, MemoryError, OverflowError)  # what it says
+DAMAGE = (
+    struct.error,
+    zstandard.ZstdError,
+    ValueError,
+    KeyError,
+    EOFError,
+    MemoryError,
+    OverflowError,
+)  # of damaged files
 
 
 class BadRecording(ValueError):
@@ -53,7 +61,7 @@ class Recording:
     facts: dict[str, str] = field(default_factory=dict)
     attachments: dict[str, bytes] = field(default_factory=dict)
     exchanges: list[Exchange] = field(default_factory=list)
-    inputs: list[tuple[int, Input]] = field(default_factory=list)  # how many exchanges were before it
+    inputs: list[tuple[int, Input]] = field(default_factory=list)  # with the number of exchanges before each
     topics: dict[str, int] = field(default_factory=dict)
     first: int = 0
     last: int = 0
@@ -122,9 +130,9 @@ def _answer(open_ones: list[Asked], number: int, reply: Exchange) -> None:
         return
     began = reply.stamp - reply.seconds
     exact = [asked for asked in open_ones if abs(asked.request.stamp - began) <= 1e-6]
-    # A dog answers one request more than once, at its door and to its driver; of two at once the newer one is meant.
+    # A dog answers a request more than once, at its door and to its driver; of two at once the newer one is meant.
     often = reply.door.removeprefix(DRIVER) == "cyberdog"
-    if often or not exact:  # what older versions recorded does not say when it was asked for
+    if often or not exact:  # recordings of older versions lack the time of the request
         best = (exact or open_ones)[-1]
     else:
         best = min(exact, key=lambda asked: (len(asked.numbered) > 0, asked.number))
@@ -180,7 +188,7 @@ def parts(path: Path) -> Sequence[Path]:
     """Return the files that a recording consists of."""
     found, stem, number = [path], path.stem, 2
     if (numbered := re.fullmatch(r"(.+)-(\d{3,})", stem)) and _part_of(path) == numbered[2].lstrip("0") != "1":
-        stem, number = numbered[1], int(numbered[2]) + 1  # those before it are deleted, or not wanted
+        stem, number = numbered[1], int(numbered[2]) + 1  # earlier parts were deleted, or are not wanted
     while (following := path.with_name(f"{stem}-{number:03}{path.suffix}")).exists():
         found.append(following)
         number += 1

@@ -28,8 +28,8 @@ from roboglot.recording.truth import TruthSampler
 
 log = logging.getLogger(__name__)
 MARK_MAX = 500  # characters
-SAVED_MAX = 50  # files that a ring writes by itself
-AFTER_FAULT = 2.0  # s of robot time that still belong to it
+SAVED_MAX = 50  # files written by a ring on its own
+AFTER_FAULT = 2.0  # s of robot time after a fault that still belong to its file
 DROPS_PERIOD = 10.0  # s between two warnings
 
 
@@ -65,7 +65,7 @@ class Recorder:
     ) -> None:
         """``outside``: inputs that change the world."""
         self._outside = outside
-        self._looking: list[Callable[[], None]] = []  # what ends it
+        self._looking: list[Callable[[], None]] = []  # functions that end it
         self._config, self._robots, self._stage, self._clock, self._origin = config, robots, stage, clock, origin
         self._redaction = Redaction((*FIELDS, *config.redact))
         self._files: Files | None = None
@@ -223,7 +223,7 @@ class Recorder:
         except (OSError, NotRecording) as error:
             log.error("the last minutes before %s cannot be written: %s", why, error)
 
-    # -- looking -------------------------------------------------------------------------------------------------------
+    # -- sampling ------------------------------------------------------------------------------------------------------
 
     def _look_at_robots(self) -> None:
         if self._samplers:
@@ -288,7 +288,7 @@ class Recorder:
     def note_log(self, record: logging.LogRecord) -> None:
         """Take a line of the log along."""
         at, wall = self._stamp()
-        with contextlib.suppress(Exception):  # a broken line of the log must not break what logs
+        with contextlib.suppress(Exception):  # a broken log line must not break its logger
             self._put(Entry("/log", "log", at, wall, (record.levelno, record.name, record.getMessage()[:2000])))
 
     async def close(self) -> None:

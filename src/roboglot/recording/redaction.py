@@ -41,7 +41,7 @@ class Redaction:
     def __init__(self, fields: Sequence[str] = FIELDS) -> None:
         names = b"|".join(re.escape(name).encode() for name in fields)
         self._some = re.compile(names, re.IGNORECASE) if fields else None
-        # JSON, also inside a JSON string, where every quote is escaped once or more: \1 is the quote as it is there.
+        # JSON, also inside a JSON string, where each quote is escaped once or more: \1 is the quote in that form.
         self._in_json = re.compile(
             rb'(\\*")(' + names + rb")\1(\s*:\s*)(?:\1.*?(?<!\\)\1|-?[\d.][\d.eE+-]*|\[[^\[\]{}]*\])",
             re.IGNORECASE | re.DOTALL,

@@ -22,9 +22,9 @@ from mcap.summary import Summary
 
 from roboglot.recording.reader import DAMAGE, RECORD_MAX, BadRecording, parts, stream
 
-UNPACKED_MAX = 256 << 20  # bytes of one chunk
+UNPACKED_MAX = 256 << 20  # bytes per chunk
 TOPICS_MAX = 4096
-RECORD_HEAD = 9  # bytes: the opcode and the length
+RECORD_HEAD = 9  # bytes: opcode and length
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +75,7 @@ class Reel:
         if not found:
             raise BadRecording(f"{path} has no messages")
         self._chunks = sorted(found, key=lambda chunk: chunk.first)
-        self._ends = list(accumulate((chunk.last for chunk in self._chunks), max))  # of each and all before it
+        self._ends = list(accumulate((chunk.last for chunk in self._chunks), max))  # of each chunk and all before it
 
     def play(self, since: int) -> Iterator[Sequence[Shot]]:
         """Yield all messages at or after that time, some together, none earlier than those yielded before.
@@ -98,7 +98,7 @@ class Reel:
         """Return the last message of each of these topics at or before that time. Raises BadRecording, OSError."""
         found: dict[int, Shot] = {}
         for number in range(bisect_right(self._chunks, at, key=lambda chunk: chunk.first) - 1, -1, -1):
-            # What was found is final when no earlier chunk reaches beyond it.
+            # An entry is final when no earlier chunk reaches beyond it.
             sought = {place for place in topics if place not in found or found[place].at < self._ends[number]}
             if not sought:
                 break
@@ -133,7 +133,7 @@ class Reel:
         part, offset = _Part(path, places), 0
         for record in stream(path, file, chunks=True):
             if isinstance(record, Chunk):
-                with suppress(BadRecording):  # what cannot be read here is passed over there, too
+                with suppress(BadRecording):  # what cannot be read here is skipped there, too
                     inside = _unpacked(path, record)
                     schemas |= {schema.id: schema for schema in inside if isinstance(schema, Schema)}
                     channels = [channel for channel in inside if isinstance(channel, Channel)]

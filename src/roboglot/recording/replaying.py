@@ -40,7 +40,7 @@ class Replay:
             async with asyncio.TaskGroup() as tasks:
                 for mine in lines.values():
                     tasks.create_task(self._one_line(mine))
-        if self._lost and not self._answered:  # silence of a robot that is not there is no session
+        if self._lost and not self._answered:  # no session consists of an absent robot's silence
             raise self._lost
         return sorted(self._found, key=lambda exchange: exchange.stamp)
 
@@ -95,7 +95,7 @@ class Replay:
             Exchange(now, "replay", door, connection, "", direction, operation, payload, status, refusal, seconds)
         )
 
-    # -- ids that the robot gives --------------------------------------------------------------------------------------
+    # -- ids given by the robot ----------------------------------------------------------------------------------------
 
     def _learn(self, recorded: bytes, live: bytes) -> None:
         """Remember what the robot calls now what it called otherwise then."""

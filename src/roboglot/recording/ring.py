@@ -17,7 +17,7 @@ from roboglot.recording.files import Origin, PartWriter
 from roboglot.recording.redaction import Redaction
 from roboglot.recording.standing import STANDING, STANDING_MAX
 
-BYTES_MAX = 64 << 20  # of compressed entries; what is older goes first
+BYTES_MAX = 64 << 20  # of compressed entries; older ones are dropped first
 BLOCK_SECONDS = 1.0
 
 
@@ -27,7 +27,7 @@ class Ring:
     def __init__(self, origin: Origin, redaction: Redaction, seconds: float = 300.0) -> None:
         self._origin, self._redaction, self._seconds = origin, redaction, seconds
         self._blocks: deque[tuple[int, bytes]] = deque()
-        self._standing: dict[str, bytes] = {}  # by topic: the last one before the first block
+        self._standing: dict[str, bytes] = {}  # by topic: the last entry before the first block
         self._bytes = 0
         self._open: list[Entry] = []
         self._lock = threading.Lock()
@@ -97,5 +97,5 @@ class Ring:
 
     @staticmethod
     def _unpack(data: bytes) -> list[Entry]:
-        entries: list[Entry] = pickle.loads(zstandard.decompress(data))  # our own, from this process's memory
+        entries: list[Entry] = pickle.loads(zstandard.decompress(data))  # our own, from this process
         return entries

@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from rosbags.typesys.store import Msg, Msgarg
 
 JSON = "std_msgs/msg/String"
-ROS_LEVELS = {number: python for python, number in LEVELS.items()}  # rcl's levels are Python's
-SPEED_SPAN = 0.5  # s of poses that a speed is made of
+ROS_LEVELS = {number: python for python, number in LEVELS.items()}  # rcl's levels equal Python's
+SPEED_SPAN = 0.5  # s of poses from which a speed is computed
 STORE = get_typestore(Stores.ROS2_JAZZY)
 
 

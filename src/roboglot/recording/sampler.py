@@ -25,8 +25,8 @@ from roboglot.recording.entries import Entry
 from roboglot.recording.messages import plain
 
 POSE_PERIOD = 0.1  # s
-CAMERA_PERIOD = 1.0  # s between two looks for a camera
-STATE_BEATS = 10  # poses to one look at what changes seldom
+CAMERA_PERIOD = 1.0  # s between two checks for a camera
+STATE_BEATS = 10  # poses between two readings of values that change rarely
 MAP_BEATS = 50
 Put = Callable[[Entry], object]
 
@@ -96,7 +96,7 @@ class Sampler:
     def _send(self, topic: str, kind: str, value: object, at: int, wall: int) -> None:
         self._put(Entry(f"{self._topic}/{topic}", kind, at, wall, value))
 
-    # -- what comes by itself ------------------------------------------------------------------------------------------
+    # -- events --------------------------------------------------------------------------------------------------------
 
     def _note_exchange(self, exchange: Exchange) -> None:
         self._send(exchange.door, "exchange", exchange, self._stamps.at(exchange.stamp), time.time_ns())
@@ -119,9 +119,9 @@ class Sampler:
         self._send("scan", "scan", (f"{self._robot.id}/laser", scan), self._stamps.at(scan.stamp), wall)
 
     async def _film(self) -> None:
-        from roboglot.media.video import VideoStream  # its libraries are an extra
+        from roboglot.media.video import VideoStream  # the libraries are an extra
 
-        while VideoStream not in self._robot:  # a real robot's comes with its link
+        while VideoStream not in self._robot:  # a real robot's video appears with its link
             await self._robot.clock.sleep(CAMERA_PERIOD)
         frame = f"{self._robot.id}/camera"
         with self._robot[VideoStream].subscribe() as packets:
@@ -129,7 +129,7 @@ class Sampler:
                 at, wall = self._stamps.now()
                 self._send("camera", "video", (frame, packet.data), at, wall)
 
-    # -- what is looked at ---------------------------------------------------------------------------------------------
+    # -- readings ------------------------------------------------------------------------------------------------------
 
     def _note_places(self, at: int, wall: int) -> None:
         robot, name = self._robot, self._robot.id

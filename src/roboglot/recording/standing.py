@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from roboglot.recording.entries import Entry
 
-STANDING = frozenset({"state", "battery", "grid", "scene"})  # kinds of which the last one holds until the next
+STANDING = frozenset({"state", "battery", "grid", "scene"})  # kinds whose last value holds until the next
 STANDING_MAX = 1000  # topics
-REPEATED = 0  # the sequence of messages in a file that an earlier part has, too
+REPEATED = 0  # the sequence number of messages repeated from an earlier part
 
 
 class Standing:

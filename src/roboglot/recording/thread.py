@@ -11,9 +11,9 @@ from typing import Protocol
 from roboglot.recording.entries import Entry
 
 log = logging.getLogger(__name__)
-ENTRIES_MAX = 20_000  # that wait
+ENTRIES_MAX = 20_000  # queued
 BYTES_MAX = 64 << 20
-PERIOD = 0.5  # s between two looks; then what has come is written and flushed
+PERIOD = 0.5  # s between two writes, each with a flush
 
 
 class Sink(Protocol):
@@ -44,7 +44,7 @@ class WriterThread:
         self._settled = threading.Event()
         self._ending = False
         self.dropped = 0
-        self.failure = ""  # why nothing is written any more, in plain words
+        self.failure = ""  # why writing has stopped, in plain words
         self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
         self._thread.start()
 
@@ -115,12 +115,12 @@ class WriterThread:
             self._sink.write(entry)
         except OSError:
             raise
-        except Exception:  # one value that cannot be written must not end the recording
+        except Exception:  # one value that cannot be encoded must not end the recording
             self.dropped += 1
             log.exception("recording: a value of %s cannot be written", entry.topic)
 
     def _fail(self, error: OSError) -> None:
-        if self.failure:  # it has been said
+        if self.failure:  # already reported
             return
         self.failure = error.strerror or str(error)
         log.error("recording ends: %s", self.failure)

@@ -13,14 +13,14 @@ from dataclasses import dataclass, field
 
 from roboglot.model.clock import Clock, Timer
 
-EARLIER = 0.25  # s: so long an answer waits for pushes that were recorded before it
+EARLIER = 0.25  # s for which an answer waits for pushes recorded before it
 
 
 @dataclass(order=True, slots=True)
 class _Item:
     due: float
     number: int
-    send: Callable[[], bool] = field(compare=False)  # whether someone else goes on from here
+    send: Callable[[], bool] = field(compare=False)  # whether another task continues from here
 
 
 class Timeline:

@@ -14,10 +14,10 @@ from roboglot.model.tap import Direction
 from roboglot.recording.entries import NANO
 from roboglot.recording.reader import Record, read_messages
 
-AROUND = 5  # messages before the first difference
-SHOWN_MAX = 300  # characters of one
-LEFT_OUT = frozenset({"/log"})  # lines of the log name ports
-UNCOUNTED = ("connection", "client", "turn")  # of exchanges and inputs: ports of clients, and an order that is seen
+AROUND = 5  # messages shown before the first difference
+SHOWN_MAX = 300  # characters per message
+LEFT_OUT = frozenset({"/log"})  # log lines contain ports
+UNCOUNTED = ("connection", "client", "turn")  # of exchanges and inputs: ports of clients, and a visible order
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,12 +18,12 @@ import msgspec
 
 from roboglot.shards.messages import MESSAGE_MAX, Beat, News, Ready, Refusal, pair
 
-AGAIN_SECONDS = 1.0  # before a process whose shard ended lets Ray start another
+AGAIN_SECONDS = 1.0  # before a process whose shard ended makes Ray start another
 STOP_SECONDS = 12.0
 LINES_MAX = 2000  # log lines kept until the fleet fetches them
 EXIT_ENDED = 1
 NODE_DIGITS = 12  # of a node's id
-RUN_BITS = 53  # of the number of a run, which JSON keeps whole
+RUN_BITS = 53  # of a run's number, so that JSON keeps it exactly
 
 
 class Condition(msgspec.Struct):
@@ -120,7 +120,7 @@ class ShardActor:
                 self._hear()
             if not self._stopping and not (self._refusal and self._refusal.lasting):
                 time.sleep(AGAIN_SECONDS)
-                os._exit(EXIT_ENDED)  # Ray starts it again
+                os._exit(EXIT_ENDED)  # Ray restarts the actor
 
     def _hear(self) -> None:
         """Take what the shard sent since the last time."""

@@ -40,9 +40,9 @@ from roboglot.shards.shard import CLASS_SOCKET
 
 log = logging.getLogger(__name__)
 FOLDER = "classes"
-PENDING_MAX = 256  # wishes of one world that are being answered
-SEATS_MAX = 200  # pages of one world
-UNREAD_MAX = 32 << 20  # bytes that a world has not read: it hangs, and is hung up on
+PENDING_MAX = 256  # requests of one world in progress
+SEATS_MAX = 200  # pages per world
+UNREAD_MAX = 32 << 20  # bytes that a world has not read: it hangs and is disconnected
 STOP_SECONDS = 10.0
 _decode = msgspec.json.Decoder(ToRoom).decode
 
@@ -61,7 +61,7 @@ class FleetClasses:
         listening = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
             room = await asyncio.to_thread(Classroom, ClassFiles(self._folder / FOLDER))
-            path.unlink(missing_ok=True)  # left by a program that was killed; the folder is ours alone
+            path.unlink(missing_ok=True)  # left by a killed program; no other program uses the folder
             os.fchmod(listening.fileno(), 0o600)
             listening.bind(bytes(path))
 
@@ -155,7 +155,7 @@ class _Link:
             if found is not None and found.only == self._world:
                 await self._room.end(message.code)
         elif found is None:
-            with contextlib.suppress(Refused):  # too many: the console's own class is open all the same
+            with contextlib.suppress(Refused):  # too many: the console's own class stays open
                 await self._room.begin(message.name, message.code, self._world)
 
     def _seat(self, number: int) -> Seat:

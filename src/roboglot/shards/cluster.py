@@ -32,21 +32,21 @@ from roboglot.storage.residence import LEASE
 from roboglot.storage.silence import Silence
 
 with explaining("--on", "fleet"):
-    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # nothing leaves the machine unasked
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # no data leaves the machine unasked
     import ray
     from ray.exceptions import RayActorError, RayError
 
 log = logging.getLogger(__name__)
 LOCAL = "local"
 NAMESPACE = "roboglot"
-CLIENT_PORT = 10001  # of ray://HOST
-STORE_BYTES = 80 << 20  # of a cluster that we start: actors share nothing
-PERIOD = 1.0  # s between two looks at each shard
-LOOK_MAX = 5.0  # s that an actor may take to answer
-START_MAX = 90.0  # s until every shard has been heard of
+CLIENT_PORT = 10001  # default port of ray://HOST
+STORE_BYTES = 80 << 20  # of a cluster that we start: actors share no objects
+PERIOD = 1.0  # s between two checks of each shard
+LOOK_MAX = 5.0  # s for an actor to answer
+START_MAX = 90.0  # s for every shard to report
 STOP_MAX = 15.0
-CORE_EACH, CORES_MAX = 0.05, 1.0  # processors of a robot, and of a shard: a world is one thread's work
-MEMORY = 256 << 20  # bytes that a shard is placed by
+CORE_EACH, CORES_MAX = 0.05, 1.0  # processors per robot, and per shard: a world runs in one thread
+MEMORY = 256 << 20  # bytes that Ray reserves for a shard
 
 
 def join(where: str) -> None:
@@ -69,7 +69,7 @@ def join(where: str) -> None:
         ray.init(address=address, namespace=NAMESPACE, log_to_driver=False, configure_logging=False)
     except Exception as error:  # noqa: BLE001 - Ray raises bare ones, too
         lines = str(error).strip().splitlines() or [type(error).__name__]
-        why = f"{lines[0]} {lines[-1]}" if lines[0].endswith(":") else lines[0]  # a server's own error comes last
+        why = f"{lines[0]} {lines[-1]}" if lines[0].endswith(":") else lines[0]  # the server's own error is last
         raise OSError(f"--on {where}: {why}") from None
 
 
@@ -255,7 +255,7 @@ class ClusterFleet:
         shard.beat = condition.beat or shard.beat
         if condition.refusal is not None:
             shard.reason = condition.refusal.reason
-            state = State.FAILED if condition.refusal.lasting else State.STARTING  # Ray tries that again
+            state = State.FAILED if condition.refusal.lasting else State.STARTING  # Ray retries it
             log.warning("shard %s did not start: %s", name, shard.reason)
         else:
             state = State.READY if shard.ready and condition.serving else State.STARTING
@@ -312,7 +312,7 @@ def _registry_of(shard: ShardPlan) -> str:
 
 
 def _refuse_unfenced(plan: FleetPlan) -> None:
-    for shard in plan.shards[:1]:  # they differ in names and addresses only
+    for shard in plan.shards[:1]:  # they differ only in names and addresses
         if not _registry_of(shard):
             raise ValueError(
                 "a fleet on a cluster needs `database` or `registry` in its --template: without one, a robot could run"

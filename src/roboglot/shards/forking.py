@@ -19,8 +19,8 @@ from roboglot.shards.messages import MESSAGE_MAX, Birth, Born, Dead, End, Fork, 
 from roboglot.shards.warmth import ENVIRONMENT
 
 log = logging.getLogger(__name__)
-AGAIN_SECONDS = 5.0  # between two tries to start one that does not get ready
-WARM_SECONDS_MAX = 240.0  # s until everything is loaded; kernels that have to be compiled take a minute
+AGAIN_SECONDS = 5.0  # between two attempts to start one that does not become ready
+WARM_SECONDS_MAX = 240.0  # s to load everything; compiling kernels takes a minute
 
 
 class NotWarm(RuntimeError):

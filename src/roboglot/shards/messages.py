@@ -6,7 +6,7 @@ import socket
 
 import msgspec
 
-MESSAGE_MAX = 1 << 17  # bytes; a hundred robots' endpoints are 60 kB
+MESSAGE_MAX = 1 << 17  # bytes; the endpoints of a hundred robots take 60 kB
 
 
 class Fork(msgspec.Struct, tag=True, frozen=True):

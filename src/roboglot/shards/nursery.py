@@ -23,9 +23,9 @@ from roboglot.shards.messages import MESSAGE_MAX, Birth, Born, Dead, End, Fork, 
 from roboglot.shards.warmth import ENVIRONMENT, refuse_threads, warm
 
 PR_SET_PDEATHSIG = 1
-LAST_SECONDS = 12.0  # that shards have to close when the nursery ends
+LAST_SECONDS = 12.0  # for shards to close when the nursery ends
 LINK_FD = 3  # of a shard
-EXIT_BROKEN = 70  # of a shard that could not even begin
+EXIT_BROKEN = 70  # of a shard that could not begin
 
 
 class Nursery:
@@ -33,7 +33,7 @@ class Nursery:
 
     def __init__(self, control: socket.socket, run: Callable[[str, socket.socket], int]) -> None:
         self._control, self._run = control, run
-        self._children: dict[int, int] = {}  # the number by process
+        self._children: dict[int, int] = {}  # shard numbers by process
         self._wake, wake = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         os.set_inheritable(control.fileno(), False)
         self._libc = ctypes.CDLL(None, use_errno=True)
@@ -56,7 +56,7 @@ class Nursery:
     def close(self) -> None:
         """End the shards: kindly, then by force."""
         with contextlib.suppress(OSError):
-            self._control.close()  # nothing more is reported
+            self._control.close()  # nothing is reported from here on
         for end, patience in ((signal.SIGTERM, LAST_SECONDS), (signal.SIGKILL, LAST_SECONDS)):
             for pid in self._children:
                 os.kill(pid, end)
@@ -79,7 +79,7 @@ class Nursery:
             case End(number=number, signal=kind):
                 for pid, child in self._children.items():
                     if child == number:
-                        os.kill(pid, kind)  # it is ours and not yet reaped, so the number cannot be another's
+                        os.kill(pid, kind)  # ours and not reaped yet, so the number cannot have been reused
         return True
 
     def _fork(self, number: int, folder: str, link: int, output: int) -> None:
@@ -131,7 +131,7 @@ class Nursery:
 
 def _take_descriptors(link: int, output: int) -> None:
     """Move link and log to their numbers, and close everything else."""
-    link, output = os.dup(link), os.dup(output)  # above those that are overwritten now
+    link, output = os.dup(link), os.dup(output)  # above the descriptors that are overwritten now
     os.dup2(output, 1)
     os.dup2(output, 2)
     nothing = os.open(os.devnull, os.O_RDONLY)
@@ -147,8 +147,8 @@ def _ignore(number: int, frame: FrameType | None) -> None:
 def main(descriptor: int) -> None:
     """Warm up, say so, and serve on an inherited socket."""
     began = time.monotonic()
-    os.setpgid(0, 0)  # Ctrl-C of the terminal is for the supervisor, which stops us in order
-    for kind in (signal.SIGINT, signal.SIGTERM):  # to a whole group or unit: we end with the supervisor's socket
+    os.setpgid(0, 0)  # the terminal's Ctrl-C is for the supervisor, which stops us in order
+    for kind in (signal.SIGINT, signal.SIGTERM):  # sent to a whole group or unit: the supervisor's socket ends us
         signal.signal(kind, signal.SIG_IGN)
     control = socket.socket(fileno=descriptor)
     warm()

@@ -83,7 +83,7 @@ def plan_fleet(
     plan = FleetPlan(
         {"worlds": worlds, "robots_each": len(robots), "first_address": first, "template": template}, shards
     )
-    for shard in plan.shards[:1]:  # they differ in names and addresses only
+    for shard in plan.shards[:1]:  # they differ only in names and addresses
         refuse_unguarded(checked(shard))
     return plan
 
@@ -122,7 +122,7 @@ def _robots(count: int) -> list[dict[str, object]]:
 def _console(template: dict[str, Any], address: str, number: int) -> dict[str, Any]:
     """Return the console's settings: on the address of the world's first robot, where the template has none."""
     given = dict(template.get("console", {}))
-    if given.get("address") and (port := given.get("port", ConsoleConfig().port)):  # one for all: a port for each
+    if given.get("address") and (port := given.get("port", ConsoleConfig().port)):  # one address: separate ports
         given["port"] = port + number - 1
     return {"address": address, **given} if is_loopback(address) else {"enabled": False, **given}
 

@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 CLASS_SOCKET = "class"  # in the fleet's folder
 SETTINGS = "shard.json"  # in the shard's folder, as in a configuration file
-PERIOD = 1.0  # s between two beats
-WEIGHED = 10  # beats between two looks at the memory, which cost 3 ms
+PERIOD = 1.0  # s between two heartbeats
+WEIGHED = 10  # heartbeats between two measurements of memory, which take 3 ms
 
 
 def settings_of(values: dict[str, object]) -> Config:
@@ -109,7 +109,7 @@ async def _serve(config: Config, reporter: Reporter, class_home: ClassHome | Non
     try:
         runtime = Runtime(config, class_home=class_home)
     except (FolderInUse, ValueError, OSError, sqlite3.Error) as error:
-        # A predecessor that was killed may hold folder and addresses for a moment; wrong settings stay wrong.
+        # A killed predecessor may hold folder and addresses for a moment; wrong settings stay wrong.
         reporter.send(Refusal(str(error), lasting=isinstance(error, ValueError)))
         return 1
     try:

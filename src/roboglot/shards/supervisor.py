@@ -22,15 +22,15 @@ from roboglot.shards.plan import FleetPlan, ShardPlan, save
 from roboglot.shards.shard import SETTINGS
 
 log = logging.getLogger(__name__)
-STARTING_MAX = max(2, os.cpu_count() or 2)  # at once; more would only take processors from each other
-SILENCE_MAX = 10.0  # s without a heartbeat until a shard counts as hung
-START_MAX = 60.0  # s that a shard may need to be ready
-STOP_MAX = 12.0  # s that it may need to close
-SLOW, SLOW_FOR, SETTLING = 0.9, 10, 10.0  # x real time; looks in a row; s after the start that are not judged
-STEADY = 60.0  # s up after which an earlier crash is forgotten
-PAUSES = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0)  # s before the next try, by how often it died in a row
+STARTING_MAX = max(2, os.cpu_count() or 2)  # at the same time; more would only compete for processors
+SILENCE_MAX = 10.0  # s without a heartbeat after which a shard counts as hung
+START_MAX = 60.0  # s for a shard to become ready
+STOP_MAX = 12.0  # s for it to close
+SLOW, SLOW_FOR, SETTLING = 0.9, 10, 10.0  # x real time; checks in a row; s after the start that are not judged
+STEADY = 60.0  # s of running after which earlier crashes are forgotten
+PAUSES = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0)  # s before the next attempt, by the number of crashes in a row
 LOG_FILE = "log"
-LOG_MAX = 10 << 20  # bytes kept of a shard's log when it starts
+LOG_MAX = 10 << 20  # bytes of a shard's log that are kept on start
 
 
 class State(StrEnum):
@@ -41,7 +41,7 @@ class State(StrEnum):
     READY = "ready"
     STOPPING = "stopping"
     STOPPED = "stopped"  # by request
-    FAILED = "failed"  # it tries again, unless its settings are wrong
+    FAILED = "failed"  # retried, unless its settings are wrong
 
 
 class Shard:
@@ -50,10 +50,10 @@ class Shard:
     def __init__(self, number: int, plan: ShardPlan, folder: Path) -> None:
         self.number, self.plan, self.folder = number, plan, folder
         self.state = State.WAITING
-        self.pid = self.restarts = self.deaths = 0  # deaths: in a row
-        self.slow_for = 0  # looks at it in a row
-        self.since = 0.0  # s of the loop, of the state
-        self.heard = 0.0  # s of the loop
+        self.pid = self.restarts = self.deaths = 0  # restarts: crashes in a row
+        self.slow_for = 0  # checks in a row
+        self.since = 0.0  # s by the loop's clock: start of the state
+        self.heard = 0.0  # s by the loop's clock
         self.beat = Beat(0.0, 0, 0.0)
         self.ready: Ready | None = None
         self.reason = ""
@@ -78,7 +78,7 @@ class Supervisor:
         self._forks = Forks(self._born, self._dead)
         self._turn: asyncio.Task[None] | None = None
         self._watch: asyncio.TimerHandle | None = None
-        self._changed = asyncio.Event()  # set and cleared at every change of a state
+        self._changed = asyncio.Event()  # set and cleared with every change of a state
         self._loop = asyncio.get_running_loop()
         self._wake = asyncio.Event()
         self._closing = False
@@ -217,7 +217,7 @@ class Supervisor:
 
     def _dead(self, number: int, status: int) -> None:
         shard = self._by_number[number]
-        while self._hear(shard):  # what it said last
+        while self._hear(shard):  # its last message
             pass
         self._unlink(shard)
         shard.pid = 0
@@ -267,7 +267,7 @@ class Supervisor:
             log.warning("shard %s does not keep up: %.2f x real time", shard.plan.name, shard.beat.factor)
         if self._memory_max and shard.beat.memory > self._memory_max:
             shard.reason = f"it had grown to {shard.beat.memory >> 20} MB of {self._memory_max >> 20}"
-            shard.beat = Beat(0.0, 0, 0.0)  # judged once
+            shard.beat = Beat(0.0, 0, 0.0)  # each heartbeat is judged once
             self._forks.end(shard.number, signal.SIGTERM)
 
     def _turn_to(self, shard: Shard, state: State) -> None:

@@ -49,7 +49,7 @@ def warm() -> None:
     for name in _modules():
         try:
             importlib.import_module(name)
-        except ModuleNotFoundError as missing:  # an extra that is not installed; who needs it says so
+        except ModuleNotFoundError as missing:  # the extra is not installed; code that needs it reports that
             if (missing.name or "").startswith("roboglot"):
                 raise
     for name in FOREIGN:

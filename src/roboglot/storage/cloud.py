@@ -11,8 +11,8 @@ from collections.abc import Collection
 
 from roboglot.storage.transactions import Connection, Transactions
 
-PROGRAMS_MAX = 20_000  # of one account
-RECORDS_MAX = 10_000  # of one account; the oldest go first
+PROGRAMS_MAX = 20_000  # per account
+RECORDS_MAX = 10_000  # per account; the oldest are dropped first
 NAME_MAX = 64  # characters of an account's name
 
 

@@ -22,7 +22,7 @@ from roboglot.storage.transactions import AlreadyThere, Connection, DatabaseErro
 
 T = TypeVar("T")
 Work = Callable[[Connection], object]
-ROBOTS = "roboglot.storage.schema"  # tables of what robots remember
+ROBOTS = "roboglot.storage.schema"  # tables of the robots' memory
 
 
 class Database:
@@ -39,7 +39,7 @@ class Database:
         self._connection = self._thread.submit(connect, str(path), schema).result()
         self._reader = None if self._in_place else _Reader(path)
         self._disk: Disk | None = None
-        self._together: list[tuple[Database, Work, asyncio.Future[Any]]] = []  # of all robots: copies share it
+        self._together: list[tuple[Database, Work, asyncio.Future[Any]]] = []  # for all robots: copies share it
 
     def on(self, disk: Disk) -> Database:
         """The same file for the robot that has this disk: while nothing is left on it, writing raises Refused."""
@@ -123,11 +123,11 @@ class Database:
             result = work(self._connection)
             self._connection.execute("COMMIT")
         except BaseException:
-            if self._connection.in_transaction:  # a full disk ends some transactions by itself
+            if self._connection.in_transaction:  # a full disk ends some transactions on its own
                 self._connection.execute("ROLLBACK")
             raise
         if isinstance(result, sqlite3.Cursor):
-            result.close()  # left to another thread's garbage collection, it would reset a statement in use here
+            result.close()  # left to another thread's garbage collector, it would reset a statement in use here
         return result
 
     def _within_room(self, work: Callable[[Connection], T]) -> T:

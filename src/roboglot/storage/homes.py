@@ -53,7 +53,7 @@ class Homes:
             free = {"", holder, *_locked(connection, silent, holder)}
             taken = {
                 robot: epoch
-                for robot in sorted(addresses)  # always in this order, or two programs could wait for each other
+                for robot in sorted(addresses)  # always in this order, to prevent deadlocks between programs
                 if (epoch := _take(connection, robot, addresses[robot], holder, free))
             }
             if left := addresses.keys() - taken.keys():
@@ -134,7 +134,7 @@ def _locked(connection: Connection, silent: Mapping[str, int], holder: str = "")
     ``holder``: a program that takes robots, which is a sign of it.
     """
     still = []
-    for name in sorted({holder, *silent} - {""}):  # always in this order, or two programs could wait for each other
+    for name in sorted({holder, *silent} - {""}):  # always in this order, to prevent deadlocks between programs
         if name == holder:
             query = "INSERT INTO robot_holder (holder, renewals) VALUES (?, 1)"
             changed = " ON CONFLICT (holder) DO UPDATE SET renewals=robot_holder.renewals+1"

@@ -47,7 +47,7 @@ class StoredMembers(Members):
 
         try:
             id = await self._database.run(insert)
-        except AlreadyThere:  # taken meanwhile
+        except AlreadyThere:  # added meanwhile
             raise InvalidGoal(f"there is a member named {name!r} already") from None
         return self._keep(Member(id, name, host))
 

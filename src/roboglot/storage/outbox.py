@@ -5,7 +5,7 @@ from __future__ import annotations
 from roboglot.storage.program_errors import store_errors
 from roboglot.storage.transactions import Connection, Transactions
 
-OUTBOX_MAX = 10_000  # documents of one robot; the oldest go first
+OUTBOX_MAX = 10_000  # documents per robot; the oldest are dropped first
 
 
 class Outbox:

@@ -25,10 +25,10 @@ from roboglot.storage.transactions import AlreadyThere, Connection, DatabaseErro
 T = TypeVar("T")
 
 CONNECTIONS_MAX = 4
-CONNECT_MAX, STATEMENT_MAX, IDLE_MAX = 5, 10, 10  # s for connecting, for a statement, for a transaction that waits
+CONNECT_MAX, STATEMENT_MAX, IDLE_MAX = 5, 10, 10  # s for connecting, for a statement, for an idle transaction
 CLAIM_LOCKS = 0x626F74  # the class of the locks by which a program claims its robots
 ESCAPE = "\ue000"  # of Unicode's private use
-MIGRATION_LOCK = 0x726F626F  # who opens an empty database first makes the tables, the others wait
+MIGRATION_LOCK = 0x726F626F  # the program that opens an empty database first creates the tables; others wait
 
 
 class PostgreSQL:
@@ -78,7 +78,7 @@ class PostgreSQL:
             return self.run_now(work)
         return await asyncio.get_running_loop().run_in_executor(self._threads, self._transact, work)
 
-    run_together = run  # the server itself flushes the disk once for transactions that end at the same time
+    run_together = run  # the server itself combines disk flushes of transactions that end together
 
     async def read(self, work: Callable[[Connection], T]) -> T:
         """Run ``work``, which changes nothing, beside what is being written."""
@@ -145,8 +145,8 @@ class PostgreSQL:
     def _connect(self) -> psycopg.Connection[object]:
         limits = (
             f"-c statement_timeout={STATEMENT_MAX}s -c idle_in_transaction_session_timeout={IDLE_MAX}s"
-            # The server notices within five seconds that a machine is gone, also one that it was just sending to, and
-            # frees its robots: as soon as another node can have started their shard.
+            # The server notices within five seconds that a machine is gone, even one to which it was sending, and
+            # frees its robots: by then another node may have started their shard.
             " -c tcp_keepalives_idle=2 -c tcp_keepalives_interval=1 -c tcp_keepalives_count=3 -c tcp_user_timeout=5s"
         )
         connection = psycopg.connect(
@@ -161,7 +161,7 @@ class PostgreSQL:
         self._threads.shutdown()
         self._readers.shutdown()
         for connection in self._opened:
-            with contextlib.suppress(psycopg.Error):  # the server would free the robots only when it hears of the end
+            with contextlib.suppress(psycopg.Error):  # the server would free the robots only on noticing the end
                 connection.execute("SELECT pg_advisory_unlock_all()")
             connection.close()
 

@@ -54,7 +54,7 @@ class Residence:
     ) -> None:
         self._homes, self._addresses, self._holder, self._lost, self._now = homes, addresses, holder, lost, now
         self._epochs: dict[str, int] = {}
-        self._elsewhere: set[str] = set()  # another program took them: for good
+        self._elsewhere: set[str] = set()  # taken permanently by another program
         self._reported: set[str] = set()
         self._until = -float("inf")
         self._keeping: list[asyncio.Task[None]] = []

@@ -16,7 +16,7 @@ from roboglot.storage.residence import LEASE, PERIOD, uptime
 from roboglot.storage.transactions import DatabaseError
 
 log = logging.getLogger(__name__)
-GAP_MAX = 2.0  # s without a look, after which silence is counted anew
+GAP_MAX = 2.0  # s without a check after which silence is counted from zero
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,7 @@ class Silence:
         self._homes, self._robots, self._now = homes, frozenset(robots), now
         self._seen: dict[str, _Sight] = {}
         self._looked = -float("inf")
-        self._done: dict[str, int] = {}  # programs whose robots were freed, and how often they had renewed
+        self._done: dict[str, int] = {}  # programs whose robots were freed, with their renewals by then
 
     async def look(self) -> list[str]:
         """Look once; return the robots that were freed. Raises DatabaseError."""

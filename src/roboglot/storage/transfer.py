@@ -8,7 +8,7 @@ from pathlib import Path
 
 from roboglot.storage.database import connect
 
-OF_OTHERS = frozenset({"cloud_record"})  # tables that name a robot and belong to someone else
+OF_OTHERS = frozenset({"cloud_record"})  # tables that mention a robot but belong to others
 
 
 def copy_robot(robot: str, source: Path, target: Path) -> int:
@@ -18,7 +18,7 @@ def copy_robot(robot: str, source: Path, target: Path) -> int:
     """
     if not source.exists():
         return 0
-    connect(source).close()  # both with the newest schema, or the columns would differ
+    connect(source).close()  # both with the newest schema, so that their columns match
     with closing(connect(target)) as connection:
         connection.execute("ATTACH ? AS source", (str(source),))
         connection.execute("BEGIN IMMEDIATE")

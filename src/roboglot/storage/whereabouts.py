@@ -10,7 +10,7 @@ from roboglot.storage.homes import Home, Homes
 from roboglot.storage.transactions import DatabaseError
 
 log = logging.getLogger(__name__)
-PERIOD = 1.0  # s between two looks at a robot that is connected
+PERIOD = 1.0  # s between two checks of a connected robot
 PORT_MAX = 65535
 
 

@@ -10,8 +10,8 @@ from collections.abc import Iterable
 FREE_TRIES = 100
 PROBED = (1448, 40923, 50052, 50053)
 PORTS = range(20_000, 32_000)
-PORT_SHARES = 24  # workers that each have their own
-PORT_STRIDE = 37  # ports by which processes of one worker number begin apart
+PORT_SHARES = 24  # workers with ports of their own
+PORT_STRIDE = 37  # distance between the first ports of processes with the same worker number
 _given: set[str] = set()
 _ports_given = itertools.count()
 

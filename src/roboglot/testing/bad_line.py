@@ -22,7 +22,7 @@ from typing import Self
 
 DEVICE = "/dev/net/tun"
 PACKET_MAX = 2048  # bytes
-UNDERWAY_MAX = 10_000  # packets; more are lost
+UNDERWAY_MAX = 10_000  # packets; further ones are dropped
 IPV4 = 4
 PREFIX = "198.18"  # RFC 2544: for benchmarks
 _MAKE, _ADDRESS, _MASK, _FLAGS = 0x400454CA, 0x8916, 0x891C, 0x8914  # TUNSETIFF, SIOCSIFADDR, -NETMASK, -FLAGS
@@ -56,7 +56,7 @@ class BadLine:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self._over = True
         self._thread.join()
-        os.close(self._tun)  # the device goes with it
+        os.close(self._tun)  # the device disappears with it
 
     def _carry(self) -> None:
         underway: list[tuple[float, int, bytes]] = []

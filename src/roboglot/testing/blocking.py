@@ -10,7 +10,7 @@ from contextlib import AbstractAsyncContextManager, AbstractContextManager
 from types import TracebackType
 from typing import Any
 
-PATIENCE = 60.0  # real s until a call of a test fails
+PATIENCE = 60.0  # real s after which a test's call fails
 
 
 class Loop:
@@ -32,7 +32,7 @@ class Loop:
         try:
             return future.result(within)
         except Late:
-            if future.done():  # the call's own
+            if future.done():  # raised by the call itself
                 raise
             future.cancel()
             raise TimeoutError(

@@ -9,7 +9,7 @@ from html import escape
 from roboglot.model.tap import Exchange
 
 SHOWN_MAX = 500  # exchanges
-TEXT_MAX = 4000  # characters of one
+TEXT_MAX = 4000  # characters per exchange
 STYLE = """body{font:14px/1.4 system-ui,sans-serif;margin:2em;max-width:80em}pre{white-space:pre-wrap;margin:0}
 table{border-collapse:collapse;width:100%}td,th{border-top:1px solid #ccc;padding:4px 8px;text-align:left;
 vertical-align:top}td:nth-child(-n+4){white-space:nowrap}.refused{background:#fdecea}.push{color:#666}

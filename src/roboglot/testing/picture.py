@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from roboglot.model.geometry import Point
 from roboglot.model.stage import FloorPlan, Placed
 
-SIDE = 1000  # pixels of the longer side
+SIDE = 1000  # pixels along the longer side
 MARGIN = 0.5  # m
 BACK, WALL, FURNITURE, PERSON, INK = "#fafaf8", "#2b3038", "#cdd1d6", "#6a4c93", "#2b3038"
 COLOURS = ("#d1495b", "#00798c", "#edae49", "#66a182", "#2e4057")

@@ -61,7 +61,7 @@ def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
     It would rewrite every module of a package that brings a plugin: 800 here, seconds at each start, for nothing.
     """
     hook = getattr(early_config.pluginmanager, "rewrite_hook", None)
-    marked = getattr(hook, "_must_rewrite", None)  # there is no public way; without it, it only takes longer
+    marked = getattr(hook, "_must_rewrite", None)  # there is no public way; without it, this only takes longer
     if hook is not None and isinstance(marked, set):
         marked.discard("roboglot")
         hook.mark_rewrite("roboglot.testing")
@@ -206,7 +206,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
         server.close()
 
 
-# -- what failed tests leave -------------------------------------------------------------------------------------------
+# -- files left by failed tests --------------------------------------------------------------------------------------
 
 
 @pytest.hookimpl(wrapper=True)

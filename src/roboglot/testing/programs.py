@@ -86,7 +86,7 @@ class ProgramClient:
     async def _printed(self, task: str) -> list[str]:
         """Return the lines printed since the program was run."""
         log, lines = self._of(self._log), list[str]()
-        await log.send("")  # answered behind all that was printed before
+        await log.send("")  # its answer follows everything printed before
         async for text in log:
             line = json.loads(text)
             if "entries" in line:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 KEPT_EXCHANGES = 2000
-START_SECONDS_MAX = 240.0  # kernels may have to be compiled
+START_SECONDS_MAX = 240.0  # including the time to compile kernels
 
 
 class NotInTime(AssertionError):
@@ -43,7 +43,7 @@ class RobotServer:
     ``address`` is the first robot's. Its methods may be called from any thread but its own; they block.
     """
 
-    clients: Clients  # from ``start`` on
+    clients: Clients  # set by ``start``
 
     def __init__(self, wanted: Wanted | None = None, *, data: Path | None = None) -> None:
         self.wanted = wanted or Wanted()
@@ -58,7 +58,7 @@ class RobotServer:
         self._ways = Ways()
         self.tracks = self._ways.tracks
 
-    # -- life ----------------------------------------------------------------------------------------------------------
+    # -- lifecycle -----------------------------------------------------------------------------------------------------
 
     def __enter__(self) -> RobotServer:
         return self.start()
@@ -98,7 +98,7 @@ class RobotServer:
             self._thread.join()
             self._loop = self._thread = self._runtime = None
             give_back(self.addresses.values())
-            gc.unfreeze()  # what the runtime froze is garbage now
+            gc.unfreeze()  # objects that the runtime froze are garbage now
             if self._given_data is None:
                 shutil.rmtree(self.data, ignore_errors=True)
 
@@ -128,7 +128,7 @@ class RobotServer:
             await self._ways.wait_for_places()
         self._break_things()
 
-    # -- what is there -------------------------------------------------------------------------------------------------
+    # -- contents ------------------------------------------------------------------------------------------------------
 
     @property
     def runtime(self) -> Runtime:

@@ -11,7 +11,7 @@ from roboglot.config import RobotConfig
 if TYPE_CHECKING:
     import pytest
 
-SPEED = 4.0  # of the clock: a second of the test is so many of the robot
+SPEED = 4.0  # seconds of robot time per second of the test
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from roboglot.fleet import Fleet
     from roboglot.model.geometry import Pose
 
-LOOK_AGAIN = 0.05  # s of robot time between two looks at a condition
+LOOK_AGAIN = 0.05  # s of robot time between two checks of a condition
 TRACK_PERIOD = 0.2  # s of robot time between two points of a track
 
 
@@ -29,7 +29,7 @@ class Ways:
     def __init__(self) -> None:
         self.origins: dict[str, Pose] = {}
         self.tracks: dict[str, list[tuple[float, float]]] = {}
-        self._starts: dict[str, Pose] = {}  # where each believed to stand at first
+        self._starts: dict[str, Pose] = {}  # the first believed pose of each
         self._fleet: Fleet
         self._clock: Clock
         self._tracking: asyncio.Task[None] | None = None

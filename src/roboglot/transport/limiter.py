@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable
 
 PAUSE_MAX = 5.0  # s
-BUCKETS_MAX = 4096  # clients that are counted at once; full buckets are forgotten first
+BUCKETS_MAX = 4096  # clients tracked at the same time; full buckets are dropped first
 
 
 class Limiter:
@@ -14,7 +14,7 @@ class Limiter:
 
     def __init__(self, rate: float, burst: float, now: Callable[[], float]) -> None:
         self._rate, self._burst, self._now = rate, burst, now
-        self._buckets: dict[str, tuple[float, float]] = {}  # what is left, and when it was
+        self._buckets: dict[str, tuple[float, float]] = {}  # the remaining amount, and its time
 
     def take(self, key: str) -> bool:
         """Take one; whether there was one."""

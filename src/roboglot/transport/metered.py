@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import cast
 
 Spend = Callable[[int], float]
-PAUSE_MIN = 0.01  # s: shorter debts are left standing
-STEP = 4096  # bytes that are counted together: most messages are short
+PAUSE_MIN = 0.01  # s: shorter debts are carried over
+STEP = 4096  # bytes counted together: most messages are short
 
 
 class Metered(asyncio.Protocol):
@@ -61,7 +61,7 @@ class Valve:
 
     def __init__(self, transport: asyncio.Transport, meter: Metered, spend: Spend) -> None:
         self._transport, self._meter, self._spend = transport, meter, spend
-        self.is_closing = transport.is_closing  # asked for every message
+        self.is_closing = transport.is_closing  # bound once: called for every message
         self._paused = False  # by the inner protocol
         self.uncounted = 0
         """Bytes; they are counted from STEP on by the one that adds to them."""

@@ -13,8 +13,8 @@ from contextvars import copy_context
 
 log = logging.getLogger(__name__)
 
-PIECE = 64 * 1024  # bytes that are received at once
-HIGH = 64 * 1024  # bytes that may wait before the writer is asked to pause, unless it says otherwise
+PIECE = 64 * 1024  # bytes received at once
+HIGH = 64 * 1024  # bytes queued before the writer must pause, by default
 
 Address = tuple[str, int]
 
@@ -34,10 +34,10 @@ class PipeEnd(asyncio.Transport):
     def __init__(self, protocol: asyncio.BaseProtocol, own: Address, peer: Address) -> None:
         super().__init__({"sockname": own, "peername": peer})
         self._protocol = protocol
-        self._context = copy_context()  # each call has a copy: no client's name stays for the next
+        self._context = copy_context()  # each call gets a copy: no client's name is left for the next
         self._loop = asyncio.get_running_loop()
         self._other: PipeEnd
-        self._inbox = bytearray()  # what the other wrote and this end has not yet received
+        self._inbox = bytearray()  # written by the other end and not received here yet
         self._reading = self._taking = False
         self._high, self._low = HIGH, HIGH // 4
         self._crowded = False  # this end was asked to pause
@@ -53,7 +53,7 @@ class PipeEnd(asyncio.Transport):
         if not self._closing:
             self.resume_reading()
 
-    # -- of asyncio.WriteTransport -------------------------------------------------------------------------------------
+    # -- asyncio.WriteTransport ----------------------------------------------------------------------------------------
 
     def write(self, data: bytes | bytearray | memoryview) -> None:
         """The other end has it at once, unless it rests."""
@@ -105,7 +105,7 @@ class PipeEnd(asyncio.Transport):
         self._high = high if high is not None else (4 * low if low is not None else HIGH)
         self._low = low if low is not None else self._high // 4
 
-    # -- of asyncio.ReadTransport --------------------------------------------------------------------------------------
+    # -- asyncio.ReadTransport -----------------------------------------------------------------------------------------
 
     def is_reading(self) -> bool:
         """True unless it rests."""
@@ -134,7 +134,7 @@ class PipeEnd(asyncio.Transport):
         """Return the default: there is no socket."""
         return self._other.ended if name == "hung_up" else super().get_extra_info(name, default)
 
-    # -- from the other end --------------------------------------------------------------------------------------------
+    # -- called by the other end ---------------------------------------------------------------------------------------
 
     @property
     def waiting(self) -> int:
@@ -155,7 +155,7 @@ class PipeEnd(asyncio.Transport):
         """Take what the other end wrote."""
         free = self._reading and not self._taking
         if free and not self._inbox and len(data) <= PIECE:
-            self._taking = True  # what it answers may make the other end write, and that waits
+            self._taking = True  # answers may make the other end write; those bytes wait
             self._call(self._protocol.data_received, bytes(data))  # type: ignore[attr-defined]
             self._taking = False
             if self._inbox and self._reading:

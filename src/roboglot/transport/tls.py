@@ -22,9 +22,9 @@ log = logging.getLogger(__name__)
 seldom = Seldom(log)
 
 HANDSHAKE_SECONDS_MAX = 5.0
-HANDSHAKE_BYTES_MAX = 64 * 1024  # from the client, until the handshake is over
-RECORD_MAX = 16 * 1024  # bytes that one record carries
-REPLIES_MAX = 16 * 1024  # bytes of TLS's own on one connection, in answer to the peer: refused handshakes, new keys
+HANDSHAKE_BYTES_MAX = 64 * 1024  # from the client before the handshake is complete
+RECORD_MAX = 16 * 1024  # bytes per record
+REPLIES_MAX = 16 * 1024  # bytes of TLS messages in reply to the peer, per connection: refused handshakes, new keys
 HELLO = 0x16  # the first byte of a TLS connection: a handshake record
 
 Factory = Callable[[], asyncio.Protocol]
@@ -68,7 +68,7 @@ class TlsEnd(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Wait for the first byte."""
         self._transport = cast(asyncio.Transport, transport)
-        self._gone = self._transport.is_closing  # asked for every message
+        self._gone = self._transport.is_closing  # bound once: called for every message
         self._host = (transport.get_extra_info("peername") or ("",))[0]
         self._patience = asyncio.get_running_loop().call_later(HANDSHAKE_SECONDS_MAX, self._transport.abort)
 
@@ -152,14 +152,14 @@ class TlsEnd(asyncio.Protocol):
         incoming = self._incoming
         try:
             while incoming.pending and not self._gone():
-                data = self._tunnel.read(RECORD_MAX)  # one record, and all of it
+                data = self._tunnel.read(RECORD_MAX)  # one complete record
                 if not data:
                     self._end()
                     return
                 assert self.inner is not None
                 self.inner.data_received(data)
         except ssl.SSLWantReadError:
-            pass  # a record is not whole yet
+            pass  # an incomplete record
         except ssl.SSLError as error:
             if not isinstance(error, ssl.SSLZeroReturnError):
                 log.info("%s: TLS broke: %s", self._host, error.reason)
@@ -256,7 +256,7 @@ class _Encrypted:
 
     def __init__(self, end: TlsEnd, transport: asyncio.Transport) -> None:
         self._end, self._transport = end, transport
-        self.write, self.is_closing = end.send, transport.is_closing  # wanted for every message
+        self.write, self.is_closing = end.send, transport.is_closing  # bound once: called for every message
 
     def writelines(self, pieces: list[bytes]) -> None:
         self._end.send(b"".join(pieces))

@@ -19,15 +19,15 @@ from roboglot.recording.comparing.masks import How, Mask, is_volatile
 from roboglot.recording.comparing.trees import kind_of, leaves, tree
 from roboglot.recording.reader import pair
 
-MAGNITUDE = 10.0  # times: what is further off has another unit
-SMALL = 1e-3  # below, numbers have no magnitude
-RANGE_MIN = 5  # values on both sides before their range counts
-SLACK = 0.25  # of a range, to both sides
-PUSHES_MIN = 4  # of a kind on both sides before their rate counts
+MAGNITUDE = 10.0  # times; larger differences suggest another unit
+SMALL = 1e-3  # below this, numbers have no magnitude
+RANGE_MIN = 5  # values required on both sides to compare ranges
+SLACK = 0.25  # of a range, at both ends
+PUSHES_MIN = 4  # of a kind on both sides, required to compare rates
 RATE_SHARE = 0.25
-FIELDS_MAX = 2000  # of an operation
+FIELDS_MAX = 2000  # per operation
 _index = re.compile(r"\[\d+\]")
-_own_name = re.compile(r"\.(?:[0-9a-fA-F-]{12,}|\d+)(?=[.\[]|$)")  # of an object that has ids for keys
+_own_name = re.compile(r"\.(?:[0-9a-fA-F-]{12,}|\d+)(?=[.\[]|$)")  # of an object whose keys are ids
 
 
 @dataclass(slots=True)
@@ -50,8 +50,8 @@ class Profile:
     count: int = 0
     statuses: set[str] = field(default_factory=set)
     fields: dict[str, Field] = field(default_factory=dict)
-    seconds: list[float] = field(default_factory=list)  # of answers
-    stamps: list[float] = field(default_factory=list)  # of pushes
+    seconds: list[float] = field(default_factory=list)  # until each answer
+    stamps: list[float] = field(default_factory=list)  # of each push
 
     def note(self, payload: bytes) -> None:
         """Take in the values of one message."""
@@ -132,7 +132,7 @@ def _compare_field(row: Row, path: str, ones: dict[str, Field], others: dict[str
     one, other = ones.get(path), others.get(path)
     if one is None or other is None:
         if _is_filled(path, ones) or _is_filled(path, others):
-            return  # an empty list or object here, a filled one there
+            return  # empty here, filled there
         there = "there"
         row.check(False, path, there if one else MISSING, there if other else MISSING)
         return

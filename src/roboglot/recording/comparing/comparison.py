@@ -13,7 +13,7 @@ from roboglot.recording.comparing.trees import leaves, tree
 from roboglot.recording.matching import normal
 from roboglot.recording.reader import Asked, pair
 
-SHOWN_MAX = 20  # differences kept of one operation
+SHOWN_MAX = 20  # differences kept per operation
 VALUE_MAX = 80  # characters of a value in a report
 MISSING = "(not there)"
 
@@ -148,7 +148,7 @@ def _compare_payloads(row: Row, one: bytes, other: bytes, mask: Mask) -> None:
     for path in mine.keys() | theirs.keys():
         a, b = mine.get(path, MISSING), theirs.get(path, MISSING)
         there = path in mine and path in theirs
-        ignored = mask.agree(row.operation, path, "", 0)  # only a rule that ignores the field lets these agree
+        ignored = mask.agree(row.operation, path, "", 0)  # they agree only because a rule ignores the field
         row.check(ignored or (there and mask.agree(row.operation, path, a, b)), path, a, b)
 
 

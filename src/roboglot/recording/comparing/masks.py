@@ -15,7 +15,7 @@ import msgspec
 from roboglot.recording.comparing.trees import kind_of
 
 RULES_MAX = 1000
-# Values that no two sessions share: UUIDs, dates, Unix times in s, ms, us or ns.
+# Values that differ in every session: UUIDs, dates, Unix times in s, ms, us or ns.
 _volatile = re.compile(
     r"[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}"
     r"|.*\b\d{4}-\d\d-\d\d[T ]\d\d:\d\d.*|.*\b1[5-9]\d{8,17}\b.*",

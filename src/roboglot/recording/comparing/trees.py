@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 
-LEAVES_MAX = 5000  # of one payload
+LEAVES_MAX = 5000  # per payload
 _number = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _sequence = re.compile(r"\s*\bseq\s+\d+\s*(?=;|$)")
 _decode = msgspec.json.Decoder().decode

@@ -24,8 +24,8 @@ from roboglot.recording.thread import WriterThread
 log = logging.getLogger(__name__)
 CONNECT_SECONDS = 10.0
 CONNECTIONS_MAX = 256
-BUFFER_MAX = 1 << 20  # bytes that wait for the slower end before the faster one is slowed down
-SIDE_PORTS = {"robomaster": (40921, 40922, 40925)}  # video, audio, events: passed, and events are noted
+BUFFER_MAX = 1 << 20  # bytes queued for the slower end before the faster one is paused
+SIDE_PORTS = {"robomaster": (40921, 40922, 40925)}  # video, audio, events: forwarded; events are also recorded
 EVENTS, PUSHES = 40925, 40924
 
 

@@ -18,8 +18,8 @@ from roboglot.wire.robomaster.commands import Malformed, parse
 from roboglot.wire.robomaster.lines import LineSplitter
 from roboglot.wire.visual.requests import BadFrame, Kind, parse_request
 
-BEYOND = {"version", "version ?"}  # commands that robots know and the manual does not list
-WAITING_MAX = 1000  # requests without an answer
+BEYOND = {"version", "version ?"}  # commands that robots know although the manual does not list them
+WAITING_MAX = 1000  # requests awaiting an answer
 PATH_MAX = 128  # bytes of a request's first line
 Note = Callable[[Direction, str, bytes, str, float | None], float]
 
@@ -150,13 +150,13 @@ class FrameSniffer(Sniffer):
         from wsproto import ConnectionType, WSConnection
 
         super().__init__(note)
-        self._client: object = WSConnection(ConnectionType.SERVER)  # what the client sends, read as a server does
+        self._client: object = WSConnection(ConnectionType.SERVER)  # parses the client's bytes as a server would
         self._robot: object = None
         self._began: dict[str, tuple[str, float]] = {}
         self._partial = {True: "", False: ""}
         self._upgraded = {True: b"", False: b""}
         self._path = FRAMES
-        self._path_asked = 0.0  # when
+        self._path_asked = 0.0  # the time of that request
 
     def from_client(self, data: bytes) -> None:
         self._feed(data, client=True)
@@ -169,7 +169,7 @@ class FrameSniffer(Sniffer):
         from wsproto.events import TextMessage
 
         connection = self._client if client else self._robot
-        if not isinstance(connection, Connection):  # the handshake, up to the empty line
+        if not isinstance(connection, Connection):  # the handshake, up to the blank line
             head, end, rest = (self._upgraded[client] + data).partition(b"\r\n\r\n")
             if not end:
                 self._upgraded[client] = head[: 1 << 16]

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from roboglot.model.actions import Action
 from roboglot.model.clock import Clock
 
-SETTLED = math.radians(0.1)  # what comes back to its middle rests when this near
-LOOK = 0.02  # s between looks at whether a motion has ended
+SETTLED = math.radians(0.1)  # an axis returning to its centre rests within this
+LOOK = 0.02  # s between checks whether a motion has ended
 
 
 @dataclass(slots=True)
@@ -61,7 +61,7 @@ class Axis:
             self.position, self.rate = goal, 0.0
             return
         wanted = math.copysign(top, left)
-        if self.rate * left < 0.0:  # on the wrong way: brake first
+        if self.rate * left < 0.0:  # moving the wrong way: brake first
             wanted = self.rate + math.copysign(min(step, abs(self.rate)), left)
         self.rate = wanted
         self.shift(wanted * seconds)

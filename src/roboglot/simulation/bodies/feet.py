@@ -12,8 +12,8 @@ from roboglot.model.components.motion.feet import Foot, FootState
 from roboglot.model.geometry import STILL, Point, Pose, Twist, Vector3
 from roboglot.simulation.bodies.footfalls import DOWN, Swing, Swings
 
-LOWERING = 0.5  # m/s at which a foot that was kept up comes down
-HOME = 0.01  # m beside its place at which a foot is at home
+LOWERING = 0.5  # m/s at which a raised foot is lowered
+HOME = 0.01  # m from its place at which a foot is at rest
 
 
 class Feet:
@@ -25,9 +25,9 @@ class Feet:
         self._hanging = False
         self._places = [_there(pose, *home) for home in self._homes]
         self._heights = [0.0] * len(homes)
-        self._starts: list[tuple[float, float, float] | None] = [None] * len(homes)  # where a swing began, how high
+        self._starts: list[tuple[float, float, float] | None] = [None] * len(homes)  # start and height of each swing
         self._last: list[Swing | None] = [None] * len(homes)
-        self.restless = False  # whether one is not at home, or in the air
+        self.restless = False  # whether a foot is away from its place or in the air
 
     def states(self, pose: Pose) -> Mapping[Foot, FootState]:
         """Return the state of each foot, seen from base_link at ``pose``."""

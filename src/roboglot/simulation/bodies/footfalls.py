@@ -11,8 +11,8 @@ from roboglot.model.components.motion.feet import Foot, Footfall, Foothold
 from roboglot.model.components.motion.gaits import GAITS, Gait
 from roboglot.model.components.motion.legs import FootLift
 
-RAISING = 0.2  # s until a foot that stays in the air is up
-DUTY = 0.55  # of a step's time that a foot stands
+RAISING = 0.2  # s to raise a foot that stays in the air
+DUTY = 0.55  # of a step for which a foot stands
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,10 +42,10 @@ class Swing:
         return max(0.0, soft + (up - soft) * self.landing)
 
 
-Swings = tuple[Swing | None, ...]  # one of each foot; None: it stands
+Swings = tuple[Swing | None, ...]  # one per foot; None: the foot stands
 DOWN: Swings = (None,) * len(Foot)
 
-# When each foot rises, as a share of a step; None: it never comes down. Diagonal pairs are what trots are.
+# When each foot rises, as a share of a step; None: it never comes down. Trots move diagonal pairs.
 _TROT = (0.0, 0.5, 0.5, 0.0)
 _CRAWL = (0.0, 0.5, 0.75, 0.25)
 _RISES: Mapping[Gait, tuple[float | None, ...]] = {

@@ -22,13 +22,13 @@ from roboglot.simulation.building.terrain import Ground
 if TYPE_CHECKING:
     from mujoco import MjData, MjModel
 
-DRIVE_GAIN = 150.0  # 1/s: how fast the body takes on the wheels' velocity: in one step of physics, or it swings
+DRIVE_GAIN = 150.0  # 1/s: gain from the wheels' velocity to the body's: done in one step of physics, or it swings
 LEVEL = (0.0, 0.0)
-FALLING = 0.05  # m/s up or down at which one looks whether the wheels still stand
+FALLING = 0.05  # m/s up or down at which wheel contact is checked
 TIPPED = 1.0  # rad
-SHELL = 0.4  # grip of the shell, of the wheels'
-ROLLING = 0.02  # of the grip: what resists a robot whose wheels run free
-HAND_STIFFNESS, HAND_DAMPING = 60.0, 15.0  # 1/s2 and 1/s: how firmly hands hold
+SHELL = 0.4  # friction of the shell, relative to the wheels'
+ROLLING = 0.02  # of the friction: resistance of a robot with free wheels
+HAND_STIFFNESS, HAND_DAMPING = 60.0, 15.0  # 1/s2 and 1/s: stiffness of a hand's grip
 
 Floats = NDArray[np.float64]
 
@@ -83,12 +83,12 @@ class Hull:
         self.wheels = [model.geom(f"{name} wheel {index}").id for index in range(4 if ground.uneven else 1)]
         self.support = Support(model, name, self.mass, self.wheels)
         own = model.body_rootid[model.geom_bodyid] == model.body(name).id
-        self.shape: list[int] = np.flatnonzero(own).tolist()  # all geoms, also those that bump into nothing
+        self.shape: list[int] = np.flatnonzero(own).tolist()  # all geoms, including those without collisions
         self._forces = model.actuator_forcerange[self._drive].copy()
         self._share, self._free = 1.0, False
-        self.leash: tuple[float, float] | None = None  # N in the world, the pull of a hand
-        self.hand: float | None = None  # height in the world at which a hand holds the base_link, m
-        self.standing = 1.0  # share of the wheels that touch the ground
+        self.leash: tuple[float, float] | None = None  # N in the world: the pull of a leash
+        self.hand: float | None = None  # height in the world at which a hand holds base_link, m
+        self.standing = 1.0  # share of the wheels in contact with the ground
         self.overturned = self.pulls = self.rests = self.disturbed = False
         self._belly: int | None = None
         self.legs: HullLegs | None = None
@@ -97,34 +97,34 @@ class Hull:
             self._belly, self._sinking = self.legs.torso, self.legs.sinking
         self._level = slice(self._q, self._q + 4), slice(self._v, self._v + 4)  # x, y, z, yaw and their rates
         self._rates = slice(self._v, self._v + 4 + 2 * self._tilts + bool(body.legs))
-        self._servos = data.actuator_force[self._drive], data.ctrl[self._drive]  # views: they show what is now
-        self.floor, self._counted = 0, 0.0  # and the elevation at which the floor was found, m
+        self._servos = data.actuator_force[self._drive], data.ctrl[self._drive]  # views of the current values
+        self.floor, self._counted = 0, 0.0  # and the elevation at which that was found, m
         self.x = self.y = 0.0  # base_link in world, m
         self.turned = 0.0  # yaw without wrapping, rad
-        self._pose: Pose | None = None  # x, y and yaw, once they are read
+        self._pose: Pose | None = None  # x, y and yaw, once read
         self.elevation = 0.0  # height of base_link in the world, m
         self.tilt = LEVEL  # roll and pitch, rad, REP-103
-        self.tilting = LEVEL  # how fast they change, rad/s
+        self.tilting = LEVEL  # their rates, rad/s
         self.loose = False  # whether the wheels may have left the ground
-        self.attitude = STRAIGHT  # how the legs hold the torso against base_link, rad; truth, no physics
-        self.shift = Point()  # of the torso's middle against base_link, by the legs, m
-        self.clearance = body.hull.clearance  # what is lower passes under the chassis, m
-        self.effort = 0.0  # what the legs draw besides traction, W
+        self.attitude = STRAIGHT  # the torso's attitude on its legs, relative to base_link, rad; truth, without physics
+        self.shift = Point()  # the torso's centre relative to base_link, by the legs, m
+        self.clearance = body.hull.clearance  # lower objects pass under the chassis, m
+        self.effort = 0.0  # power of the legs besides traction, W
         self.belly = body.hull.height - body.hull.torso_height  # height of the torso's underside above the floor, m
         self.motion = (0.0, 0.0, 0.0, 0.0)  # along x, y and z (m/s, world; z of the torso), and the turn rate (rad/s)
-        self.before = self.motion  # the same a step ago
-        self.gaze = LEVEL  # pitch and yaw of the gimbal, rad; a robot without looks straight ahead
-        self.touches: list[Touch] = []  # what touches the hull now, docks left out
-        self.when_touched: list[Duty] = []  # begin when something touches the hull
+        self.before = self.motion  # the same one step earlier
+        self.gaze = LEVEL  # pitch and yaw of the gimbal, rad; zero without one
+        self.touches: list[Touch] = []  # current contacts of the hull, except docks
+        self.when_touched: list[Duty] = []  # start when the hull is touched
         self.edges, self.walls = Nearness(body.hull.radius), Nearness(body.hull.radius)
-        self._looked = 0.0, 0.0, -1, 0.0  # where it looked for them last, the floor, and how far that holds, m
+        self._looked = 0.0, 0.0, -1, 0.0  # where they were last looked up, on which floor; m for which it holds
 
     @property
     def geoms(self) -> list[int]:
         """The geoms that bump into things."""
         return self._solid
 
-    # -- where it is -------------------------------------------------------------------------------------------------
+    # -- where it is ---------------------------------------------------------------------------------------------------
 
     def place(self, pose: Pose, floor: int) -> None:
         """Put it there, standing still."""
@@ -228,16 +228,16 @@ class Hull:
         """True if chassis, torso or what is between them reach to ``height`` m above the floor."""
         return self.clearance <= height - self.rise < self.belly + self.body.hull.torso_height
 
-    # -- how it moves ------------------------------------------------------------------------------------------------
+    # -- how it moves --------------------------------------------------------------------------------------------------
 
     def drive(self, twist: Twist, seconds: float) -> None:
         """Let the wheels pull at ``twist`` (base_link) for the next ``seconds``, if they stand on the ground."""
         if self.hand is not None or self.overturned or self._free:
-            self._servos[1][:] = 0.0  # the hand holds it, or it lies there
+            self._servos[1][:] = 0.0  # held by a hand, or lying
             self.pulls = False
             return
         vx, vy = twist.x, twist.y
-        if self._tilts:  # the wheels measure along the slope, and hold against it
+        if self._tilts:  # the wheels measure along the slope and hold against it
             roll, pitch = self.tilt
             vx = vx * math.cos(pitch) - GRAVITY * math.tan(pitch) / DRIVE_GAIN
             vy = vy * math.cos(roll) + GRAVITY * math.tan(roll) / DRIVE_GAIN
@@ -269,7 +269,7 @@ class Hull:
         self._share = ROLLING if free else 1.0
         self._model.actuator_forcerange[self._drive] = self._forces * self._share
 
-    # -- what hands do to it -----------------------------------------------------------------------------------------
+    # -- hands ---------------------------------------------------------------------------------------------------------
 
     def lift(self, height: float | None) -> None:
         """Hold it so high above where it is (m), or let go (None)."""
@@ -313,14 +313,14 @@ class Hull:
         force, speed = self._servos
         return max(0.0, float(force.dot(speed)))
 
-    # -- leaps ------------------------------------------------------------------------------------------------------
+    # -- leaps ---------------------------------------------------------------------------------------------------------
 
     def leap(self, x: float, y: float, turn: float, airtime: float) -> None:
         """Take off at this velocity (base_link, m/s, rad/s) and fly for ``airtime`` s if the ground is level."""
         self.support.release()
         c, s = math.cos(self.turned), math.sin(self.turned)
-        up = GRAVITY * (airtime + float(self._model.opt.timestep)) / 2  # Euler's steps fall a little too fast
-        self._data.qvel[self._rates] = 0.0  # the torso has no way of its own any more: it takes the rest along
+        up = GRAVITY * (airtime + float(self._model.opt.timestep)) / 2  # Euler integration falls slightly too fast
+        self._data.qvel[self._rates] = 0.0  # the torso has no momentum of its own any more: it carries the rest along
         self._data.qvel[self._v : self._v + 4] = (c * x - s * y, s * x + c * y, up, turn)
         self.loose = True
 

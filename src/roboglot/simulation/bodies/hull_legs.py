@@ -20,7 +20,7 @@ class HullLegs:
 
     def __init__(self, model: MjModel, data: MjData, name: str, body: Body) -> None:
         self._model, self._section = model, body.hull
-        self._positions, self._ctrl = data.qpos, data.ctrl  # views: they show what is now
+        self._positions, self._ctrl = data.qpos, data.ctrl  # views of the current values
         torso, self._servo = model.joint(f"{name} torso"), model.actuator(f"{name} torso").id
         self.torso, self.sinking = int(torso.qposadr[0]), int(torso.dofadr[0])
         self._gains = (model.actuator_gainprm[self._servo].copy(), model.actuator_biasprm[self._servo].copy())

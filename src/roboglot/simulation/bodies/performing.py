@@ -17,13 +17,13 @@ from roboglot.model.geometry import LEVEL, STILL, Orientation, Point, Pose, Twis
 from roboglot.simulation.bodies.footfalls import Order, Swings, lifted
 from roboglot.simulation.bodies.support import GRAVITY
 
-CROUCH, PUSH, RECOVER = 0.20, 0.08, 0.25  # s: bending before a jump, stretching, straightening after it
-DIP = 0.08  # m of bending
-RAMP = 1.5  # s at most into and out of a figure
-OFF_MAX, OFF_ANGLE_MAX = 0.08, 0.15  # m and rad that a motion may end beside its place before it counts as stopped
-PAWS = lifted(FootLift(0.06, 0.06))  # m that paws are lifted in figures
+CROUCH, PUSH, RECOVER = 0.20, 0.08, 0.25  # s: to bend before a jump, to stretch, to straighten after it
+DIP = 0.08  # m by which it bends
+RAMP = 1.5  # s at most to enter and leave a figure
+OFF_MAX, OFF_ANGLE_MAX = 0.08, 0.15  # m and rad from the expected end within which a motion counts as completed
+PAWS = lifted(FootLift(0.06, 0.06))  # m by which paws are lifted in figures
 RUN_SPEED = 0.8  # m/s, mean of a run-up
-STRAIGHTEN = 0.6  # s back to standing straight
+STRAIGHTEN = 0.6  # s to straighten up again
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +58,8 @@ class Frame:
     leap: float = 0.0
     airborne: bool = False
     landed: bool = False
-    lift: float | None = None  # m that every foot is lifted at least while stepping; None: as it walks
-    feet: Swings | None = None  # who is in the air; None: as it walks
+    lift: float | None = None  # m by which every foot is lifted at least while stepping; None: the gait's
+    feet: Swings | None = None  # feet in the air; None: the gait's
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +125,7 @@ def dance_frames(
         holds = step.footholds or lifted(step.lift)
         lift = min(hold.lift for hold in holds)
         end += step.seconds
-        count = round(end / stance.tick) - ticks  # what is rounded does not add up
+        count = round(end / stance.tick) - ticks  # rounded values do not add up
         for index in range(count):
             twist = _gripping(twist, step.twist, step.friction * GRAVITY * stance.tick)
             feet = order.swings(ticks * stance.tick, holds, step.landing) if order else None
@@ -178,7 +178,7 @@ def _figure(spec: MotionSpec, begin: Body, stance: Stance) -> Iterator[Frame]:
         t = part * duration
         into, out = ease(t / ramp), ease((duration - t) / ramp)
         body = begin.towards(rest, into) if t < duration - ramp else end.towards(rest, out)
-        # Whole waves: the mean of the speed is way / duration.
+        # Whole periods, so that the mean speed is distance / duration.
         wave = (1.0 - math.cos(math.tau * part)) / duration
         twist = Twist(spec.way.x * wave, spec.way.y * wave, spec.way.yaw * wave) if spec.way != Pose() else STILL
         feet = order.swings(t - ramp, PAWS, 1.0) if order and ramp <= t <= duration - ramp else None

@@ -27,8 +27,8 @@ from roboglot.simulation.bodies.performing import Body
 
 STEP_SECONDS_MAX = 60.0
 INWARD_MAX = 0.05  # m
-ON_TWO_FEET_MAX, ON_FEWER_MAX = 0.6, 0.3  # s that a robot keeps its balance; three carry it for ever
-TAUT, GIVING = 3.0, 0.05  # N of a pull that it feels, and m/s that it gives way for every N more
+ON_TWO_FEET_MAX, ON_FEWER_MAX = 0.6, 0.3  # s for which a robot keeps its balance; on three feet, forever
+TAUT, GIVING = 3.0, 0.05  # N of a pull that it notices, and m/s by which it yields per further N
 
 
 def added(now: Body, by: BodyPose, limits: LegLimits) -> BodyPose:
@@ -100,7 +100,7 @@ def _check_balance(footfalls: Sequence[Footfall]) -> None:
     if not all(FOOTFALL_SECONDS_MIN <= footfall.seconds <= STEP_SECONDS_MAX for footfall in footfalls):
         raise InvalidGoal(f"a footfall takes {FOOTFALL_SECONDS_MIN} to {STEP_SECONDS_MAX:g} s")
     runs = [(down, sum(each.seconds for each in same)) for down, same in groupby(footfalls, lambda each: each.down)]
-    if runs[0][0] == runs[-1][0]:  # again from the start: it goes on where it ended
+    if runs[0][0] == runs[-1][0]:  # the run continues at the beginning
         endless = len(runs) == 1
         runs[0] = (runs[0][0], math.inf if endless else runs[0][1] + runs[-1][1])
     for down, seconds in runs:

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from operator import length_hint
 
-CYCLE_MAX = 100  # ticks after which the order of calls repeats itself at the latest
-Entry = tuple[int, Callable[..., None], float]  # rank, what is called, s since its last call
+CYCLE_MAX = 100  # ticks after which the order of calls repeats at the latest
+Entry = tuple[int, Callable[..., None], float]  # rank, function, s since its last call
 
 
 class Duty:
@@ -62,8 +62,8 @@ class Schedule:
     def __init__(self, jobs: Sequence[Job], tick: float) -> None:
         self._seconds = tick
         self._jobs = [_every_tick(job) if CYCLE_MAX % job.every else job for job in jobs]
-        self._entries: dict[tuple[int, int], Entry] = {}  # by rank and the ticks since the last call
-        self._start = max((job.first for job in self._jobs), default=1)  # from then on all goes round
+        self._entries: dict[tuple[int, int], Entry] = {}  # by rank and ticks since the last call
+        self._start = max((job.first for job in self._jobs), default=1)  # from then on the order is periodic
         self._length = self._start + math.lcm(*(job.every for job in self._jobs))
         self._rounds: list[list[Entry]] = [self._round(tick) for tick in range(1, self._length + 1)]
         self._next = self._at = 0
@@ -118,7 +118,7 @@ class Schedule:
             return None
         ticks = job.first if tick == job.first else job.every
         entry = self._entries.get((rank, ticks))
-        if entry is None:  # the seconds are added up as time is, to the last bit
+        if entry is None:  # the seconds are summed like the clock's, to the last bit
             entry = self._entries[rank, ticks] = rank, job.call, sum([self._seconds] * ticks)
         return entry
 

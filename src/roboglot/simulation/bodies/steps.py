@@ -47,7 +47,7 @@ class Steps:
         if frame and frame.feet:
             swings = frame.feet
         elif velocity != STILL or (self.feet.restless and standing):
-            if frame or velocity == STILL:  # otherwise the body swings with the steps and counts them
+            if frame or velocity == STILL:  # otherwise the body would sway with the steps and count them
                 self.count += GAITS[self.gait].steps * seconds
             swings = walking(self.gait, self.count, self.lift)
         self.feet.step(self._hull.pose, velocity, swings, seconds)

@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from mujoco import MjModel
 
 GRAVITY = 9.81
-STANDS, FOOT, HANGS, MOVES = 1, 2, 4, 8  # bits of what meets what
-SPRING, DAMPER = 2500.0, 100.0  # 1/s2 and 1/s, of the floor per kg
-SETTLED, LIFTED = 1e-4, 1e-3  # m/s up to which it stands on the floor, and m by which it does not any more
+STANDS, FOOT, HANGS, MOVES = 1, 2, 4, 8  # collision bits
+SPRING, DAMPER = 2500.0, 100.0  # 1/s2 and 1/s: stiffness and damping of the floor per kg
+SETTLED, LIFTED = 1e-4, 1e-3  # m/s up to which it rests on the floor, and m from which it is off it
 NEAR = 0.3  # m beyond the rim
-AGAIN = 0.1  # m that a robot goes near something until it is seen whether it still is
+AGAIN = 0.1  # m of motion near an object after which the distance is checked again
 
 
 class Nearness:
@@ -29,13 +29,13 @@ class Nearness:
     def __init__(self, radius: float) -> None:
         self._zone = radius + NEAR  # m from the middle
         self._room: Callable[[float, float, int], float] | None = None
-        self._x = self._y = 0.0  # where it was looked last
+        self._x = self._y = 0.0  # where the distance was last checked
         self._floor = -1
         self._free = 0.0  # m from there
         self._next = -math.inf  # m from there to the nearest
         self._radius = radius
         self._duties: list[Duty] = []
-        self.near = True  # before it knows where things are, they may be anywhere
+        self.near = True  # before the first check objects may be anywhere
 
     def call(self, duty: Duty, reach: float = 0.0) -> Duty:
         """Have ``duty`` begin when it may be within ``reach`` m of the middle, or near the rim."""
@@ -86,7 +86,7 @@ class Support:
         self._model, self._mass, self._wheels = model, mass, wheels
         self._body, self._chassis = model.body(name).id, model.geom(f"{name} chassis").id
         self._joint, self._q, self._v = joint.id, int(joint.qposadr[0]), int(joint.dofadr[0])
-        self._rest = 0.0  # where it stands on the spring, m
+        self._rest = 0.0  # m: compression of the spring at rest
         self._bits = STANDS | MOVES
         self.sprung = False
 

@@ -36,7 +36,7 @@ class Torso:
         """Hold it like this from now on."""
         self.taken = body
         self._legs.hold(body.height, weightless=weightless)
-        # The one object where the torso is level: the IMU asks for it in every tick.
+        # One shared object for a level torso: the IMU asks for it in every tick.
         self._hull.attitude = LEVEL if body.attitude == LEVEL else body.attitude
         self._hull.shift = body.shift
 

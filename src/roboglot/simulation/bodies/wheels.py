@@ -30,7 +30,7 @@ class Wheels:
         """These motors give nothing from now on: their wheels drag."""
         if wheels - set(WheelSpeeds.__slots__):
             raise ValueError(f"a wheel is one of {', '.join(WheelSpeeds.__slots__)}")
-        if not self.mecanum:  # one motor a side
+        if not self.mecanum:  # one motor per side
             sides = {wheel.split("_")[1] for wheel in wheels}
             wheels = frozenset(wheel for wheel in WheelSpeeds.__slots__ if wheel.split("_")[1] in sides)
         self.dead = wheels

@@ -17,7 +17,7 @@ from roboglot.simulation.world.description import WorldDescription
 if TYPE_CHECKING:
     from roboglot.simulation.building.lift import LiftCar
 
-STEP = 0.03  # m that the car may be lower until that is a drop
+STEP = 0.03  # m by which the car may be lower before that counts as a drop
 
 
 class Walls:

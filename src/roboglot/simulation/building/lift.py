@@ -17,11 +17,11 @@ from roboglot.simulation.building.lift_passengers import Passengers
 from roboglot.simulation.building.mechanics import Mechanics
 from roboglot.simulation.world.description import WorldDescription
 
-HOLD_MAX = 120.0  # s that one may keep the door open
+HOLD_MAX = 120.0  # s for which a client may keep the door open
 CALLS_MAX = 20
-BLOCKED_AFTER = 15.0  # s of an obstructed door until that counts as a failure
+BLOCKED_AFTER = 15.0  # s of obstruction after which the door has failed
 LEVEL = 0.003  # m within which the car stands level with a floor
-SETTLING = 0.3  # s that the car takes to come to rest at a floor
+SETTLING = 0.3  # s for the car to come to rest at a floor
 
 Listener = Callable[[Event], None]
 
@@ -38,7 +38,7 @@ class LiftCar:
         self.names = tuple(floor.name or str(number) for number, floor in enumerate(world.floors))
         self.listeners: list[Listener] = []
         self.in_service = True
-        self._floor = world.lift.parked_at  # where it stands or stood last
+        self._floor = world.lift.parked_at  # the floor where it stands or last stood
         self._target: int | None = None
         self._calls: list[int] = []
         self._opening, self._door = 1.0, LiftDoor.OPEN
@@ -73,7 +73,7 @@ class LiftCar:
         load = self.passengers.load(self) / self.section.capacity
         return LiftState(self.floor, self._target, self._door, load, self.in_service, bool(self._failure))
 
-    # -- asking it -----------------------------------------------------------------------------------------------------
+    # -- status --------------------------------------------------------------------------------------------------------
 
     def call(self, floor: int) -> None:
         """Have it come. Raises InvalidGoal, and Refused when out of service or called too often."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Squares = NDArray[np.uint8]
-QR_BYTES_MAX = 106  # in the largest that is made here
+QR_BYTES_MAX = 106  # in the largest code produced here
 _FAMILY = Path(__file__).parent / "april_36h11.json"  # 36 bits each, row by row, 1 is white
 # By version, error correction level L, one block: bytes of data and of correction.
 _QR_SIZES = {1: (19, 7), 2: (34, 10), 3: (55, 15), 4: (80, 20), 5: (108, 26)}

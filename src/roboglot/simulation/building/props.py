@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 OBSTACLES_MAX = 16
 PASSENGERS_MAX = 4
-TAGS_MAX = 16  # that hands hang up
-SHELF_PARTS = 5  # four legs and the board
-AWAY = (0.0, 0.0, -50.0)  # where what is not there waits
+TAGS_MAX = 16  # put up by hands
+SHELF_PARTS = 5  # four legs and a board
+AWAY = (0.0, 0.0, -50.0)  # where absent props wait
 
 
 class Props:
@@ -30,7 +30,7 @@ class Props:
     def __init__(self, model: MjModel, data: MjData, elevations: list[float]) -> None:
         self._model, self._data, self._elevations = model, data, elevations
         self.solids: dict[str, tuple[int, Solid]] = {}
-        self.revisions: dict[int, int] = defaultdict(int)  # per floor, counts changes
+        self.revisions: dict[int, int] = defaultdict(int)  # number of changes per floor
         self.tags: dict[int, tuple[int, PrintedTag]] = {}
         """Printed codes that hands hung up, by number: floor and code; nothing collides with them."""
 

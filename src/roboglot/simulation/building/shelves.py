@@ -22,7 +22,7 @@ class ShelfStand:
 
     def __init__(self, shelf: Shelf, floor: int, key: str, props: Props, world: WorldDescription) -> None:
         self.shelf, self.floor, self._key, self._props, self._world = shelf, floor, key, props, world
-        self._fixed: dict[int, list[Solid]] = {}  # by floor, what cannot be moved
+        self._fixed: dict[int, list[Solid]] = {}  # by floor: immovable solids
         self.pose = shelf_pose(shelf)
         self.lifted = 0.0  # m above the floor
         self._show()

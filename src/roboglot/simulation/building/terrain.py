@@ -11,8 +11,8 @@ from collections.abc import Iterator, Sequence
 from roboglot.model.geometry import Pose
 from roboglot.simulation.world.description import Terrain, WorldDescription
 
-BELOW = 0.05  # m that pieces reach into the floor, so that no edge is sharp there
-FLAT = 1e-4  # m; what is lower changes the grip only
+BELOW = 0.05  # m by which pieces extend into the floor, so that there is no sharp edge
+FLAT = 1e-4  # m; lower pieces only change the friction
 
 Corner = tuple[float, float, float]
 

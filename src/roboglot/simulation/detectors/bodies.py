@@ -26,12 +26,12 @@ from roboglot.simulation.people import figure
 from roboglot.simulation.people.people import Walker
 
 PEOPLE_RANGE, GESTURE_RANGE, ROBOT_RANGE = 15.0, 5.0, 8.0  # m
-PERSON_HEIGHT, FACE_HEIGHT, ROBOT_HEIGHT = 0.06, 0.045, 0.03  # the least that must be filled of the picture's height
-PART = 0.35  # of a body that must be seen
-FRONTAL = math.radians(60)  # how far a face or a gesturing person may be turned away
-GESTURE_TIME = 0.4  # s until a gesture is distinguished from a chance movement
+PERSON_HEIGHT, FACE_HEIGHT, ROBOT_HEIGHT = 0.06, 0.045, 0.03  # smallest share of the picture's height
+PART = 0.35  # of a body that must be visible
+FRONTAL = math.radians(60)  # the largest angle of a face or a gesturing person
+GESTURE_TIME = 0.4  # s to distinguish a gesture from a chance movement
 AGE_NOISE = 1.5  # years
-FACE_LOW, FACE_HIGH = np.array((-0.10, -0.085, -0.13)), np.array((0.11, 0.085, 0.13))  # around the head's middle
+FACE_LOW, FACE_HIGH = np.array((-0.10, -0.085, -0.13)), np.array((0.11, 0.085, 0.13))  # around the centre of the head
 HEAD = slice(0, 5)
 WRIST = JOINTS.index("right_wrist")
 

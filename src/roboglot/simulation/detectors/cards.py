@@ -12,9 +12,9 @@ from roboglot.simulation.building.cards import Card
 from roboglot.simulation.building.tags import fixed_tags, moving_tags
 from roboglot.simulation.detectors.glance import Floats, Glance
 
-SLANT = math.radians(65)  # how far a card may be turned away
-CARD_HEIGHT = {"marker": 0.025, TagKind.APRIL: 0.025, TagKind.QR: 0.06}  # the least of the picture's height
-GRID = 7  # spots across a card that must all be seen
+SLANT = math.radians(65)  # the steepest angle to a card
+CARD_HEIGHT = {"marker": 0.025, TagKind.APRIL: 0.025, TagKind.QR: 0.06}  # smallest share of the picture's height
+GRID = 7  # points across a card that must all be visible
 ASIDE, UP = (axis.ravel() for axis in np.meshgrid(*2 * [np.linspace(-0.5, 0.5, GRID)]))
 TAG_YAW_NOISE = math.radians(0.8)
 TAG_HEIGHT_NOISE = 0.003  # m

@@ -20,11 +20,11 @@ from roboglot.simulation.world.description import WorldDescription
 from roboglot.simulation.world.sightlines import Obstacles, SightLines
 
 Floats = NDArray[np.float64]
-BOX_NOISE = 0.003  # of a box's extent, one standard deviation
+BOX_NOISE = 0.003  # of a box's size, one standard deviation
 PIXEL_NOISE = 0.001  # of the picture's width
 RANGE_NOISE = 0.02  # of the distance
 BEARING_NOISE = math.radians(0.3)
-MISSED = 0.01  # of what could be seen
+MISSED = 0.01  # share of visible objects that are missed
 
 
 class Surroundings:

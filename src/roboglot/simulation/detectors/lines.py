@@ -10,7 +10,7 @@ from roboglot.simulation.detectors.glance import PIXEL_NOISE, Floats, Glance
 from roboglot.simulation.detectors.tapes import Tape
 
 LINE_RANGE = 3.0  # m
-SHORTEST = 12  # points of a tape in one piece that make a line
+SHORTEST = 12  # points of uninterrupted tape that make a line
 CURVATURE_NOISE = 0.02  # 1/m
 
 

@@ -13,8 +13,8 @@ from roboglot.simulation.world.description import Floor, Line
 
 Floats = NDArray[np.float64]
 SPACING = 0.02  # m between points
-SMOOTH = 6  # points to both sides over which curvature is taken
-POINTS_MAX = 20_000  # of one line
+SMOOTH = 6  # points on either side over which curvature is computed
+POINTS_MAX = 20_000  # per line
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -50,7 +50,7 @@ from roboglot.simulation.world.truth import Truth
 
 Undo = Callable[[], object]
 C = TypeVar("C", bound=Component)
-DELAY_MAX = 60.0  # s by which answers can be made late
+DELAY_MAX = 60.0  # s: the longest delay of answers
 KIDNAP_TRIES = 400
 KIDNAP_DISTANCE = 4.0  # m at least
 

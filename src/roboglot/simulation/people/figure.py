@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from roboglot.model.perception import JOINTS, Gesture, Sport
 
 Floats = NDArray[np.float64]
-TALL, WIDE = 1.75, 0.22  # m: the height and radius that the places below are given for
-STRIDE, SWING = 0.72, 0.35  # m per step; m that ankles go back and forth
-PAD_LOW = np.array((0.10, 0.05, 0.08))  # m of flesh around the joints, below, behind and to the right
+TALL, WIDE = 1.75, 0.22  # m: height and radius to which the places below refer
+STRIDE, SWING = 0.72, 0.35  # m per step; m of an ankle's swing
+PAD_LOW = np.array((0.10, 0.05, 0.08))  # m around the joints, below, behind and to the right
 PAD_HIGH = np.array((0.10, 0.05, 0.10))
 _INDEX = {name: number for number, name in enumerate(JOINTS)}
 _Places = dict[str, tuple[float, float, float]]
@@ -35,7 +35,7 @@ _JUMPED: _Places = {
     "shoulder": (0, 0.19, 1.45), "elbow": (0, 0.32, 1.66), "wrist": (0, 0.20, 1.90), "knee": (0.02, 0.26, 0.51),
     "ankle": (0, 0.42, 0.10),
 }  # fmt: skip
-_LYING: _Places = {  # on the back, feet ahead
+_LYING: _Places = {  # on the back, feet first
     "nose": (-0.62, 0, 0.20), "eye": (-0.66, 0.035, 0.19), "ear": (-0.64, 0.08, 0.10), "shoulder": (-0.45, 0.19, 0.10),
     "elbow": (-0.50, 0.33, 0.14), "wrist": (-0.66, 0.14, 0.16), "hip": (0.05, 0.10, 0.10), "knee": (0.33, 0.10, 0.42),
     "ankle": (0.55, 0.10, 0.08),
@@ -45,7 +45,7 @@ _SITTING: _Places = {
     "elbow": (0.30, 0.30, 0.66), "wrist": (0.16, 0.14, 0.78), "hip": (0.05, 0.10, 0.10), "knee": (0.33, 0.10, 0.42),
     "ankle": (0.55, 0.10, 0.08),
 }  # fmt: skip
-_PRESSED_UP: _Places = {  # arms straight, head ahead
+_PRESSED_UP: _Places = {  # arms straight, head first
     "nose": (0.83, 0, 0.56), "eye": (0.84, 0.035, 0.60), "ear": (0.76, 0.08, 0.63), "shoulder": (0.55, 0.19, 0.55),
     "elbow": (0.56, 0.22, 0.29), "wrist": (0.57, 0.22, 0.03), "hip": (0.07, 0.10, 0.40), "knee": (-0.32, 0.10, 0.25),
     "ankle": (-0.72, 0.10, 0.10),
@@ -80,7 +80,7 @@ _ENDS: dict[Sport, tuple[Floats, Floats]] = {
     Sport.PUSH_UP: (_arranged(_PRESSED_UP), _arranged(_PRESSED_DOWN)),
     Sport.PLANK: (_arranged(_PLANKING), _arranged(_PLANKING)),
 }
-# Where the right elbow and wrist are; for those that move, where the wrist goes to within a second and back.
+# Places of the right elbow and wrist; for gestures that move, where the wrist goes within a second and back.
 _ARMS: dict[Gesture, tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]] = {
     Gesture.PULL: ((0.20, -0.30, 1.15), (0.55, -0.22, 1.35), (0.25, -0.22, 1.35)),
     Gesture.PUSH: ((0.20, -0.30, 1.15), (0.25, -0.22, 1.35), (0.55, -0.22, 1.35)),
@@ -127,7 +127,7 @@ def exercising(sport: Sport, part: float) -> Floats:
         begin, end = _ENDS[sport]
         return begin + (end - begin) * _there_and_back(part)
     joints = UPRIGHT.copy()
-    side = "left" if math.floor(part) % 2 == 0 else "right"  # one knee after the other
+    side = "left" if math.floor(part) % 2 == 0 else "right"  # alternating knees
     raised = _there_and_back(part)
     joints[_INDEX[f"{side}_knee"]] += np.array((0.40, 0, 0.45)) * raised
     joints[_INDEX[f"{side}_ankle"]] += np.array((0.32, 0, 0.45)) * raised

@@ -28,14 +28,14 @@ from roboglot.simulation.people.routine import (
 from roboglot.simulation.sound.voice import speaking_time
 from roboglot.simulation.world.description import Person
 
-MANNERS = 0.8  # m to a robot ahead at which people wait
+MANNERS = 0.8  # m in front of a robot at which people wait
 SIDE = 0.55  # m to the side at which they still pass it
-PATIENCE = 2.5  # s that they wait for a robot before they step aside
-ASIDE = 0.75  # m that they step aside, or else back
-APART = 0.45  # m to a robot's middle that they keep, whatever they do
+PATIENCE = 2.5  # s for which they wait for a robot before they step aside
+ASIDE = 0.75  # m by which they step aside, or back
+APART = 0.45  # m from a robot's centre that they always keep
 TURN_RATE = 2.5  # rad/s
 CLAP_PAUSE = 0.35  # s between claps
-ORDERS_MAX = 100  # steps that wait for one person
+ORDERS_MAX = 100  # steps queued per person
 
 
 class Placed(Protocol):
@@ -60,22 +60,22 @@ class Walker:
         self.person, self.floor, self.key, self.body, self.look = person, floor, person.name or body, body, look
         self.emotion = person.emotion
         self.walking = False
-        self.displaced = False  # whether they were put elsewhere since the last tick
-        self.aloud: list[Say | Clap] = []  # what they began to say or clap since it was fetched last
+        self.displaced = False  # whether they were moved since the last tick
+        self.aloud: list[Say | Clap] = []  # what they began to say or clap since the last fetch
         self._script = person.script or tuple(_strolling(person))
         self._number = 0
-        self._told: deque[Step] | None = None  # None: they follow their script
+        self._told: deque[Step] | None = None  # None: their own routine
         self.doing: Step | None = None
         self._elapsed = 0.0
         self._way = self._waited = 0.0
-        self._dodging: Point | None = None  # where they go to let a robot pass
+        self._dodging: Point | None = None  # their destination while they let a robot pass
         path = [Point(*spot) for spot in person.path]
         facing = path[0].bearing_to(path[1]) if len(path) > 1 else 0.0
         if person.facing is not None:
             facing = math.radians(person.facing)
         self.pose = Pose(path[0].x, path[0].y, facing)
 
-    # -- what can be seen of them --------------------------------------------------------------------------------------
+    # -- appearance ----------------------------------------------------------------------------------------------------
 
     @cached_property
     def face(self) -> bytes:
@@ -109,7 +109,7 @@ class Walker:
         aloud, self.aloud = self.aloud, []
         return aloud
 
-    # -- orders --------------------------------------------------------------------------------------------
+    # -- orders --------------------------------------------------------------------------------------------------------
 
     def order(self, step: Step) -> None:
         """Leave the script and do this, after earlier orders. Raises ValueError if that is too much."""
@@ -171,7 +171,7 @@ class Walker:
     def _do(self, seconds: float, robots: Sequence[Placed], free: Free) -> bool:
         """True if the step is over."""
         doing = self.doing
-        if isinstance(doing, Walk):  # what they do most
+        if isinstance(doing, Walk):  # the most frequent step
             return self._walk_on(doing, robots, seconds, free)
         match doing:
             case Look(at=at):

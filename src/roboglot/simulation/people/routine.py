@@ -9,7 +9,7 @@ from msgspec import Meta, Struct
 from roboglot.model.perception import Emotion, Gesture, Sport
 
 STEPS_MAX = 200
-TEXT_MAX = 300  # characters said at once
+TEXT_MAX = 300  # characters per utterance
 
 Coordinate = Annotated[float, Meta(ge=-10_000, le=10_000)]
 Spot = tuple[Coordinate, Coordinate]

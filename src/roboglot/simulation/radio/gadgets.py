@@ -24,7 +24,7 @@ class GadgetInWorld:
     battery: float
     on: bool = True
     stick: Twist = STILL
-    presses: int = 0  # of the gear's button so far
+    presses: int = 0  # of the gear button so far
 
     def steer(self, forward: float = 0.0, left: float = 0.0, turn: float = 0.0) -> None:
         """Hold the stick there from now on; without values it springs back. Raises ValueError beyond -1..1."""

@@ -13,13 +13,13 @@ from roboglot.model.geometry import Point, Pose
 from roboglot.simulation.building.blueprint import Kind, solids_of
 from roboglot.simulation.world.description import AccessPoint, Mobile, WorldDescription
 
-EXPONENT = 2.2  # indoors, in sight
+EXPONENT = 2.2  # indoors, with line of sight
 WALL_LOSS = 4.0  # dB
 SLAB_LOSS = 15.0
 SILENCE = -200.0
 
 
-FIRST_HOST = 100  # of the addresses that are given out
+FIRST_HOST = 100  # of the assigned addresses
 HOSTS_MAX = 154
 
 

@@ -38,14 +38,14 @@ HAIRS: tuple[Rgb, ...] = ((40, 28, 22), (96, 62, 34), (24, 24, 26), (170, 130, 7
 SKIN: tuple[Rgb, ...] = ((236, 196, 168), (198, 150, 116), (128, 88, 64), (246, 212, 188))
 ROBOTS: tuple[Rgb, ...] = ((240, 130, 40), (60, 150, 220), (110, 190, 80), (200, 80, 150), (230, 210, 70))
 SIDES = 8
-LIMBS = (  # joints at both ends, radii there (m), cloth
+LIMBS = (  # the joints at its ends, radii there (m), cloth
     ("shoulder", "elbow", 0.058, 0.048, 0), ("elbow", "wrist", 0.046, 0.034, 0), ("hip", "knee", 0.092, 0.068, 1),
     ("knee", "ankle", 0.064, 0.048, 1),
 )  # fmt: skip
 HAND, FOOT, NECK = (0.038, 0.03, 2), (0.045, 0.035, 4), (0.06, 0.055, 2)
 RADII = np.array([limb[2:] for limb in LIMBS for _ in (0, 1)] + [HAND] * 2 + [FOOT] * 2 + [NECK])
 TORSO = np.array(((-0.16, 0.15, 0.10), (0.1, 0.165, 0.11), (0.5, 0.16, 0.11), (0.85, 0.195, 0.12), (1.03, 0.16, 0.09),
-                  (1.12, 0.05, 0.05)))  # part of the way from hips to shoulders, half width, half depth  # fmt: skip
+                  (1.12, 0.05, 0.05)))  # share of the way from hips to shoulders, half width, half depth  # fmt: skip
 HEAD = np.array(((-0.11, 0.05, 0.05), (-0.06, 0.08, 0.08), (0.01, 0.1, 0.1), (0.06, 0.097, 0.097), (0.11, 0.06, 0.06),
                  (0.13, 0.012, 0.012)))  # m above the ears  # fmt: skip
 HAIR = np.array(((-0.02, 0.1, 0.1), (0.06, 0.108, 0.108), (0.115, 0.07, 0.07), (0.138, 0.012, 0.012)))

@@ -33,14 +33,14 @@ from roboglot.simulation.rendering.shapes import (
     turned,
 )
 
-BAR = 0.018  # m, half the thickness of an arm's bars
-PAW, SHANK = 0.018, 0.16  # m: half a paw, and how long thigh and shank are at least
-ELBOW = 0.55  # each of an arm's two bars, as a share of the way that it can reach
+BAR = 0.018  # m: half the thickness of an arm's bars
+PAW, SHANK = 0.018, 0.16  # m: half a paw; minimum lengths of thigh and shank
+ELBOW = 0.55  # length of each of an arm's two bars, relative to its reach
 DARK, STEEL, BEAD = Paint((44, 46, 52)), Paint((150, 154, 160)), Paint((80, 200, 250), glows=True)
 CAR_WALL, CAR_FLOOR, CAR_LAMP = Paint((176, 180, 184)), Paint((92, 88, 84)), Paint((255, 252, 240), glows=True)
 RAIL = Paint((110, 112, 116))
-CAR_HEIGHT, SKIN = 2.2, 0.03  # m: inside; how far its panels stand before the shaft's walls
-# Where a zone's lamps are: direction from the middle (rad), width (share of the radius), height (share of the torso).
+CAR_HEIGHT, SKIN = 2.2, 0.03  # m: inside; distance of its panels from the shaft's walls
+# Place of a zone's lamps: direction from the centre (rad), width (share of the radius), height (share of the torso).
 PLACES: dict[str, tuple[float, float, float]] = {
     "front": (0.0, 0.7, 0.12),
     "head": (0.0, 0.9, 0.86),

@@ -15,8 +15,8 @@ from roboglot.simulation.building.blueprint import Kind, Solid
 from roboglot.simulation.world.description import Floor, Wall
 
 CELL = 0.1  # m
-CELLS_MAX = 1000  # along a side; larger floors get larger cells
-SOFTNESS = 3  # cells that a shadow reaches
+CELLS_MAX = 1000  # along one side; larger floors get larger cells
+SOFTNESS = 3  # cells over which a shadow extends
 DARK = 0.5
 Cells = NDArray[np.uint8]
 

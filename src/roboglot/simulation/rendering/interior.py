@@ -64,10 +64,10 @@ GROUNDS: tuple[Paint, ...] = (
 )
 CEILING = Paint((150, 150, 150), (255, 255, 250), Texture.CEILING, glows=True)
 SKY = Paint((150, 190, 230), glows=True)
-GROUND_TILE = 2.0  # m of floor or ceiling that one texture covers
-LINTEL = 2.1  # m above which a doorway is closed, for the eye only
-PROUD = 0.004  # m that what hangs at a wall stands out of it
-PAPER = 1.3  # of a printed code's size: the white around it belongs to it
+GROUND_TILE = 2.0  # m of floor or ceiling per texture tile
+LINTEL = 2.1  # m above which a doorway is closed, in pictures only
+PROUD = 0.004  # m by which objects on a wall protrude
+PAPER = 1.3  # of a printed code's size: its white margin included
 
 
 def interior(floor: Floor, solids: Sequence[Solid], plan: Plan, masks: Masks) -> Iterator[Mesh]:

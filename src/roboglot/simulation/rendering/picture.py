@@ -13,8 +13,8 @@ from roboglot.kernels.raster_shading import shade
 from roboglot.simulation.rendering.interior import GROUND_TILE
 from roboglot.simulation.rendering.views import Eye, Scene
 
-POLYGONS_MAX = 12_000  # drawn in one picture
-LOWEST = 0.05  # m that the eye stays above the floor and below the ceiling
+POLYGONS_MAX = 12_000  # per picture
+LOWEST = 0.05  # m that the eye keeps from floor and ceiling
 
 
 class Renderer:

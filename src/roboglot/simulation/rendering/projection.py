@@ -23,7 +23,7 @@ class View:
     at: Floats
     rotation: Floats
     fov: float
-    aspect: float  # width by height
+    aspect: float  # width / height
 
     def project(self, points: Floats) -> tuple[Floats, Floats]:
         """Return where points (n, 3) appear (n, 2; 0..1 within the picture) and how far ahead they lie, m.
@@ -32,7 +32,7 @@ class View:
         """
         seen = (points - self.at) @ self.rotation.T
         ahead = np.where(seen[:, 2] > NEAREST, seen[:, 2], np.nan)
-        focal = 0.5 / math.tan(self.fov / 2)  # in widths
+        focal = 0.5 / math.tan(self.fov / 2)  # in picture widths
         x = 0.5 + focal * seen[:, 0] / ahead
         y = 0.5 + focal * self.aspect * seen[:, 1] / ahead
         return np.stack((x, y), axis=1), seen[:, 2]

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Rgb = tuple[int, int, int]
-SUN = np.array((0.35, 0.55, 0.76)) / math.sqrt(0.35**2 + 0.55**2 + 0.76**2)  # where most of the light comes from
+SUN = np.array((0.35, 0.55, 0.76)) / math.sqrt(0.35**2 + 0.55**2 + 0.76**2)  # direction of the main light
 FLAT = -1
-EVERYWHERE = 0  # the room of what is drawn whichever rooms are seen
+EVERYWHERE = 0  # the room of shapes drawn regardless of the visible rooms
 
 
 @dataclass(frozen=True, slots=True)

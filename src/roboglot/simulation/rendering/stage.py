@@ -46,7 +46,7 @@ from roboglot.simulation.world.description import WorldDescription
 FAR_AWAY = 60.0  # m beyond which people are not drawn
 FLOOR_LIGHT = 0.95
 LEVEL = (0.0, 0.0)
-SLACK = 0.1  # rad beside what an eye sees: one that nods or leans a little sees more near its picture's corners
+SLACK = 0.1  # rad around an eye's view: one that nods or leans sees slightly more at its picture's corners
 
 
 @dataclass(frozen=True, slots=True)

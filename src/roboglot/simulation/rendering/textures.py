@@ -17,7 +17,7 @@ from roboglot.simulation.building.printed_codes import april, qr
 
 SIZE = 256
 SMALLEST = 2
-SPARES_MAX = 32  # symbols that are asked for later; more than can hang at a time
+SPARES_MAX = 32  # symbols requested later; more than can hang at the same time
 CODE = "code "
 Mask = NDArray[np.uint32]
 
@@ -48,7 +48,7 @@ class Masks:
         names = list(dict.fromkeys(symbols))
         self._symbols = {name: len(Texture) + number for number, name in enumerate(names)}
         surfaces = [_PAINTERS[texture] for texture in Texture]
-        self._spare: OrderedDict[str, int] = OrderedDict()  # asked for later, the oldest first
+        self._spare: OrderedDict[str, int] = OrderedDict()  # requested later, oldest first
         self._growing = threading.Lock()
         self.rows: Mask = np.stack([*(_surface(painter) for painter in surfaces), *(_symbol(name) for name in names)])
 
@@ -78,7 +78,7 @@ def _surface(painter: Callable[[], NDArray[np.float64]]) -> Mask:
     return _with_copies(painter())
 
 
-@lru_cache(maxsize=64)  # of worlds, and of tags that people think of
+@lru_cache(maxsize=64)  # for worlds, and for tags that users invent
 def _symbol(name: str) -> Mask:
     match name:
         case "heart":

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from roboglot.simulation.rendering.floor_plan import Plan
     from roboglot.simulation.rendering.shapes import Floats, Mesh
 
-REACH = 0.5  # m that shadows and arms reach beyond the radius
+REACH = 0.5  # m by which shadows and arms extend beyond the radius
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,7 @@ class Figure:
     z: float
     rotation: Floats
     radius: float
-    reach: float = REACH  # m that it reaches beyond the radius without a shadow
+    reach: float = REACH  # m by which it extends beyond the radius, without a shadow
 
 
 @dataclass(frozen=True, slots=True)

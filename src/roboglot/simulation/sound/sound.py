@@ -17,12 +17,12 @@ from roboglot.simulation.radio.radio import crossed, walls_of
 from roboglot.simulation.world.description import WorldDescription
 
 SPEED = 343.0  # m/s
-NEAREST = 0.25  # m: closer by, a sound grows no louder
-WALL_LOSS = 0.15  # what a wall lets through, of the amplitude
+NEAREST = 0.25  # m: nearer sources do not sound louder
+WALL_LOSS = 0.15  # share of the amplitude that passes a wall
 SLAB_LOSS = 0.01
-STOREY = 3.0  # m of way between floors
+STOREY = 3.0  # m of distance per floor
 SOURCES_MAX = 100
-LINGER = 2.0  # s after its end that a sound may still arrive somewhere
+LINGER = 2.0  # s after its end for which a sound may still arrive somewhere
 
 
 @dataclass(frozen=True, slots=True)

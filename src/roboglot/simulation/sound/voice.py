@@ -18,12 +18,12 @@ from roboglot.model.sound import SAMPLE_RATE, Sound
 
 log = logging.getLogger(__name__)
 PROGRAM = "espeak-ng"
-SECONDS_MAX = 20.0  # of computing
+SECONDS_MAX = 20.0  # of synthesis
 LETTERS_PER_SECOND = 14.0
 SYLLABLES_PER_SECOND = 4.5  # Chinese characters
 SHORTEST = 0.4  # s
 HIGHEST = 3000.0  # Hz in a hum
-HUM = 0.2  # of full scale, a metre away
+HUM = 0.2  # of full scale at a distance of one metre
 CJK = ("\u3400", "\u9fff")
 
 

@@ -62,7 +62,7 @@ class Beads:
         self._rays = rays
         self._flying: deque[_Bead] = deque(maxlen=FLYING_MAX)
         self.targets: list[Target] = []
-        self.landed: deque[Landing] = deque(maxlen=LANDED_MAX)  # the newest last
+        self.landed: deque[Landing] = deque(maxlen=LANDED_MAX)  # newest last
 
     @property
     def flying(self) -> int:

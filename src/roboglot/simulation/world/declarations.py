@@ -16,7 +16,7 @@ import msgspec
 
 T = TypeVar("T")
 FILE_BYTES_MAX = 4_000_000
-DECODED_MAX = 8  # files remembered
+DECODED_MAX = 8  # files cached
 
 
 class BadFile(ValueError):

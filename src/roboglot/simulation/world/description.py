@@ -20,7 +20,7 @@ SOLIDS_MAX = 4000
 PEOPLE_MAX = 50
 FAULTS_MAX = 200
 THINGS_MAX = 100
-APRIL_MAX = 586  # the last tag of the family 36h11
+APRIL_MAX = 586  # the last tag of family 36h11
 GADGETS_MAX = 100
 STAIR_STEPS_MAX = 30
 

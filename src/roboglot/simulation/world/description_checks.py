@@ -24,7 +24,7 @@ from roboglot.simulation.world.description import (
     WorldDescription,
 )
 
-EDGE = 0.5  # m that things may stand out of a floor
+EDGE = 0.5  # m by which objects may protrude from a floor
 
 
 def completed(world: WorldDescription, where: str) -> WorldDescription:

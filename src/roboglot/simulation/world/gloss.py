@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 Rows = NDArray[np.float64]  # n x 4: x, y, x, y of edges counter-clockwise around solids; x, y, radius, 0 of circles
 Vectors = NDArray[np.float64]  # n x 2
 
-SQUARE = math.cos(math.radians(12.0))  # cosine of the angle up to which glass sends a ray back
+SQUARE = math.cos(math.radians(12.0))  # cosine of the angle up to which glass reflects a ray
 OFF = 1e-9  # m, m2
 
 

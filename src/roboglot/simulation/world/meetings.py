@@ -16,12 +16,12 @@ from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.support import GRAVITY
 from roboglot.simulation.building.props import AWAY, Props
 
-ROOM = 0.02  # m that are kept free of doubt: more than contacts reach beyond the shapes
+ROOM = 0.02  # m of safety margin: more than contacts extend beyond the shapes
 PERSON_MAX = 3.0  # m/s
 STILL = 1e-6  # m/s
 HORIZON, FAR = 1.0, 1000.0  # s, m
-AGAIN, AGAIN_MAX = 0.06, 0.5  # s until it is looked again after something was near: the first time; at most
-WORTH = 0.06  # s: for less it does not pay to look
+AGAIN, AGAIN_MAX = 0.06, 0.5  # s until the next check after an object was near: at first; at most
+WORTH = 0.06  # s below which a check does not pay
 NO_CONTACTS = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
 
 
@@ -36,14 +36,14 @@ class Meetings:
         bodies = np.flatnonzero(model.body_mocapid >= 0)
         bodies = bodies[np.argsort(model.body_mocapid[bodies])]
         self._geoms = model.body_geomadr[bodies]
-        self._round = model.geom_type[self._geoms] == mujoco.mjtGeom.mjGEOM_CAPSULE  # people; else boxes
+        self._round = model.geom_type[self._geoms] == mujoco.mjtGeom.mjGEOM_CAPSULE  # people; the others are boxes
         self._radii = np.array([hull.body.hull.radius for hull in hulls])
-        self._pulls = np.array([hull.body.base.traction * GRAVITY for hull in hulls])  # m/s2 that wheels can give
+        self._pulls = np.array([hull.body.base.traction * GRAVITY for hull in hulls])  # m/s2 that the wheels can apply
         self._revision = -1
         self._pairs = np.triu_indices(len(hulls), 1)
         self._others: tuple[NDArray[np.int64], list[float], list[float]] | None = None  # see ``_there``
-        self._off = False  # whether it looks for none now
-        self._left = 0.0  # s until it has to be looked again
+        self._off = False  # whether checks are switched off
+        self._left = 0.0  # s until the next check
         self._wait = AGAIN
 
     def forget(self) -> None:
@@ -60,7 +60,7 @@ class Meetings:
             self._revision = revision
             self.forget()
         self._left -= seconds
-        if self._left >= 0.0 or not self._hulls:  # real and recorded robots are in no world
+        if self._left >= 0.0 or not self._hulls:  # real and recorded robots are not in any world
             return
         free = self._free() if self._is_calm() else 0.0
         self._switch(off=bool(free >= WORTH))

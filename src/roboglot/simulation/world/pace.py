@@ -6,9 +6,9 @@ import logging
 from collections.abc import Callable
 
 log = logging.getLogger(__name__)
-WINDOW = 5.0  # s of the clock that one judgement is about
-WORSE = 0.1  # of the wanted pace: what must be lost beyond the last warning for another one
-CALM = 6  # windows without a loss until it is over
+WINDOW = 5.0  # s of the clock per judgement
+WORSE = 0.1  # of the wanted pace: the further loss that justifies another warning
+CALM = 6  # windows without a loss after which it is over
 
 
 class Pace:
@@ -16,9 +16,9 @@ class Pace:
 
     def __init__(self, speed: Callable[[], float]) -> None:
         self._speed = speed
-        self._began: float | None = None  # the window
-        self._lost = self._total = 0.0  # s, in the window and since the machine became too slow
-        self._warned: float | None = None  # the share of the wanted pace in the last warning; None: all was well
+        self._began: float | None = None  # start of the window
+        self._lost = self._total = 0.0  # s lost in the window, and since the machine became too slow
+        self._warned: float | None = None  # the share of the wanted pace in the last warning; None: no warning
         self._calm = 0
 
     def skip(self, seconds: float) -> None:

@@ -25,8 +25,8 @@ from roboglot.simulation.world.meetings import Meetings
 from roboglot.simulation.world.rays import Rays
 from roboglot.simulation.world.scene import TIMESTEP, VISITORS_MAX, build, visitors
 
-JUMP = 0.1  # m that no person walks in a tick
-LIGHT = 1.0  # kg; a thing that weighs less gives way before a bumper does
+JUMP = 0.1  # m: more than a person walks in a tick
+LIGHT = 1.0  # kg; a lighter object moves before a bumper is pressed
 _compiled = lru_cache(maxsize=8)(build)
 
 
@@ -35,7 +35,7 @@ def _model_of(world: WorldDescription, bodies: Mapping[str, Body]) -> mujoco.MjM
     what = replace(world, faults=()), tuple(bodies.items())
     try:
         hash(what)
-    except TypeError:  # made by hand, with lists
+    except TypeError:  # created by hand, with lists
         return build(*what)
     return copy.copy(_compiled(*what))
 
@@ -53,8 +53,8 @@ class Physics:
             name: Hull(model, self._data, name, body, self._elevations, self.ground) for name, body in bodies.items()
         }
         self._hull_of = {geom: hull for hull in self.hulls.values() for geom in hull.geoms}
-        self._hulls_of = np.isin(np.arange(model.ngeom), list(self._hull_of))  # whether a geom is a hull's
-        self._shape_of = np.full(model.ngeom, -1)  # the first geom of the robot that a geom belongs to
+        self._hulls_of = np.isin(np.arange(model.ngeom), list(self._hull_of))  # whether a geom belongs to a hull
+        self._shape_of = np.full(model.ngeom, -1)  # by geom: the first geom of its robot
         for hull in self.hulls.values():
             self._shape_of[hull.shape] = hull.shape[0]
         self._docks = {geom for geom in range(model.ngeom) if model.geom(geom).name.startswith("dock ")}
@@ -65,7 +65,7 @@ class Physics:
         self.props = Props(model, self._data, self._elevations)
         self.rays = Rays(model, self._data)
         self._car = (model.joint("car").qposadr[0], model.actuator("car").id) if world.lift else None
-        self.obstacles: dict[int, tuple[int, Solid]] = {}  # by number: floor and box
+        self.obstacles: dict[int, tuple[int, Solid]] = {}  # by its number: floor and box
         self._touched: set[Hull] = set()
         self._feet = sum(model.geom(geom).name.split(" ")[-1] == "foot" for geom in range(model.ngeom))
         self._feet += sum(len(hull.wheels) for hull in self.hulls.values())
@@ -186,8 +186,8 @@ class Physics:
             hull.touches = []
         self._touched = set()
         data = self._data
-        # A caster's contact is frictionless: one constraint. Only a touching hull makes more constraints than contacts
-        # (limp legs do too, which costs a useless look) or more contacts than there are feet, and looking is dear.
+        # A caster's contact is frictionless: one constraint. Only a touching hull causes more constraints than contacts
+        # (limp legs do, too, at the price of a needless check) or more contacts than feet, and checking is expensive.
         if (not data.nefc or data.nefc <= data.ncon <= feet) and not before:
             return
         geoms, near = data.contact.geom, data.contact.dist <= 0.0
@@ -223,4 +223,4 @@ class _Standing:
         self.id, self.mocap, self.bits = body.id, int(body.mocapid[0]), int(model.geom_conaffinity[geom])
         self.half = float(model.geom_size[geom][:2].sum())  # m: of a capsule, radius and half its straight part
         self.x = self.y = self.facing = math.nan
-        self.there = False  # whether robots may bump into them
+        self.there = False  # whether robots may collide with them

@@ -13,13 +13,13 @@ from roboglot.model.geometry import Pose
 from roboglot.simulation.building.blueprint import Solid, solids_of
 from roboglot.simulation.world.description import WorldDescription
 
-CONTACT_GAP = 0.005  # m between hull and dock at the start
+CONTACT_GAP = 0.005  # m between hull and dock at start
 BESIDE = 0.3  # m between robots that start side by side
 SEARCH = 40.0  # m around the first robot
-SAME_ROOM = 5.0  # m around it that are looked through for a good place
-CLEAR = 0.3, 0.05  # m around a robot in a crowd, as long as there are such places
-AHEAD = 0.6  # m that a good place leaves free
-NEAR, NEAR_STEP = 3.0, 0.1  # m around a taken place that are looked through for one to name, and between two looks
+SAME_ROOM = 5.0  # m around it that are searched for a good place
+CLEAR = 0.3, 0.05  # m around a robot in a crowd, while such places exist
+AHEAD = 0.6  # m that must be free in front of a good place
+NEAR, NEAR_STEP = 3.0, 0.1  # m around an occupied place that are searched for an alternative to suggest, and the step
 
 
 def docks_of(world: WorldDescription) -> list[list[Pose]]:
@@ -40,9 +40,9 @@ class Places:
     """Gives places away, one after the other."""
 
     world: WorldDescription
-    reserved: Sequence[tuple[Pose, int, float]] = ()  # for robots whose place is wanted; others stay away
+    reserved: Sequence[tuple[Pose, int, float]] = ()  # for robots with a configured place; others stay away
     _taken: list[tuple[Pose, int, float]] = field(default_factory=list)  # with the robots' radii
-    _crowded: set[int] = field(default_factory=set)  # floors with no good place left
+    _crowded: set[int] = field(default_factory=set)  # floors without good places
     _solids: dict[int, list[Solid]] = field(default_factory=dict)
     _searches: dict[tuple[int, float, Pose], _Search] = field(default_factory=dict)
 

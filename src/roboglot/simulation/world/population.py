@@ -27,10 +27,10 @@ class Population:
     """``robots`` and ``simulated`` grow as robots are equipped; their hulls stand in the physics from the start."""
 
     physics: Physics
-    walkers: list[Walker]  # all who look at people share this list
+    walkers: list[Walker]  # shared by everything that observes people
     robots: dict[str, Robot] = field(default_factory=dict)
     simulated: dict[str, SimulatedRobot] = field(default_factory=dict)
-    starts: dict[str, tuple[Pose, int]] = field(default_factory=dict)  # where each stood at first, and on which floor
+    starts: dict[str, tuple[Pose, int]] = field(default_factory=dict)  # the initial place and floor of each
 
     @property
     def hulls(self) -> Mapping[str, Hull]:

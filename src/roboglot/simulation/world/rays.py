@@ -15,20 +15,20 @@ from roboglot.simulation.bodies.hull import Hull
 if TYPE_CHECKING:
     from mujoco import MjData, MjModel
 
-PASSED = 0  # a kind of shape that the kernel does not meet
-UNSEEN = 5  # MuJoCo's geom group for what rays pass through
+PASSED = 0  # a kind of shape that the kernel skips
+UNSEEN = 5  # MuJoCo's group for geoms that rays pass through
 SEEN = np.array([group != UNSEEN for group in range(6)], np.uint8)
-COMPILED = (2, 3, 5, 6)  # MuJoCo's numbers of the shapes that the kernel knows: all but ramps, which are meshes
+COMPILED = (2, 3, 5, 6)  # MuJoCo's numbers of the shapes that the kernel supports: all but ramps, which are meshes
 
 
 class Rays:
     """Casts them against everything but the robot that looks."""
 
     def __init__(self, model: MjModel, data: MjData) -> None:
-        import mujoco  # it takes a quarter of a second to load
+        import mujoco  # loading takes a quarter of a second
 
         self._model, self._data, self._mujoco = model, data, mujoco
-        self._kinds: dict[Hull, NDArray[np.int32]] = {}  # of all shapes, without those of the robot that looks
+        self._kinds: dict[Hull, NDArray[np.int32]] = {}  # of all shapes except those of the observing robot
         self._kernel: Callable[..., NDArray[np.float64]] | None = None
 
     def load_kernel(self) -> None:

@@ -39,15 +39,15 @@ from roboglot.simulation.world.description import (
     WorldDescription,
 )
 
-TIMESTEP = 0.02 / 3  # s: a third of a tick, and of the time in which a contact gives way
+TIMESTEP = 0.02 / 3  # s: a third of a tick, and of a contact's time constant
 SLAB = 0.2
 VISITORS_MAX = 8
 PIT = 1.2  # m below the lowest floor
 BELLY_PLAY = 0.002
 CASTER = 0.02
-BUMPER_TRAVEL = 0.006  # m by which the hull must be clear again until the bumper is no longer pressed
+BUMPER_TRAVEL = 0.006  # m of clearance after which the bumper is released
 TILT_MAX = math.radians(70)
-TYRES = 0.4  # N m s/rad per kg: how fast tyres and suspension calm the body down
+TYRES = 0.4  # N m s/rad per kg: damping of the body by tyres and suspension
 
 
 def build(world: WorldDescription, robots: Sequence[tuple[str, Body]]) -> mujoco.MjModel:
@@ -71,7 +71,7 @@ def build(world: WorldDescription, robots: Sequence[tuple[str, Body]]) -> mujoco
         _add_robot(spec, name, body, tilting=uneven)
     model = spec.compile()
     for key in (*keys_of(world), *visitors()):
-        model.body_conaffinity[model.body(key).id] = 0  # away: looking whether it touches anything would cost time
+        model.body_conaffinity[model.body(key).id] = 0  # away: collision checks would cost time
     return model
 
 
@@ -81,7 +81,7 @@ def _empty_spec() -> mujoco.MjSpec:
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.gravity = [0, 0, -GRAVITY]
     spec.option.iterations = 20
-    spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP  # what stands still for good is not placed anew
+    spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP  # static objects are not repositioned
     spec.compiler.degree = False
     return spec
 
@@ -135,7 +135,7 @@ def _add_standing(
 def _add_slabs(root: mujoco.MjsBody, floor: Floor, lift: Lift | None, elevation: float) -> None:
     for slab in slabs_of(floor, lift):
         _add_slab(root, slab, elevation)
-    if elevation == 0.0:  # what falls through the lowest floor falls into a pit
+    if elevation == 0.0:  # objects that fall through the lowest floor land in a pit
         for pit in holes_of(floor) + ([shaft_of(lift)] if lift else []):
             _add_slab(root, pit, -PIT)
 
@@ -197,7 +197,7 @@ def _add_terrain(spec: mujoco.MjSpec, terrain: Terrain, elevation: float, name: 
 
 def _add_thing(root: mujoco.MjsBody, thing: Thing, elevation: float) -> None:
     """A can on a frictionless foot: it never falls over; damping stands for its friction on the floor."""
-    never = mujoco.mjtSleepPolicy.mjSLEEP_NEVER  # it can be put elsewhere at any time
+    never = mujoco.mjtSleepPolicy.mjSLEEP_NEVER  # it may be moved at any time
     body = root.add_body(name=f"thing {thing.name}", sleep=never)
     for axis, direction, damping in (("x", [1, 0, 0], 1.0), ("y", [0, 1, 0], 1.0), ("z", [0, 0, 1], 0.0)):
         body.add_joint(

@@ -57,7 +57,7 @@ class Sight:
             self._glossy.append([solid for solid in still if solid.material != "plain"])
         self._terrain = [floor.relief for floor in world.floors]
         self._dark: dict[tuple[int, float, float], tuple[Rows, Rows]] = {}  # by floor, height and share
-        self._moving: dict[tuple[int, float], Rows] = {}  # what stands round and moves, by floor and height
+        self._moving: dict[tuple[int, float], Rows] = {}  # objects around the robot that move, by floor and height
         self._cast: Callable[..., Distances] = _sweep
         self.blur: Callable[..., NDArray[np.float32]] = blur
         self._edges: dict[tuple[int, float], tuple[int, Rows]] = {}  # by floor and height, with the props' revision
@@ -141,7 +141,7 @@ class Sight:
         for walker in self._walkers:
             person = walker.person
             if walker.floor == floor and 0.0 < height < person.height:
-                # People are capsules: rounder towards feet and crown.
+                # People are capsules: narrower towards feet and crown.
                 off = max(0.0, person.radius - height, height - person.height + person.radius)
                 radius = math.sqrt(person.radius**2 - off**2)
                 found.append((walker.pose.x, walker.pose.y, radius, 0.0))

@@ -22,7 +22,7 @@ from roboglot.simulation.world.description import WorldDescription
 
 Floats = NDArray[np.float64]
 FEET_TO_HEAD = (0.15, 0.6, 1.2)  # m above the floor
-SHORT = 0.02  # m before its end that a line of sight stops: what is looked at lies on something
+SHORT = 0.02  # m before its end where a line of sight stops: the target lies on a surface
 Row = tuple[float, ...]
 
 

@@ -13,8 +13,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-Edges = NDArray[np.complex128]  # n x 2, both ends as x + iy; the solid lies to the left
-Circles = NDArray[np.complex128]  # n x 2, middle as x + iy, and the radius
+Edges = NDArray[np.complex128]  # n x 2: both ends as x + iy; the solid is on the left
+Circles = NDArray[np.complex128]  # n x 2: centre as x + iy, and radius
 Distances = NDArray[np.float64]
 NOTHING = np.empty((0, 2), dtype=np.complex128)
 
@@ -52,13 +52,13 @@ def blur(exact: Distances, noise: NDArray[np.float32], sigma: float, low: float,
 
 def _meet_edges(edges: Edges, directions: NDArray[np.complex128], ranges: NDArray[np.float64]) -> None:
     start, end = edges[:, 0], edges[:, 1]
-    swept = start * end.conj()  # its angle is how far one turns from end to start, its imaginary part twice an area
-    seen = swept.imag > 1e-9  # m2; one seen along itself is met by rounding alone, even at the eye
+    swept = start * end.conj()  # its angle is the turn from end to start, its imaginary part twice an area
+    seen = swept.imag > 1e-9  # m2; an edge seen end-on would be hit by rounding only, even at the eye
     start, end, swept = start[seen], end[seen], swept[seen]
     which, ray = _pairs(np.angle(end), np.angle(swept), len(ranges))
     along = (end - start)[which]
     u = directions[ray]
-    with np.errstate(divide="ignore"):  # a ray along an edge only touches it
+    with np.errstate(divide="ignore"):  # a ray along an edge merely touches it
         distance = swept.imag[which] / (along.real * u.imag - along.imag * u.real)
     np.minimum.at(ranges, ray, np.abs(distance))
 
@@ -75,7 +75,7 @@ def _meet_circles(
     middles, radii, away = middles[near], radii[near], away[near]
     half = np.arcsin(radii / away)
     which, ray = _pairs(np.angle(middles) - half, 2.0 * half, len(ranges))
-    seen = middles[which] * directions[ray].conj()  # real: way to the point nearest to the middle; imaginary: the miss
+    seen = middles[which] * directions[ray].conj()  # real: way to the point nearest the centre; imaginary: the miss
     depth = np.sqrt(np.maximum(0.0, radii[which] ** 2 - seen.imag**2))
     np.minimum.at(ranges, ray, seen.real - depth)
 

@@ -53,8 +53,8 @@ from roboglot.simulation.world.truth import Truth
 
 log = logging.getLogger(__name__)
 TICK = 0.02  # s: controls and sensors
-CATCH_UP_MAX = 5  # ticks in one go, so that others get their turn
-BEHIND_MAX = 25  # ticks a slow machine may lag before time is skipped
+CATCH_UP_MAX = 5  # ticks in one go, so that other tasks get a turn
+BEHIND_MAX = 25  # ticks by which a slow machine may lag before time is skipped
 ROBOTS_MAX = 200
 
 
@@ -83,7 +83,7 @@ class World:
     def __init__(
         self, description: WorldDescription, robots: Sequence[RobotPlacement], *, clock: Clock, seed: int = 1
     ) -> None:
-        from roboglot.simulation.world.physics import Physics  # MuJoCo takes a quarter of a second to load
+        from roboglot.simulation.world.physics import Physics  # loading MuJoCo takes a quarter of a second
 
         if len(robots) > ROBOTS_MAX:
             raise ValueError(f"{len(robots)} robots are more than {ROBOTS_MAX}")
@@ -190,7 +190,7 @@ class World:
 
     async def _load_kernels(self) -> None:
         """Have the sensors use the compiled kernels; missing ones are compiled first, in a process of their own."""
-        with contextlib.suppress(KernelsUnavailable):  # autonomy reports it; sensors go on without
+        with contextlib.suppress(KernelsUnavailable):  # autonomy reports it; sensors continue without it
             await compile_beside(("sweep", "rays"))
             await load(self._environment.sight.load_kernel)
             await load(self._environment.rays.load_kernel)
@@ -241,7 +241,7 @@ class World:
         self._environment.sight.moved()
         beads = self._environment.beads
         self._physics.step(TICK, beads.fly if beads.flying else None)
-        for robot in robots:  # all of one robot together: its data are in the cache then
+        for robot in robots:  # one robot at a time: its data stay in the cache
             robot.sense(stamp)
 
     def _walk(self) -> None:

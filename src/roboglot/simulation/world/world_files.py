@@ -34,9 +34,9 @@ from roboglot.simulation.world.description_checks import completed
 WORLDS = Path(__file__).parent.parent / "worlds"
 CELLS_MAX = 16_000_000
 HEIGHT = 2.5
-WALL_LENGTH = 1.0  # m from which a solid counts as a wall, not a thing
+WALL_LENGTH = 1.0  # m from which a solid counts as a wall rather than an object
 ROOM = (2.0, 1.5, 1.0, 0.75, 0.6, 0.5)  # m of free floor around a robot that leaves its dock; the first that exists
-DOCK_TO_START = 0.3  # m from the dock's front to the middle of that room
+DOCK_TO_START = 0.3  # m from the dock's front to the centre of that space
 
 Cells = NDArray[np.bool_]
 

@@ -23,8 +23,8 @@ from roboglot.testing.campaign.trials import Outcome, Result, Trial
 with explaining("--on", "fleet"):
     import ray
 
-FILES_MAX, BYTES_MAX = 2000, 64 << 20  # of a campaign's scenarios, and of what one trial leaves
-LOOK_SECONDS = 0.5  # between two looks at Ctrl-C
+FILES_MAX, BYTES_MAX = 2000, 64 << 20  # of a campaign's scenarios, and of one trial's results
+LOOK_SECONDS = 0.5  # between two checks for Ctrl-C
 Files = dict[str, bytes]
 
 

@@ -21,7 +21,7 @@ from roboglot.shards.warmth import ENVIRONMENT
 from roboglot.testing.campaign.trials import Outcome, Result, Trial, play_trial
 
 END_SECONDS_MAX = 10.0
-ATTEMPTS_MAX = 3  # of a trial whose process dies
+ATTEMPTS_MAX = 3  # for a trial whose process dies
 PRELOADED = ["roboglot.testing.campaign.warmed"]
 Leave = Callable[[Trial], Path | None]
 Ended = Callable[[Trial, Result], None]

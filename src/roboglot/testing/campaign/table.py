@@ -69,7 +69,7 @@ class Table:
         """Write how it went; the disk has it when this returns."""
         row = Row(
             trial.scenario,
-            " ".join(trial.name.split()),  # a row is a line: half of one can be seen
+            " ".join(trial.name.split()),  # each row is written at once, so that no partial one is read
             trial.seed,
             result.outcome,
             " ".join(result.why.split()),

@@ -14,20 +14,20 @@ import msgspec
 
 from roboglot.testing.scenarios.files import Found, read, with_seed
 
-WHY_MAX = 500  # characters of a reason that are kept
+WHY_MAX = 500  # characters kept of a reason
 
 
 class Outcome(StrEnum):
     """Outcome of a trial."""
 
     PASSED = "passed"
-    FAILED = "failed"  # something that should be true was not
-    BROKEN = "broken"  # the scenario could not be played at all
-    CRASHED = "crashed"  # its process died, every time
-    LATE = "late"  # it was ended after the longest that a trial may take
+    FAILED = "failed"  # an expectation was not met
+    BROKEN = "broken"  # the scenario could not be played
+    CRASHED = "crashed"  # its process died every time
+    LATE = "late"  # stopped after the time limit of a trial
 
 
-FINAL = (Outcome.PASSED, Outcome.FAILED, Outcome.BROKEN)  # played again it would end in the same way
+FINAL = (Outcome.PASSED, Outcome.FAILED, Outcome.BROKEN)  # playing it again would give the same result
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,8 +21,8 @@ from roboglot.testing.scenarios.checks import Checker
 from roboglot.testing.scenarios.files import STEPS, BadScenario, Step, fault_of, verb_of
 from roboglot.testing.server import NotInTime, RobotServer
 
-OUTPUT_MAX = 1 << 20  # characters of a command that are kept
-SHOWN_MAX = 2000  # of its end, when it fails
+OUTPUT_MAX = 1 << 20  # characters kept of a command's output
+SHOWN_MAX = 2000  # characters of its end shown after a failure
 ANSWER_MAX = 16 << 20
 
 
@@ -82,7 +82,7 @@ class Steps:
             _end_group(process)
             output, _ = process.communicate()
             raise StepFailed(f"{command!r} has not ended after {step.within:g} s\n{output[-SHOWN_MAX:]}") from None
-        except BaseException:  # Ctrl-C, too, leaves nothing behind
+        except BaseException:  # Ctrl-C, too, must leave no process behind
             _end_group(process)
             raise
         self._checker.printed += output[-OUTPUT_MAX:].splitlines()

@@ -7,15 +7,15 @@ APP_PORT = 8981
 ROBOT_NAME = "cyberdog2.server"  # the common names in the two certificates
 APP_NAME = "cyberdog2.client"
 
-MESSAGE_MAX = 5_242_880  # bytes of one message, in either direction, on the robot's side
-STREAMS_MAX = 256  # calls under way on one connection
-CONNECTIONS_MAX = 512  # with a robot at once: one costs 20 kB before its handshake, and 20 more when that breaks
-HANDSHAKE_SECONDS_MAX = 5  # a connection that says nothing is hung up on then
+MESSAGE_MAX = 5_242_880  # bytes per message in either direction, at the robot's end
+STREAMS_MAX = 256  # concurrent calls per connection
+CONNECTIONS_MAX = 512  # per robot: each costs 20 kB before its handshake, and 20 more if that fails
+HANDSHAKE_SECONDS_MAX = 5  # after which a silent connection is closed
 PUSH_MAX = 4_194_304 - 64  # bytes of text in a push: an app's gRPC takes 4 MiB by default
 
 HEARTBEAT_PERIOD = 0.5  # s
 HEARTBEAT_DEADLINE = 2.5  # s
-LOST_AFTER = 5.0  # s without a heartbeat that came through
+LOST_AFTER = 5.0  # s without a successful heartbeat
 PUSH_DEADLINE = 3.0  # s
 
 Options = list[tuple[str, int | str]]
@@ -46,6 +46,6 @@ def client_options(name: str) -> Options:
         *_LIMITS,
         *_KEEPALIVE,
         ("grpc.ssl_target_name_override", name),
-        # Each dial is a fresh attempt: no connection, and no back-off, of an earlier one.
+        # Each dial is independent: it inherits neither connection nor back-off from an earlier one.
         ("grpc.use_local_subchannel_pool", 1),
     ]

@@ -94,11 +94,11 @@ class Code(IntEnum):
     DISCONNECT_APP = 55001
 
 
-# Codes of robots in the field that the published text leaves out.
+# Codes of robots in the field that are missing from the published text.
 UNPUBLISHED = frozenset({1100, 1101, 2001, 2002, 5002, 5010, 5011, 6012, 6013, 10006, 10007, 11001, 11002})
-# Codes of the text that no robot in the field knows.
+# Codes in the text that no robot in the field knows.
 TEXT_ONLY = frozenset({1015, 1023, 4005, 5008})
-# Where a real robot whose service is not running ends the stream without a word; elsewhere it says UNAVAILABLE.
+# Operations whose stream a real robot ends silently when their service is not running; others say UNAVAILABLE.
 SILENT_WITHOUT_SERVICE = frozenset(
     {1001, *range(1020, 1025), 3001, 3002, 3011, 3012, 3014, 5001, 5002, 5003, 5004, 5006, 7001, 7002, 9030, 9031}
 )
@@ -227,7 +227,7 @@ class Feedback(IntEnum):
     MAP_GOOD = 310
     NO_MAP = 311
     DOCKING = 500
-    FOLLOW_STARTING = 500  # the same number in another task
+    FOLLOW_STARTING = 500  # the same number is used in another task
     FOLLOW_WAITS_FOR_CHOICE = 501
     FOLLOW_CHOSEN = 502
     FOLLOWING = 503

@@ -9,10 +9,10 @@ from typing import Annotated, NoReturn
 
 import msgspec
 
-# Tolerated where the strict reader fails: line ends as they are inside of a text, as one app sends its SDP.
+# Accepted when the strict reader fails: raw line ends inside a string, as one app sends its SDP.
 _lenient = json.JSONDecoder(strict=False, parse_constant=lambda name: _refuse(name))
 
-NOTHING = "{}"  # what most requests without fields send
+NOTHING = "{}"  # usual params of requests without fields
 Int32 = Annotated[int, msgspec.Meta(ge=-(2**31), le=2**31 - 1)]
 
 
@@ -27,7 +27,7 @@ def read_params(text: str) -> Mapping[str, object]:
     value = read_json(text)
     if not isinstance(value, dict):
         return {}
-    # A null stands for a field that was left out.
+    # null stands for an absent field.
     return {name: field for name, field in value.items() if field is not None}
 
 
@@ -73,7 +73,7 @@ def misfits(values: Mapping[str, object], fields: type[msgspec.Struct]) -> list[
 
 @cache
 def _fields(kind: type[msgspec.Struct]) -> tuple[msgspec.structs.FieldInfo, ...]:
-    return msgspec.structs.fields(kind)  # takes longer than the rest of a request
+    return msgspec.structs.fields(kind)  # slower than the rest of a request
 
 
 def _fits(value: object, kind: object) -> bool:
@@ -83,7 +83,7 @@ def _fits(value: object, kind: object) -> bool:
 def _misfit(value: object, kind: object) -> str:
     """Return why ``value`` is not of that ``kind``; empty if it is."""
     try:
-        # JSON of some languages writes whole numbers with a point: 303.0 is as good as 303.
+        # Some languages write whole numbers in JSON with a decimal point: 303.0 counts as 303.
         msgspec.convert(value, kind, strict=not isinstance(value, float))
     except msgspec.ValidationError as error:
         return str(error)

@@ -14,7 +14,7 @@ from typing import Any
 import msgspec
 
 SUBPROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
-PLAYS = SUBPROTOCOLS[:1]  # those that have playback
+PLAYS = SUBPROTOCOLS[:1]  # the subprotocols with playback
 ENCODING_MAX = 64  # bytes of the name of an encoding
 REQUEST_ID_MAX = 256  # bytes of the id of a playback request
 _DATA = struct.Struct("<BIQ")

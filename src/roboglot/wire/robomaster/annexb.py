@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-ACCESS_UNIT_MAX = 4 << 20  # bytes; beyond it the stream is no video
+ACCESS_UNIT_MAX = 4 << 20  # bytes; anything longer is not video
 _START = re.compile(rb"\x00\x00\x01")
 _SLICE, _KEY_SLICE = 1, 5
 _HEADS = frozenset({6, 7, 8, 9})  # SEI, SPS, PPS, delimiter: they come before a picture's first slice
@@ -25,7 +25,7 @@ class AccessUnitSplitter:
 
     def __init__(self) -> None:
         self._buffer = bytearray()
-        self._looked = 0  # start codes before it have been seen
+        self._looked = 0  # start codes before it have been examined
         self._has_slice = self._keyframe = False
 
     def feed(self, data: bytes) -> Iterator[AccessUnit]:

@@ -43,7 +43,7 @@ class Profile:
     broadcast_end: str
     decimals: int
     as_robots: bool
-    separator: str  # between the attributes of one datagram
+    separator: str  # between attributes in one datagram
 
     def result(self, text: str, seq: int | None = None) -> bytes:
         """A fixed answer, or any other single text."""

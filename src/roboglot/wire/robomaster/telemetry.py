@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from ipaddress import IPv4Address
 
-TEXT_MAX = 8192  # bytes of a datagram that are read
+TEXT_MAX = 8192  # bytes read of a datagram
 TARGETS_MAX = 128
 LINE_POINTS = 10
 
@@ -161,11 +161,11 @@ def hear(data: bytes) -> Iterator[Telemetry]:
                 continue
             if module == "AI":
                 yield from _seen(words)
-            elif (module, words[0]) in _ATTRIBUTES:  # robots name the module once and go on after a `;`
+            elif (module, words[0]) in _ATTRIBUTES:  # robots name the module once and continue after a `;`
                 yield _ATTRIBUTES[module, words[0]](words[1:])
             else:
                 yield from _event(" ".join(text.split()))
-        except ValueError:  # numbers that are none, or too few
+        except ValueError:  # not numbers, or too few
             continue
 
 

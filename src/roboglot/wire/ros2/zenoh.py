@@ -9,7 +9,7 @@ import struct
 from dataclasses import dataclass
 
 _ATTACHMENT = struct.Struct("<qqB16s")
-RELIABLE, KEPT, SENSORS = "::,10:,:,:,,", ":1:,1:,:,:,,", "2::,5:,:,:,,"  # QoS as tokens have it
+RELIABLE, KEPT, SENSORS = "::,10:,:,:,,", ":1:,1:,:,:,,", "2::,5:,:,:,,"  # QoS in the syntax of liveliness tokens
 GRAPH = "@ros2_lv"
 
 

@@ -7,7 +7,7 @@ from typing import Annotated
 import msgspec
 
 COORDINATE_MAX = 1e5  # m; far beyond any map
-ANGLE_MAX = 1e4  # rad; headings may be given with turns too many
+ANGLE_MAX = 1e4  # rad; headings may include full turns
 
 Metres = Annotated[float, msgspec.Meta(ge=-COORDINATE_MAX, le=COORDINATE_MAX)]
 Radians = Annotated[float, msgspec.Meta(ge=-ANGLE_MAX, le=ANGLE_MAX)]

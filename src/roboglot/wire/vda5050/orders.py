@@ -10,7 +10,7 @@ import msgspec
 
 MESSAGE_MAX = 1 << 20  # bytes
 NODES_MAX = 1000
-ACTIONS_MAX = 64  # of a node, of a message
+ACTIONS_MAX = 64  # per node; per message
 PARAMETERS_MAX = 64
 
 Id = Annotated[str, msgspec.Meta(min_length=1, max_length=256)]
@@ -40,7 +40,7 @@ class Action(msgspec.Struct, frozen=True, rename="camel"):
     action_id: Id
     blocking_type: Literal["NONE", "SINGLE", "SOFT", "HARD"] = "HARD"
     action_parameters: Annotated[tuple[Parameter, ...], msgspec.Meta(max_length=PARAMETERS_MAX)] = ()
-    retriable: bool = False  # 3.0: it may be tried again after a failure
+    retriable: bool = False  # 3.0: may be tried again after a failure
 
     @property
     def values(self) -> dict[str, object]:

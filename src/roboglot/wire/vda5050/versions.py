@@ -24,8 +24,8 @@ class ErrorKind(StrEnum):
     UNKNOWN_MAP = "UNKNOWN_MAP_ID"
     NOT_AVAILABLE = "MOBILE_ROBOT_NOT_AVAILABLE"
     ACTION_FAILED = "ACTION_FAILED"
-    FORBIDDEN = "ACCESS_DENIED"  # ours: fleet control lacks the right
-    FAULT = "ROBOT_FAULT"  # ours: something of the robot is broken
+    FORBIDDEN = "ACCESS_DENIED"  # ours: fleet control lacks the permission
+    FAULT = "ROBOT_FAULT"  # ours: a part of the robot is broken
 
 
 class Level(StrEnum):
@@ -33,7 +33,7 @@ class Level(StrEnum):
 
     WARNING = "WARNING"
     URGENT = "URGENT"
-    CRITICAL = "CRITICAL"  # the order cannot go on; another may be taken
+    CRITICAL = "CRITICAL"  # the order cannot continue; another may be accepted
     FATAL = "FATAL"
 
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
-KINDS, RECORD = ("task", "module"), "record"  # what an account has; what happened on its robots
-ITEMS_MAX = 20_000  # programs of one answer
+KINDS, RECORD = ("task", "module"), "record"  # an account's programs; the history of its robots
+ITEMS_MAX = 20_000  # programs per answer
 ANSWER_MAX = 64 * 1024 * 1024  # bytes
-ROBOT_HEADER = "x-robot"  # which of an account's robots it is
+ROBOT_HEADER = "x-robot"  # identifies the account's robot
 
 
 class CloudCode(StrEnum):

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 
 from roboglot.wire.visual.codes import FeedbackState
 
-DESCRIBE_MAX = 4000  # characters of describe in a frame that goes out
-UTF8_MAX = 4  # bytes of a character
-PART = 64  # bytes of a response's part and parts, and some to spare
+DESCRIBE_MAX = 4000  # characters of describe in an outgoing frame
+UTF8_MAX = 4  # bytes per character
+PART = 64  # bytes of a response's part and parts, with a margin
 
 
 def feedback(
@@ -30,7 +30,7 @@ def feedback(
             "target_id": target,
             "operate": operate,
             "state": state,
-            # Programs can raise errors whose text no UTF-8 can hold.
+            # Programs can raise errors whose text UTF-8 cannot encode.
             "describe": describe[:DESCRIBE_MAX].encode("utf-8", "replace").decode(),
         }
     }
@@ -48,7 +48,7 @@ def responses(*, kind: str, id: str, items: Sequence[Mapping[str, object]], long
     encoded = [json.dumps(item, ensure_ascii=False) for item in items]
     around = len(_response(kind, id, []).encode()) + PART
     if not longest or around + sum(map(len, encoded)) * UTF8_MAX + 2 * len(encoded) <= longest:
-        return [_response(kind, id, encoded)]  # by far the most frequent: not even counted
+        return [_response(kind, id, encoded)]  # the usual case: not even measured
     sizes = [len(text.encode("utf-8", "replace")) + 2 for text in encoded]
     parts: list[list[str]] = [[]]
     refused, room = [], longest - around

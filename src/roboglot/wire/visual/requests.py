@@ -148,7 +148,7 @@ class _Checker:
         value = self.text("operate", FeedbackState.BAD_OPERATE, ID_MAX)
         if not value and kind in (Kind.AI, Kind.SLAM):
             value = "inquiry"
-        if value == "add" and kind is Kind.MODULE:  # what the manual's module chapter calls it
+        if value == "add" and kind is Kind.MODULE:  # the name in the manual's module chapter
             value = "save"
         if value not in OPERATIONS[kind]:
             self.refuse(
@@ -194,7 +194,7 @@ class _Checker:
             self.refuse(state, "condition of debug is now")
         if operate not in ("save", "run", DEBUG):
             return ""
-        # Where run gives no mode, the stored one decides what the condition must look like: not ours to know.
+        # Without a mode in run, the stored one decides the form of the condition, which is unknown here.
         if mode:
             try:
                 CONDITIONS[mode](value)

@@ -18,20 +18,20 @@ from roboglot.simulation.bodies.support import GRAVITY
 from roboglot.simulation.components.energy.dock_contact import SimulatedDockContact
 from roboglot.simulation.components.motion.base import SimulatedBase
 
-# Open-circuit voltage of a lithium cell over its charge.
+# Open-circuit voltage of a lithium cell by its charge.
 CHARGES = (0.0, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0)
 VOLTS = (3.0, 3.3, 3.45, 3.58, 3.68, 3.8, 3.97, 4.07, 4.18)
 AMBIENT = 25.0  # Celsius
 HEAT_CAPACITY = 700.0  # J/K
 COOLING = 0.8  # W/K
-FULL, RECHARGE = 0.999, 0.97  # charging ends at the one and begins again below the other
-REVIVED = 0.02  # an empty battery lets the robot drive again from here
-NOMINAL = 3.6  # V of a cell, as capacities are given
-AGED = 0.8  # of its capacity is what a battery holds at the end of its life
+FULL, RECHARGE = 0.999, 0.97  # charging ends at the first and resumes below the second
+REVIVED = 0.02  # charge at which an empty battery lets the robot drive again
+NOMINAL = 3.6  # V per cell, on which nominal capacities are based
+AGED = 0.8  # remaining capacity at the end of a battery's life
 BUZZING = 0.05  # charge below which it beeps
-MINUTE = 60.0  # s over which the usual load is taken
-LOCK, UNLOCK = 50.0, 45.0  # Celsius from which the guard lets no charge in, and below which it does again
-TAPER = 0.9  # from this charge on the charger gives less and less
+MINUTE = 60.0  # s over which the usual load is averaged
+LOCK, UNLOCK = 50.0, 45.0  # Celsius above which the guard blocks charging, and below which it allows it again
+TAPER = 0.9  # charge from which the charger reduces its current
 
 
 class BatterySection(Struct, frozen=True, forbid_unknown_fields=True):
@@ -74,10 +74,10 @@ class SimulatedBattery(Battery):
         self._drawn = 0.0  # Wh since the start, for the cycles
         self._published: tuple[int, bool] | None = None
         self._wire = False
-        self._usual = section.idle_power  # W drawn, over the last minute
+        self._usual = section.idle_power  # W drawn, averaged over the last minute
         self._locked = False  # by the guard
-        self.unfed = False  # whether the dock gives no current
-        self.saving = 1.0  # share of the idle power that the robot draws now
+        self.unfed = False  # whether the dock supplies no current
+        self.saving = 1.0  # factor on the robot's idle power
 
     @property
     def state(self) -> BatteryState:
@@ -163,7 +163,7 @@ class SimulatedBattery(Battery):
             docked and not (self._locked or self._starved) and self._charge < (FULL if self._charging else RECHARGE)
         )
         self._usual += (load - self._usual) * min(1.0, seconds / MINUTE)
-        # On the dock the charger feeds the robot too.
+        # On the dock the charger also supplies the robot.
         power = -load if not docked or self._starved else self._charger() if self._charging else 0.0
         self._charge = min(
             1.0, max(0.0, self._charge + power * seconds / 3600.0 / (self._section.capacity * self._health))

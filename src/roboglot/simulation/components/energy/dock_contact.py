@@ -13,9 +13,9 @@ from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Positive
 
-NEAR = 1.0  # m along an axis from which a dock is felt for in every tick
-SELDOM = 0.5  # s until a robot far from docks is looked at again: a dock may be moved
-FASTEST = 5.0  # m/s that a robot may come nearer to a dock
+NEAR = 1.0  # m along an axis within which docks are checked in every tick
+SELDOM = 0.5  # s between two checks far from docks: a dock may be moved
+FASTEST = 5.0  # m/s at which a robot may approach a dock at most
 
 
 class DockContactSection(Struct, frozen=True, forbid_unknown_fields=True):
@@ -32,8 +32,8 @@ class SimulatedDockContact(DockContact):
         self, section: DockContactSection, hull: Hull, docks: Sequence[Sequence[Pose]], events: EventStream
     ) -> None:
         self._section, self._hull, self._docks, self._events = section, hull, docks, events
-        self._far = 0.0  # stamp up to which docks are out of reach
-        self._felt: tuple[object, ...] = ()  # where it felt for one last, and where docks were
+        self._far = 0.0  # stamp until which docks are out of reach
+        self._felt: tuple[object, ...] = ()  # the last checked place of the robot and of the docks
         self._docked, _ = self._touches()
 
     @property
@@ -46,7 +46,7 @@ class SimulatedDockContact(DockContact):
             return
         hull = self._hull
         here = hull.x, hull.y, hull.turned, hull.floor, *self._docks[hull.floor]
-        if here == self._felt:  # it stands, and so do they
+        if here == self._felt:  # neither has moved
             return
         self._felt = here
         touches, away = self._touches()

@@ -23,7 +23,7 @@ from roboglot.simulation.components.sensing.lidar import SimulatedLidar
 
 AUTOMATIC = "power.automatic"
 AFTER_MAX = 30 * 86_400.0  # s
-_SHARES = {PowerMode.OFF: 0.0, PowerMode.ASLEEP: 0.5, PowerMode.LOW_POWER: 1.0}  # of what low power draws
+_SHARES = {PowerMode.OFF: 0.0, PowerMode.ASLEEP: 0.5, PowerMode.LOW_POWER: 1.0}  # relative to low power
 
 
 class PowerSection(Struct, frozen=True, forbid_unknown_fields=True):

@@ -25,11 +25,11 @@ from roboglot.simulation.bodies.quantities import NotNegative, Positive
 from roboglot.simulation.bodies.schedule import Duty
 from roboglot.simulation.components.motion.gimbal import SimulatedGimbal
 
-PROUD = 0.005  # m that plates stand out of the hull
-SECTOR = math.tan(math.radians(40))  # a touch up to 40 degrees from a plate's middle shakes it
-DEAF = 0.2  # s after a push or a touch until a plate feels the next one
-BEAD_SPEED = 22.0, 2.0  # m/s that a bead must have towards the plate, at sensitivity 0 and 10
-FORCE, SOFTER = 200.0, 0.72  # N that a push must have at sensitivity 0, and its ratio from step to step
+PROUD = 0.005  # m by which plates protrude from the hull
+SECTOR = math.tan(math.radians(40))  # a touch within 40 degrees of a plate's centre registers
+DEAF = 0.2  # s after a push or a touch for which a plate registers no other
+BEAD_SPEED = 22.0, 2.0  # m/s towards the plate that a bead needs, at sensitivity 0 and 10
+FORCE, SOFTER = 200.0, 0.72  # N that a push needs at sensitivity 0, and its ratio from step to step
 HIT_MAX = 64  # not published yet; more are dropped
 
 Floats = NDArray[np.float64]
@@ -64,7 +64,7 @@ class SimulatedArmor(Armor):
         self._sensitivity = 5
         self._deaf: dict[PlatePlace, float] = {}  # until when, robot time
         self._hits: list[tuple[PlatePlace, HitKind]] = []
-        self.duty = Duty()  # while something touches the hull or hit a plate
+        self.duty = Duty()  # active while the hull is touched or a plate has been hit
         hull.when_touched.append(self.duty)
 
     @property
@@ -92,7 +92,7 @@ class SimulatedArmor(Armor):
         for place in self.plates:
             middle, axes, (width, height) = self._plate(place)
             depth = float(along @ axes[:, 0])
-            if depth >= -1e-12:  # from behind or along it
+            if depth >= -1e-12:  # from behind or along the plate
                 continue
             share = float((middle - start) @ axes[:, 0]) / depth
             if not 0.0 <= share <= 1.0 or (best is not None and share >= best[0]):

@@ -47,7 +47,7 @@ class SimulatedBlaster(Blaster):
         self._robot, self._random = robot, random
         self._beads, self._ammo = 1, section.magazine
         self.busy = Duty()
-        self._due, self._wait = 0, 0.0  # beads of the shot still to come, and s until the next may leave
+        self._due, self._wait = 0, 0.0  # beads of the shot still to be fired, and s until the next
 
     @property
     def beads(self) -> int:

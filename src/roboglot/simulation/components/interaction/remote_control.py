@@ -16,8 +16,8 @@ from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.components.system.bluetooth import SimulatedBluetooth
 
 KEY = "remote.gear"
-LIFETIME = 0.5  # s that a command lasts if no other follows: the device may be gone
-# How the robot walks in a gear, and how fast the stick at its end drives it (m/s ahead, m/s aside, rad/s).
+LIFETIME = 0.5  # s for which a command lasts without another: the device may be gone
+# The gait of each gear, and the speed at the stick's end (m/s ahead, m/s sideways, rad/s).
 PACES = {
     Gear.LOW: (Gait.TROT_SLOW, Twist(0.6, 0.2, 1.0)),
     Gear.MIDDLE: (Gait.TROT_MEDIUM, Twist(1.0, 0.3, 1.5)),
@@ -70,7 +70,7 @@ class SimulatedRemoteControl(RemoteControl):
                 self._robot[Legs].walk(gait)
             wanted = Twist(stick.x * top.x, stick.y * top.y, stick.yaw * top.yaw)
             self._driving = self._robot[Driving].drive(wanted, lifetime=LIFETIME, source=REMOTE)
-        except RobotError:  # it cannot now; the stick is looked at again soon
+        except RobotError:  # refused for now; the stick is read again soon
             self._driving = None
 
     def _stop(self) -> None:

@@ -22,8 +22,8 @@ from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Positive
 
-LOOK = 0.02  # s between looks at how far a door is
-PINCH_BACK = 0.3  # of its way that a stalled door opens again
+LOOK = 0.02  # s between two checks of a door's position
+PINCH_BACK = 0.3  # of its travel by which a stalled door opens again
 LOCKED_BELOW = 1e-6
 NAMESPACE = uuid.UUID("5d3c53f2-8a51-4b29-9e54-62b0a4f0b9b1")  # of the compartments' ids
 
@@ -51,8 +51,8 @@ class _Box:
     opening: float = 0.0
     moving: int = 0
     fill: float = 0.0
-    hand: bool = False  # something is in the door
-    jammed: bool = False  # the motor gives nothing
+    hand: bool = False  # an object is in the door
+    jammed: bool = False  # the motor has no force
     error: str = ""
 
     def state(self) -> BoxState:
@@ -91,7 +91,7 @@ class SimulatedCargo(Cargo):
     def close_box(self, id: int, *, source: str = "") -> Action:
         return self._start(self._get(id), -1, source)
 
-    # -- what people do to it ------------------------------------------------------------------------------------------
+    # -- people's actions ----------------------------------------------------------------------------------------------
 
     def put(self, id: int, fill: float) -> None:
         """Have the box be so full (0..1). Refused while its door is not open. ValueError for other numbers."""

@@ -37,9 +37,12 @@ class SimulatedJack(Jack):
         self._position = 0.0
         self._moving = 0
         self._shelf: ShelfStand | None = None
-        self.carrying = Duty()  # while it holds a shelf
+        self.carrying = Duty()  # active while it holds a shelf
         self._offset = Pose()  # of the shelf in base_link
-        self._free: tuple[Pose, frozenset[Hashable]] = Pose(), frozenset()  # where it was, and what the shelf met there
+        self._free: tuple[Pose, frozenset[Hashable]] = (
+            Pose(),
+            frozenset(),
+        )  # the shelf's last pose, and its contacts there
         self._alarm = ""
         self.jammed = False  # whether the drive fails
         self._told: tuple[JackStage, bool, str] = (JackStage.DOWN, False, "")

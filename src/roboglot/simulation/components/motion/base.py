@@ -40,13 +40,15 @@ class SimulatedBase(Base):
         self._twist = STILL
         self._speeds = NO_WHEELS
         self.locks, self.hindrances = DriveLocks(self._stop), Hindrances()
-        self.pace = math.inf  # m/s that what stands ahead allows
+        self.pace = math.inf  # m/s permitted by obstacles ahead
         self._carried = False
         self._free = False
-        self._hardest = max(1.0, (section.braking or 0.0) / section.acceleration)  # of the accelerations, in a pinch
-        self._haste = 1.0  # of the accelerations that it takes now
+        self._hardest = max(
+            1.0, (section.braking or 0.0) / section.acceleration
+        )  # of the accelerations, in an emergency
+        self._haste = 1.0  # the factor in use
         self._walkable: Callable[[Twist], Twist] = _any
-        self.steer: float | None = None  # rad/s; a turn rate that takes the place of the commanded one
+        self.steer: float | None = None  # rad/s; a turn rate that replaces the commanded one
 
     def set_velocity(self, twist: Twist) -> None:
         if not all(map(math.isfinite, (twist.x, twist.y, twist.yaw))):
@@ -209,5 +211,5 @@ PART = Part(
     section=BaseSection,
     fit=_fit,
     control=SimulatedBase.control,
-    control_after=("legs", "gimbal"),  # which say what it is to pass on
+    control_after=("legs", "gimbal"),  # they command what the base passes on
 )

@@ -18,9 +18,9 @@ from roboglot.simulation.bodies.schedule import Duty
 from roboglot.simulation.components.motion.base import SimulatedBase
 
 WHO = "emergency braking"
-SLOW = 0.05  # m/s; who creeps (onto a dock, to a shelf) may come close
+SLOW = 0.05  # m/s; at creeping speed (onto a dock, to a shelf) it does not intervene
 SIDE = 0.02  # m beside the hull that count as ahead
-BLOCKED_DECELERATION = 5.0  # m/s2 of blocked wheels on the floor, with reserve
+BLOCKED_DECELERATION = 5.0  # m/s2 of blocked wheels on the floor, with a margin
 
 
 class EmergencyBrakingSection(Struct, frozen=True, forbid_unknown_fields=True):
@@ -39,7 +39,7 @@ class SimulatedEmergencyBraking(EmergencyBraking):
         self._section, self._radius, self._base, self._lidar, self._events = section, radius, base, lidar, events
         self.duty, self._braking = Duty(on=section.on), False
         self._seen: LaserScan | None = None
-        self._free = (math.inf, math.inf)  # m ahead of and behind the hull
+        self._free = (math.inf, math.inf)  # m ahead of the hull and behind it
 
     @property
     def enabled(self) -> bool:

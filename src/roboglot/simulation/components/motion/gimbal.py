@@ -39,7 +39,7 @@ class SimulatedGimbal(Gimbal):
         self.limits = GimbalLimits(GimbalAngles(-section.up, -side), GimbalAngles(section.down, side), section.speed)
         self._section, self._hull, self._robot = section, hull, robot
         self.axes = GimbalAxes(section, hull, base, robot)
-        self._turning: Action | None = None  # the newest action of set_speed
+        self._turning: Action | None = None  # the latest action of set_speed
 
     @property
     def angles(self) -> GimbalAngles:
@@ -159,7 +159,7 @@ class SimulatedGimbal(Gimbal):
             pitch_frame, yaw_frame = (Frame.WORLD, Frame.BODY) if frame is Frame.STABILIZED else (frame, frame)
             heading = yaw
             if heading is not None and self.axes.mode is FollowMode.GIMBAL_LEAD and yaw_frame is Frame.BODY:
-                # In the world, else it would run after the body after it.
+                # In the world, or else it would run after the next body.
                 heading, yaw_frame = heading + self.axes.heading, Frame.WORLD
             await move(action, self._robot.clock, begin, self.axes.arrived, self.axes.halt)
 

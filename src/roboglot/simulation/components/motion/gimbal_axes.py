@@ -20,9 +20,9 @@ from roboglot.simulation.bodies.hull import LEVEL, Hull
 from roboglot.simulation.bodies.quantities import Offset, Positive
 from roboglot.simulation.components.motion.base import SimulatedBase
 
-FOLLOWING = 6.0  # 1/s: turn rate of the gimbal back to the chassis' front, per rad that it is off
-STEERING = 4.0  # 1/s: the same for a chassis that follows the gimbal
-THERE = 0.002  # rad: near enough to a goal
+FOLLOWING = 6.0  # 1/s: the gimbal's turn rate back to the chassis' front, per rad of offset
+STEERING = 4.0  # 1/s: the same of a chassis that follows the gimbal
+THERE = 0.002  # rad: tolerance of a goal
 
 
 class GimbalSection(Struct, frozen=True, forbid_unknown_fields=True):
@@ -65,7 +65,7 @@ class GimbalAxes:
         self.suspended = False
         self._resting = False
         self._turned = hull.turned
-        self._since_start = 0.0  # how far the body really turned, to count whole turns
+        self._since_start = 0.0  # the body's true rotation since the start, to count whole turns
         self.lean = 0.0
 
     def set_mode(self, mode: FollowMode) -> None:

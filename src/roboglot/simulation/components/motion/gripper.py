@@ -25,7 +25,7 @@ from roboglot.simulation.building.things import Thing, Things
 from roboglot.simulation.components.motion.arm import SimulatedArm
 
 PLAY = 0.001  # m
-FRICTION = 0.8  # of both jaws together on a thing
+FRICTION = 0.8  # of both jaws on an object
 
 
 class GripperSection(Struct, frozen=True, forbid_unknown_fields=True):
@@ -45,9 +45,9 @@ class SimulatedGripper(Gripper):
         self._jaws = Axis(0.0, section.opening, 10.0, position=section.opening)
         self._level = 1
         self._goal: float | None = None
-        self.busy = Duty()  # while the jaws move or hold something
-        self.holds: Thing | None = None  # truth: what it carries
-        self._grip: NDArray[np.float64] = np.zeros(3)  # where in the gripper's frame (base_link's axes) that sits
+        self.busy = Duty()  # active while the jaws move or hold an object
+        self.holds: Thing | None = None  # truth: the object carried
+        self._grip: NDArray[np.float64] = np.zeros(3)  # its place in the gripper's frame (base_link's axes)
 
     @property
     def status(self) -> GripperStatus:
@@ -134,7 +134,7 @@ class SimulatedGripper(Gripper):
         """Hold it, if it is not too heavy for this level."""
         if FRICTION * self._section.force * self._level >= thing.mass * GRAVITY:
             self._grip = self._seen(thing)
-            self._grip[1] = 0.0  # the jaws centre it
+            self._grip[1] = 0.0  # the jaws centre the object
             self.holds = thing
             thing.take()
 

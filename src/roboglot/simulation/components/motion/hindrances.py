@@ -5,8 +5,8 @@ from __future__ import annotations
 from roboglot.model.errors import Blocked
 from roboglot.model.geometry import Twist
 
-STANDS = 0.01  # m/s; slower is standing
-GLANCING = 0.1  # cosine between the way of the hull and what it touches up to which it passes along
+STANDS = 0.01  # m/s; anything slower is standing
+GLANCING = 0.1  # cosine between the hull's motion and a contact up to which the hull slides past
 
 
 class Hindrances:

@@ -41,9 +41,9 @@ from roboglot.simulation.bodies.walking_body import check_posture, held_body, sw
 from roboglot.simulation.components.motion.base import SimulatedBase
 from roboglot.simulation.components.motion.motion_player import MotionPlayer
 
-LOOK = 0.02  # s between looks at whether a motion has ended
-TURN_RATE = 1.2  # rad/s at which the body straightens on its way between postures
-OWN_GAIT_AFTER = 1.0  # s of standing still until the robot walks its own way again
+LOOK = 0.02  # s between checks whether a motion has ended
+TURN_RATE = 1.2  # rad/s at which the body straightens between postures
+OWN_GAIT_AFTER = 1.0  # s of standstill after which the robot returns to its own gait
 
 
 class SimulatedLegs(Legs):
@@ -64,7 +64,7 @@ class SimulatedLegs(Legs):
         self._steps = Steps(section, hull)
         self._player = MotionPlayer(hull, base, torso, self._steps, self._stance)
         self.choreography = Choreography()
-        self.off = ""  # why the motors have no power; empty: they have
+        self.off = ""  # why the motors lack power; empty: they have it
         torso.put(section.standing)
         self.walk(section.gait)
 
@@ -126,7 +126,7 @@ class SimulatedLegs(Legs):
         self._become(Posture.LIMP)
 
     def _start(self, name: str, run: Callable[[Action], Awaitable[None]], there: bool, goal: object, by: str) -> Action:
-        # A body that is there already does not interrupt a drive.
+        # A body already in that posture does not interrupt a drive.
         return self._robot.actions.start(name, run, resources=[LEGS] if there else [LEGS, BASE], goal=goal, source=by)
 
     async def _move(self, action: Action, wanted: Posture, height: float, duration: float) -> None:
@@ -169,7 +169,7 @@ class SimulatedLegs(Legs):
             self._base.locks.lock(LEGS, f"the robot cannot drive while {posture}")
         self._robot.events.publish(PostureChanged(stamp=self._clock.time(), posture=posture))
 
-    # -- how the body is held, how it walks --------------------------------------------------------------------------
+    # -- pose and gait of the body -------------------------------------------------------------------------------------
 
     def hold(self, body: BodyPose, *, duration: float = 1.0, relative: bool = False, source: str = "") -> Action:
         if not 0.0 <= duration <= STEP_SECONDS_MAX:
@@ -220,7 +220,7 @@ class SimulatedLegs(Legs):
     ) -> Action:
         check_steps(steps, footfalls, self.limits, self._base.limits.twist)
         self.choreography = Choreography(tuple(steps), tuple(footfalls))
-        falls = footfalls if self._steps.feet else ()  # who rolls has no feet to lift
+        falls = footfalls if self._steps.feet else ()  # there are no feet to lift while rolling
 
         async def run(action: Action) -> None:
             self._check_ready(frozenset({Posture.STANDING}))
@@ -262,7 +262,7 @@ class SimulatedLegs(Legs):
         if performance.hit or (spec and strayed(self._hull.pose, begin.compose(spec.way))):
             raise Collided("something stood in the way")
 
-    # -- every tick --------------------------------------------------------------------------------------------------
+    # -- every tick ----------------------------------------------------------------------------------------------------
 
     def control(self, seconds: float) -> None:
         """Move the torso's set point, the feet, and base_link while performing; before the physics."""
@@ -287,7 +287,7 @@ class SimulatedLegs(Legs):
         velocity, gait, body = self._base.velocity, self._steps.gait, self._torso.body
         on_a_leash = gait is Gait.TROT_PASSIVE
         if on_a_leash and self._hull.leash and not (self._base.locks.held or self._robot.actions.running(BASE)):
-            with suppress(Collided):  # it stands against what it is pulled into
+            with suppress(Collided):  # it stands against the obstacle into which it is pulled
                 self._base.set_velocity(led(self._hull.leash, self._hull.turned))
         if not (velocity.x or velocity.y or velocity.yaw):
             self._still += 0.0 if on_a_leash else seconds

@@ -20,7 +20,7 @@ CLIMBING = 0.01  # m/s up or down
 SLOPE, ROLLED = math.radians(5), math.radians(60)
 SLIP_SPEED, SLIP_RATE = 0.15, 0.4  # m/s and rad/s between wheels and body
 SLIP_SQUARE = SLIP_SPEED**2
-SLIP_TICKS = 5  # in a row until it counts: contacts jitter
+SLIP_TICKS = 5  # in a row before it counts: contacts jitter
 
 
 class MotionStatusSection(Struct, frozen=True, forbid_unknown_fields=True):
@@ -36,7 +36,7 @@ class SimulatedMotionStatus(MotionStatus):
     def __init__(self, section: MotionStatusSection, hull: Hull, base: SimulatedBase, imu: SimulatedImu) -> None:
         self._section, self._hull, self._base, self._imu = section, hull, base, imu
         self._stamp = 0.0
-        self._blows = [-math.inf] * 3  # when the last one came, along x, y, z
+        self._blows = [-math.inf] * 3  # time of the last blow along x, y, z
         self._slipping = 0
 
     @property
@@ -48,7 +48,7 @@ class SimulatedMotionStatus(MotionStatus):
         picked_up = not hull.standing and not hull.overturned
         sloping = SLOPE < tilt < ROLLED and not picked_up
         wheels, (c, s) = self._base.velocity, (math.cos(hull.turned), math.sin(hull.turned))
-        driven = wheels.x * (c * vx + s * vy) + wheels.y * (c * vy - s * vx) > 0.0  # the way the wheels turn
+        driven = wheels.x * (c * vx + s * vy) + wheels.y * (c * vy - s * vx) > 0.0  # the motion of the wheels
         impacts = [self._stamp - blow <= self._section.hold for blow in self._blows]
         return MotionFlags(
             static=static,

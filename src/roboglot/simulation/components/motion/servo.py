@@ -35,7 +35,7 @@ class SimulatedServos(Servos):
         self._goals: dict[int, tuple[float, float]] = {}  # index: angle (unwrapped) and top speed
         self._speeds: dict[int, float] = {}
         self.turning = Duty()
-        self._turning: dict[int, Action] = {}  # the newest actions of set_speed
+        self._turning: dict[int, Action] = {}  # the latest actions of set_speed
 
     def angle(self, number: int) -> float:
         return _within_a_turn(self._axes[self._index(number)].position)
@@ -50,7 +50,7 @@ class SimulatedServos(Servos):
 
         async def run(action: Action) -> None:
             axis = self._axes[index]
-            # The angle within the turn in which it stands: it goes back the way it came, not through its stop.
+            # Its angle within one turn: it returns the way it came, not through its stop.
             goal = axis.position - _within_a_turn(axis.position) + angle
 
             def begin() -> None:

@@ -17,15 +17,15 @@ from roboglot.simulation.components.sensing.bumper import BumperSection, Simulat
 from roboglot.simulation.world.sight import Sight
 
 HEIGHTS = (0.10, 0.16)  # m above the floor
-STEEP = 0.06  # m between the two hits up to which it stands
-RAYS = 120  # in a turn
-AHEAD = slice(RAYS // 2 - 17, RAYS // 2 + 18)  # those within 51 degrees of the way
-FAN = math.tau / RAYS * np.arange(-17, 18)  # rad from the way
+STEEP = 0.06  # m between the two hits up to which a surface is vertical
+RAYS = 120  # per turn
+AHEAD = slice(RAYS // 2 - 17, RAYS // 2 + 18)  # those within 51 degrees of the direction of motion
+FAN = math.tau / RAYS * np.arange(-17, 18)  # rad from the direction of motion
 SIDE, ALONG = np.maximum(1e-9, np.abs(np.sin(FAN))), np.cos(FAN)
-DECELERATION = 5.0  # m/s2 of blocked wheels on the floor, with reserve
+DECELERATION = 5.0  # m/s2 of blocked wheels on the floor, with a margin
 REACTION = 0.1  # s
 PERIOD = 4  # ticks
-SLOW = 0.3  # m/s; it does not begin to feel at less
+SLOW = 0.3  # m/s; below this it does not begin
 
 
 class SoftTouch:

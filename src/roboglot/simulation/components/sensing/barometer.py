@@ -15,7 +15,7 @@ from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import NotNegative
 
 SEA_LEVEL = 101_325.0  # Pa, standard atmosphere (ISO 2533)
-LAPSE, EXPONENT = 2.25577e-5, 5.25588  # 1/m, and the power of the share of temperature that is left
+LAPSE, EXPONENT = 2.25577e-5, 5.25588  # 1/m, and the exponent of the remaining share of temperature
 
 
 class BarometerSection(Struct, frozen=True, forbid_unknown_fields=True):

@@ -32,12 +32,12 @@ class SimulatedBumper(Bumper):
         self._hull, self._events = hull, events
         self._pressed: frozenset[str] = frozenset()
         self._stuck: frozenset[str] = frozenset()
-        self.duty = Duty()  # while something touches the hull, or a switch hangs
+        self.duty = Duty()  # active while the hull is touched, or a switch hangs
         hull.when_touched.append(self.duty)
-        self.reactions: list[Duty] = []  # of those that look at it while it has a duty
-        self.masked: frozenset[str] = frozenset()  # zones that report nothing
-        self.touched = False  # whether the hull touches something, or did in the tick before
-        self.bearings: tuple[tuple[float, float], ...] = ()  # where it is pressed: unit vectors, base_link
+        self.reactions: list[Duty] = []  # duties of components that read it while it is active
+        self.masked: frozenset[str] = frozenset()  # zones that do not report
+        self.touched = False  # whether the hull is touched, or was in the last tick
+        self.bearings: tuple[tuple[float, float], ...] = ()  # directions of contact: unit vectors, base_link
 
     @property
     def pressed(self) -> frozenset[str]:

@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     from roboglot.simulation.rendering.picture import Renderer
 
 log = logging.getLogger(__name__)
-QUEUE_MAX = 2  # pictures that a viewer may be behind
+QUEUE_MAX = 2  # pictures by which a viewer may lag
 WINDOW = 5.0  # s over which pictures are counted
-ENOUGH, RECOVERED = 0.8, 0.95  # of the pictures: fewer are worth a warning, and so many end it
+ENOUGH, RECOVERED = 0.8, 0.95  # share of the pictures: below the first a warning, from the second it is over
 
 
 class CameraSection(Struct, frozen=True, forbid_unknown_fields=True):
@@ -108,17 +108,17 @@ class SimulatedCamera(Camera):
         self._busy = asyncio.Lock()
         self._feed: Feed[Frame] = Feed(self._begin, self._end, queue_max=QUEUE_MAX)
         self._filming: asyncio.Task[None] | None = None
-        self.drawn = 0  # pictures so far
+        self.drawn = 0  # number of pictures so far
 
     @property
     def mount(self) -> Mount:
         section, (pitch, yaw) = self._section, self._hull.gaze
         gimbal = self._hull.body.get(GimbalSection)
         middle = gimbal.forward if gimbal else 0.0
-        ahead = section.forward - middle  # of the gimbal's axis, with which it turns
+        ahead = section.forward - middle  # distance from the gimbal's axis, with which the camera turns
         at = np.array(((middle + ahead * math.cos(yaw), ahead * math.sin(yaw), section.above_belly),))
         hull, (x, y, z) = self._hull, self._hull.held(at)[0].tolist()
-        held = hull.attitude  # roll has no place in a mount; pictures have it
+        held = hull.attitude  # mounts have no roll; pictures do
         pitch += section.pitch + held.pitch
         return Mount(x + hull.shift.x, y + hull.shift.y, hull.belly + z, pitch, yaw + held.yaw)
 
@@ -143,7 +143,7 @@ class SimulatedCamera(Camera):
             log.exception("the camera cannot draw")
 
     async def capture(self) -> Frame:
-        # In a task of its own: a drawing thread cannot be called off, and until it ends its renderer stays taken.
+        # In a task of its own: a drawing thread cannot be cancelled, and its renderer stays in use until it ends.
         return await asyncio.shield(asyncio.get_running_loop().create_task(self._capture()))
 
     async def _capture(self) -> Frame:
@@ -185,7 +185,7 @@ class SimulatedCamera(Camera):
         try:
             shortfall = Shortfall(self._hull.name, self.rate)
             self._feed.push(await self.capture())
-            async for now in self._clock.every(1.0 / self.rate):  # which skips the beats that a picture takes too long
+            async for now in self._clock.every(1.0 / self.rate):  # which skips beats while a picture takes too long
                 self._feed.push(await self.capture())
                 shortfall.note(now)
         except Exception:

@@ -16,7 +16,7 @@ from roboglot.simulation.building.floor_edges import Footing
 from roboglot.simulation.components.motion.base import SimulatedBase
 
 WHO = "the cliff sensor"
-PLACES = {  # direction in base_link, of the hull's radius
+PLACES = {  # direction in base_link, as shares of the hull's radius
     "front": (1.0, 0.0),
     "front left": (0.78, 0.63),
     "front right": (0.78, -0.63),
@@ -43,7 +43,7 @@ class SimulatedCliff(Cliff):
         self._detected: frozenset[str] = frozenset()
         self._fooled: frozenset[str] = frozenset()
         self.duty = hull.edges.call(Duty(), self._reach)
-        self.masked: frozenset[str] = frozenset()  # zones that report nothing
+        self.masked: frozenset[str] = frozenset()  # zones that do not report
 
     @property
     def detected(self) -> frozenset[str]:

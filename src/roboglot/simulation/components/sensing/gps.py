@@ -16,9 +16,9 @@ from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import NotNegative
 from roboglot.simulation.world.description import Georeference, WorldDescription
 
-WANDER = 60.0  # s: how long an error stays about the same
-SATELLITES = 14  # in sight under the open sky
-FEW = 4  # satellites through a roof and windows
+WANDER = 60.0  # s over which an error stays roughly constant
+SATELLITES = 14  # in view under the open sky
+FEW = 4  # satellites received through a roof and windows
 COARSE = 3.0  # times worse while the fix is young
 
 
@@ -42,7 +42,7 @@ class SimulatedGps(Gps):
         self._reading = GpsReading(clock.time())
         self._measured = -math.inf
         self._sky_since: float | None = None
-        self.jammed = False  # whether no satellite is heard
+        self.jammed = False  # whether no satellite is received
 
     @property
     def reading(self) -> GpsReading:

@@ -29,8 +29,8 @@ from roboglot.simulation.sound.sound import Air, Heard
 log = logging.getLogger(__name__)
 QUEUE_MAX = 20
 BEAT = 0.1  # s
-LATENCY = 0.3  # s from the end of an utterance until it is understood
-AUDIBLE, CLEAR = 3.0, 6.0  # times the noise from which on a voice is noticed, and its words are understood
+LATENCY = 0.3  # s from the end of an utterance to its recognition
+AUDIBLE, CLEAR = 3.0, 6.0  # times the noise from which a voice is noticed, and its words are understood
 FULL_SCALE = 32767.0
 
 

@@ -20,13 +20,13 @@ from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import NotNegative
 from roboglot.simulation.bodies.support import GRAVITY
 
-ACCELERATION_UNIT = GRAVITY / 8192  # of a converter of 16 bits that goes to 4 g
-RATE_UNIT = math.radians(1.0 / 65.5)  # to 500 degrees/s
+ACCELERATION_UNIT = GRAVITY / 8192  # per unit of a 16-bit converter for 4 g
+RATE_UNIT = math.radians(1.0 / 65.5)  # for 500 degrees/s
 FIELD_UNIT = 0.15e-6  # T
 FIELD_NOISE = 0.4e-6  # T, one standard deviation
 COUNTS_MAX = 32767
-HORIZONTAL, DOWN = 22e-6, 43e-6  # T, the earth's field in the middle latitudes
-DRAWN = 64  # ticks whose noise is drawn at once
+HORIZONTAL, DOWN = 22e-6, 43e-6  # T: the earth's field at middle latitudes
+DRAWN = 64  # ticks for which noise is drawn at once
 
 
 class ImuSection(Struct, frozen=True, forbid_unknown_fields=True):
@@ -58,16 +58,16 @@ class SimulatedImu(Imu):
             (random.normal(0.0, section.gyro_bias, 3), random.normal(0.0, section.acceleration_bias, 3))
         )
         self._sigma = np.array([section.gyro_noise] * 3 + [section.acceleration_noise] * 3)
-        self._held = STRAIGHT  # the legs' share of the attitude, the last time
+        self._held = STRAIGHT  # the legs' last share of the attitude
         self.forget()
         self._yaw = 0.0
-        self.rate = 0.0  # rad/s, the mean turn rate over the last tick as the gyro has it
+        self.rate = 0.0  # rad/s: the gyro's mean turn rate over the last tick
         self.felt = (0.0, 0.0, GRAVITY)  # the accelerometer's x, y, z, m/s2
-        self._level = (0.0, 0.0, 0.0, 0.0)  # stamp and rates (rad/s) of a reading that was not read yet
+        self._level = (0.0, 0.0, 0.0, 0.0)  # stamp and rates (rad/s) of a reading that has not been read yet
         self._reading: ImuReading | None = None
         self._raw: RawImu | None = None
-        self._compass, self._field = compass, field  # chance, and the earth's field in the world's frame, T
-        self._noises: list[list[float]] = []  # six for each tick to come, the next ones last
+        self._compass, self._field = compass, field  # random numbers, and the earth's field in the world's frame, T
+        self._noises: list[list[float]] = []  # six per tick to come, the next ones last
 
     @property
     def reading(self) -> ImuReading:

@@ -22,7 +22,7 @@ from roboglot.simulation.bodies.quantities import NotNegative, Positive
 from roboglot.simulation.components.sensing.odometry import SimulatedOdometry
 from roboglot.simulation.world.sight import Sight
 
-CLIMBED = 0.01  # m above its floor at which a robot's standing higher counts
+CLIMBED = 0.01  # m of elevation above its floor from which the robot counts as raised
 
 SAME = 1e-6  # m
 RAYS_MAX = 2000
@@ -71,7 +71,7 @@ class SimulatedLidar(Lidar):
         self.rate = 1.0 / (self.period * tick)
         self._increment = math.tau / section.rays
         self._scan: LaserScan | None = None
-        self.silent = False  # whether it stands still and sends nothing
+        self.silent = False  # whether it has stopped sending
 
     @property
     def scan(self) -> LaserScan | None:
@@ -108,7 +108,7 @@ class SimulatedLidar(Lidar):
             mount=ORIGIN,
         )
         pose = self._odometry.pose if self._odometry else ORIGIN
-        if late and self._odometry:  # the driver takes odometry of a moment before
+        if late and self._odometry:  # the driver uses slightly older odometry
             twist = self._odometry.reading.twist
             pose = pose.compose(Pose(-late * twist.x, -late * twist.y, -late * twist.yaw))
         self._events.publish(ScanTaken(stamp=stamp, scan=self._scan, odometry=pose))

@@ -18,7 +18,7 @@ from roboglot.simulation.sound.sound import Air
 
 PERIOD = BLOCK / SAMPLE_RATE
 QUEUE_MAX = 25  # blocks: half a second
-BEHIND_MAX = 0.5  # s that a slow machine may lag before sound is skipped
+BEHIND_MAX = 0.5  # s by which a slow machine may lag before sound is skipped
 
 
 class MicrophoneSection(Struct, frozen=True, forbid_unknown_fields=True):

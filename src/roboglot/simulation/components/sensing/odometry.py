@@ -16,7 +16,7 @@ from roboglot.simulation.components.motion.base import SimulatedBase
 from roboglot.simulation.components.sensing.imu import SimulatedImu
 
 USUAL = OdometryNoise()
-DRAWN = 64  # ticks whose noise is drawn at once
+DRAWN = 64  # ticks for which noise is drawn at once
 
 
 class DescribedNoise(Struct, frozen=True, forbid_unknown_fields=True):
@@ -55,9 +55,9 @@ class SimulatedOdometry(Odometry):
         self._section, self._base, self._imu, self._random = section, base, imu, random
         self._scale_x, self._scale_y = (1.0 + random.normal(0.0, section.scale_error, 2)).tolist()
         self._disturbs = bool(section.turn_slip or section.jump_every)
-        self._noises: list[float] = []  # two for each tick to come
-        self._state = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # stamp; x, y, yaw; twist; way
-        self._reading: OdometryReading | None = None  # the same, once it is read
+        self._noises: list[float] = []  # two per tick to come
+        self._state = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # stamp; x, y, yaw; twist; distance
+        self._reading: OdometryReading | None = None  # the same, once read
 
     @property
     def reading(self) -> OdometryReading:
@@ -94,7 +94,7 @@ class SimulatedOdometry(Odometry):
         wheels = self._base.velocity
         _, x, y, yaw, _, _, _, way = self._state
         still = not (wheels.x or wheels.y or wheels.yaw)
-        # With still wheels a slow rate is the gyro's own error.
+        # With wheels at rest, a slow rate is the gyro's own error.
         rate, section = self._imu.rate, self._section
         if still and abs(rate) < section.still_rate:
             rate = 0.0

@@ -23,7 +23,7 @@ from roboglot.simulation.bodies.schedule import Duty
 if TYPE_CHECKING:
     from roboglot.simulation.world.rays import Rays
 
-RAYS = 7  # of a fan
+RAYS = 7  # per fan
 
 
 class RangeSensorsSection(Struct, frozen=True, forbid_unknown_fields=True):

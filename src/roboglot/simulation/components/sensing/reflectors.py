@@ -25,9 +25,9 @@ from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.components.sensing.lidar import LidarSection
 from roboglot.simulation.world.description import Reflector, WorldDescription
 
-REACH = 8.0  # m from which enough light comes back
-SLANT = math.radians(70)  # how far a strip may be turned away
-NEAR = 0.12  # m between a ray's end and the strip for the ray to have met it
+REACH = 8.0  # m within which enough light returns
+SLANT = math.radians(70)  # the steepest angle to a strip
+NEAR = 0.12  # m between a ray's end and a strip within which it was hit
 QUEUE_MAX = 4
 
 

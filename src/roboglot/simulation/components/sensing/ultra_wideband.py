@@ -16,9 +16,9 @@ from roboglot.simulation.bodies.quantities import NotNegative, Positive
 from roboglot.simulation.components.system.bluetooth import SimulatedBluetooth
 from roboglot.simulation.radio.gadgets import GadgetInWorld, Gadgets
 
-WALL_DETOUR = 0.15  # m that every wall in between seems to add
+WALL_DETOUR = 0.15  # m that each wall in between seems to add
 VAGUE = 3.0  # times the noise without a line of sight
-WALLS_MAX = 3  # through more, nothing is heard
+WALLS_MAX = 3  # beyond this many, no signal arrives
 
 
 class UltraWidebandSection(Struct, frozen=True, forbid_unknown_fields=True):

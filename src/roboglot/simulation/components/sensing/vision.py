@@ -31,7 +31,7 @@ from roboglot.simulation.world.randomness import Chances
 
 T = TypeVar("T")
 log = logging.getLogger(__name__)
-QUEUE_MAX = 4  # sightings that a viewer may be behind
+QUEUE_MAX = 4  # sightings by which a viewer may lag
 
 
 class VisionSection(Struct, frozen=True, forbid_unknown_fields=True):
@@ -72,7 +72,7 @@ class SimulatedDetector(Detector[T]):
             self._looking = None
 
     async def _watch(self) -> None:
-        ready: Sighting[T] | None = None  # what is being worked at until the next beat
+        ready: Sighting[T] | None = None  # the work in progress until the next beat
         try:
             async for stamp in self._clock.every(1.0 / self.rate):
                 if ready is not None:

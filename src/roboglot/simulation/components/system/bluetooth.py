@@ -27,7 +27,7 @@ from roboglot.simulation.radio.gadgets import GadgetInWorld, Gadgets
 
 HISTORY_MAX = 50
 KEY = "bluetooth.history"
-LOOK = 0.5  # s between looks at the connection
+LOOK = 0.5  # s between checks of the connection
 UPDATE_SECONDS = 20.0
 UPDATE_BATTERY = 1 / 3
 
@@ -44,8 +44,8 @@ class SimulatedBluetooth(Bluetooth):
 
     def __init__(self, section: BluetoothSection, hull: Hull, gadgets: Gadgets, robot: Robot) -> None:
         self._section, self._hull, self._gadgets, self._robot = section, hull, gadgets, robot
-        self._wanted: GadgetInWorld | None = None  # the device that people connected
-        self._linked = False  # and whether it is in reach
+        self._wanted: GadgetInWorld | None = None  # the device that people paired
+        self._linked = False  # and whether it is in range
         self._found: tuple[BluetoothDevice, ...] = ()
         self._remembered: list[BluetoothDevice] | None = None
         self._next = 0.0

@@ -37,9 +37,9 @@ from roboglot.simulation.bodies.quantities import Positive
 from roboglot.simulation.components.motion.base import SimulatedBase
 from roboglot.simulation.components.system.firmware_record import FirmwareRecord
 
-PACKAGE = "firmware package"  # under this name it takes room on the disk
-CHARGE_MIN = 0.3  # for an installation
-LOOK_EVERY = 60.0  # s between looks for a newer version
+PACKAGE = "firmware package"  # the entry that occupies its space on the disk
+CHARGE_MIN = 0.3  # required for an installation
+LOOK_EVERY = 60.0  # s between checks for a newer version
 AFTER_MAX = 86_400.0  # s
 RESTART_SECONDS = {Module.SOFTWARE: 8.0, Module.BASE: 3.0}
 
@@ -69,7 +69,7 @@ class SimulatedFirmware(Firmware):
         self._next_look = LOOK_EVERY
         self._module: Module | None = None
 
-    # -- what runs ---------------------------------------------------------------------------------------------------
+    # -- versions ------------------------------------------------------------------------------------------------------
 
     @property
     def version(self) -> str:
@@ -197,7 +197,7 @@ class SimulatedFirmware(Firmware):
         async def run(action: Action) -> None:
             await self._clock.sleep(after)
             self._restarting = asyncio.get_running_loop().create_task(self._restart(action), name="reboot")
-            await asyncio.shield(self._restarting)  # who asked for it may go; it goes on
+            await asyncio.shield(self._restarting)  # its caller may be cancelled; the update continues
 
         return self._robot.actions.start("reboot", run, resources=[FIRMWARE], source=source)
 
@@ -230,7 +230,7 @@ class SimulatedFirmware(Firmware):
             self._module = module
             try:
                 if module is Module.BASE and EmergencyStop in robot:
-                    robot[EmergencyStop].release()  # what applications asked of it is forgotten
+                    robot[EmergencyStop].release()  # requests of applications are forgotten
                     robot[EmergencyStop].release_brake(False)
                 await self._clock.sleep(RESTART_SECONDS[module])
             finally:

@@ -26,8 +26,8 @@ class FirmwareRecord:
     def __init__(self, robot: Robot, version: str, modules: Mapping[str, str]) -> None:
         self._robot, self._factory = robot, (version, modules)
         self._kept: dict[str, object] = {}  # for a robot without settings
-        self._awake = False  # whether it knows what an earlier life left
-        self._booted: Versions | None = None  # what that life had installed, without a reboot since: it runs by now
+        self._awake = False  # whether the state left by the previous run is loaded
+        self._booted: Versions | None = None  # the versions installed before the last reboot: they are running by now
 
     def wake(self) -> FirmwarePackage | None:
         """Take up what an earlier life left, once; return what it had downloaded."""

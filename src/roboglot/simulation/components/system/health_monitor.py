@@ -29,8 +29,8 @@ from roboglot.simulation.bodies.part import Fitting, Part
 PERIOD = 10  # ticks
 EMPTY = 0.05  # charge below which the battery is an error
 HOT = 60.0  # Celsius
-DOUBT, CERTAIN = 0.2, 0.5  # quality of localization below which the robot is lost, and from which it no longer is
-STUCK_AFTER = 5.0  # s of pressing against nothing that moves
+DOUBT, CERTAIN = 0.2, 0.5  # quality of localization below which the robot is lost, and from which it is not
+STUCK_AFTER = 5.0  # s of pushing against an immovable obstacle
 SCANLESS_AFTER = 1.0  # s
 
 
@@ -93,7 +93,7 @@ class HealthWatch:
     def __init__(self, robot: Robot, health: Health, hull: Hull) -> None:
         self._robot, self._health, self._hull = robot, health, hull
         self._watches: list[tuple[_Watch, Component]] | None = None
-        for changed in (EmergencyStopChanged, BrakeChanged):  # these are seen elsewhere in the same instant
+        for changed in (EmergencyStopChanged, BrakeChanged):  # these are noticed elsewhere at the same instant
             robot.events.listen(changed, lambda _: self._look())
         self._pressed_since: dict[str, float] = {}
         self._scanned = 0.0

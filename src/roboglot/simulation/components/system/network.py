@@ -80,12 +80,14 @@ class SimulatedNetwork(Network):
         self._own_name = f"{section.name}-{tail:06X}"
         self._unsaved: dict[str, object] = {}  # for a robot without settings
         self._signal = self.strongest = FLOOR_OF_NOISE
-        self._ssid = ""  # of the network that it is in
-        self._levels: tuple[tuple[float, float, int], dict[str, float]] | None = None  # place, and dBm of all networks
+        self._ssid = ""  # of the joined network
+        self._levels: tuple[tuple[float, float, int], dict[str, float]] | None = (
+            None  # the place, and dBm of all networks
+        )
         self._joining = False
         self._told: NetworkState | None = None
         self._next = -math.inf
-        self.jammed = False  # whether it hears nothing at all
+        self.jammed = False  # whether it receives no signal at all
         self.sense(0.0, 0.0)
 
     @property
@@ -254,7 +256,7 @@ class SimulatedNetwork(Network):
             await self._robot[Settings].put(KEY, {**self._robot[Settings].get(KEY, {}), **changes})
         else:
             self._unsaved.update(changes)
-        self._next = -math.inf  # the link follows at the next look
+        self._next = -math.inf  # the link follows at the next measurement
 
 
 def _check(ssid: str, password: str) -> None:

@@ -13,11 +13,11 @@ import msgspec
 
 from roboglot.wire.cyberdog.text import Int32, NotJson, read_json
 
-DEFAULT_UID = "default_uid"  # of an app that names itself not
+DEFAULT_UID = "default_uid"  # of an app that does not name itself
 UID_MAX = 128  # characters
 SDP_MAX = 65_536  # characters
 CANDIDATE_MAX = 1024  # characters
-STRETCH_MAX = 4.0  # of a screen: its height to its width, or the other way round
+STRETCH_MAX = 4.0  # of a screen: ratio of its sides
 
 
 class Alignment(StrEnum):

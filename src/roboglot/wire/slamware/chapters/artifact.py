@@ -15,13 +15,13 @@ METADATA_MAX = 64  # entries
 METADATA_TEXT_MAX = 4096  # characters
 
 Identifier = Annotated[str, msgspec.Meta(min_length=1, max_length=ID_MAX)]
-# Of what a client adds: an id that can stand in a path, where a colon begins the name of a command.
+# For new entries: an id that can stand in a path, where a colon starts the name of a command.
 NewIdentifier = Annotated[
     str, msgspec.Meta(min_length=1, max_length=ID_MAX, pattern=r"\A[^:\x00-\x1f\x7f][^\x00-\x1f\x7f]*\Z")
 ]
 _Text = Annotated[str, msgspec.Meta(max_length=METADATA_TEXT_MAX)]
 _Key = Annotated[str, msgspec.Meta(max_length=ID_MAX)]
-# Values are text by the manual, but clients send numbers as well, and [] for none.
+# By the manual, values are text, but clients also send numbers, and [] for none.
 Metadata = (
     Annotated[dict[_Key, _Text | int | float | bool | None], msgspec.Meta(max_length=METADATA_MAX)]
     | Annotated[list[None], msgspec.Meta(max_length=0)]

@@ -28,11 +28,11 @@ class Motion(IntEnum):
     USER_GAIT = 401
 
 
-# What a robot with a low battery still does.
+# Motions allowed with a low battery.
 ALLOWED_ON_LOW_BATTERY = frozenset(
     {Motion.EMERGENCY_STOP, Motion.LIE_DOWN, Motion.LIE_DOWN_PASSIVE, Motion.STAND_UP, Motion.POSE_RELATIVE}
 )
-# What leads out of an emergency stop, or into it again.
+# Motions that lead out of an emergency stop, or into it.
 ALLOWED_WHEN_STOPPED = frozenset({Motion.EMERGENCY_STOP, Motion.STAND_UP})
 
 

@@ -90,7 +90,7 @@ class _Strings:
 
 def _utf8(chunk: bytes, at: int) -> str:
     size = 0
-    for _ in range(2):  # how many characters, how many bytes
+    for _ in range(2):  # number of characters, number of bytes
         size = chunk[at]
         at += 1
         if size & 0x80:

@@ -15,7 +15,7 @@ import msgspec
 
 DIRECTORY_MAX = 4 << 20  # bytes of an archive's table of contents
 ENTRY_MAX = 4 << 20  # bytes of a description, unpacked
-TAIL = 22 + 0xFFFF  # bytes at the end of an archive that say where its table is
+TAIL = 22 + 0xFFFF  # bytes at the end of an archive that contain the offset of its table
 DESCRIPTION = "firmware.json"
 Text = Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
 

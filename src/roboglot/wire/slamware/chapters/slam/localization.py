@@ -14,7 +14,7 @@ class Switch(msgspec.Struct):
     enable: bool
 
 
-IMU_RAW = 16 | 32 | 64  # accelerometer, gyro and compass as they come
+IMU_RAW = 16 | 32 | 64  # raw accelerometer, gyro and compass
 IMU_QUATERNION, IMU_ACCELEROMETER, IMU_GYROSCOPE, IMU_EULER = 1, 2, 4, 512  # bits of ImuData.availability
 
 

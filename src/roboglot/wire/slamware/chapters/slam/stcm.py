@@ -18,7 +18,7 @@ MAGIC = b"STCM"
 VERSION = (18, 1, 1, 1)
 MAP_BYTES_MAX = 64 << 20
 LAYERS_MAX = 1000
-PAIRS_MAX = 1000  # of one layer
+PAIRS_MAX = 1000  # per layer
 TEXT_MAX = 0xFFFF  # bytes of a key or a value
 _VERSION, _SIZE, _SHORT = struct.Struct("<4H"), struct.Struct("<I"), struct.Struct("<H")
 

@@ -29,7 +29,7 @@ JSON = "vnd.roboglot.map-layer/json"
 EXPLORE, WALLS, TRACKS = "explore", "virtual_walls", "virtual_tracks"
 PLACES, DOCKS, AREAS, LANDMARKS = "point_of_interest", "home_dock_pose", "rectangle_area", "landmark"
 T = TypeVar("T")
-ENTRIES_MAX = 20_000  # of one layer
+ENTRIES_MAX = 20_000  # per layer
 _ENDS, _POSE = struct.Struct("<4f"), struct.Struct("<3f")
 
 
