@@ -1,0 +1,214 @@
+"""Clients in a process of their own: one for each robot, ten requests a second, and what they saw.
+
+REST clients ask for the pose and have their robot turn, text clients turn theirs and take pushes at 10 Hz, gRPC
+clients send frames that let the dog turn, and take its heartbeats. Some text clients film: they take the video's bytes.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import socket
+import time
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
+from ipaddress import IPv4Address
+from multiprocessing import get_context
+from typing import NamedTuple
+
+import grpc
+
+from roboglot.clients.cyberdog import Certificates
+from roboglot.clients.cyberdog.link import PUSH_MAX
+from roboglot.wire.cyberdog.channel import HEARTBEAT_PERIOD, ROBOT_NAME, client_options
+from roboglot.wire.cyberdog.chapters.motion.motion import Motion
+from roboglot.wire.cyberdog.codes import Code
+from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
+from roboglot.wire.cyberdog.proto import cyberdog_app_pb2_grpc as service
+
+REST, TEXT, GRPC = "hermes", "robomaster_ep", "cyberdog2"  # the bodies that each kind of client is for
+RATE = 10  # Hz, of requests and of pushes
+CLIENTS = 1 << 10  # that their addresses are above those of the robots
+PICTURE = b"\x00\x00\x00\x01\x09"  # a delimiter stands before each
+POSE = b"GET /api/core/slam/v1/localization/pose HTTP/1.1\r\nHost: localhost\r\n\r\n"
+MOVE = b'{"action_name":"slamtec.agent.actions.MoveByAction","options":{"direction":3,"duration":1500}}'
+TURN = b"POST /api/core/motion/v1/actions HTTP/1.1\r\nHost: localhost\r\nContent-Length: %d\r\n\r\n%s" % (
+    len(MOVE),
+    MOVE,
+)
+FRAME = {"motion_id": int(Motion.TROT_SLOW), "cmd_type": 1, "cmd_source": 0, "vel_des": [0.0, 0.0, 0.3]}
+SERVO = json.dumps(FRAME | {"step_height": [0.05, 0.05]})
+
+
+class Lesson(NamedTuple):
+    """What is to be done: body and address of each robot, which of them are filmed; ``seconds`` are counted."""
+
+    robots: list[tuple[str, str]]
+    filmed: set[str]
+    proof: Certificates
+    app: str
+    settle: float
+    seconds: float
+
+
+@dataclass(slots=True)
+class Seen:
+    """What all clients of one kind saw: s of each answer, and pushes of each robot a second."""
+
+    waits: list[float] = field(default_factory=list)
+    pushes: list[float] = field(default_factory=list)
+    pictures: list[float] = field(default_factory=list)
+    refused: int = 0
+
+    def percentile(self, share: float) -> float:
+        """ms that so many of the requests waited at most."""
+        return 1e3 * sorted(self.waits)[min(len(self.waits) - 1, int(share * len(self.waits)))]
+
+
+class App(service.GrpcAppServicer):
+    """The phone that all dogs call."""
+
+    def __init__(self) -> None:
+        self.beats: dict[str, int] = {}
+
+    async def heartbeat(self, request: pb.Ticks, _context: object) -> pb.Result:
+        self.beats[request.sn] = self.beats.get(request.sn, 0) + 1
+        return pb.Result(result="ok")
+
+    async def sendMsg(self, request: pb.SendRequest, context: grpc.aio.ServicerContext) -> None:  # noqa: N802
+        await context.write(pb.RecResponse(nameCode=request.nameCode, data="{}"))
+
+    async def serve(self, where: str, proof: Certificates) -> grpc.aio.Server:
+        """Listen where the dogs look for it."""
+        server = grpc.aio.server(options=[("grpc.so_reuseport", 0), ("grpc.max_receive_message_length", PUSH_MAX)])
+        service.add_GrpcAppServicer_to_server(self, server)
+        pair = [(proof.key, proof.certificate)]
+        server.add_secure_port(where, grpc.ssl_server_credentials(pair, proof.ca, require_client_auth=True))
+        await server.start()
+        return server
+
+
+@dataclass(slots=True)
+class Class:
+    """All clients of one run."""
+
+    lesson: Lesson
+    seen: dict[str, Seen] = field(default_factory=lambda: {kind: Seen() for kind in (REST, TEXT, GRPC)})
+    ready: asyncio.Event = field(default_factory=asyncio.Event)
+    began: float = 0.0
+
+    async def run(self) -> dict[str, Seen]:
+        """Have every client do its part."""
+        app, lesson = App(), self.lesson
+        server = await app.serve(lesson.app, lesson.proof)
+        parts: dict[str, Callable[[int, str], Awaitable[None]]] = {REST: self.rest, TEXT: self.text, GRPC: self.dog}
+        tasks = [asyncio.ensure_future(parts[body](n, at)) for n, (body, at) in enumerate(lesson.robots)]
+        await asyncio.sleep(lesson.settle)
+        self.began = time.perf_counter()
+        self.ready.set()
+        before = dict(app.beats)
+        await asyncio.sleep(lesson.seconds)
+        for serial, count in app.beats.items():
+            self.seen[GRPC].pushes.append((count - before.get(serial, 0)) * HEARTBEAT_PERIOD / lesson.seconds)
+        await asyncio.gather(*tasks)
+        await server.stop(None)
+        return self.seen
+
+    async def beats(self, number: int, kind: str, request: Callable[[int], Awaitable[bool]]) -> None:
+        """Send a request at every beat, each client a little later than the one before; only then count."""
+        await self.ready.wait()
+        began, seen = self.began + number / len(self.lesson.robots) / RATE, self.seen[kind]
+        for beat in range(round(self.lesson.seconds * RATE)):
+            await asyncio.sleep(began + beat / RATE - time.perf_counter())
+            sent = time.perf_counter()
+            seen.refused += not await request(beat)
+            seen.waits.append(time.perf_counter() - sent)
+
+    async def rest(self, number: int, address: str) -> None:
+        """Ask where the robot is; once a second have it turn on."""
+        await self.ready.wait()  # an idle connection is hung up on
+        reader, writer = await asyncio.open_connection(address, 1448)
+
+        async def request(beat: int) -> bool:
+            writer.write(POSE if beat % RATE else TURN)
+            head = await reader.readuntil(b"\r\n\r\n")
+            await reader.readexactly(int(head.lower().partition(b"content-length:")[2].partition(b"\r\n")[0]))
+            return head.startswith(b"HTTP/1.1 200")
+
+        await self.beats(number, REST, request)
+        writer.close()
+
+    async def text(self, number: int, address: str) -> None:
+        """Drive, and take pushes; film, if that is this client's part."""
+        host, loop = str(IPv4Address(address) + CLIENTS), asyncio.get_running_loop()
+        reader, writer = await asyncio.open_connection(address, 40923, local_addr=(host, 0))
+        inbox, pushes = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), 0
+        inbox.bind((host, 40924))
+        inbox.setblocking(False)
+
+        def pushed() -> None:
+            nonlocal pushes
+            pushes += inbox.recv(2048).startswith(b"chassis push position")
+
+        loop.add_reader(inbox, pushed)
+        writer.write(b"command;chassis push position on pfreq %d;" % RATE)
+        await reader.readuntil(b";ok;")
+        film = asyncio.ensure_future(self.film(address)) if address in self.lesson.filmed else None
+        if film:
+            writer.write(b"stream on;")
+            await reader.readuntil(b"ok;")
+
+        async def request(_: int) -> bool:
+            writer.write(b"chassis speed x 0 y 0 z 30;")
+            return await reader.readuntil(b";") == b"ok;"
+
+        await self.ready.wait()
+        before = pushes
+        await self.beats(number, TEXT, request)
+        await asyncio.sleep(self.began + self.lesson.seconds - time.perf_counter())
+        self.seen[TEXT].pushes.append((pushes - before) / (time.perf_counter() - self.began))
+        if film:
+            await film
+        loop.remove_reader(inbox)
+        inbox.close()
+        writer.close()
+
+    async def film(self, address: str) -> None:
+        """Count the pictures that come."""
+        reader, writer = await asyncio.open_connection(address, 40921)
+        pictures, end = 0, 0.0
+        while not end or time.perf_counter() < end:
+            data = await reader.read(1 << 18)
+            if self.ready.is_set():
+                end = self.began + self.lesson.seconds
+                pictures += data.count(PICTURE)
+        self.seen[TEXT].pictures.append(pictures / self.lesson.seconds)
+        writer.close()
+
+    async def dog(self, number: int, address: str) -> None:
+        """Have the dog stand up, then turn, frame by frame."""
+        proof = self.lesson.proof
+        credentials = grpc.ssl_channel_credentials(proof.ca, proof.key, proof.certificate)
+        options = client_options(ROBOT_NAME)
+        async with grpc.aio.secure_channel(f"{address}:50052", credentials, options=options) as channel:
+            stub = service.GrpcAppStub(channel)
+
+            async def tell(code: Code, text: str) -> bool:
+                answers = [answer.data async for answer in stub.sendMsg(pb.SendRequest(nameCode=code, params=text))]
+                return bool(answers) and '"error_code"' not in answers[-1]
+
+            await tell(Code.MOTION, json.dumps({"motion_id": int(Motion.STAND_UP), "cmd_source": 0, "duration": 0}))
+            await self.beats(number, GRPC, lambda _: tell(Code.SERVO, SERVO))
+
+
+def attend(lesson: Lesson) -> dict[str, Seen]:
+    """Run the clients of a lesson in this process."""
+    import uvloop
+
+    return uvloop.run(Class(lesson).run())
+
+
+def in_a_process(lesson: Lesson) -> dict[str, Seen]:
+    """Run the clients of a lesson in a process of their own."""
+    with get_context("spawn").Pool(1) as pool:
+        return pool.apply(attend, (lesson,))
