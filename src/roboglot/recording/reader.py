@@ -24,15 +24,8 @@ from roboglot.recording.standing import REPEATED
 log = logging.getLogger(__name__)
 RECORD_MAX = 1 << 30  # bytes per record
 EXCHANGES_MAX = 2_000_000
-DAMAGE = (
-    struct.error,
-    zstandard.ZstdError,
-    ValueError,
-    KeyError,
-    EOFError,
-    MemoryError,
-    OverflowError,
-)  # of damaged files
+# What reading a damaged file raises.
+DAMAGE = (struct.error, zstandard.ZstdError, ValueError, KeyError, EOFError, MemoryError, OverflowError)
 
 
 class BadRecording(ValueError):

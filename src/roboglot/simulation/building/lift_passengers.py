@@ -14,12 +14,7 @@ from roboglot.simulation.world.description import Lift
 
 PERSON_MASS = 75.0  # kg
 PERSON_SIZE = (0.35, 0.45, 1.72)  # m
-SPOTS = (
-    (-0.25, -0.3),
-    (0.25, 0.3),
-    (-0.25, 0.3),
-    (0.25, -0.3),
-)  # centres, as shares of the car's half extent times 1.3
+SPOTS = ((-0.25, -0.3), (0.25, 0.3), (-0.25, 0.3), (0.25, -0.3))  # centres, as shares of 1.3 half extents of the car
 SILL = 0.05  # m in front of and behind the door that must be free as well
 
 

@@ -39,10 +39,7 @@ class SimulatedJack(Jack):
         self._shelf: ShelfStand | None = None
         self.carrying = Duty()  # active while it holds a shelf
         self._offset = Pose()  # of the shelf in base_link
-        self._free: tuple[Pose, frozenset[Hashable]] = (
-            Pose(),
-            frozenset(),
-        )  # the shelf's last pose, and its contacts there
+        self._free: tuple[Pose, frozenset[Hashable]] = Pose(), frozenset()  # where the shelf was, its contacts there
         self._alarm = ""
         self.jammed = False  # whether the drive fails
         self._told: tuple[JackStage, bool, str] = (JackStage.DOWN, False, "")

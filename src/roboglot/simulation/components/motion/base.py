@@ -43,9 +43,7 @@ class SimulatedBase(Base):
         self.pace = math.inf  # m/s permitted by obstacles ahead
         self._carried = False
         self._free = False
-        self._hardest = max(
-            1.0, (section.braking or 0.0) / section.acceleration
-        )  # of the accelerations, in an emergency
+        self._hardest = max(1.0, (section.braking or 0.0) / section.acceleration)  # factor in an emergency
         self._haste = 1.0  # the factor in use
         self._walkable: Callable[[Twist], Twist] = _any
         self.steer: float | None = None  # rad/s; a turn rate that replaces the commanded one

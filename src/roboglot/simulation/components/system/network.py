@@ -81,9 +81,7 @@ class SimulatedNetwork(Network):
         self._unsaved: dict[str, object] = {}  # for a robot without settings
         self._signal = self.strongest = FLOOR_OF_NOISE
         self._ssid = ""  # of the joined network
-        self._levels: tuple[tuple[float, float, int], dict[str, float]] | None = (
-            None  # the place, and dBm of all networks
-        )
+        self._levels: tuple[tuple[float, float, int], dict[str, float]] | None = None  # place, dBm of all networks
         self._joining = False
         self._told: NetworkState | None = None
         self._next = -math.inf
