@@ -6,6 +6,9 @@ from roboglot.console import words
 from roboglot.model.components.mapping.annotations import Annotations, MapAnnotations
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.places import Places
+from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.components.system.link import require_heard
+from roboglot.model.errors import RobotError
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
 from roboglot.model.stage import Stage
@@ -61,6 +64,21 @@ def truth_of(stage: Stage) -> dict[str, object]:
 def anchor_of(robot: Robot, stage: Stage) -> Pose | None:
     """Return the map's pose in the world, if the robot stands where it believes; None for real robots."""
     true = next((r.pose for r in stage.robots if r.name == robot.id), None)
-    if true is None or Localization not in robot:
+    believed = whereabouts(robot)
+    if true is None or believed is None:
         return None
-    return true.compose(robot[Localization].pose.inverse())
+    return true.compose(believed.inverse())
+
+
+def whereabouts(robot: Robot) -> Pose | None:
+    """Return the pose that the robot believes in; None if it knows none, or was never heard.
+
+    A robot that cannot localize itself reckons from where it woke up, which is where its map would begin.
+    """
+    try:
+        require_heard(robot)
+    except RobotError:
+        return None
+    if Localization in robot:
+        return robot[Localization].pose
+    return robot[Odometry].reading.pose if Odometry in robot else None

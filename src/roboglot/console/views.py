@@ -11,7 +11,6 @@ from roboglot.console.frames import map_frame, path_frame, scan_frame
 from roboglot.console.settings import MAP_SECONDS
 from roboglot.console.state import state_of
 from roboglot.console.wire_log import WireLog
-from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.navigation import NavigationFeedback
@@ -95,9 +94,11 @@ class RobotView:
 
     @property
     def motion(self) -> list[float | None]:
-        """[x, y, yaw, forward m/s, left m/s, rad/s] now, in the robot's map."""
+        """[x, y, yaw, forward m/s, left m/s, rad/s] now, in the robot's map; all None while the pose is unknown."""
         robot = self.robot
-        where = robot[Localization].pose if Localization in robot else Pose()
+        where = drawings.whereabouts(robot)
+        if where is None:
+            return [None] * 6
         speed = robot[Base].velocity if Base in robot else None
         rates = [words.number(v) for v in (speed.x, speed.y, speed.yaw)] if speed else [0.0, 0.0, 0.0]
         return [*words.pose(where), *rates]
@@ -137,7 +138,7 @@ class RobotView:
             self._packing = None
 
     def _note_scan(self, event: ScanTaken) -> None:
-        where = self.robot[Localization].pose if Localization in self.robot else Pose()
+        where = drawings.whereabouts(self.robot) or Pose()
         self.scan = scan_frame(self.robot.id, event.scan, where)
 
     def _note_refusal(self, event: ControlRefused) -> None:

@@ -152,7 +152,7 @@ function receive(message) {
     case "you": you.value = message.client; break;
     case "pong": age.value = performance.now() - message.at; break;
     case "moment":
-      batch(() => { clock.value = message.time; poses.value = message.poses; recording.value = message.recording; if (message.truth) truth.value = message.truth; steer(message.pace); });
+      batch(() => { clock.value = message.time; poses.value = Object.fromEntries(Object.entries(message.poses).filter(([, p]) => p[0] !== null)); recording.value = message.recording; if (message.truth) truth.value = message.truth; steer(message.pace); });
       break;
     case "state":
       states.value = { ...states.value, [message.robot]: { ...states.value[message.robot], ...message.state } };

@@ -69,14 +69,13 @@ function Control() {
 }
 
 function State() {
-  const { about, battery, place, safety, drawings } = state.value, pose = poses.value[current.value] ?? [0, 0, 0, 0, 0, 0];
-  const speed = Math.hypot(pose[3], pose[4]);
+  const { about, battery, place, safety, drawings } = state.value, pose = poses.value[current.value];
   return html`<${Control} />
     <div class="card"><h3>${t("condition")}</h3><${Faults} /><dl>
       ${battery && html`<${Row} name=${t("battery")} kind=${battery.low ? "bad" : ""}>${Math.round(battery.charge * 100)} %${battery.charging ? ` · ${t("charging")}` : ""}
         <small>${battery.volts} V · ${battery.amperes} A${battery.remaining ? ` · ${t("battery.left", { time: duration(battery.remaining) })}` : ""}</small><//>`}
-      <${Row} name=${t("pose")}>x ${pose[0].toFixed(2)} · y ${pose[1].toFixed(2)} m · ${Math.round(pose[2] * 180 / Math.PI)}°<//>
-      <${Row} name=${t("speed")}>${speed.toFixed(2)} m/s · ${Math.round(pose[5] * 180 / Math.PI)}°/s<//>
+      ${pose && html`<${Row} name=${t("pose")}>x ${pose[0].toFixed(2)} · y ${pose[1].toFixed(2)} m · ${Math.round(pose[2] * 180 / Math.PI)}°${place.quality === null && html`<small>${t("odometry")}</small>`}<//>
+      <${Row} name=${t("speed")}>${Math.hypot(pose[3], pose[4]).toFixed(2)} m/s · ${Math.round(pose[5] * 180 / Math.PI)}°/s<//>`}
       ${place.quality !== null && html`<${Row} name=${t("place.fit")} kind=${place.lost ? "bad" : ""}>${place.lost ? t("place.lost", { why: robotWord(place.lost) }) : `${Math.round(place.quality * 100)} %`}<//>`}
       ${place.floor !== null && html`<${Row} name=${t("floor")}>${place.floor}<//>`}
       <${Row} name=${t("dock")}>${safety.docked ? t("docked") : t("undocked")}<//>
@@ -87,7 +86,7 @@ function State() {
       ${state.value.parts.includes("emergency_stop") && !safety.emergency_stop && html`<${Button} kind="danger" icon="alert" label=${t("estop")} verb="emergency_stop" onClick=${() => command("emergency_stop", { engage: true })} />`}
     </div></div>
     <details class="card"><summary>${t("list")}</summary>
-      <p>${t("list.robot", { name: current.value, x: pose[0].toFixed(1), y: pose[1].toFixed(1), yaw: Math.round(pose[2] * 180 / Math.PI) })}</p>
+      ${pose && html`<p>${t("list.robot", { name: current.value, x: pose[0].toFixed(1), y: pose[1].toFixed(1), yaw: Math.round(pose[2] * 180 / Math.PI) })}</p>`}
       <ul class="list">${drawings.places.map((p) => html`<li><span>${p.name}</span><small>${p.pose[0].toFixed(1)}, ${p.pose[1].toFixed(1)}</small>
         <${Button} label=${t("go")} verb="go_to" onClick=${() => go([[p.pose[0], p.pose[1]]], p.pose[2])} /></li>`)}</ul>
       <p>${t("list.drawn", { lines: drawings.lines.length, areas: drawings.areas.length, docks: drawings.docks.length })}</p>

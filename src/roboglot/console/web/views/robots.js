@@ -23,7 +23,7 @@ function Thumbnail({ name }) {
 
 function Tile({ robot }) {
   const state = states.value[robot.name], pose = poses.value[robot.name];
-  if (!state || !pose) return html`<li class="tile"><h2>${robot.name}</h2></li>`;
+  if (!state) return html`<li class="tile"><h2>${robot.name}</h2></li>`;
   const { battery, faults, actions, control, safety, about } = state, task = actions[actions.length - 1];
   const worst = ["FATAL", "ERROR", "WARNING"].find((level) => faults.some((f) => f.level === level));
   const open = () => { choose(robot.name); location.hash = "#/live"; };
@@ -32,7 +32,7 @@ function Tile({ robot }) {
     <dl><div class="row"><dt>${t("battery")}</dt><dd class=${battery?.low ? "bad" : ""}>${battery ? `${Math.round(battery.charge * 100)} %` : "–"}${battery?.charging ? ` · ${t("charging")}` : ""}</dd></div>
       <div class="row"><dt>${t("task")}</dt><dd>${task ? robotWord(task.name) : safety.docked ? t("docked") : t("task.none")}</dd></div>
       <div class="row"><dt>${t("control")}</dt><dd>${control.taken_by || control.holder || t("control.nobody")}</dd></div>
-      <div class="row"><dt>${t("pose")}</dt><dd>${pose[0].toFixed(1)}, ${pose[1].toFixed(1)} m</dd></div></dl>
+      <div class="row"><dt>${t("pose")}</dt><dd>${pose ? `${pose[0].toFixed(1)}, ${pose[1].toFixed(1)} m` : "–"}</dd></div></dl>
     ${safety.emergency_stop ? html`<p class="warned"><${Icon} name="alert" size=${16} />${t("estop.on")}</p>` : faults.length ? html`<p class="warned"><${Icon} name="alert" size=${16} />${robotWord(faults[0].name)}${faults.length > 1 ? ` +${faults.length - 1}` : ""}</p>` : html`<p class="allwell">${t("faults.none")}</p>`}
     <div class="buttons"><${Button} kind="main" label=${t("show")} onClick=${open} /><${Button} icon="stop" label=${t("stop")} disabled=${!robot.rights.includes("drive")} title=${robot.rights.includes("drive") ? "" : t("right.missing", { right: t("right.drive") })} onClick=${() => ask(robot.name, "stop").catch((e) => say(e.message, true))} /></div></li>`;
 }

@@ -115,9 +115,9 @@ function Drawn() {
     ...drawn.lines.map((l) => [`${robotWord(l.kind)} ${l.id}`, t("line"), () => command("remove_drawing", { id: l.id })]),
     ...drawn.areas.map((a) => [`${robotWord(a.kind)} ${a.id}`, t("area"), () => command("remove_drawing", { id: a.id })]),
   ];
-  const here = poses.value[current.value] ?? [0, 0, 0];
+  const here = poses.value[current.value];
   return html`<div class="card"><h3>${t("map")}</h3><div class="buttons">
-      <${Button} label=${t("place.here")} verb="add_place" onClick=${() => { const name = prompt(t("place.name")); if (name) draw("add_place", { name, x: here[0], y: here[1], yaw: here[2] }); }} />
+      <${Button} label=${t("place.here")} verb="add_place" onClick=${() => { const name = here && prompt(t("place.name")); if (name) draw("add_place", { name, x: here[0], y: here[1], yaw: here[2] }); }} />
       <${Button} label=${t("home.here")} verb="set_home" onClick=${() => command("set_home")} />
       <${Button} label=${t("relocalize")} verb="relocalize" onClick=${() => command("relocalize")} />
       <${Button} label=${t("mapping")} on=${Boolean(state.value.place.mapping)} verb="mapping" onClick=${() => command("mapping", { on: !state.value.place.mapping })} />
