@@ -1,4 +1,4 @@
-// The frame of the page: header with what must always be seen, views, messages.
+// The frame of the page: header, views, messages.
 import { render } from "preact";
 import { useEffect } from "preact/hooks";
 import { signal } from "@preact/signals";

@@ -86,7 +86,7 @@ function State() {
       ${state.value.parts.includes("emergency_stop") && !safety.emergency_stop && html`<${Button} kind="danger" icon="alert" label=${t("estop")} verb="emergency_stop" onClick=${() => command("emergency_stop", { engage: true })} />`}
     </div></div>
     <details class="card"><summary>${t("list")}</summary>
-      ${pose && html`<p>${t("list.robot", { name: current.value, x: pose[0].toFixed(1), y: pose[1].toFixed(1), yaw: Math.round(pose[2] * 180 / Math.PI) })}</p>`}
+      <p>${pose && t("list.robot", { name: current.value, x: pose[0].toFixed(1), y: pose[1].toFixed(1), yaw: Math.round(pose[2] * 180 / Math.PI) })}</p>
       <ul class="list">${drawings.places.map((p) => html`<li><span>${p.name}</span><small>${p.pose[0].toFixed(1)}, ${p.pose[1].toFixed(1)}</small>
         <${Button} label=${t("go")} verb="go_to" onClick=${() => go([[p.pose[0], p.pose[1]]], p.pose[2])} /></li>`)}</ul>
       <p>${t("list.drawn", { lines: drawings.lines.length, areas: drawings.areas.length, docks: drawings.docks.length })}</p>
