@@ -74,7 +74,7 @@ function State() {
     <div class="card"><h3>${t("condition")}</h3><${Faults} /><dl>
       ${battery && html`<${Row} name=${t("battery")} kind=${battery.low ? "bad" : ""}>${Math.round(battery.charge * 100)} %${battery.charging ? ` · ${t("charging")}` : ""}
         <small>${battery.volts} V · ${battery.amperes} A${battery.remaining ? ` · ${t("battery.left", { time: duration(battery.remaining) })}` : ""}</small><//>`}
-      ${pose && html`<${Row} name=${t("pose")}>x ${pose[0].toFixed(2)} · y ${pose[1].toFixed(2)} m · ${Math.round(pose[2] * 180 / Math.PI)}°${place.quality === null && html`<small>${t("odometry")}</small>`}<//>
+      ${pose && html`<${Row} name=${t("pose")}>x ${pose[0].toFixed(2)} · y ${pose[1].toFixed(2)} m · ${Math.round(pose[2] * 180 / Math.PI)}°<//>
       <${Row} name=${t("speed")}>${Math.hypot(pose[3], pose[4]).toFixed(2)} m/s · ${Math.round(pose[5] * 180 / Math.PI)}°/s<//>`}
       ${place.quality !== null && html`<${Row} name=${t("place.fit")} kind=${place.lost ? "bad" : ""}>${place.lost ? t("place.lost", { why: robotWord(place.lost) }) : `${Math.round(place.quality * 100)} %`}<//>`}
       ${place.floor !== null && html`<${Row} name=${t("floor")}>${place.floor}<//>`}
