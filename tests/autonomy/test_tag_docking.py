@@ -149,3 +149,13 @@ async def test_a_lifted_shelf_is_carried_elsewhere(tour):
         assert around.max() <= 0  # the map does not keep what the robot carries
     await tour.end_of(tour.robot[TagDocking].back_off(Mark.SHELF, distance=1.0))
     assert not tour.robot[Jack].loaded
+
+
+@pytest.mark.world("empty", body="hermes")
+async def test_backing_off_on_the_dock_moves_or_fails(tour):
+    docking = tour.robot[TagDocking]
+    held = await tour.end_of(docking.back_off(Mark.PRINTED, distance=0.5))  # the dock is behind
+    assert isinstance(held.error, Blocked)
+    away = await tour.end_of(docking.back_off(Mark.PRINTED, distance=0.5, ahead=True))
+    assert away.reason == ""
+    assert tour.truth.distance_to(tour.start) > 0.4

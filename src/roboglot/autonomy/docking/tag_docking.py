@@ -10,7 +10,6 @@ from roboglot.autonomy.navigation.course import Goal
 from roboglot.autonomy.navigation.driving import OdometryDriving
 from roboglot.autonomy.navigation.navigation import GridNavigation
 from roboglot.model.actions import Action, OnBusy
-from roboglot.model.components.energy.battery import DockContact
 from roboglot.model.components.logistics.jack import Jack, JackStage
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.navigation import NavigationFeedback, NavigationOptions
@@ -78,8 +77,6 @@ class MarkDocking(TagDocking):
             raise InvalidGoal(f"robots back off by up to {DISTANCE_MAX:g} m, not {distance}")
 
         async def run(action: Action) -> None:
-            if DockContact in self._robot and self._robot[DockContact].docked:
-                return
             if mark is Mark.SHELF and Jack in self._robot and self._robot[Jack].stage is not JackStage.DOWN:
                 action.report("lowering")
                 await self._jack(up=False)
