@@ -46,6 +46,12 @@ async def test_the_way_from_one_network_to_another(robot: Robot, client: httpx.A
     assert (off["ssid"], off["ip"], off["quality"]) == ("", "", 0)
 
 
+async def test_options_may_be_an_empty_list(client: httpx.AsyncClient) -> None:
+    """The manual's own example."""
+    assert (await client.put(STATUS, json={"networkmode": 0, "options": []})).json() is True
+    assert (await client.put(STATUS, json={"networkmode": 0, "options": ["ssid"]})).status_code == 400
+
+
 async def test_an_access_point(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
     assert (await put(client, 0)).json() is True
     await forward(seconds=1)

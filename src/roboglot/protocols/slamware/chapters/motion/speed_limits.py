@@ -56,7 +56,9 @@ class SpeedLimits:
         base = self._robot[Base]
         x, yaw = base.limits.twist.x if speed is None else speed, base.limits.twist.yaw if turning is None else turning
         if not (SPEED_MIN <= x <= self._built.x and SPEED_MIN <= yaw <= self._built.yaw):
-            raise InvalidGoal(f"it can do {self._built.x:g} m/s and {self._built.yaw:g} rad/s, and no less than creep")
+            raise InvalidGoal(
+                f"{SPEED_MIN:g} to {self._built.x:g} m/s and {SPEED_MIN:g} to {self._built.yaw:g} rad/s are possible"
+            )
 
     def set(self, *, speed: float | None = None, turning: float | None = None) -> None:
         """Drive no faster than ``speed`` m/s, turn no faster than ``turning`` rad/s. InvalidGoal beyond what it can."""

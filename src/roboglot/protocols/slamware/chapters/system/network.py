@@ -38,7 +38,7 @@ async def get_network_status(context: Context) -> WrappedStatus:
 async def set_network_status(context: Context, body: NetworkRequest) -> bool:
     """Be a network, join one (which takes seconds, and where it fails changes nothing), or switch something."""
     network = context.robot[Network]
-    options = body.options or StationOptions()
+    options = body.options if isinstance(body.options, StationOptions) else StationOptions()
     match body.networkmode:
         case RequestedMode.ACCESS_POINT:
             await network.be_access_point(options.ssid, options.password)

@@ -57,7 +57,7 @@ def _number(value: str | float) -> float:
     try:
         return float(value)
     except ValueError:
-        raise InvalidGoal(f"{value} is no number") from None
+        raise InvalidGoal(f"'{value}' is no number") from None
 
 
 def _switch(value: str | float) -> bool:

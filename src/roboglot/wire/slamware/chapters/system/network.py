@@ -37,6 +37,9 @@ class RequestedMode(IntEnum):
     DHCP = 4
 
 
+Nothing = Annotated[list[object], msgspec.Meta(max_length=0)]  # the manual's example has [] for no options
+
+
 class StationOptions(msgspec.Struct):
     """Both needed for a station, both optional for an access point."""
 
@@ -48,7 +51,7 @@ class NetworkRequest(msgspec.Struct):
     """A mode, and what it needs."""
 
     networkmode: RequestedMode
-    options: StationOptions | None = None
+    options: StationOptions | Nothing | None = None
 
 
 class RouteStatus(msgspec.Struct):
