@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import logging
 import subprocess
 import sys
@@ -130,3 +131,38 @@ async def test_navigation_is_not_ready_while_compiling(
     await fleet_of_one.start(wait=True)
     assert not robot[Health].has(UNAVAILABLE)
     assert robot[Navigation].navigate_to([Point(1.0, 0.0)], NavigationOptions())
+
+
+def test_changes_of_built_in_kernels_are_noticed(cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    sources = tmp_path / "kernels"
+    sources.mkdir()
+    for name, text in (
+        ("compiled", ""),
+        ("linear", "from roboglot.kernels.compiled import kernel\n"),
+        ("graph", "from roboglot.kernels.compiled import kernel\nfrom roboglot.kernels.linear import invert\n"),
+        ("touring", "from roboglot.kernels.compiled import kernel\n"),
+    ):
+        (sources / f"{name}.py").write_text(text)
+    monkeypatch.setattr(ahead, "HERE", sources)
+    ahead._sources.cache_clear()
+    built: list[list[str]] = []
+
+    def note(names: list[str]) -> Iterator[str]:
+        built.append(list(names))
+        yield from names
+
+    monkeypatch.setattr(ahead, "_compiled", note)
+    names = ["linear", "graph", "touring"]
+    compile_ahead(names)
+    kept = tmp_path / f"kernels_{hashlib.sha1(str(sources).encode()).hexdigest()}"
+    kept.mkdir()
+    for name in names:
+        (kept / f"{name}.f-1.py311.nbi").touch()
+    (sources / "linear.py").write_text("from roboglot.kernels.compiled import kernel\n# changed\n")
+    assert missing(names) == ["linear", "graph"]
+    compile_ahead(names)
+    assert built == [names, ["linear", "graph"]]
+    assert [file.name for file in kept.iterdir()] == ["touring.f-1.py311.nbi"], "Numba would take the old ones"
+    (sources / "compiled.py").write_text("# changed\n")
+    assert missing(names) == names
+    ahead._sources.cache_clear()

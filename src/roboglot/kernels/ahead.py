@@ -1,7 +1,8 @@
 """Compiles the kernels ahead into Numba's cache on disk, on all cores, and knows which are compiled. Imports no Numba.
 
-A kernel counts as compiled when a mark beside the cache carries the fingerprint of its source, of Numba and of this
-machine's processor: a cache from another version or another processor is compiled anew, with progress, not in silence.
+A kernel counts as compiled when a mark beside the cache carries the fingerprint of its source, of the kernels that are
+built into it, of Numba and of this machine's processor: a cache from another version or another processor is compiled
+anew, with progress, not in silence.
 """
 
 from __future__ import annotations
@@ -54,6 +55,7 @@ def compile_ahead(modules: Sequence[str] = MODULES, report: Report = lambda _nam
         folder.mkdir(parents=True, exist_ok=True)
         with _alone(folder):
             names = missing(modules)
+            _forget(names)
             for done, name in enumerate(_compiled(names), start=1):
                 (folder / _mark(name)).touch()
                 report(name, done, len(names))
@@ -104,10 +106,29 @@ def cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "numba"
 
 
+def _forget(names: Sequence[str]) -> None:
+    """Remove what Numba keeps of ``names``: it looks at a kernel's own file only, not at those it is built from."""
+    beside, apart = HERE / "__pycache__", f"{HERE.name}_{hashlib.sha1(str(HERE).encode()).hexdigest()}"
+    folder = cache_folder()
+    for name in names:
+        for old in (folder if folder == beside else folder / apart).glob(f"{name}.*.nb[ci]"):
+            old.unlink(missing_ok=True)
+
+
 def _mark(name: str) -> str:
-    source = (HERE / f"{name}.py").stat()
-    text = f"{_machine()} {HERE} {source.st_mtime_ns} {source.st_size}"
+    stats = [(HERE / f"{source}.py").stat() for source in _sources(name)]
+    text = f"{_machine()} {HERE} {[(stat.st_mtime_ns, stat.st_size) for stat in stats]}"
     return f"roboglot-{name}.{hashlib.sha256(text.encode()).hexdigest()[:16]}.compiled"
+
+
+@cache
+def _sources(name: str) -> tuple[str, ...]:
+    """Return the modules whose text becomes part of the compiled module ``name``: it and all that it imports."""
+    found = [name]
+    for source in found:
+        text = (HERE / f"{source}.py").read_text("utf-8")
+        found += sorted(set(re.findall(r"^from roboglot\.kernels\.(\w+) import", text, re.MULTILINE)) - {*found})
+    return tuple(found)
 
 
 @cache

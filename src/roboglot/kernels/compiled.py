@@ -2,7 +2,8 @@
 
 No C wrapper is made, which nothing calls and which takes a tenth of the compiler's time. Kernels are written with loops
 rather than array expressions, reductions, ``np.full`` or ``np.round``: those compile ten times as slowly, and run no
-faster.
+faster. Divisions are not checked: a check costs a branch, and a loop with one is not turned into vectors. So a kernel
+divides only by what cannot be 0, or asks for CHECKED.
 """
 
 from __future__ import annotations
@@ -13,9 +14,11 @@ from typing import TypeVar
 from numba import njit
 
 F = TypeVar("F", bound=Callable[..., object])
+CHECKED = "python"  # error model of kernels that raise ZeroDivisionError
 
 
 def kernel(signature: str | None = None, **options: object) -> Callable[[F], F]:
     """Compile a function for this signature (None: for what it is called with); ``options`` are Numba's."""
-    compiled: Callable[[F], F] = njit(signature, cache=True, nogil=True, no_cfunc_wrapper=True, **options)
+    chosen = {"error_model": "numpy"} | options
+    compiled: Callable[[F], F] = njit(signature, cache=True, nogil=True, no_cfunc_wrapper=True, **chosen)
     return compiled

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from roboglot.kernels.arrays import FloatArray, Int32Array
-from roboglot.kernels.compiled import kernel
+from roboglot.kernels.compiled import CHECKED, kernel
 from roboglot.kernels.linear import invert
 
 SETTLED = 1e-4  # m, rad: iterations end when no pose moves farther
@@ -136,7 +136,7 @@ def _follow(direction: FloatArray, share: float, fresh: FloatArray) -> None:
             direction[i, c] = fresh[i, c] + share * direction[i, c]
 
 
-@kernel("float64[:,::1](int64, int32[:,::1], float64[:,:,::1], float64[:,::1])")
+@kernel("float64[:,::1](int64, int32[:,::1], float64[:,:,::1], float64[:,::1])", error_model=CHECKED)
 def _solve(count: int, pairs: Int32Array, slopes: FloatArray, system: FloatArray) -> FloatArray:
     """The Gauss-Newton step, by conjugate gradients after the chain's part, which is solved exactly."""
     right = np.zeros((count, 3))

@@ -193,7 +193,7 @@ def integrate(
                 evidence[row, col] = 1
         if surface[row, col, 0] < HITS_MAX:
             dx, dy = x - ends[i, 0], y - ends[i, 1]
-            away = np.sqrt(dx * dx + dy * dy)
+            away = max(np.sqrt(dx * dx + dy * dy), 1e-9)
             surface[row, col, 0] += 1.0
             surface[row, col, 1] += ends[i, 0] - col * resolution
             surface[row, col, 2] += ends[i, 1] - row * resolution

@@ -16,7 +16,7 @@ from roboglot.kernels.compiled import kernel
 NEAR = 0.03  # m in front of the eye
 
 
-@kernel(error_model="numpy")
+@kernel()
 def _clipped(quad: FloatArray, polygon: FloatArray) -> int:
     """The part of ``quad`` (4 x 3, camera frame) in front of NEAR into ``polygon``; its number of corners."""
     count = 0
@@ -34,7 +34,7 @@ def _clipped(quad: FloatArray, polygon: FloatArray) -> int:
     return count
 
 
-@kernel(error_model="numpy")
+@kernel()
 def _plane(
     quad: FloatArray, mapping: FloatArray, rotation: FloatArray, eye: FloatArray, lens: FloatArray, plane: FloatArray
 ) -> bool:
@@ -64,7 +64,7 @@ def _plane(
     return True
 
 
-@kernel(error_model="numpy")
+@kernel()
 def _fill(
     polygon: FloatArray,
     count: int,
@@ -112,7 +112,6 @@ def _fill(
 @kernel(
     "int64(float64[:,:,::1], float64[:,:,::1], int32[::1], uint8[::1], float64[:,::1], float64[::1], float64[::1],"
     " float64[:,::1], int32[::1], float32[:,::1], uint16[:,::1], int64)",
-    error_model="numpy",
 )
 def draw(
     corners: FloatArray,

@@ -28,7 +28,7 @@ HAZE = 0.045  # 1/m: how fast light fades with distance
 DARKEST = 0.35
 
 
-@kernel(error_model="numpy", inline="always")
+@kernel(inline="always")
 def _at(planes: FloatArray, k: int, x: float, y: float) -> tuple[float, float, float]:
     """Distance ahead and texture coordinates at a pixel."""
     near = planes[k, 0] * x + planes[k, 1] * y + planes[k, 2]
@@ -38,7 +38,7 @@ def _at(planes: FloatArray, k: int, x: float, y: float) -> tuple[float, float, f
     return z, u, v
 
 
-@kernel(error_model="numpy", inline="always")
+@kernel(inline="always")
 def _texels(planes: FloatArray, k: int, z: float, u: float, v: float) -> float:
     """Return how many of a texture's 256 texels lie between two pixels there, between sharp and calm."""
     across = abs(planes[k, 3] - (u - planes[k, 6]) * planes[k, 0]) + abs(
@@ -50,7 +50,7 @@ def _texels(planes: FloatArray, k: int, z: float, u: float, v: float) -> float:
     return float(256.0 * z * max(0.5 * max(across, along), min(across, along)))
 
 
-@kernel(error_model="numpy", inline="always")
+@kernel(inline="always")
 def _level(texels: float) -> int:
     """Return the copy of the texture that has about one texel per pixel."""
     level = 0
@@ -60,14 +60,14 @@ def _level(texels: float) -> int:
     return level
 
 
-@kernel(error_model="numpy", inline="always")
+@kernel(inline="always")
 def _light(paints: SingleArray, k: int, z: float, gain: float) -> float:
     """Brightness of a surface z metres ahead."""
     fade = DARKEST + (1.0 - DARKEST) / (1.0 + HAZE * z)
     return float(gain * paints[k, 6] * (1.0 + paints[k, 7] * (fade - 1.0)))
 
 
-@kernel(error_model="numpy", inline="always")
+@kernel(inline="always")
 def _paint_flat(
     luma: ByteArray, row: int, x0: int, x1: int, light: float, light_end: float, paints: SingleArray, k: int
 ) -> None:
@@ -80,7 +80,7 @@ def _paint_flat(
         line[np.uintp(x0 + i)] = np.uint8(min(S(S(value + S(S(i) * step)) >> S(16)), WHITE))
 
 
-@kernel(error_model="numpy", inline="always")
+@kernel(inline="always")
 def _fetch(
     texels: Uint32Array, places: Uint32Array, count: int, masks: Uint32Array, texture: int, level: int, uv: FloatArray
 ) -> None:
@@ -95,7 +95,7 @@ def _fetch(
         texels[np.uintp(i)] = masks[np.uintp(texture), np.uintp(places[np.uintp(i)])]
 
 
-@kernel(error_model="numpy", inline="always")
+@kernel(inline="always")
 def _paint_textured(
     luma: ByteArray, row: int, x0: int, x1: int, texels: Uint32Array, level: int, uv: FloatArray,
     light: float, light_end: float, paints: SingleArray, k: int,
@@ -126,7 +126,7 @@ def _paint_textured(
         line[np.uintp(x0 + i)] = np.uint8(min(value, WHITE))
 
 
-@kernel(error_model="numpy", inline="always")
+@kernel(inline="always")
 def _paint_chroma(
     blue: ByteArray,
     red: ByteArray,
@@ -156,7 +156,7 @@ def _paint_chroma(
         reds[np.uintp(first + i)] = np.uint8(S(v_base + S(v_mix * mask)) >> S(16))
 
 
-@kernel(error_model="numpy", inline="always")
+@kernel(inline="always")
 def _cell(cells: ByteArray, frame: FloatArray, u: float, v: float) -> int:
     """Return the value of ``cells`` at a place of the floor."""
     column = int(min(max((u - frame[0]) * frame[2], 0.0), cells.shape[1] - 1.0))
@@ -164,7 +164,7 @@ def _cell(cells: ByteArray, frame: FloatArray, u: float, v: float) -> int:
     return int(cells[row, column])
 
 
-@kernel(error_model="numpy", inline="always")
+@kernel(inline="always")
 def _shadow(cells: ByteArray, frame: FloatArray, u: float, v: float) -> float:
     """Smooth brightness 0..1 of a place of the floor."""
     column = min(max((u - frame[0]) * frame[2] - 0.5, 0.0), cells.shape[1] - 1.001)
@@ -176,7 +176,7 @@ def _shadow(cells: ByteArray, frame: FloatArray, u: float, v: float) -> float:
     return float((upper + (lower - upper) * down) / 255.0)
 
 
-@kernel(error_model="numpy", inline="always")
+@kernel(inline="always")
 def _run(seen: Uint16Array, y: int, x: int, limit: int) -> int:
     """Return the end of the run of equal numbers that begins at (x, y), at ``limit`` if not before."""
     number, end = seen[y, x], x
@@ -195,7 +195,6 @@ def _run(seen: Uint16Array, y: int, x: int, limit: int) -> int:
 @kernel(
     "void(uint16[:,::1], float64[:,::1], int32[::1], float32[:,::1], int32[::1], uint32[:,::1], uint8[:,::1],"
     " uint8[:,::1], float64[::1], float64, uint8[:,::1], uint8[:,::1], uint8[:,::1])",
-    error_model="numpy",
 )
 def shade(
     seen: Uint16Array,

@@ -44,7 +44,6 @@ def _least_cost(rows: int, columns: int) -> float:
 
 @kernel(
     "boolean(float32[:,::1], int64, int64, int64, int64, float32[::1], int8[::1])",
-    error_model="numpy",
 )
 def _search(
     cost: SingleArray, start_row: int, start_col: int, goal_row: int, goal_col: int, paid: SingleArray, came: Int8Array
@@ -61,24 +60,25 @@ def _search(
     spare, used, waiting, level, paid[start_row * width + start_col] = -1, 1, 1, 0, 1.0
     least, scale = _least_cost(start_row - goal_row, start_col - goal_col), 1.0 / BUCKET
     around = np.array((-width, -1, 1, width, -width - 1, -width + 1, width - 1, width + 1), np.int64)
-    steps = np.array((1, 3, 5, 7, 0, 2, 6, 8), np.int8)
+    steps, opens = np.array((1, 3, 5, 7, 0, 2, 6, 8), np.int8), np.empty(8, np.bool_)
+    downs, rights = np.array((-1, 0, 0, 1, -1, -1, 1, 1)), np.array((0, -1, 1, 0, -1, 1, -1, 1))
     while waiting > 0:
-        entry = heads[level % BUCKETS]
+        entry = heads[level & (BUCKETS - 1)]
         if entry < 0:
             level += 1
             if paid[goal] > 0.0 and paid[goal] - 1.0 <= least + level * BUCKET:
                 return True
             continue
         row, col = np.int64(places[entry] >> 16), np.int64(places[entry] & 65535)
-        heads[level % BUCKETS], waiting = below[entry], waiting - 1
+        heads[level & (BUCKETS - 1)], below[entry], waiting, spare = below[entry], spare, waiting - 1, entry
         cell, so_far = row * width + col, asked[entry]
-        below[entry], spare = spare, entry
         if so_far > paid[cell]:
             continue
         half = np.float32(0.5) * ground[cell]
         up, down = row > 0 and ground[cell - width] < np.inf, row < height - 1 and ground[cell + width] < np.inf
         left, right = col > 0 and ground[cell - 1] < np.inf, col < width - 1 and ground[cell + 1] < np.inf
-        opens = (up, left, right, down, up and left, up and right, down and left, down and right)
+        opens[0], opens[1], opens[2], opens[3], opens[4] = up, left, right, down, up & left
+        opens[5], opens[6], opens[7] = up & right, down & left, down & right
         for k in range(8):
             if not opens[k]:
                 continue
@@ -88,11 +88,10 @@ def _search(
             if (paid[other] != 0.0 and value >= paid[other]) or value == np.inf:
                 continue
             paid[other], came[other] = value, steps[k]
-            r, c = row + steps[k] // 3 - 1, col + steps[k] % 3 - 1
+            r, c = row + downs[k], col + rights[k]
             estimate = value - 1.0 + _least_cost(r - goal_row, c - goal_col)
             # Entries beyond the ring are examined early only if necessary.
-            offset = int((estimate - least) * scale) - level
-            place = (level + min(max(offset, 0), BUCKETS - 1)) % BUCKETS
+            place = (level + min(max(int((estimate - least) * scale) - level, 0), BUCKETS - 1)) & (BUCKETS - 1)
             if spare >= 0:
                 fresh, spare = spare, below[spare]
             else:
