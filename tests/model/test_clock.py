@@ -254,3 +254,30 @@ async def test_a_faster_clock_wakes_its_sleepers_sooner() -> None:
     clock.set_speed(1000.0)
     await asyncio.wait_for(sleeper, 20)
     assert not clock._timers
+
+
+async def test_longer_work_gives_others_their_turn() -> None:
+    clock, loop, done = RealClock(), asyncio.get_running_loop(), list[str]()
+
+    def job(name: str) -> None:
+        done.append(name)
+        loop.call_soon(done.append, f"after {name}")
+        if name == "b":
+            raise ZeroDivisionError
+
+    failures: list[object] = []
+    loop.set_exception_handler(lambda _, context: failures.append(context["exception"]))
+    for name in "abc":
+        clock.in_turn(partial(job, name))
+    assert not done
+    for _ in range(5):
+        await asyncio.sleep(0)
+    assert [name for name in done if len(name) == 1] == ["a", "b", "c"]
+    assert done.index("after a") < done.index("c")
+    assert [type(failure) for failure in failures] == [ZeroDivisionError]  # and the next had its turn all the same
+
+
+def test_longer_work_is_done_at_once_in_lockstep() -> None:
+    done: list[str] = []
+    LockstepClock().in_turn(lambda: done.append("a"))
+    assert done == ["a"]

@@ -14,6 +14,7 @@ from roboglot.model.components.motion.base import Base
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import Collided, NotFound
+from roboglot.model.events import ScanTaken
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.simulation.building.props import OBSTACLES_MAX
@@ -200,7 +201,29 @@ async def test_a_slow_machine_skips_time_with_one_warning(caplog):
     assert world.truth.pose_of("a").x < 2.01  # two ticks, not a hundred seconds
     assert robot[Odometry].reading.stamp == pytest.approx(clock.now)
     clock.leap(3 * TICK)
+    assert robot[Odometry].reading.stamp == pytest.approx(clock.now - 2 * TICK)  # others get their turn between ticks
+    clock.leap(0)
+    clock.leap(0)
     assert robot[Odometry].reading.stamp == pytest.approx(clock.now)
+    world.close()
+
+
+@pytest.mark.parametrize(("clock", "ticks"), [(Jumping, 5), (LockstepClock, 1)])
+async def test_robots_scan_in_different_ticks_where_time_passes_by_itself(clock, ticks):
+    clock, scans = clock(), []
+    world = World(load_world("empty"), [RobotPlacement(name) for name in "abcde"], clock=clock)
+    for name in "abcde":
+        robot = Robot(name, world.description_of(name), clock)
+        world.equip(robot)
+        robot.events.listen(ScanTaken, lambda event: scans.append(round(event.stamp / TICK)))
+    world.start()
+    if isinstance(clock, LockstepClock):
+        await clock.advance(9.5 * TICK)
+    else:
+        for _ in range(9):
+            clock.leap(TICK)
+    assert len(scans) == 5
+    assert len(set(scans)) == ticks
     world.close()
 
 

@@ -69,6 +69,7 @@ class RealClock(Clock):
         self._until = math.inf  # robot time at which the clock stops
         self._timers: set[_RealTimer] = set()
         self._speed = 1.0
+        self._jobs: deque[Callable[[], None]] = deque()
         self.set_speed(speed)
 
     @property
@@ -92,6 +93,20 @@ class RealClock(Clock):
         timer = _RealTimer(self, when, callback)
         self._timers.add(timer)
         return timer
+
+    def in_turn(self, job: Callable[[], None]) -> None:
+        self._jobs.append(partial(copy_context().run, job))
+        if len(self._jobs) == 1:
+            asyncio.get_running_loop().call_soon(self._next_job)
+
+    def _next_job(self) -> None:
+        """Do one of them; the loop sees to its sockets before the next."""
+        try:
+            self._jobs[0]()
+        finally:
+            self._jobs.popleft()
+            if self._jobs:
+                asyncio.get_running_loop().call_soon(self._next_job)
 
     def set_speed(self, speed: float) -> None:
         """Run ``speed`` times as fast as real time from now on. Raises ValueError unless it is above 0."""

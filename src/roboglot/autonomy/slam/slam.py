@@ -36,6 +36,7 @@ from roboglot.autonomy.slam.odometry.learner import Correction, OdometryLearner
 from roboglot.autonomy.slam.scan_points import ECHO_SHARE_MIN, ScanPoints
 from roboglot.autonomy.slam.slip import SlipWatch
 from roboglot.autonomy.slam.trajectory import Trajectory, TrajectoryPoint
+from roboglot.autonomy.slam.turns import Turns
 from roboglot.autonomy.slam.whereabouts import Whereabouts
 from roboglot.model.components.mapping.localization import Region
 from roboglot.model.events import LoopClosed, LostReason, PoseJumped, RecoveryMeans, RobotDisplaced, ScanTaken
@@ -94,14 +95,16 @@ class Slam:
         self._excursions = Excursions(
             belief, self.odometry.noise, lambda scan, pose: self._adding.paint(scan, pose, self._way)
         )
+        self._turns = Turns(robot.clock, self._take)
         listen = robot.events.listen
-        self._listeners = [listen(ScanTaken, self._take), listen(PoseJumped, self._jumped)]
+        self._listeners = [listen(ScanTaken, self._turns.hear), listen(PoseJumped, self._jumped)]
         self._timer = robot.clock.call_later(SILENCE_PERIOD, self._listen)
 
     def close(self) -> None:
         """Stop listening."""
         for stop in self._listeners:
             stop()
+        self._turns.close()
         self._timer.cancel()
 
     def _listen(self) -> None:

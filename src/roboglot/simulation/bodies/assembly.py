@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from types import MethodType
 from typing import TypeVar
 
@@ -14,9 +15,13 @@ P = TypeVar("P")
 
 
 class SimulatedRobot:
-    """The simulated parts of one robot, run by the world once a tick: ``control``, physics, ``sense``."""
+    """The simulated parts of one robot, run by the world once a tick: ``control``, physics, ``sense``.
 
-    def __init__(self, fitting: Fitting) -> None:
+    Parts that sense once in some ticks begin ``turn`` ticks later, within their period: the scans of many robots do not
+    all come in one tick, which would keep their clients waiting.
+    """
+
+    def __init__(self, fitting: Fitting, turn: int = 0) -> None:
         self._fitting = fitting
         self._context = context_of(fitting.robot.id)
         fitted: list[tuple[Part[object], object]] = []
@@ -34,7 +39,7 @@ class SimulatedRobot:
         controlled = ordered((part for part, _ in fitted if part.control), lambda part: part.control_after)
         tick = fitting.tick
         self._controls = Schedule([_job(part, made[part.name], part.control) for part in controlled], tick)
-        sensed = [_job(part, component, part.sense, periodic=True) for part, component in fitted if part.sense]
+        sensed = [_periodic(part, component, turn) for part, component in fitted if part.sense]
         self._senses = Schedule(sensed, tick)
         self._displaced = [MethodType(part.displaced, component) for part, component in fitted if part.displaced]
         self._detach = [MethodType(part.detach, component) for part, component in fitted if part.detach]
@@ -62,10 +67,12 @@ class SimulatedRobot:
             detach()
 
 
-def _job(part: Part[object], component: object, method: Callable[..., None] | None, *, periodic: bool = False) -> Job:
+def _job(part: Part[object], component: object, method: Callable[..., None] | None) -> Job:
     assert method is not None
-    duty = part.duty(component) if part.duty is not None else None
-    if not periodic:
-        return Job(MethodType(method, component), duty=duty)
+    return Job(MethodType(method, component), duty=part.duty(component) if part.duty is not None else None)
+
+
+def _periodic(part: Part[object], component: object, turn: int) -> Job:
     every = part.every if isinstance(part.every, int) else part.every(component)
-    return Job(MethodType(method, component), every, part.first or every, duty)
+    job = _job(part, component, part.sense)
+    return replace(job, every=every, first=(part.first or every) + turn % every)

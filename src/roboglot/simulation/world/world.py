@@ -53,7 +53,6 @@ from roboglot.simulation.world.truth import Truth
 
 log = logging.getLogger(__name__)
 TICK = 0.02  # s: controls and sensors
-CATCH_UP_MAX = 5  # ticks in one go, so that other tasks get a turn
 BEHIND_MAX = 25  # ticks by which a slow machine may lag before time is skipped
 ROBOTS_MAX = 200
 
@@ -151,7 +150,8 @@ class World:
     def equip(self, robot: Robot) -> None:
         """Give ``robot`` the simulated components of the body that was placed under its id."""
         fitting = Fitting(robot, self._population.hull(robot.id), self._environment, TICK)
-        self._population.simulated[robot.id] = SimulatedRobot(fitting)
+        turn = 0 if self._clock.repeats else len(self._population.simulated)
+        self._population.simulated[robot.id] = SimulatedRobot(fitting, turn)
         self._population.robots[robot.id] = robot
 
     @property
@@ -217,14 +217,17 @@ class World:
         return self._origin + (self._ticks + 1) * TICK
 
     def _beat(self) -> None:
-        """Do the ticks that are due. A machine that is too slow skips robot time instead of running after it."""
+        """Do a tick that is due; others get their turn before the next one, even if it is due as well.
+
+        A machine that is too slow skips robot time instead of running after it.
+        """
         due = int((self._clock.time() - self._origin) / TICK + 1e-6) - self._ticks
         if due > BEHIND_MAX:
             self._origin += (due - 1) * TICK
             self._pace.skip((due - 1) * TICK)
             due = 1
         self._pace.look(self._clock.time())
-        for _ in range(min(due, CATCH_UP_MAX)):
+        if due > 0:
             self._tick()
         self._clock.reached(self.time)
         self._timer = self._clock.call_at(self._due(), self._beat)

@@ -1,0 +1,40 @@
+"""Scans of one robot, matched in turn with the work of the others in its world. Knows no map."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from roboglot.model.clock import Clock
+from roboglot.model.events import ScanTaken
+
+
+class Turns:
+    """Calls ``take`` with every scan: at once in lockstep, else in a turn of the loop, before the next scan comes."""
+
+    __slots__ = ("_clock", "_queued", "_take", "_waiting")
+
+    def __init__(self, clock: Clock, take: Callable[[ScanTaken], None]) -> None:
+        self._clock, self._take = clock, take
+        self._waiting: ScanTaken | None = None
+        self._queued = False
+
+    def hear(self, event: ScanTaken) -> None:
+        """Take it when it is this robot's turn; one that waits is taken now, so none is lost where turns are late."""
+        self._catch_up()
+        self._waiting = event
+        if not self._queued:
+            self._queued = True
+            self._clock.in_turn(self._have_turn)
+
+    def close(self) -> None:
+        """Take no more."""
+        self._waiting = None
+
+    def _have_turn(self) -> None:
+        self._queued = False
+        self._catch_up()
+
+    def _catch_up(self) -> None:
+        event, self._waiting = self._waiting, None
+        if event is not None:
+            self._take(event)
