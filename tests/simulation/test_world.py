@@ -209,7 +209,7 @@ async def test_a_slow_machine_skips_time_with_one_warning(caplog):
 
 
 @pytest.mark.parametrize(("clock", "ticks"), [(Jumping, 5), (LockstepClock, 1)])
-async def test_robots_scan_in_different_ticks_where_time_passes_by_itself(clock, ticks):
+async def test_robots_scan_in_turns_in_real_time(clock, ticks):
     clock, scans = clock(), []
     world = World(load_world("empty"), [RobotPlacement(name) for name in "abcde"], clock=clock)
     for name in "abcde":

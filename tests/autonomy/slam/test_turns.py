@@ -18,7 +18,7 @@ def scan(stamp: float) -> ScanTaken:
     return ScanTaken(stamp=stamp, scan=LaserScan(stamp, ranges, 0.0, 1.0, 0.1, 9.0, mount=ORIGIN), odometry=ORIGIN)
 
 
-async def test_scans_wait_for_their_turn_and_none_is_lost() -> None:
+async def test_no_scan_that_waits_is_lost() -> None:
     clock, taken = RealClock(), list[float]()
     turns = Turns(clock, lambda event: taken.append(event.stamp))
     turns.hear(scan(1.0))
