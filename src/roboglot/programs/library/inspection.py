@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+from collections import OrderedDict
 from collections.abc import Sequence
 
 from roboglot.programs.engine.engine import (
@@ -11,26 +13,47 @@ from roboglot.programs.engine.engine import (
     SandboxUnavailable,
 )
 from roboglot.programs.errors import EngineTimeout, EngineUnavailable, InvalidBody, ProgramProblems
-from roboglot.programs.language import BUILTINS, MODULES, Problem
+from roboglot.programs.language import BUILTINS, MODULES, Problem, ProblemKind
 from roboglot.programs.worker.prelude import Prelude
 
 PROBLEMS_SHOWN = 3
+KEPT_MAX = 64  # judgements of the newest programs
+KEPT_CHARACTERS_MAX = 16 * 1024  # of a program whose judgement is kept
+Judgement = tuple[list[Problem], frozenset[str]]
 
 
 class Inspector:
-    """Looks at programs that find ``prelude``."""
+    """Looks at programs that find ``prelude``; at the same text once: it is checked while typed, saved, and run."""
 
     def __init__(self, engine: Engine, prelude: Prelude) -> None:
         self._engine = engine
         self._prelude = prelude
+        self._judged: OrderedDict[tuple[str, frozenset[str]], asyncio.Future[Judgement]] = OrderedDict()
 
     def reserved(self, name: str) -> bool:
         """Return whether the language or the robot's functions use this name already."""
         names = self._prelude.names()
         return name in BUILTINS or name in names.plain or name in names.roots or name in MODULES
 
-    async def inspect(self, source: str, functions: frozenset[str]) -> tuple[list[Problem], frozenset[str]]:
+    async def inspect(self, source: str, functions: frozenset[str]) -> Judgement:
         """Return its problems, and which of ``functions`` it uses; raises ProgramError if that fails."""
+        if len(source) > KEPT_CHARACTERS_MAX:
+            return await self._examine(source, functions)
+        key = (source, functions)
+        judging = self._judged.get(key)
+        if judging is None:
+            judging = self._judged[key] = asyncio.ensure_future(self._examine(source, functions))
+            judging.add_done_callback(lambda done: None if _holds(done) else self._forget(key))
+            if len(self._judged) > KEPT_MAX:
+                self._judged.popitem(last=False)
+        else:
+            self._judged.move_to_end(key)
+        return await asyncio.shield(judging)  # others may wait for the same
+
+    def _forget(self, key: tuple[str, frozenset[str]]) -> None:
+        self._judged.pop(key, None)
+
+    async def _examine(self, source: str, functions: frozenset[str]) -> Judgement:
         try:
             return await self._engine.examine(source, self._prelude, functions=functions)
         except ValueError as error:
@@ -39,6 +62,13 @@ class Inspector:
             raise EngineTimeout(str(late)) from None
         except (SandboxUnavailable, EngineError) as error:
             raise EngineUnavailable(str(error)) from None
+
+
+def _holds(judged: asyncio.Future[Judgement]) -> bool:
+    """Return whether a judgement is the text's alone: time and memory of a busy machine may count in others."""
+    if judged.cancelled() or judged.exception() is not None:
+        return False
+    return all(problem.kind is not ProblemKind.SIZE for problem in judged.result()[0])
 
 
 def refuse_wrong(problems: Sequence[Problem]) -> None:
