@@ -97,7 +97,7 @@ class Database:
                 connection.execute("SAVEPOINT one")
                 try:
                     with database_errors():
-                        results.append((database._within_room(work), None))
+                        results.append((_without_cursor(database._within_room(work)), None))
                 except Exception as error:
                     connection.execute("ROLLBACK TO one")
                     results.append((None, error))
@@ -126,9 +126,7 @@ class Database:
             if self._connection.in_transaction:  # a full disk ends some transactions on its own
                 self._connection.execute("ROLLBACK")
             raise
-        if isinstance(result, sqlite3.Cursor):
-            result.close()  # left to another thread's garbage collector, it would reset a statement in use here
-        return result
+        return _without_cursor(result)
 
     def _within_room(self, work: Callable[[Connection], T]) -> T:
         if self._disk is None or self._disk.free > 0:
@@ -149,6 +147,13 @@ class Database:
             self._reader.close()
         self._thread.submit(self._connection.close).result()
         self._thread.shutdown()
+
+
+def _without_cursor(result: T) -> T:
+    """Close a cursor: left to another thread's garbage collector, it would reset a statement in use here."""
+    if isinstance(result, sqlite3.Cursor):
+        result.close()
+    return result
 
 
 class _Reader:

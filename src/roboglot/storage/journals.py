@@ -64,7 +64,7 @@ class DatabaseJournalStore:
 
     async def _run(self, work: Callable[[Connection], T]) -> T:
         with store_errors():
-            return await self._database.run(work)
+            return await self._database.run_together(work)
 
     def _run_now(self, work: Callable[[Connection], T]) -> T:
         with store_errors():

@@ -156,7 +156,7 @@ class DatabaseProgramStore:
 
     async def _run(self, work: Callable[[Connection], T]) -> T:
         with store_errors():
-            return await self._database.run(work)
+            return await self._database.run_together(work)
 
     async def _read(self, work: Callable[[Connection], T]) -> T:
         with store_errors():

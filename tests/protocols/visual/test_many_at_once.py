@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import random
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
-from tests.protocols.visual.front_end import FrontEnd
+from roboglot.programs.stores import LogEntry
+from tests.protocols.visual.front_end import PATIENCE, FrontEnd
 
 BODIES = (
     "while True:\n    pass\n",
@@ -68,3 +70,23 @@ async def test_each_of_twenty_busy_programs_is_stopped_individually(app: FrontEn
     await app.ask("shutdown", *ids)
     assert all(app.news(id, "shutdown") for id in ids)
     assert app.service._runs == {}
+
+
+async def test_all_programs_end_at_once_when_the_server_does(app: FrontEnd, monkeypatch: pytest.MonkeyPatch) -> None:
+    for number in range(6):
+        await app.start(f"t{number}", "while True:\n    time.sleep(1)\n")
+    pids = [run._run.pid for run in app.service._runs.values()]
+    store, waiting = app.service._store, 0
+    write = store.set_state
+
+    async def slowly(id: str, state: str, log: Sequence[LogEntry] = ()) -> None:
+        nonlocal waiting
+        waiting += 1
+        async with asyncio.timeout(PATIENCE):  # a slow disk: no program, and no other write, waits for it
+            while waiting < len(pids) or any(Path(f"/proc/{pid}").exists() for pid in pids):  # noqa: ASYNC110, ASYNC240
+                await asyncio.sleep(0.001)
+        await write(id, state, log)
+
+    monkeypatch.setattr(store, "set_state", slowly)
+    await app.service.close()
+    assert {task.state for task in await store.all()} == {"shutdown"}

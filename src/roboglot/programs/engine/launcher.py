@@ -25,10 +25,11 @@ import msgspec
 from roboglot.programs.worker.zygote import MESSAGE_MAX
 
 _BOOT = """
-import sys
+import os, sys
 sys.path.insert(0, sys.argv[1])
 from roboglot.programs.worker import zygote
 zygote.main(int(sys.argv[2]), filter_required=sys.argv[3] == "filter")
+os._exit(0)  # all is said: to take the interpreter apart would only let the server wait
 """
 # With our own environment these are equivalent to -I, but allow a fixed hash seed: two runs of a program then
 # iterate its sets in the same order.

@@ -99,10 +99,10 @@ class ProgramService:
         """End every run; the tasks are as if a user had ended them. What waits for its time goes on waiting."""
         self._turns.closed = True
         self._timetable.clear()
-        for id in tuple(self._runs):
-            async with self._lock:
-                if id in self._runs:
-                    await self._runner.end(id, "the server was stopped")
+        async with self._lock:
+            for run in self._runs.values():
+                run.call_off()
+            await asyncio.gather(*(self._runner.end(id, "the server was stopped") for id in tuple(self._runs)))
         await self._fires.done()
         await self._runner.done()
         self._timetable.clear()
