@@ -18,6 +18,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import uvloop
 from playwright.async_api import async_playwright
 
 from roboglot.config import load_config
@@ -169,4 +170,4 @@ async def main() -> None:
 
 
 if __name__ == "__main__":
-    asyncio.run(main())
+    uvloop.run(main())

@@ -56,3 +56,25 @@ async def test_program_of_blocks_comes_back_from_its_file(studio: Open, wanted: 
     await until(page, "studio.program.value.name === 'from a frame'")
     assert await page.evaluate("[studio.editor.code.value, JSON.stringify(studio.editor.save())]") == [code, state]
     assert page.errors == []
+
+
+@pytest.mark.parametrize(
+    ("name", "held", "why"),
+    [
+        ("a.py", b"#" * 262_145, "it is too large"),
+        ("b.json", b" " * 4_000_001, "it is too large"),
+        ("c.json", json.dumps({"blocks": {"blocks": [{"type": "forever"}] * 6001}}).encode(), "it is too large"),
+        ("d.json", b"null", "it is no program"),
+        ("e.json", b'{"style": "{"}', "it is no program"),
+        ("f.json", b"[1, 2", "it is no program"),
+        ("g.txt", b"\x89PNG\x00\x00", "it is no program"),
+    ],
+)
+async def test_file_without_a_program_is_refused(studio: Open, name: str, held: bytes, why: str) -> None:
+    page = await loaded(await studio(), COUNTING)
+    before = await page.evaluate("[studio.program.value.id, studio.editor.code.value]")
+    await page.click("text=Programs")
+    await page.set_input_files("input[type=file]", {"name": name, "mimeType": "", "buffer": held})
+    await until(page, f"document.querySelector('dialog .notice').textContent.includes({why!r})")
+    assert await page.evaluate("[studio.program.value.id, studio.editor.code.value]") == before
+    assert page.errors == []

@@ -320,3 +320,30 @@ def test_a_failure_is_explained(text: str, line: int, words: str) -> None:
 def test_starting_blocks_of_the_table_are_right_programs() -> None:
     for function in table()["functions"]:
         assert check(f"x = {function['key']}\n", ability_set().names()) == [], function["key"]
+
+
+async def test_lists_go_to_the_page_that_asked(shown: Shown) -> None:
+    async with page(shown) as first, page(shown) as second:
+        inquiry = {"type": "task", "operate": "inquiry", "target_id": []}
+        assert "response" in await first.frame(**inquiry, id="of_first")
+        assert "response" in await second.frame(**inquiry, id="of_second")
+        broken = json.dumps({**inquiry, "id": "raw", "describe": "-"}).replace("-", "a\nb")  # as the manual has it
+        await first.say(type="frame", text=broken)
+        await first.until(lambda m: m["type"] == "frame" and '"id": "raw"' in m["text"])
+        lists = [[m["text"] for m in one.heard if "response" in m.get("text", "")] for one in (first, second)]
+        assert [len(found) for found in lists] == [2, 1]
+        assert "of_second" in lists[1][0]
+
+
+async def test_functions_that_answer_nothing_are_no_readings(shown: Shown) -> None:
+    async with page(shown) as studio:
+        body = "import time\ntime.sleep(0)\ntime.monotonic()\nprint('end')\n"
+        await studio.frame(**SAVE, id="1", body=body)
+        await studio.say(
+            type="frame",
+            text=json.dumps(
+                {"type": "task", "operate": "run", "target_id": ["t"], "id": "2", "mode": "single", "condition": "now"}
+            ),
+        )
+        await studio.kind("log")
+        assert [m["function"] for m in studio.heard if m["type"] == "reading"] == ["time.monotonic"]

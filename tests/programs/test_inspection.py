@@ -40,7 +40,7 @@ def inspector(judge: Judge) -> Inspector:
     return Inspector(cast(Engine, judge), ability_set())
 
 
-async def test_same_text_is_judged_once_for_all_who_ask() -> None:
+async def test_same_text_is_judged_once_for_all() -> None:
     judge = Judge(WRONG)
     judge.ready.clear()
     looks = inspector(judge)
@@ -61,7 +61,7 @@ async def test_other_modules_mean_another_judgement() -> None:
     assert len(judge.asked) == 2
 
 
-async def test_failures_and_what_was_too_much_are_judged_again() -> None:
+async def test_failures_and_excesses_are_judged_again() -> None:
     judge = Judge(LONG)
     looks = inspector(judge)
     for _ in range(2):

@@ -72,7 +72,7 @@ async def test_each_of_twenty_busy_programs_is_stopped_individually(app: FrontEn
     assert app.service._runs == {}
 
 
-async def test_all_programs_end_at_once_when_the_server_does(app: FrontEnd, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_programs_end_together_when_the_server_closes(app: FrontEnd, monkeypatch: pytest.MonkeyPatch) -> None:
     for number in range(6):
         await app.start(f"t{number}", "while True:\n    time.sleep(1)\n")
     pids = [run._run.pid for run in app.service._runs.values()]

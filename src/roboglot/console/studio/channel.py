@@ -45,7 +45,9 @@ PENDING_MAX = 16  # messages of one page that are being answered
 LIGHT_EVERY = 0.02  # s: minimum between two highlighted blocks on a page
 DRAW_EVERY = 2.0  # s between two maps of a pupil's robot shown to the teacher
 WAITING_MAX = 2000  # messages queued for a slow page; beyond this the oldest insights are dropped
+ASKED_MAX = 64  # unanswered inquiries of one page
 _BLOCK = re.compile(r'"block": \{"type": "(begin|end)"')
+_LIST = re.compile(r'\{"response": \{[^{}]*"id": "([^"\\]*)"')
 Send = Callable[[str], Awaitable[None]]
 Id = Annotated[str, msgspec.Meta(max_length=ID_MAX)]
 
@@ -86,6 +88,21 @@ class Fetch(msgspec.Struct, tag="fetch", tag_field="type"):
     log: bool = True
 
 
+class _Named(msgspec.Struct):
+    """Name of a frame, for its answers."""
+
+    id: str = ""
+
+
+def _id_of(text: str) -> str:
+    """Return the id of a frame, "" where it has none that can be read."""
+    try:
+        return msgspec.json.decode(text, type=_Named).id
+    except (msgspec.MsgspecError, ValueError):  # frames may have line breaks in their texts, which JSON has not
+        found = re.search(r'"id"\s*:\s*"([^"\\]*)"', text)
+        return found[1] if found else ""
+
+
 @lru_cache(maxsize=8)
 def _framed(text: str) -> str:
     """A frame as it goes to pages; the same goes to many of them."""
@@ -112,6 +129,7 @@ class Session:
         self._due = asyncio.Event()
         self._light: dict[str, object] | None = None  # the last block that began, while it waits
         self._pending: set[asyncio.Task[None]] = set()
+        self._asked: deque[str] = deque(maxlen=ASKED_MAX)  # ids of frames
         self._trial = Trial(self.tell)
         self._seat = classroom.seat(self.tell)
         self._drawn = -DRAW_EVERY
@@ -156,8 +174,9 @@ class Session:
     # -- a front end of the frames -------------------------------------------------------------------------------------
 
     def answer(self, text: str) -> None:
-        """An answer to a frame."""
-        self.tell({"type": "frame", "text": text})
+        """An answer to a frame; lists that another page asked for are of no use here."""
+        if (found := _LIST.match(text)) is None or found[1] in self._asked:
+            self.tell({"type": "frame", "text": text})
 
     def publish(self, text: str) -> None:
         """A report of a task. Of blocks that begin quickly one after the other only the newest counts."""
@@ -232,6 +251,7 @@ class Session:
         programs.robot.admission.check(CLIENT, "program", Right.PROGRAM)
         match message:
             case Frame(text=text):
+                self._asked.append(_id_of(text))
                 await programs.frames.receive(text)
             case Debug(id=id, text=text):
                 self.tell({"type": "debugged", "id": id, "text": await debugging.answer(programs.service, text)})

@@ -282,7 +282,7 @@ class TaskRun:
         if request.name in MARKS:
             await self._pace.wait()
             self._halts |= self._block_stops.halts(self.block)
-        elif self._insights.listening:
+        elif value is not None and self._insights.listening:
             self._insights.publish(
                 Reading(self.task.id, self.line, self.module, self.block, request.name, in_short(value))
             )

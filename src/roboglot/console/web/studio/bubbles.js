@@ -3,6 +3,8 @@ import { t } from "../base.js";
 import * as editor from "./editor.js";
 
 const NS = "http://www.w3.org/2000/svg", LONG = 40, PAD = 6, HEIGHT = 22; // characters, workspace units
+const pen = /** @type {CanvasRenderingContext2D} */ (document.createElement("canvas").getContext("2d"));
+pen.font = "600 13px ui-monospace, monospace"; // as in studio.css
 /** By id of the block: what is shown there. @type {Map<string, string>} */
 const shown = new Map();
 let due = false;
@@ -72,7 +74,7 @@ function bubble(root, id, text) {
   const [box, words] = /** @type {any} */ (group.children);
   if (words.textContent === text) return;
   words.textContent = text;
-  const block = editor.workspace.getBlockById(id), width = words.getComputedTextLength() + 2 * PAD;
+  const block = editor.workspace.getBlockById(id), width = pen.measureText(text).width + 2 * PAD; // asked for it, the page would lay everything out
   group.setAttribute("transform", `translate(${block.width + 4}, 4)`);
   for (const [name, value] of Object.entries({ width, height: HEIGHT, rx: 8 })) box.setAttribute(name, value);
   words.setAttribute("x", PAD);

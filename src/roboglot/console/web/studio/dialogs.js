@@ -25,6 +25,10 @@ function Dialog({ title, children }) {
 async function opening(id) { try { await openStored(id); await catchUp(); close(); } catch (error) { say(error.message, true); } }
 const STATES = ["error", "wait_run", "run_wait", "run", "suspend", "shutdown"];
 
+const runs = (/** @type {any} */ { operate: state }) => state === "run" || state === "suspend";
+/** @param {any[]} all */
+const runningFirst = (all) => [...all].sort((a, b) => Number(runs(b)) - Number(runs(a)));
+
 function Row({ item }) {
   const state = STATES.includes(item.operate) ? t(`studio.state.${item.operate}`) : item.operate;
   return html`<li class=${item.id === program.value.id ? "chosen" : ""}><span class="grow"><b>${item.describe || item.id}</b><small>${state}${item.condition && item.condition !== "now" ? ` · ${plainly(item.mode, item.condition)}` : ""}</small></span>
@@ -47,7 +51,7 @@ export function Library() {
     <div class="buttons"><${Button} icon="plus" label=${t("studio.new.blocks")} onClick=${() => { fresh("blocks"); close(); }} /><${Button} icon="plus" label=${t("studio.new.text")} onClick=${() => { fresh("text"); close(); }} />
       <label class="button">${t("studio.file.open")}<input type="file" class="unseen" accept=".json,.py,.txt" onChange=${async (e) => { try { await upload(e.target.files[0]); close(); } catch (error) { say(t("studio.file.bad", { why: error.message }), true); } }} /></label></div>
     <h3>${t("studio.on.robot")}</h3>
-    ${listed.value.length ? html`<ul class="rows">${listed.value.map((item) => html`<${Row} key=${item.id} item=${item} />`)}</ul>` : html`<p class="muted">${t("studio.on.robot.none")}</p>`}
+    ${listed.value.length ? html`<ul class="rows">${runningFirst(listed.value).map((item) => html`<${Row} key=${item.id} item=${item} />`)}</ul>` : html`<p class="muted">${t("studio.on.robot.none")}</p>`}
     ${editor.modules.value.length > 0 && html`<h3>${t("studio.toolbox.modules")}</h3><ul class="rows">${editor.modules.value.map((m) => html`<li><span class="grow"><b>${m.condition}</b><small>${m.describe}</small></span>
       <${Button} label=${t("studio.open")} onClick=${() => openModule(m).then(close, (error) => say(error.message, true))} />
       <${Button} kind="danger" label=${t("studio.delete")} onClick=${() => { if (confirm(t("studio.delete.sure", { name: m.condition }))) removeModule(m).catch((error) => say(error.message, true)); }} /></li>`)}</ul>`}

@@ -12,7 +12,7 @@ import { connect, online, open, opened, unopened } from "./link.js";
 import { Inside } from "./modules.js";
 import { Missions, allowHere, forget, loadMissions } from "./missions.js";
 import { Output, Python, RobotPanel, TextEditor, Values } from "./panels.js";
-import { body, changed, handOver, list, listed, program, rename, restore, stored } from "./program.js";
+import { body, changed, handOver, list, program, rename, restore, stored } from "./program.js";
 import * as runner from "./runner.js";
 
 const TABS = { python: Python, output: Output, values: Values, robot: RobotPanel, missions: Missions, group: Group };
@@ -51,6 +51,7 @@ function held() {
 }
 
 function Bar() {
+  const others = runner.others.value.length;
   const phase = runner.phase.value, busy = phase === "running" || phase === "starting";
   const word = phase === "idle" ? (runner.failure.value ? t("studio.phase.failed") : t("studio.phase.idle")) : `${t(`studio.phase.${phase}`)}${runner.module.value ? ` · ${t("studio.phase.module", { name: runner.module.value })}` : ""}`;
   return html`<div class="controls" role="toolbar" aria-label=${t("studio.controls")}>
@@ -64,7 +65,7 @@ function Bar() {
     <span class="grow"></span>
     ${program.value.kind === "blocks" && html`<label class="search"><span class="unseen">${t("studio.search")}</span><input type="search" placeholder=${t("studio.search")} value=${sought.value} onInput=${(e) => { sought.value = e.target.value; editor.search(e.target.value); }} /></label>`}
     <${Button} compact icon="undo" label=${t("studio.undo")} onClick=${() => editor.undo(false)} /><${Button} compact icon="redo" label=${t("studio.redo")} onClick=${() => editor.undo(true)} />
-    <${Button} icon="folder" label=${t("studio.programs")} onClick=${() => { shown.value = "library"; }} />
+    <${Button} icon="folder" label=${t("studio.programs")} title=${others ? t("studio.others", { n: others }) : t("studio.programs")} aria-label=${others ? `${t("studio.programs")}. ${t("studio.others", { n: others })}` : t("studio.programs")} onClick=${() => { shown.value = "library"; }}>${others > 0 && html`<b class="count">${others}</b>`}<//>
     <${Button} compact icon="clock" label=${t("studio.schedule")} onClick=${() => { shown.value = "schedule"; }} />
     <${Button} compact icon="keys" label=${t("studio.keys")} onClick=${() => { shown.value = "keys"; }} />
   </div>`;
@@ -73,7 +74,6 @@ function Bar() {
 function Banner() {
   if (online.value === "lost" || status.value === "lost") return html`<div class="banner bad" role="alert">${t("link.gone")}</div>`;
   if (unopened.value) return html`<div class="banner warn" role="status">${t("studio.unopened", { why: unopened.value })}</div>`;
-  if (runner.others.value.length) return html`<div class="banner warn" role="status">${t("studio.others")}${runner.others.value.map((id) => html`<${Button} label=${`${t("studio.stop")}: ${listed.value.find((one) => one.id === id)?.describe || id}`} onClick=${() => runner.operate("shutdown", id)} />`)}</div>`;
   return null;
 }
 
@@ -81,7 +81,7 @@ function Blocks() {
   const place = useRef(null);
   useEffect(() => { editor.mount(place.current); restore(); runner.check(); }, []);
   return html`<div class="workspace" ref=${place} hidden=${program.value.kind !== "blocks"}></div>${program.value.kind === "text" && html`<${TextEditor} />`}
-    ${program.value.kind === "blocks" && html`<${Inside} name=${runner.phase.value === "idle" ? "" : runner.module.value} block=${runner.lit.value} />`}`;
+    ${program.value.kind === "blocks" && html`<${Inside} name=${runner.phase.value === "idle" ? "" : runner.module.value} block=${runner.module.value && runner.lit.value} />`}`;
 }
 
 function Side() {
@@ -120,8 +120,9 @@ function App() {
     <div class=${`notice ${notice.value.bad ? "bad" : ""}`} role="status" aria-live="polite">${notice.value.text}</div>`;
 }
 
-const NAMES_AFTER = 1000; // ms; a class does not ask at once
+const ENDED_AFTER = 500; // ms
 const AWAY_AFTER = 2000; // ms until files are kept for the time without a server: the page itself comes first
+const AWAY_AT_LAST = 30_000; // ms; a program that runs comes first, too, until then
 await Promise.all([loadWords("/words", "/studio/words"), loadTable()]);
 want({ moving: false }); // until a map is shown
 render(html`<${App} />`, document.getElementById("app"));
@@ -135,10 +136,11 @@ effect(() => { if (current.value && online.value === "open") open(program.peek()
 const robot = computed(() => opened.value?.robot ?? "");
 effect(() => { if (robot.value) list().then(() => editor.modules.value.length && editor.remake()).then(handOver).catch(() => undefined); });
 effect(() => { void language.value; runner.show(); });
-let naming = 0;
-effect(() => { // names of the others: looked up once for all that start together
-  if (naming || !runner.others.value.some((id) => !listed.peek().some((one) => one.id === id))) return;
-  naming = window.setTimeout(() => { naming = 0; list().catch(() => undefined); }, NAMES_AFTER * (1 + Math.random()));
+let ran = false;
+effect(() => { // what was changed meanwhile; at an end that is not its own the robot has yet to hear of it
+  const runs = runner.phase.value !== "idle";
+  if (ran && !runs) setTimeout(() => handOver().catch(() => undefined), ENDED_AFTER);
+  ran = runs;
 });
 effect(() => { if (status.value === "out") location.assign("/?to=studio"); }); // a name is needed (again)
 let shownId = program.peek().id;
@@ -154,5 +156,10 @@ effect(() => {
 loadMissions().catch(() => undefined);
 addEventListener("pagehide", () => { if (editor.changes.peek()) changed(); });
 document.title = t("studio");
-setTimeout(() => navigator.serviceWorker?.register("/studio/worker.js").catch(() => undefined), AWAY_AFTER); // on https and this machine
+/** Keep the page's files, on https and this machine. */
+function keepForAway() {
+  if (runner.phase.value !== "idle" && performance.now() < AWAY_AT_LAST) setTimeout(keepForAway, AWAY_AFTER);
+  else navigator.serviceWorker?.register("/studio/worker.js").catch(() => undefined);
+}
+setTimeout(keepForAway, AWAY_AFTER);
 Object.assign(window, { studio: { editor, runner, program, say } }); // for tests and the benchmark

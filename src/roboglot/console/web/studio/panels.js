@@ -1,6 +1,6 @@
 // What stands beside the blocks: Python, output, variables and readings, the robot.
-import { useEffect, useRef } from "preact/hooks";
-import { signal } from "@preact/signals";
+import { useEffect, useLayoutEffect, useRef } from "preact/hooks";
+import { effect, signal } from "@preact/signals";
 import { Button, html, language, robotWord, t } from "../base.js";
 import { MapView } from "../map.js";
 import { command, current, state, want } from "../link.js";
@@ -28,19 +28,28 @@ function coloured(text) {
   return [...parts, text.slice(at)];
 }
 
+/** Mark the lines of the lit block; a light changes many times a second, so nothing is made anew for it.
+ * @param {HTMLElement | null} list @param {string} block */
+function mark(list, block) {
+  for (const old of list?.querySelectorAll(".here") ?? []) if (/** @type {any} */ (old).dataset.of !== block) old.classList.remove("here");
+  if (block) for (const line of list?.querySelectorAll(`[data-of="${CSS.escape(block)}"]`) ?? []) line.classList.add("here");
+}
+
 /** The Python of the blocks: each line leads to its block, its number to a breakpoint. */
 function Lines() {
+  const place = useRef(/** @type {HTMLElement | null} */ (null));
+  useLayoutEffect(() => effect(() => mark(place.current, lit.value)));
   const code = editor.code.value, owners = blocksOfLines(code), seen = new Set();
   const rows = code.split("\n").map((text, i) => ({ text, owner: owners[i], number: i + 1, mark: text.includes("cyberdog.task.block('") }))
     .filter((row) => marks.value || !row.mark);
   while (rows.length && !rows[rows.length - 1].text.trim()) rows.pop();
   const wrong = new Map(problems.value.map((p) => [p.line, p[language.value] ?? p.en]));
   if (!code.trim()) return html`<p class="muted pad8">${t("studio.python.none")}</p>`;
-  return html`<ol class="python" aria-label=${t("studio.tab.python")}>${rows.map((row, i) => {
+  return html`<ol class="python" ref=${place} aria-label=${t("studio.tab.python")}>${rows.map((row, i) => {
     const first = row.owner && !seen.has(row.owner);
     if (row.owner) seen.add(row.owner);
-    const classes = [row.owner && row.owner === lit.value ? "here" : "", row.owner && row.owner === editor.selected.value ? "chosen" : "", wrong.has(row.number) ? "wrong" : ""].join(" ");
-    return html`<li key=${row.number} class=${classes} title=${wrong.get(row.number)}>
+    const classes = [row.owner && row.owner === editor.selected.value ? "chosen" : "", wrong.has(row.number) ? "wrong" : ""].join(" ");
+    return html`<li key=${row.number} class=${classes} data-of=${row.owner} title=${wrong.get(row.number)}>
       ${first ? html`<button type="button" class=${`gutter ${editor.breaks.value.includes(row.owner) ? "on" : ""}`} aria-pressed=${String(editor.breaks.value.includes(row.owner))}
         aria-label=${t("studio.break.line", { n: i + 1 })} onClick=${() => editor.toggleBreak(row.owner)}>${i + 1}</button>` : html`<span class="gutter">${i + 1}</span>`}
       <code onClick=${() => row.owner && editor.focus(row.owner)}>${coloured(row.text) || " "}</code></li>`;

@@ -6,6 +6,7 @@ import { newId } from "./blocks.js";
 import { ask, frame, opened } from "./link.js";
 
 const PREFIX = "studio.program.", VERSIONS_MAX = 20, VERSION_EVERY = 60_000, SAVE_AFTER = 1500; // ms
+const FILE_MAX = 4_000_000, TEXT_MAX = 262_144, BLOCKS_MAX = 6000, NAME_MAX = 60; // bytes; characters; blocks of a file
 export const body = signal(""); // of a program that is text
 const opening = /** @type {any} */ (read(kept("studio.last", "").value));
 export const program = signal(/** @type {{id: string, name: string, kind: "blocks" | "text", lesson?: string}} */ (
@@ -67,22 +68,24 @@ function keep() {
 
 export function versions() { try { return JSON.parse(localStorage.getItem(`studio.versions.${program.value.id}`) ?? "[]"); } catch { return []; } }
 
+const described = (/** @type {string} */ name) => (name || t("studio.untitled")).replaceAll('"""', "'");
 /** The frame that saves a program. @param {any} [of] as ``whole`` makes it */
 export const saveFrame = (of = whole()) => frame({
-  type: "task", operate: "save", target_id: [of.id], describe: (of.name || t("studio.untitled")).replaceAll('"""', "'"),
+  type: "task", operate: "save", target_id: [of.id], describe: described(of.name),
   style: of.id === program.value.id ? style() : JSON.stringify(of.style ?? { roboglot: { kind: "text" } }), mode: "single", condition: "now", body: of.body });
 
 /** Whether the robot has exactly this program, and it is right: then it need not be saved and checked before it runs. */
 export async function isStored() {
   const { program: found } = await ask({ type: "fetch", program: program.value.id, log: false });
-  return Boolean(found) && found.body === python() && found.style === style() && found.state !== "error" && found.mode === "single" && found.condition === "now";
+  return Boolean(found) && found.describe === described(program.value.name) && found.body === python() && found.style === style() && found.state !== "error" && found.mode === "single" && found.condition === "now";
 }
 
 /** Save what is about to run; the save that its last change has waiting is then not needed. */
 export async function saveNow() {
-  const of = whole(), drawn = style(), saved = await saveFrame(of);
-  if (program.value.id !== of.id || python() !== of.body || style() !== drawn) return saved; // changed meanwhile
-  clearTimeout(timer);
+  const of = whole(), drawn = style(), due = timer;
+  clearTimeout(due);
+  const saved = await saveFrame(of).catch((error) => { if (timer === due) timer = window.setTimeout(() => saveToRobot(), SAVE_AFTER); throw error; });
+  if (program.value.id !== of.id || python() !== of.body || style() !== drawn) return saved; // changed meanwhile: that has its own save
   if (!saved.feedback.state) { note(of.id, false); stored.value = "robot"; }
   return saved;
 }
@@ -100,10 +103,10 @@ async function saveToRobot(of = whole()) {
   } catch { /* the browser has it */ }
 }
 
-/** Hand over what was written while the robot was away. */
+/** Hand over what was written while the robot was away, or while the program ran. */
 export async function handOver() {
   for (const id of unsent()) {
-    if (opened.value?.running.includes(id)) continue; // after its next change
+    if (id !== program.value.id && opened.value?.running.includes(id)) continue; // once it has ended
     const of = id === program.value.id ? whole() : read(id);
     if (of) await saveToRobot(of); else note(id, false);
   }
@@ -170,11 +173,23 @@ export function download(form) {
 
 /** Read a file: our own, the app's style, or Python. @param {File} file */
 export async function upload(file) {
-  const text = await file.text(), name = file.name.replace(/\.(roboglot\.|style\.)?(json|py|txt)$/, "");
-  if (/\.(py|txt)$/i.test(file.name)) { show({ name, kind: "text", body: text }); say(t("studio.open.python")); changed(); return; }
-  const found = JSON.parse(text), made = found.blocks ? found : typeof found.style === "string" ? JSON.parse(found.style) : found.style;
-  show({ name: found.name ?? found.describe ?? name, kind: found.kind, style: made, body: found.body ?? "" });
+  if (file.size > FILE_MAX) throw new Error(t("studio.file.large"));
+  const text = await file.text(), name = file.name.replace(/\.(roboglot\.|style\.)?(json|py|txt)$/i, "").slice(0, NAME_MAX);
+  if (text.includes("\0")) throw new Error(t("studio.file.other"));
+  if (/\.(py|txt)$/i.test(file.name)) { if (text.length > TEXT_MAX) throw new Error(t("studio.file.large")); show({ name, kind: "text", body: text }); say(t("studio.open.python")); changed(); return; }
+  const { made, named, kind, code } = contents(text);
+  if ((JSON.stringify(made ?? null).match(/"type":/g) ?? []).length > BLOCKS_MAX || code.length > TEXT_MAX) throw new Error(t("studio.file.large"));
+  show({ name: named || name, kind, style: made, body: code });
   changed();
+}
+
+/** Blocks and text of a JSON file. @param {string} text @returns {{made: any, named: string, kind: string | undefined, code: string}} */
+function contents(text) {
+  try {
+    const found = JSON.parse(text), made = found.blocks ? found : typeof found.style === "string" ? JSON.parse(found.style) : found.style;
+    if (!made && typeof found.body !== "string") throw new TypeError("it has neither");
+    return { made, named: String(found.name ?? found.describe ?? "").slice(0, NAME_MAX), kind: found.kind, code: String(found.body ?? "") };
+  } catch { throw new Error(t("studio.file.other")); }
 }
 
 /** Blocks become text for good. */

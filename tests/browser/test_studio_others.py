@@ -1,0 +1,53 @@
+"""Several programs on one robot in Chromium: each page lights its own, and shows how many others run."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.browser.served import until
+from tests.browser.test_studio import FOREVER, Open, loaded, studio
+
+__all__ = ["studio"]  # the fixture
+pytestmark = pytest.mark.asyncio(loop_scope="session")
+
+
+async def test_other_programs_are_counted_listed_first_and_ended(studio: Open) -> None:
+    page, other = await loaded(await studio(), FOREVER), await loaded(await studio(), FOREVER)
+    await page.fill("header .name input", "mine")
+    await page.keyboard.press("Enter")
+    await until(page, "document.querySelector('.stored').textContent === 'Kept on the robot'")
+    await other.fill("header .name input", "the other")
+    await other.keyboard.press("Enter")
+    await other.keyboard.press("F5")
+    await until(page, "document.querySelector('.controls .count')?.textContent === '1'")
+    assert await other.query_selector(".controls .count") is None
+    button = page.get_by_role("button", name="Other programs run on this robot: 1")
+    before = await page.evaluate("document.querySelector('.workspace').clientHeight")
+    await button.click()
+    first = page.locator("dialog .rows li").first
+    await until(page, "document.querySelector('dialog .rows b')?.textContent === 'the other'")
+    await other.fill("header .name input", "renamed")  # which the robot takes when it has ended
+    await other.keyboard.press("Enter")
+    await first.get_by_role("button", name="End").click()
+    await until(page, "!document.querySelector('.controls .count')")
+    await until(other, "studio.runner.phase.value === 'idle'")
+    assert await page.evaluate("document.querySelector('.workspace').clientHeight") == before  # nothing moved
+    await until(page, "[...document.querySelectorAll('dialog .rows b')].some(name => name.textContent === 'renamed')")
+    assert page.errors == other.errors == []
+
+
+async def test_line_of_the_lit_block_stays_marked(studio: Open) -> None:
+    page = await loaded(await studio(), FOREVER)
+    marked = "[...document.querySelectorAll('.python .here')].map(line => line.dataset.of).join()"
+    await page.keyboard.press("F5")
+    await until(page, f"{marked} === 'count'")
+    await page.evaluate("studio.editor.toggleBreak('always')")  # the lines are made anew
+    await until(page, "document.querySelector('.python .gutter.on')")
+    assert await page.evaluate(marked) == "count"
+    await page.click("#tab-output")
+    await page.click("#tab-python")
+    await until(page, f"{marked} === 'count'")
+    await page.keyboard.press("Shift+F5")
+    await until(page, f"{marked} === ''")
+    assert await page.query_selector(".value-bubble") is None  # waiting answers nothing
+    assert page.errors == []
