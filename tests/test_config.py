@@ -166,3 +166,8 @@ def test_a_real_robot_starts_where_it_stands(tmp_path: Path) -> None:
     file.write_text('robots = [{name = "a", body = "slamware://10.0.0.1", start = {x = 1.0, y = 2.0}}]')
     with pytest.raises(ValueError, match="a real one"):
         load_config(file, {})
+
+
+def test_a_table_of_free_names_is_no_section() -> None:
+    config = load_config(None, {"ros2": {"namespaces": {"a": "kitchen/robot"}}}, sections())
+    assert config.doors["ros2"].namespaces == {"a": "kitchen/robot"}

@@ -356,7 +356,7 @@ def _refuse_unknown(
         if key not in fields:
             raise ValueError(f"{prefix}{key} is not a setting; there are {', '.join(fields)}")
         nested = fields[key]
-        if isinstance(value, dict) and isinstance(nested, type):
+        if isinstance(value, dict) and isinstance(nested, type) and dataclasses.is_dataclass(nested):
             _refuse_unknown(value, nested, f"{prefix}{key}.")
         for entry in value if key == "robots" and isinstance(value, list) else ():
             if isinstance(entry, dict):

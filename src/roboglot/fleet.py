@@ -147,8 +147,11 @@ def _stand_in(place: str, clock: Clock) -> StandIn:
     return open_playback(place, clock)
 
 
-def origin_of(config: Config, version: str) -> Origin:
-    """Return what a recording says about where it comes from: settings, seed, versions, and the files they name."""
+def origin_of(config: Config, version: str, *, remembers: bool = False) -> Origin:
+    """Return what a recording says about where it comes from: settings, seed, versions, and the files they name.
+
+    ``remembers``: the robots have stored maps, programs or settings from before.
+    """
     from roboglot.recording.files import Attachment, Origin
 
     settings = json.dumps(_public(dataclasses.asdict(config)))
@@ -158,6 +161,7 @@ def origin_of(config: Config, version: str) -> Origin:
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
         "world": config.world,
         "seed": str(config.seed),
+        "data": "kept" if remembers else "new",
         "clock": "lockstep" if config.lockstep else f"x{config.speed:g}",
         "robots": json.dumps({robot.name: _without_secrets(robot.body) for robot in config.robots}),
     }

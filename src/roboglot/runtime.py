@@ -82,6 +82,13 @@ class RobotDoors:
         """Addresses that the doors listen at."""
         return [endpoint for door in self._doors for endpoint in door.endpoints]
 
+    def door(self, name: str) -> Door:
+        """Return the one of that protocol. Raises LookupError."""
+        found = next((door for door in self._doors if door.name == name), None)
+        if found is None:
+            raise LookupError(f"robot {self._robot.id} has no {name} door")
+        return found
+
     async def open(self) -> None:
         """Open those that are closed. Raises OSError naming an address that is taken."""
         async with self._turn:
@@ -136,6 +143,7 @@ class Runtime:
         running = PatientClock if config.patient else RealClock
         self.clock: Clock = LockstepClock() if config.lockstep else running(config.speed)
         file, names = config.data / "roboglot.db", [robot.name for robot in config.robots]
+        self._remembers = file.exists() or bool(config.database)
         self._database = open_database(file, config.database, names, in_place=config.lockstep)
         limits = dataclasses.asdict(config.programs)
         together = limits.pop("memory_together")
@@ -196,7 +204,7 @@ class Runtime:
             from roboglot.recording.recorder import Recorder
 
             stage = self.fleet.world.hands
-            origin = origin_of(self.config, version("roboglot"))
+            origin = origin_of(self.config, version("roboglot"), remembers=self._remembers)
             outside = self.fleet.world.outside
             self._recorder = Recorder(self.config.record, self.fleet.robots, stage, self.clock, origin, outside)
         return self._recorder

@@ -20,6 +20,7 @@ from roboglot.clients.errors import ClientError
 from roboglot.clients.slamware import SlamwareClient
 from roboglot.config import Config, ConsoleConfig, RecordConfig, RobotConfig, load_config
 from roboglot.model.clock import LockstepClock, RealClock
+from roboglot.model.inputs.outside import CALLED_OFF, GONE, Input
 from roboglot.model.tap import Direction, Exchange
 from roboglot.protocols import sections
 from roboglot.runtime import Runtime
@@ -43,7 +44,7 @@ for number in range(3):
 """
 
 
-def config(folder: Path) -> Config:
+def config(folder: Path, **more: object) -> Config:
     base = load_config(
         None,
         {
@@ -51,6 +52,7 @@ def config(folder: Path) -> Config:
             "world": "office",
             "lockstep": True,
             "cyberdog": {"plaintext": True, "app_port": free_port()},
+            **more,
         },
         sections(),
     )
@@ -65,8 +67,8 @@ def config(folder: Path) -> Config:
 class Session:
     """One runtime and its clients."""
 
-    def __init__(self, folder: Path) -> None:
-        self.config = config(folder)
+    def __init__(self, folder: Path, **more: object) -> None:
+        self.config = config(folder, **more)
         self.runtime = Runtime(self.config)
         clock = self.runtime.clock
         assert isinstance(clock, LockstepClock)
@@ -75,6 +77,7 @@ class Session:
         self.pushed: list[tuple[int, str]] = []
         self.answers: dict[int, list[str]] = {}
         self.heard: dict[tuple[str, Direction], int] = {}
+        self.gone: list[str] = []  # doors whose clients hung up, or called off
         self.tasks: set[asyncio.Task[None]] = set()
         self._numbers = itertools.count()
         self.dog: Link
@@ -88,6 +91,10 @@ class Session:
         return Link(
             ADDRESS, 50052, None, RealClock(), app_port=port, pushed=lambda code, text: self.pushed.append((code, text))
         )
+
+    def notice(self, given: Input) -> None:
+        if given.kind in (GONE, CALLED_OFF):
+            self.gone.append(given.name)
 
     async def until_heard(self, door: str, direction: Direction, count: int) -> None:
         async with asyncio.timeout(20):
@@ -128,10 +135,11 @@ def _post(url: str, values: object) -> None:
 
 
 @asynccontextmanager
-async def begun(folder: Path) -> AsyncIterator[Session]:
-    session = Session(folder)
+async def begun(folder: Path, **more: object) -> AsyncIterator[Session]:
+    session = Session(folder, **more)
     await session.runtime.start()
     session.runtime.fleet.robots["a"].tap.listen(session.hear)
+    session.runtime.fleet.robots["a"].outside.listen(session.notice)
     try:
         yield session
     finally:

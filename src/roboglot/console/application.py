@@ -12,24 +12,23 @@ from msgspec import MsgspecError
 
 from roboglot.console.api import Api
 from roboglot.console.assets import Assets
-from roboglot.console.desk import CLIENT, Desk
+from roboglot.console.desk import Desk
 from roboglot.console.http import Problem, Receive, Scope, Send, answer, answer_json
 from roboglot.console.live import Page
 from roboglot.console.people.classes import Classes
 from roboglot.console.people.entry import CHALLENGE, admission_of, enter
 from roboglot.console.people.sessions import Sessions
 from roboglot.console.people.signing import Signing
+from roboglot.console.program_runs import end_all
 from roboglot.console.settings import JOIN_BURST, JOIN_TRIES, MESSAGE_MAX, VIEWERS_MAX
 from roboglot.console.studio.channel import MESSAGE_MAX as STUDIO_MESSAGE_MAX
 from roboglot.console.studio.channel import Session
 from roboglot.console.studio.class_link import Hello, LinkedRoom
 from roboglot.console.studio.classroom import Classroom, World
-from roboglot.console.verbs.robots import stop
 from roboglot.extras import MissingExtra, explaining
 from roboglot.model.admission import Right, Unknown
 from roboglot.model.background import load
 from roboglot.model.client_context import client, identity
-from roboglot.model.errors import NotFound
 from roboglot.protocols.browsers import Browsers, of_rows
 from roboglot.transport.limiter import Limiter
 
@@ -91,13 +90,7 @@ class Application:
 
     async def _stop(self, name: str) -> None:
         """End every program and motion of a robot; who asks has been found to be its teacher. Raises RobotError."""
-        robot = self._desk.robots.get(name)
-        if robot is None:
-            raise NotFound(f"there is no robot {name!r}")
-        with robot.admission.noting(CLIENT, "stop"):
-            if (programs := self._desk.studio.programs.get(name)) is not None:
-                await programs.service.shutdown([figures.target_id for figures in programs.service.running()])
-            await stop(robot)
+        await end_all(self._desk, name)
 
     def _refusal(self, scope: Scope, method: str) -> str:
         return self._browsers.refusal(of_rows(scope["headers"], method))

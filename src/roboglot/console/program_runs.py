@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from roboglot.console.desk import CLIENT, Desk
 from roboglot.console.studio.programs import Programs
+from roboglot.console.verbs.robots import stop
 from roboglot.model.admission import Right
 from roboglot.model.errors import NotFound
 from roboglot.programs.stores import StoredProgram
+from roboglot.programs.tasks import debugging
 
 TASK = "console_script"
-PROGRAM = "program"  # the kind of recorded inputs for such programs
+PROGRAM = "program"  # the kind of recorded inputs for such programs, and for all programs of a robot
+END, DEBUG = "end", "debug"  # names of such inputs
 SOURCE_MAX = 64 * 1024  # characters of a program
 LINES_MAX = 200  # newest log lines in an answer
 
@@ -24,6 +27,23 @@ async def start(desk: Desk, name: str, source: str) -> dict[str, object]:
         await programs.service.save(StoredProgram(TASK, "run by a script", "", "single", "now", source, ""))
         await programs.service.run(TASK)
     return await program(desk, name)
+
+
+async def end_all(desk: Desk, name: str) -> None:
+    """End every program and motion of a robot; who asks may do so. Raises NotFound, RobotError."""
+    robot = desk.robots.get(name)
+    if robot is None:
+        raise NotFound(f"there is no robot {name!r}")
+    with robot.admission.noting(CLIENT, "stop"), robot.outside.noting(PROGRAM, END, {}):
+        if (programs := desk.studio.programs.get(name)) is not None:
+            await programs.service.shutdown([figures.target_id for figures in programs.service.running()])
+        await stop(robot)
+
+
+async def debug(programs: Programs, text: str) -> str:
+    """Return the answer of a robot's programs to a message of the debugger. Raises ProgramError."""
+    with programs.robot.outside.noting(PROGRAM, DEBUG, {"text": text}):
+        return await debugging.answer(programs.service, text)
 
 
 async def program(desk: Desk, name: str) -> dict[str, object]:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
+from roboglot.model.inputs.outside import CAME, GONE, Outside
 from roboglot.operations import Right
 
 Send = Callable[[str], None]
@@ -89,3 +90,27 @@ def texts(
 ) -> Channel:
     """Return a channel for texts; see ``TextSession``."""
     return Channel(lambda connection: TextSession(connection, subscribe, receive), right)
+
+
+class _Noted:
+    """A session whose end is an input."""
+
+    def __init__(self, inner: Session, note: Callable[[], None]) -> None:
+        self._inner, self._note = inner, note
+        self.receive = inner.receive
+
+    def close(self) -> None:
+        """Note it first: what follows from it comes after."""
+        self._note()
+        self._inner.close()
+
+
+def noted(channel: Channel, outside: Outside, door: str, path: str) -> Channel:
+    """Return the channel; that its clients come and go is noted as the robot's inputs."""
+
+    def open_noted(carrier: Carrier) -> Session:
+        session = channel.open(carrier)
+        outside.note_client(CAME, door, carrier.name, path=path)
+        return _Noted(session, lambda: outside.note_client(GONE, door, carrier.name))
+
+    return replace(channel, open=open_noted)

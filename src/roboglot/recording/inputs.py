@@ -1,6 +1,7 @@
 """Gives a lockstep world the recorded inputs once more, each at exactly its robot time, in the recorded order.
 
-Inputs are requests at the doors, and what came from outside in another way: see ``model/inputs/outside.py``.
+Inputs are requests at the doors, clients that come and hang up, and what came from outside in another way: see
+``model/inputs/outside.py``.
 """
 
 from __future__ import annotations
@@ -14,16 +15,20 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 
 from roboglot.clients.errors import ClientError
 from roboglot.model.clock import LockstepClock, RealClock
-from roboglot.model.inputs.outside import ANSWER, Input
+from roboglot.model.inputs import outside
+from roboglot.model.inputs.outside import Input
 from roboglot.model.tap import DRIVER, Direction, Exchange
-from roboglot.recording.lines import FrameLine, Line, TextLine
+from roboglot.recording.lines import FoxgloveLine, FrameLine, Line, TextLine
 from roboglot.recording.reader import Asked, Recording, pair
 
 HEARD_SECONDS_MAX = 5.0  # real s to wait for a request to arrive, or for an answer that needs no robot time
 LOOK = 0.0005  # real s between two checks
 HANDED_ON = ("ipv4:", "ipv6:", "unix:")  # prefixes of the names of gRPC connections
 AT_ONCE = 1e-9  # s of robot time
-Where = Callable[[str, str], Line]  # robot and door
+DRAINED = (TextLine, FrameLine, FoxgloveLine)  # connections of which answers are read, and not waited for
+Where = Callable[[str, str], Line | None]  # robot and door
+Place = tuple[str, str, str]  # robot, door, the client's end
+Key = tuple[str, str, str]  # robot, door, and what is heard
 Repeat = Callable[[Input], Awaitable[object]]
 
 
@@ -37,7 +42,8 @@ def is_of_client(exchange: Exchange) -> bool:
 class Inputs:
     """Plays the inputs of a recording.
 
-    ``where`` returns a new connection to a robot's door, not yet open; ``repeat`` does what one other input says.
+    ``where`` returns a new connection to a robot's door, not yet open, None where there is no way to repeat one;
+    ``repeat`` does what one other input says.
     """
 
     def __init__(self, recording: Recording, clock: LockstepClock, where: Where, repeat: Repeat) -> None:
@@ -48,11 +54,12 @@ class Inputs:
         replies = enumerate(recording.exchanges)
         self._replies = [(n, one) for n, one in replies if one.direction is Direction.REPLY and is_of_client(one)]
         self._answered = 0  # exchanges that should have been heard so far
-        self._wanted: Counter[tuple[str, str, Direction]] = Counter()
-        self._lines: dict[tuple[str, str, str], Line] = {}
+        self._wanted: Counter[Key] = Counter()
+        self._lines: dict[Place, Line] = {}
+        self._calls: dict[tuple[Place, str, float], asyncio.Task[None]] = {}
         self._tasks: set[asyncio.Task[None]] = set()
-        self._heard: Counter[tuple[str, str, Direction]] = Counter()
-        self._inputs: Counter[str] = Counter()
+        self._heard: Counter[Key] = Counter()
+        self._wanted_inputs: Counter[Key] = Counter()
         self._patience = HEARD_SECONDS_MAX
         self.unheard: list[str] = []  # inputs without effect, described
 
@@ -60,23 +67,27 @@ class Inputs:
         """Listen to the robots' taps with this."""
         self._heard[exchange.robot, exchange.door, exchange.direction] += 1
 
+    def notice(self, given: Input) -> None:
+        """Listen to the robots' inputs with this."""
+        self._heard[given.robot, given.name, given.kind] += 1
+
     async def play(self, until: float) -> None:
-        """Send all of it, let robot time pass until then, and hang up."""
-        try:
-            for place, (number, due) in enumerate(self._due, 1):
-                at = due if isinstance(due, Input) else due.request
-                if at.stamp > until:
-                    break
-                await self._clock.advance_to(max(self._clock.time(), at.stamp), at.turn)
-                await self._catch_up(number)
-                await (self._give(due) if isinstance(due, Input) else self._send(due, self._due[place : place + 1]))
-            await self._clock.advance_to(max(self._clock.time(), until))
-        finally:
-            for task in self._tasks:
-                task.cancel()
-            for line in self._lines.values():
-                with contextlib.suppress(ClientError, OSError):
-                    await line.close()
+        """Send all of it, and let robot time pass until then. Clients stay connected until ``close``."""
+        for place, (number, due) in enumerate(self._due, 1):
+            at = due if isinstance(due, Input) else due.request
+            if at.stamp > until:
+                break
+            await self._clock.advance_to(max(self._clock.time(), at.stamp), at.turn)
+            await self._catch_up(number)
+            await (self._give(due) if isinstance(due, Input) else self._send(due, self._due[place : place + 1]))
+        await self._clock.advance_to(max(self._clock.time(), until))
+
+    async def close(self) -> None:
+        """Hang up, and end what is not answered."""
+        for task in self._tasks:
+            task.cancel()
+        for line in self._lines.values():
+            await _quietly(line.close())
 
     async def _catch_up(self, number: int) -> None:
         """Wait for replies that were heard before the exchange with this number, however long the machine takes."""
@@ -89,58 +100,101 @@ class Inputs:
 
     async def _give(self, given: Input) -> None:
         """Give an input that is no request."""
-        if given.kind != ANSWER:  # it may take robot time
-            self._follow(self._repeat(given))
-            return
-        deadline = time.monotonic() + self._patience  # noqa: TID251 - robot time stands still
-        while not await self._repeat(given):
-            if time.monotonic() > deadline:  # noqa: TID251
-                self._patience = LOOK  # later inputs will differ as well
-                self.unheard.append(f"{given.robot} was not waiting for an answer to {given.name} at {given.stamp:.3f}")
-                return
-            await asyncio.sleep(LOOK)  # noqa: TID251
+        match given.kind:
+            case outside.ANSWER:
+                if not await self._wait_until(lambda: self._repeat(given)):
+                    self._patience = LOOK  # later inputs will differ as well
+                    self._miss(f"{given.robot} was not waiting for an answer to {given.name}", given.stamp)
+            case outside.CAME:
+                path = str(given.values.get("path", ""))
+                await self._line((given.robot, given.name, given.connection), path, given.stamp)
+            case outside.GONE:
+                line = self._lines.pop((given.robot, given.name, given.connection), None)
+                if line is not None:
+                    self._follow(line.close())
+                    await self._see(given)
+            case outside.CALLED_OFF:
+                place = given.robot, given.name, given.connection
+                asked = given.values.get("operation"), given.values.get("asked")
+                if (call := self._calls.pop((place, *asked), None)) is not None:  # type: ignore[arg-type]
+                    call.cancel()
+                    await self._see(given)
+            case _:
+                self._follow(self._repeat(given))  # it may take robot time
+
+    async def _see(self, given: Input) -> None:
+        """Wait until the robot has noticed what a client did."""
+        key = given.robot, given.name, given.kind
+        self._wanted_inputs[key] += 1
+        if not await self._wait_for({key: self._wanted_inputs[key]}):
+            self._miss(f"a client of {given.name} that has {given.kind}", given.stamp)
+
+    def _miss(self, what: str, stamp: float) -> None:
+        self.unheard.append(f"{what} at {stamp:.3f}")
 
     async def _send(self, asked: Asked, following: Sequence[tuple[int, Asked | Input]]) -> None:
         """Send a request, and wait for what is answered at once, before the ``following`` input."""
         request = asked.request
         end = following[0][0] if following else math.inf
-        place = request.robot, request.door
-        requests, replies = self._heard[*place, Direction.REQUEST], self._heard[*place, Direction.REPLY]
+        robot, door = request.robot, request.door
+        requests, replies = self._heard[robot, door, Direction.REQUEST], self._heard[robot, door, Direction.REPLY]
         at_once = sum(n < end and reply.stamp - request.stamp <= AT_ONCE for n, reply in asked.numbered)
-        try:
-            line = await self._line(request)
-            answers = 0 if isinstance(line, (TextLine, FrameLine)) else len(asked.replies)
-            self._follow(line.ask(request.operation, request.payload, answers))
-        except ClientError as error:
-            self.unheard.append(f"{request.operation}: {error}")
+        place = robot, door, request.connection
+        line = await self._line(place, request.operation, request.stamp)
+        if line is None:
             return
-        wanted = {(*place, Direction.REQUEST): requests + 1, (*place, Direction.REPLY): replies + at_once}
+        answers = () if isinstance(line, DRAINED) else [reply.payload for reply in asked.replies]
+        call = self._follow(line.ask(request.operation, request.payload, answers))
+        self._calls[place, request.operation, request.stamp] = call
+        wanted: dict[Key, int] = {(robot, door, Direction.REQUEST): requests + 1}
+        wanted[robot, door, Direction.REPLY] = replies + at_once
         if not await self._wait_for(wanted):
-            self.unheard.append(f"{request.operation} at {request.stamp:.3f}")
+            self._miss(request.operation or f"a message of {door}", request.stamp)
 
-    async def _wait_for(self, wanted: Mapping[tuple[str, str, Direction], int]) -> bool:
+    async def _wait_for(self, wanted: Mapping[Key, int]) -> bool:
+        async def heard() -> bool:
+            return all(self._heard[key] >= count for key, count in wanted.items())
+
+        return await self._wait_until(heard)
+
+    async def _wait_until(self, done: Callable[[], Awaitable[object]]) -> bool:
         deadline = time.monotonic() + self._patience  # noqa: TID251 - robot time stands still
-        while any(self._heard[key] < count for key, count in wanted.items()):
+        while not await done():
             if time.monotonic() > deadline:  # noqa: TID251
                 return False
             await asyncio.sleep(LOOK)  # noqa: TID251
         return True
 
-    async def _line(self, request: Exchange) -> Line:
-        key = request.robot, request.door, request.connection
-        if (line := self._lines.get(key)) is None:
-            line = self._lines[key] = self._where(request.robot, request.door)
-            line.clock = RealClock()
+    async def _line(self, place: Place, path: str, stamp: float) -> Line | None:
+        """Return a client's connection, opened if it is not yet; None if that cannot be."""
+        if (line := self._lines.get(place)) is not None:
+            return line
+        robot, door, _ = place
+        if (line := self._where(robot, door)) is None:
+            self._miss(f"a client of {door}, whose messages cannot be repeated,", stamp)
+            return None
+        line.clock = RealClock()
+        if isinstance(line, FrameLine) and path.startswith("/"):
+            line.path = path
+        came = self._heard[robot, door, outside.CAME]
+        try:
             await line.open()
-            if isinstance(line, (TextLine, FrameLine)):
-                self._follow(line.drain())
+        except (ClientError, OSError) as error:
+            self._miss(f"a client of {door} ({error})", stamp)
+            return None
+        self._lines[place] = line
+        if isinstance(line, DRAINED):
+            self._follow(line.drain())
+            await self._wait_for({(robot, door, outside.CAME): came + 1})
         return line
 
-    def _follow(self, work: Awaitable[object]) -> None:
-        async def quietly() -> None:
-            with contextlib.suppress(ClientError, OSError):
-                await work
-
-        task = asyncio.get_running_loop().create_task(quietly())
+    def _follow(self, work: Awaitable[object]) -> asyncio.Task[None]:
+        task = asyncio.get_running_loop().create_task(_quietly(work))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
+        return task
+
+
+async def _quietly(work: Awaitable[object]) -> None:
+    with contextlib.suppress(ClientError, OSError):
+        await work

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, urlsplit
 
 from roboglot.clients.errors import ClientError, LinkLost
 from roboglot.model.clock import Clock
+from roboglot.wire.foxglove.messages import SUBPROTOCOLS, ClientOpcode
 from roboglot.wire.robomaster.replies import Reply
 
 if TYPE_CHECKING:
@@ -20,7 +22,10 @@ if TYPE_CHECKING:
 PATIENCE = 60.0  # s for an answer
 LINE_MAX = 1 << 20
 FRAMES, LOG = "/programs", "/log"  # paths of a WebSocket
+FILES = ("4002", "4004")  # what a dog serves by ``getFile``, too
 PORTS = {"slamware": 1448, "robomaster": 40923, "cyberdog": 50052, "visual": 50053}
+SHOWN = re.compile(r'"op":"(?:advertise|status)"')  # Foxglove's server has its topics, or says why not
+BINARY = tuple(bytes([opcode]) for opcode in ClientOpcode)  # with which Foxglove's messages begin that are no text
 REFUSALS = tuple(str(reply) for reply in Reply if reply is not Reply.OK)
 Answers = list[tuple[bytes, str]]
 Pushed = Callable[[str, bytes], None]
@@ -54,8 +59,8 @@ class Line(ABC):
         """Connect."""
 
     @abstractmethod
-    async def ask(self, operation: str, payload: bytes, answers: int) -> Answers:
-        """Send one request; ``answers``: how many there were when it was recorded."""
+    async def ask(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:
+        """Send one request; ``answers``: those that were recorded, for how many there are, and of which kind."""
 
     @abstractmethod
     async def close(self) -> None:
@@ -70,7 +75,7 @@ class RestLine(Line):
 
         self._link = HttpLink(self.host, self.port, self.clock)
 
-    async def ask(self, operation: str, payload: bytes, answers: int) -> Answers:  # noqa: ARG002
+    async def ask(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:  # noqa: ARG002
         head, _, body = payload.partition(b"\n\n")
         method, _, path = head.decode("latin-1").partition(" ")
         kind = "application/json" if body[:1] in (b"{", b"[", b"") else "application/octet-stream"
@@ -91,7 +96,7 @@ class TextLine(Line):
         except (OSError, TimeoutError) as error:
             raise LinkLost(f"{self.host}:{self.port} cannot be reached: {error}") from None
 
-    async def ask(self, operation: str, payload: bytes, answers: int) -> Answers:  # noqa: ARG002
+    async def ask(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:  # noqa: ARG002
         self._writer.write(payload.rstrip(b" ;") + b";")
         if not answers:
             return []
@@ -133,11 +138,17 @@ class DogLine(Line):
         )
         await self._link.open()
 
-    async def ask(self, operation: str, payload: bytes, answers: int) -> Answers:  # noqa: ARG002
+    async def ask(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:
         found: Answers = []
-        if operation.isdigit():
-            async for _, text in self._link.send(int(operation), payload.decode("utf-8", "replace")):
-                found.append((text.encode(), status_of("cyberdog", text.encode())))
+        if not operation.isdigit():
+            return found
+        code, text = int(operation), payload.decode("utf-8", "replace")
+        if operation in FILES and answers and answers[0][:1] != b"{":  # it came in chunks
+            async for chunk in self._link.fetch(code, text):
+                found.append((chunk.SerializeToString(), "ok"))
+            return found
+        async for _, answer in self._link.send(code, text):
+            found.append((answer.encode(), status_of("cyberdog", answer.encode())))
         return found
 
     async def close(self) -> None:
@@ -147,20 +158,22 @@ class DogLine(Line):
 class FrameLine(Line):
     """Block programs over their WebSocket: answers carry the id of their request, all else is a push.
 
-    An operation that is a path (``/log``) has a socket of its own.
+    An operation that is a path (``/log``) has a socket of its own; ``path`` is that of the first socket.
     """
+
+    path = FRAMES
 
     async def open(self) -> None:
         self._sockets: dict[str, ClientConnection] = {}
         self._draining: list[asyncio.Task[None]] | None = None
-        await self._socket(FRAMES)
+        await self._socket(self.path)
 
-    async def ask(self, operation: str, payload: bytes, answers: int) -> Answers:
+    async def ask(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:
         path = operation if operation.startswith("/") else FRAMES
         socket = await self._socket(path)
         await socket.send(payload.decode("utf-8", "replace"))
         wanted, found = _frame_id(payload), Answers()
-        while len(found) < answers:
+        while len(found) < len(answers):
             frame = await self._next(socket, operation)
             if path != FRAMES or _frame_id(frame) == wanted:
                 found.append((frame, status_of("visual", frame)))
@@ -197,7 +210,7 @@ class FrameLine(Line):
     async def drain(self) -> None:
         """Read what comes, and forget it, until the robot hangs up."""
         self._draining = []
-        await _drain(self._sockets[FRAMES])
+        await _drain(self._sockets[self.path])
 
     async def close(self) -> None:
         for task in self._draining or ():
@@ -220,6 +233,47 @@ def _frame_id(frame: bytes) -> object:
         return None
     inner = value.get("feedback") or value.get("response") or value
     return inner.get("id") if isinstance(inner, dict) else None
+
+
+class FoxgloveLine(Line):
+    """Foxglove's WebSocket, for a rerun: no answer is waited for."""
+
+    async def open(self) -> None:
+        """Connect, and wait until the robot has shown its topics, as Foxglove does."""
+        from websockets.asyncio.client import connect
+        from websockets.exceptions import WebSocketException
+        from websockets.typing import Subprotocol
+
+        address = f"ws://{self.host}:{self.port}/"
+        known = [Subprotocol(name) for name in SUBPROTOCOLS]
+        try:
+            connecting = connect(address, max_size=LINE_MAX, subprotocols=known)
+            self._socket = await self.clock.wait_for(connecting, PATIENCE)
+            while not SHOWN.search(await self._text()):
+                pass
+        except (OSError, TimeoutError, WebSocketException) as error:
+            raise LinkLost(f"{address} cannot be reached: {error}") from None
+
+    async def _text(self) -> str:
+        message = await self.clock.wait_for(self._socket.recv(), PATIENCE)
+        return message if isinstance(message, str) else ""
+
+    async def ask(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:  # noqa: ARG002
+        from websockets.exceptions import WebSocketException
+
+        binary = payload[:1] in BINARY
+        try:
+            await self._socket.send(payload if binary else payload.decode("utf-8", "replace"))
+        except WebSocketException as error:
+            raise LinkLost(f"{operation} cannot be sent: {error}") from None
+        return []
+
+    async def drain(self) -> None:
+        """Read what comes, and forget it, until the robot hangs up."""
+        await _drain(self._socket)
+
+    async def close(self) -> None:
+        await self._socket.close()
 
 
 LINES: dict[str, type[Line]] = {"slamware": RestLine, "robomaster": TextLine, "cyberdog": DogLine, "visual": FrameLine}

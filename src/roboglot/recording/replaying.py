@@ -66,7 +66,8 @@ class Replay:
         self._note(request.connection, Direction.REQUEST, request.operation, request.payload)
         began = self._clock.time()
         try:
-            answers = await line.ask(request.operation, self._renamed(request.payload), len(asked.replies))
+            recorded = [reply.payload for reply in asked.replies]
+            answers = await line.ask(request.operation, self._renamed(request.payload), recorded)
         except ClientError as error:
             if isinstance(error, LinkLost):
                 self._lost = self._lost or error

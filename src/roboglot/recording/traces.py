@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby, zip_longest
 from pathlib import Path
 
-from roboglot.model.inputs.outside import ANSWER
+from roboglot.model.inputs.outside import ANSWER, CAME, GONE
 from roboglot.model.tap import Direction
 from roboglot.recording.entries import NANO
 from roboglot.recording.reader import Record, read_messages
@@ -17,7 +18,10 @@ from roboglot.recording.reader import Record, read_messages
 AROUND = 5  # messages shown before the first difference
 SHOWN_MAX = 300  # characters per message
 LEFT_OUT = frozenset({"/log"})  # log lines contain ports
-UNCOUNTED = ("connection", "client", "turn")  # of exchanges and inputs: ports of clients, and a visible order
+COMING = frozenset({CAME, GONE})  # inputs that a rerun gives by itself, and reports where it cannot
+SAID = ("roboglot.Exchange", "roboglot.Input")
+ADDRESS = re.compile(rb"((?:\d{1,3}\.){3}\d{1,3}|[0-9a-f]*:[0-9a-f:.]+):\d{1,5}(?!\d)")
+UNCOUNTED = ("connection", "client", "turn")  # of exchanges and inputs: ends of clients, and a visible order
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,10 +60,36 @@ def difference(recorded: Path, now: Path) -> Verdict:
 
 
 def _messages(path: Path) -> Iterator[tuple[str, int, bytes]]:
-    counted = (record for record in read_messages(path) if record.topic not in LEFT_OUT)
-    for at, records in groupby(counted, lambda record: record.at):
-        for record in sorted(records, key=_stream):
-            yield record.topic, at, _bytes(record)
+    counted = (record for record in read_messages(path) if _counts(record))
+    ends = _Ends()
+    for at, group in groupby(counted, lambda record: record.at):
+        records = sorted(group, key=_stream)
+        for record in records:
+            ends.note(record)
+        for record in records:
+            yield record.topic, at, _bytes(record, ends)
+
+
+def _counts(record: Record) -> bool:
+    if record.schema == "roboglot.Input":
+        return record.json()["kind"] not in COMING
+    return record.topic not in LEFT_OUT
+
+
+class _Ends:
+    """Clients' addresses so far; their ports are the machine's choice, also where they stand in actions' sources."""
+
+    def __init__(self) -> None:
+        self._seen: set[bytes] = set()
+
+    def note(self, record: Record) -> None:
+        """Remember who says it."""
+        if record.schema in SAID and (found := ADDRESS.search(str(record.json()["connection"]).encode())):
+            self._seen.add(found[0])
+
+    def without_ports(self, data: bytes) -> bytes:
+        """Return JSON without them."""
+        return ADDRESS.sub(lambda found: found[1] if found[0] in self._seen else found[0], data)
 
 
 def _stream(record: Record) -> tuple[str, str, str]:
@@ -73,13 +103,15 @@ def _stream(record: Record) -> tuple[str, str, str]:
     return record.topic, value["direction"], value["operation"] if value["direction"] == Direction.PUSH else ""
 
 
-def _bytes(record: Record) -> bytes:
-    if record.schema not in ("roboglot.Exchange", "roboglot.Input"):
+def _bytes(record: Record, ends: _Ends) -> bytes:
+    if not record.schema.startswith("roboglot."):
         return record.data
+    if record.schema not in SAID:
+        return ends.without_ports(record.data)
     value: dict[str, object] = record.json()
     for name in UNCOUNTED:
         value.pop(name, None)
-    return json.dumps(value, sort_keys=True).encode()
+    return ends.without_ports(json.dumps(value, sort_keys=True).encode())
 
 
 def _words(message: tuple[str, int, bytes] | None) -> str:

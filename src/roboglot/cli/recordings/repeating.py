@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, cast
 
@@ -15,9 +15,30 @@ from roboglot.model.inputs.outside import ANSWER, Input
 from roboglot.operations import BadParameters
 from roboglot.programs.errors import ProgramError
 from roboglot.protocols import lease_desk
+from roboglot.recording.lines import Answers, Line
 
 if TYPE_CHECKING:
-    from roboglot.runtime import Runtime
+    from roboglot.protocols.ros2.server import Ros2Door
+    from roboglot.runtime import RobotDoors, Runtime
+
+
+class Ros2Line(Line):
+    """Messages for the ROS 2 door, handed to it: a Zenoh router on the way would only add time."""
+
+    def __init__(self, doors: RobotDoors) -> None:
+        self._doors = doors
+
+    async def open(self) -> None:
+        """Do nothing: there is no connection."""
+
+    async def ask(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:  # noqa: ARG002
+        """Hand on one message; ``operation`` is its topic's key."""
+        door = cast("Ros2Door", self._doors.door("ros2"))
+        door.receive(operation, payload)
+        return []
+
+    async def close(self) -> None:
+        """Do nothing."""
 
 
 class Repeater:
@@ -55,6 +76,10 @@ class Repeater:
             case desk.COMMAND:
                 asked = cast(Mapping[str, object], values["values"])
                 await self._desk.command(given.robot, given.name, asked, values["by"])
+            case program_runs.PROGRAM if given.name == program_runs.END:
+                await program_runs.end_all(self._desk, given.robot)
+            case program_runs.PROGRAM if given.name == program_runs.DEBUG:
+                await program_runs.debug(self._desk.studio.programs[given.robot], values["text"])
             case program_runs.PROGRAM:
                 await program_runs.start(self._desk, given.robot, values["source"])
             case teleop.PAD if given.name == "move":

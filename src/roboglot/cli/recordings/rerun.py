@@ -8,6 +8,7 @@ import json
 import shutil
 import sys
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from roboglot.runtime import Runtime
 
 NEW = "rerun.mcap"
+BEGIN_MAX = 0.001  # s of robot time at which a recording begins at the latest
+KEPT = "kept"  # the fact "data" of a recording whose robots had stored things when they started
 
 
 class NoRerun(ValueError):
@@ -48,7 +51,7 @@ def command(
         if keep is not None:
             shutil.copy(Path(folder) / NEW, keep)
     for request in unheard:
-        print(f"not heard: {visible(request)}")
+        print(f"not repeated: {visible(request)}")
     if verdict.difference is None:
         print(f"identical: {verdict.agreed} messages, {recording.seconds:.1f} s")
         raise typer.Exit(0)
@@ -57,6 +60,8 @@ def command(
     for line in found.before:
         print(f"  {visible(line)}")
     print(f"- {visible(found.recorded)}\n+ {visible(found.now)}")
+    for reason in reasons(recording):
+        print(f"A reason may be: {reason}")
     raise typer.Exit(1)
 
 
@@ -78,12 +83,48 @@ def configuration(recording: Recording, folder: Path) -> Config:
     if (world := folder / Path(values["world"]).name).suffix and world.exists():
         values["world"] = str(world)
     config = config_of(values, doors=sections(), origin=str(recording.path))
-    if config.access.on:
-        raise NoRerun("who was let in by name cannot come in again: the recording has no tokens")
-    if any(not robot.is_simulated for robot in config.robots):
-        raise NoRerun("real and recorded robots do not live in a world that could be run again")
+    if why := _why_not(recording, config):
+        raise NoRerun(why)
     record = dataclasses.replace(config.record, to=str(folder / NEW), ring=False)
-    return dataclasses.replace(config, record=record, console=ConsoleConfig(enabled=False))
+    alone = {"console": ConsoleConfig(enabled=False), "database": "", "registry": "", "doors": _alone(config.doors)}
+    return dataclasses.replace(config, record=record, **alone)  # type: ignore[arg-type]
+
+
+def _why_not(recording: Recording, config: Config) -> str:
+    """Return why the recording cannot be run again; empty if it can."""
+    if config.access.on:
+        return "who was let in by name cannot come in again: the recording has no tokens"
+    if any(not robot.is_simulated for robot in config.robots):
+        return "real and recorded robots do not live in a world that could be run again"
+    if getattr(config.doors.get("vda5050"), "broker", ""):
+        return "fleet control (VDA 5050) speaks through a broker, which the recording does not have"
+    if getattr(config.doors.get("visual"), "cloud", ""):
+        return "the cloud of block programs answered then, and the recording does not have what it said"
+    late = recording.first / 1e9 - recording.epoch
+    if recording.epoch and late > BEGIN_MAX:
+        return f"{recording.path} begins {late:.1f} s after its robots, and what happened before is not in it"
+    return ""
+
+
+def _alone(doors: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the doors' settings without the ROS 2 routers that they dial: a rerun meets no one else."""
+    ros2 = doors.get("ros2")
+    return doors if ros2 is None else {**doors, "ros2": dataclasses.replace(ros2, connect=())}
+
+
+def reasons(recording: Recording) -> list[str]:
+    """Return in words what of a recording a rerun cannot give again."""
+    from roboglot.model.tap import Direction
+    from roboglot.recording.redaction import REDACTED
+
+    found = []
+    if recording.facts.get("data", "") == KEPT:
+        found.append("the robots had a data folder from before, and its maps, programs and settings are not recorded")
+    redacted = sum(REDACTED in e.payload for e in recording.exchanges if e.direction is Direction.REQUEST)
+    redacted += sum(REDACTED.decode() in str(given.values) for _, given in recording.inputs)
+    if redacted:
+        found.append(f"{redacted} requests hold [redacted] where passwords, names or the like stood")
+    return found
 
 
 async def run(recording: Recording, config: Config) -> list[str]:
@@ -99,34 +140,44 @@ async def run(recording: Recording, config: Config) -> list[str]:
     inputs = Inputs(recording, runtime.clock, lambda robot, door: _line(runtime, robot, door), repeat)
     for robot in runtime.fleet.robots.values():
         robot.tap.listen(inputs.hear)
+        robot.outside.listen(inputs.notice)
     try:
         await runtime.start()
         start = recording.epoch or runtime.clock.epoch() - runtime.clock.time()
         await inputs.play((recording.last - round(start * 1e9)) / 1e9)
     finally:
-        await runtime.close()
+        await runtime.close()  # as then: clients that did not hang up are still there
+        await inputs.close()
     return inputs.unheard
 
 
-def _line(runtime: Runtime, robot: str, door: str) -> Line:
-    """Return a connection to a door, by its own port."""
-    from roboglot.recording.lines import LINES, PORTS, DogLine
+def _line(runtime: Runtime, robot: str, door: str) -> Line | None:
+    """Return a connection to a door, by its own port; None where no client of its kind can be repeated."""
+    from roboglot.cli.recordings.repeating import Ros2Line
+    from roboglot.model.clock import RealClock
+    from roboglot.recording.lines import LINES, PORTS, DogLine, FoxgloveLine
 
     config = runtime.config
     host = next(one.address for one in config.robots if one.name == robot)
     section = config.doors.get(door)
-    port = getattr(section, "control_port" if door == "robomaster" else "port", PORTS[door])
-    from roboglot.model.clock import RealClock
-
-    line = LINES[door](host, port, RealClock(), lambda _operation, _data: None)
-    if isinstance(line, DogLine) and getattr(section, "plaintext", False):
-        line.options = {}
-    elif isinstance(line, DogLine):
-        from roboglot.protocols.cyberdog.certificates import export_client
-        from roboglot.protocols.cyberdog.server import FOLDER
-
-        folder = config.data / "app"
-        if not folder.exists():
-            export_client(config.data / FOLDER, folder)
-        line.options = {"certs": str(folder)}  # no app: its answers are in the recording
+    if door == "ros2":
+        return Ros2Line(runtime.doors[robot])
+    kind: type[Line] | None = FoxgloveLine if door == "foxglove" else LINES.get(door)
+    if kind is None:
+        return None
+    port = getattr(section, "control_port" if door == "robomaster" else "port", PORTS.get(door, 0))
+    line = kind(host, port, RealClock(), lambda _operation, _data: None)
+    if isinstance(line, DogLine):  # no app: its answers are in the recording
+        line.options = {} if getattr(section, "plaintext", False) else {"certs": str(_certificates(config))}
     return line
+
+
+def _certificates(config: Config) -> Path:
+    """Return the folder with an app's certificates."""
+    from roboglot.protocols.cyberdog.certificates import export_client
+    from roboglot.protocols.cyberdog.server import FOLDER
+
+    folder = config.data / "app"
+    if not folder.exists():
+        export_client(config.data / FOLDER, folder)
+    return folder

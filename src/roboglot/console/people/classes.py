@@ -21,6 +21,8 @@ from roboglot.console.studio import class_wishes, classroom
 from roboglot.model.admission import Proof, Right
 from roboglot.model.components.system.lease import Lease
 from roboglot.model.errors import Forbidden, NotFound, Refused, RobotError
+from roboglot.model.robot import Robot
+from roboglot.protocols.lease_desk import LEASE
 
 MINUTES_MAX = 600
 NAME_MAX = 30  # characters of a pupil's name
@@ -202,10 +204,11 @@ class Classes:
         if do == "lock" and name not in locked:
             locked.add(name)
             await self._stop(name)
-            await robot[Lease].take(TEACHER)
+            with robot.outside.noting(LEASE, "give", {"who": TEACHER}):
+                await robot[Lease].take(TEACHER)
         elif do in ("unlock", "close") and name in locked:
             locked.discard(name)
-            await robot[Lease].release()
+            await _release(robot)
         if do in ("reset", "give_back", "close"):
             await self._stop(name)
         if do == "reset":
@@ -220,10 +223,16 @@ class Classes:
         if seat.robot in self._desk.locked and seat.robot not in {left.robot for left in lesson.seats.values()}:
             self._desk.locked.discard(seat.robot)
             with contextlib.suppress(RobotError):
-                await self._desk.robots[seat.robot][Lease].release()
+                await _release(self._desk.robots[seat.robot])
         await self._desk.robots[seat.robot].admission.shut_out(seat.identity)
         self._put_out(seat.identity)
 
     def _check_teacher(self) -> None:
         if not self._desk.may_teach:
             raise Forbidden("a class is opened and led by those who have the right to admin on all robots")
+
+
+async def _release(robot: Robot) -> None:
+    """Have no one control it alone any more. Raises RobotError."""
+    with robot.outside.noting(LEASE, "release", {"who": ""}):
+        await robot[Lease].release()

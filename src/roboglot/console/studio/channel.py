@@ -19,6 +19,7 @@ from typing import Annotated
 
 import msgspec
 
+from roboglot.console import program_runs
 from roboglot.console.desk import CLIENT, Desk
 from roboglot.console.studio.class_map import draw_map
 from roboglot.console.studio.class_wishes import Member
@@ -32,7 +33,6 @@ from roboglot.operations import Right
 from roboglot.programs.errors import ProgramError
 from roboglot.programs.language import Problem
 from roboglot.programs.stores import LogEntry
-from roboglot.programs.tasks import debugging
 from roboglot.programs.tasks.reports import Insight, Reading
 from roboglot.transport.limiter import Limiter
 from roboglot.wire.visual.requests import BODY_MAX, FRAME_MAX, ID_MAX
@@ -254,7 +254,7 @@ class Session:
                 self._asked.append(_id_of(text))
                 await programs.frames.receive(text)
             case Debug(id=id, text=text):
-                self.tell({"type": "debugged", "id": id, "text": await debugging.answer(programs.service, text)})
+                self.tell({"type": "debugged", "id": id, "text": await program_runs.debug(programs, text)})
             case Check(id=id, body=body):
                 problems = await programs.service.check(body)
                 self.tell({"type": "checked", "id": id, "problems": [_plain(problem) for problem in problems]})

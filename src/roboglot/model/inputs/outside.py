@@ -1,6 +1,7 @@
 """Inputs that come to robots from outside and are no requests at doors: noted, so that a lockstep run can be repeated.
 
-Hands that change the world, commands at the console, and what others answer whom a robot calls itself (a dog's app).
+Hands that change the world, commands at the console, what others answer whom a robot calls itself (a dog's app), and
+that clients come, hang up, or call off what they asked for.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from roboglot.model.client_context import client, connection
 from roboglot.model.clock import Clock
 
 ANSWER = "answer"  # the kind of answers from outside that the robot asked for
+CAME, GONE, CALLED_OFF = "came", "gone", "called off"  # kinds of what clients do beside asking; the name is the door's
 PATIENCE = 2.0  # s (machine clock) that lockstep time waits for such an answer
 _carried_out: ContextVar[bool] = ContextVar("carried_out", default=False)
 
@@ -65,9 +67,16 @@ class Outside:
     def note(self, kind: str, name: str, values: Mapping[str, object]) -> None:
         """Hand an input to the listeners."""
         who = ("", "") if kind == ANSWER else (client(), connection())
-        note = Input(self._clock.time(), self._clock.turn, self._robot, kind, name, values, *who)
+        self._pass(Input(self._clock.time(), self._clock.turn, self._robot, kind, name, values, *who))
+
+    def note_client(self, kind: str, door: str, where: str, **values: object) -> None:
+        """Note that the client at the other end ``where`` came, has gone, or called off what it asked for."""
+        if self._listeners:
+            self._pass(Input(self._clock.time(), self._clock.turn, self._robot, kind, door, values, "", where))
+
+    def _pass(self, given: Input) -> None:
         for listener in tuple(self._listeners):
-            listener(note)
+            listener(given)
 
     @contextmanager
     def noting(self, kind: str, name: str, values: Mapping[str, object]) -> Iterator[None]:

@@ -19,6 +19,7 @@ from roboglot.model.components.motion.legs import Legs, Posture
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import RobotError
 from roboglot.model.events import BatteryChanged, LocalizationLost, LocalizationRecovered, MapReplaced
+from roboglot.model.inputs.outside import CALLED_OFF
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.app_link import AppLink, AppRoute, host_of
 from roboglot.protocols.cyberdog.call import Call
@@ -248,6 +249,9 @@ class _Service(GrpcAppServicer):
         except NotJson as bad:
             log.info("%d: %s", code, bad)
             last, code = error(InBandError.BAD_PARAMETERS), 0
+        except asyncio.CancelledError:  # the app does not wait for the end
+            self._note_end(peer, code, call.began)
+            raise
         if last is not None:
             await self._say(rpc, _answer(code, last))
 
@@ -267,6 +271,10 @@ class _Service(GrpcAppServicer):
                     tap.reply("cyberdog", str(int(request.nameCode)), chunk.SerializeToString(), "ok", began=began)
                 await self._say(rpc, chunk)
                 await self._count(peer, len(chunk.buffer))
+
+    def _note_end(self, peer: str, code: int, asked: float | None) -> None:
+        outside = self._context.robot.outside
+        outside.note_client(CALLED_OFF, "cyberdog", peer, operation=str(int(code)), asked=asked)
 
     async def _say(self, rpc: grpc.aio.ServicerContext, message: object) -> None:
         """Write to a client; how long that takes the machine is none of the robot's time."""

@@ -12,7 +12,7 @@ from roboglot.model.background import load
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.protocols.browsers import Browsers
-from roboglot.protocols.channels import Carrier, Channel
+from roboglot.protocols.channels import Carrier, Channel, noted
 from roboglot.protocols.door import Endpoint
 from roboglot.protocols.foxglove.channels import Source
 from roboglot.protocols.foxglove.config import FoxgloveConfig
@@ -52,8 +52,9 @@ class Session:
     async def _join(self) -> None:
         """Show the client all topics; what they need is loaded in a thread the first time."""
         try:
-            topics = self.context.topics = await self._door.topics()
-            topics.join(self.context)
+            with self._door.robot.clock.holding():  # lockstep time does not count how long a library loads
+                topics = self.context.topics = await self._door.topics()
+                topics.join(self.context)
         except ImportError as error:
             self.context.status(Level.ERROR, explained(error, "the robot's topics") or str(error))
         except (OSError, ValueError) as error:
@@ -75,7 +76,7 @@ class FoxgloveDoor:
         self._socket: WebSocketServer | None = None
         if config.enabled:
             browsers = Browsers(f"[{DOOR}]", config.origins, config.hosts)
-            channel = Channel(self._open, Right.SEE, SUBPROTOCOLS, binary=True)
+            channel = noted(Channel(self._open, Right.SEE, SUBPROTOCOLS, binary=True), robot.outside, DOOR, "/")
             self._socket = WebSocketServer(
                 {"/": channel}, address, config.port, browsers, robot.admission, tls, door=DOOR
             )

@@ -9,9 +9,10 @@ from collections.abc import Callable
 from functools import cache
 from typing import cast
 
+from roboglot.model.inputs.outside import CAME, GONE
 from roboglot.model.lateness import late
 from roboglot.protocols.robomaster.context import Context, speak_as
-from roboglot.protocols.robomaster.dispatch import Answer, answer
+from roboglot.protocols.robomaster.dispatch import DOOR, Answer, answer
 from roboglot.protocols.robomaster.keepalive import hung_up, probe_for_life
 from roboglot.protocols.robomaster.limits import (
     BATCH_MAX,
@@ -77,6 +78,7 @@ class ControlConnection(asyncio.Protocol):
         transport.set_write_buffer_limits(high=OUTPUT_MAX)
         probe_for_life(transport)
         self._greeting.known = transport.get_extra_info("sockname") is None  # a serial line: browsers cannot reach it
+        self._context.robot.outside.note_client(CAME, DOOR, self._name)
         log.info("robomaster: %s connected", self._shown)
 
     def data_received(self, data: bytes) -> None:
@@ -91,6 +93,7 @@ class ControlConnection(asyncio.Protocol):
         if self not in self._connections:
             return
         self._connections.discard(self)
+        self._context.robot.outside.note_client(GONE, DOOR, self._name)
         self._commands.clear()
         if self._resting:
             self._resting.cancel()

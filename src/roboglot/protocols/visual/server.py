@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from roboglot.programs.tasks.reports import TaskReport
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols.browsers import Browsers
-from roboglot.protocols.channels import Channel, Room, Send, texts
+from roboglot.protocols.channels import Channel, Room, Send, noted, texts
 from roboglot.protocols.door import Endpoint
 from roboglot.protocols.visual.config import VisualConfig
 from roboglot.protocols.visual.dispatch import Dispatch
@@ -123,10 +123,12 @@ class VisualDoor:
         def follow_frames(send: Send, room: Room) -> Callable[[], None]:
             return self._front_ends.add(Plain(send, room))
 
-        return {
+        found = {
             "/programs": texts(follow_frames, lambda text, _: self._dispatch.receive(text)),
             **self._side_paths.channels(),
         }
+        outside = self._service.robot.outside
+        return {path: noted(channel, outside, self.name, path) for path, channel in found.items()}
 
     def _end_programs_of(self, who: str) -> None:
         """End the programs of those who lost a right: what they run might count on it."""
