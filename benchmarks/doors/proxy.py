@@ -1,29 +1,26 @@
 """What the recording proxy adds to an answer, by turns with and without it: Slamware, RoboMaster, programs, CyberDog.
 
-scripts/bench proxy [requests]
+Robot, proxy and client are processes of their own, as they are in use; the robot's time stands still, so that no
+simulated world is in the figures. scripts/bench proxy [requests]
 """
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import itertools
 import json
 import statistics
 import sys
 import tempfile
 import time
-from collections.abc import Awaitable, Callable
-from dataclasses import replace
+from collections.abc import AsyncIterator
 from pathlib import Path
 
 from _claim import Claims
 
-from roboglot.config import ConsoleConfig, RobotConfig, load_config
 from roboglot.model.clock import RealClock
-from roboglot.protocols import sections
 from roboglot.recording.lines import LINES, DogLine, Line, Target
-from roboglot.recording.proxy.dog import DogRelay
-from roboglot.recording.proxy.relay import Book, Relay
-from roboglot.runtime import Runtime
 from roboglot.testing.addresses import free_port
 
 ROBOT, BETWEEN = "127.0.0.61", "127.0.0.62"
@@ -35,7 +32,8 @@ REQUESTS = {
     "cyberdog": ("10001", b"{}"),
 }
 ADDED_MAX = 1.0  # ms
-Ask = Callable[[], Awaitable[object]]
+NUMBERS = itertools.count()
+PAUSE = 0.002  # s between two requests, so that the proxy's other work falls between and upon them
 
 
 async def opened(door: str, address: str) -> Line:
@@ -45,27 +43,44 @@ async def opened(door: str, address: str) -> Line:
         line.options = {}
     await line.open()
     if door == "robomaster":
-        await line.ask("command", b"command;", 1)
+        await line.ask("command", b"command;", [b"ok;"])
     return line
 
 
 async def timed(line: Line, door: str) -> float:
     """Milliseconds of one request."""
     operation, payload = REQUESTS[door]
+    if door == "visual":  # every front end hears every answer: only its own counts
+        payload = payload.replace(b'"b"', b'"b%d"' % next(NUMBERS))
     began = time.perf_counter()
-    assert await line.ask(operation, payload, 1)
+    assert await line.ask(operation, payload, [b"{}"])
     return 1000.0 * (time.perf_counter() - began)
 
 
-async def measure(door: str, folder: Path, requests: int, called: int, claims: Claims) -> None:
-    """Ask with and without the proxy in turns; it runs in this process, as all of them do."""
-    target = Target(f"cyberdog://{ROBOT}?certs=none&app={called}" if door == "cyberdog" else f"{door}://{ROBOT}")
-    book = Book(folder / f"{door}.mcap", target, "0")
-    is_dog = door == "cyberdog"
-    relay = DogRelay(target, BETWEEN, book, None, free_port()) if is_dog else Relay(target, BETWEEN, book)
-    await relay.open()
-    lines = [await opened(door, ROBOT), await opened(door, BETWEEN)]
+@contextlib.asynccontextmanager
+async def running(ready: bytes, *words: str) -> AsyncIterator[None]:
+    """``roboglot`` with these words, from the line that begins so until the end of ``async with``."""
+    program = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", "roboglot", *words, stdout=asyncio.subprocess.PIPE, stdin=asyncio.subprocess.PIPE
+    )
+    assert program.stdout is not None
     try:
+        while not (line := await program.stdout.readline()).startswith(ready):
+            assert line, "it ended"
+        reading = asyncio.ensure_future(program.stdout.read())
+        yield
+    finally:
+        program.terminate()
+        await program.wait()
+    reading.cancel()
+
+
+async def measure(door: str, folder: Path, requests: int, called: int, claims: Claims) -> None:
+    """Ask with and without the proxy in turns."""
+    url = f"cyberdog://{ROBOT}?certs=none&app={called}" if door == "cyberdog" else f"{door}://{ROBOT}"
+    words = ("record", url, "--listen", BETWEEN, "--to", str(folder / f"{door}.mcap"))
+    async with running(BETWEEN.encode(), *words):
+        lines = [await opened(door, ROBOT), await opened(door, BETWEEN)]
         for line in lines:
             for _ in range(20):
                 await timed(line, door)
@@ -73,15 +88,15 @@ async def measure(door: str, folder: Path, requests: int, called: int, claims: C
         for number in range(requests):
             for which in (number % 2, 1 - number % 2):
                 times[which].append(await timed(lines[which], door))
-    finally:
+                await asyncio.sleep(PAUSE)
         for line in lines:
             await line.close()
-        await relay.close()
-        book.close()
-    (plain, passed), at = times, round(0.99 * requests) - 1
-    medians, tails = [statistics.median(one) for one in times], [sorted(one)[at] for one in (plain, passed)]
-    print(f"{door:10} median {medians[0]:.2f} -> {medians[1]:.2f} ms, p99 {tails[0]:.2f} -> {tails[1]:.2f} ms")
-    claims.at_most(f"{door}: the proxy adds, median", medians[1] - medians[0], ADDED_MAX, "ms")
+    medians = [statistics.median(one) for one in times]
+    tails = [sorted(one)[round(0.99 * requests) - 1] for one in times]
+    (plain, passed) = medians
+    print(f"{door:10} median {plain:.2f} -> {passed:.2f} ms, p99 {tails[0]:.2f} -> {tails[1]:.2f} ms")
+    claims.at_most(f"{door}: the proxy adds, median", passed - plain, ADDED_MAX, "ms")
+    claims.at_most(f"{door}: the proxy adds, p99", tails[1] - tails[0], ADDED_MAX, "ms")
 
 
 async def main(requests: int) -> None:
@@ -89,16 +104,14 @@ async def main(requests: int) -> None:
     claims = Claims()
     with tempfile.TemporaryDirectory() as folder:
         called = free_port()
-        dog = {"plaintext": True, "app_port": called}
-        base = load_config(None, {"data": folder, "world": "office", "cyberdog": dog}, sections())
-        robots = (RobotConfig("a", "universal", ROBOT),)
-        runtime = Runtime(replace(base, robots=robots, console=ConsoleConfig(enabled=False)))
-        await runtime.start()
-        try:
+        file = Path(folder) / "robot.toml"
+        file.write_text(
+            f"world = 'empty'\n[console]\nenabled = false\n[cyberdog]\nplaintext = true\napp_port = {called}\n"
+        )
+        words = ("up", "--lockstep", "--config", str(file), "--address", ROBOT, "--data", f"{folder}/data")
+        async with running(b"ready", *words):
             for door in REQUESTS:
                 await measure(door, Path(folder), requests, called, claims)
-        finally:
-            await runtime.close()
     claims.finish()
 
 

@@ -147,7 +147,8 @@ class RecordConfig:
 
     ``ring`` keeps the last ``ring_seconds`` in memory and writes them when a robot has a new fault. A file ends at
     ``part_bytes`` or ``part_seconds`` and the next one begins; all together keep to ``total_bytes``. ``redact``: more
-    names of fields whose values are left out. ``truth``: with what really is the case; ``video``: with the cameras.
+    names of fields whose values are left out. ``truth``: with what really is the case; ``video``: with the cameras;
+    ``photos``: with photos and films that are fetched from real robots (those of simulated ones show no one).
     """
 
     to: str = ""
@@ -159,6 +160,7 @@ class RecordConfig:
     redact: tuple[str, ...] = ()
     truth: bool = True
     video: bool = False
+    photos: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -123,6 +123,19 @@ def test_recording_continues_in_parts_and_keeps_its_total(tmp_path: Path) -> Non
     assert parts(there[-1]) == [there[-1]]
 
 
+def test_a_part_ends_at_its_size_too(tmp_path: Path) -> None:
+    files = Files(tmp_path / "x.mcap", ORIGIN, Redaction(), Limits(part_bytes=2000))
+    files.open(0)
+    for number in range(100):
+        files.write(tick(number))
+        files.flush()  # what is not flushed does not count yet
+    files.close()
+    found = parts(tmp_path / "x.mcap")
+    assert len(found) > 3
+    assert all(path.stat().st_size < 2000 + 3000 for path in found)  # its summary comes on top
+    assert numbers(tmp_path / "x.mcap") == list(range(100))
+
+
 def test_all_parts_are_read_as_one(tmp_path: Path) -> None:
     files = Files(tmp_path / "x.mcap", ORIGIN, Redaction(), Limits(part_seconds=10.0))
     files.open(0)

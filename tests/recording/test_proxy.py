@@ -11,7 +11,9 @@ from typing import Any
 
 import grpc
 import pytest
+from typer.testing import CliRunner
 
+from roboglot.cli.recordings import record
 from roboglot.clients.robomaster.datagrams import BROADCAST_PORT
 from roboglot.demo.clients.phone import Phone
 from roboglot.model.tap import Direction
@@ -264,3 +266,22 @@ async def test_dog_s_message_that_cannot_be_read_passes(tmp_path: Path) -> None:
     assert heard == [UNREADABLE + b" 1", UNREADABLE + b" 2", UNREADABLE + b" 3"]
     assert [*asked, *pushed, beaten] == [UNREADABLE + b" answer"] * 3
     assert UNREADABLE + b" answer" in [exchange.payload for exchange in read_recording(path).of(door="cyberdog")]
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (("--listen", "203.0.113.1", "--to", "new.mcap"), "cannot listen at 203.0.113.1:1448: Cannot assign"),
+        (("--listen", BETWEEN, "--to", "there.mcap"), "there.mcap exists already; --to names a new file"),
+        (("--listen", BETWEEN, "--to", "nowhere/new.mcap"), "nowhere/new.mcap: No such file or directory"),
+    ],
+)
+def test_what_cannot_begin_leaves_no_file(
+    words: tuple[str, ...], why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "there.mcap").write_bytes(b"kept")
+    done = CliRunner().invoke(record.app, [f"slamware://{ADDRESS}", *words])
+    assert why in str(done.exception) + done.output
+    assert "Errno" not in str(done.exception)
+    assert [path.read_bytes() for path in tmp_path.iterdir()] == [b"kept"]

@@ -46,6 +46,39 @@ def test_job_fails_with_the_reason_of_its_robot(tmp_path: Path) -> None:
         robot(tmp_path, "up", ARGUMENTS="--world nowhere")
 
 
+@pytest.mark.parametrize(("world", "status"), [("nowhere", 1), ("empty", 0)])
+def test_gitlabs_job_goes_on_only_with_a_robot(tmp_path: Path, world: str, status: int) -> None:
+    """Run the template's lines as a runner does; what is installed is there already."""
+    template = yaml.safe_load((ROOT / "deploy/ci/gitlab.yml").read_text())[".roboglot"]
+    before = [line for line in template["before_script"] if " install " not in line]
+    given = {**template["variables"], "ROBOGLOT": str(ROOT), "ROBOGLOT_VENV": sys.prefix}
+    given |= {"CI_PROJECT_DIR": str(tmp_path), "ROBOGLOT_CI": str(tmp_path / "roboglot-ci")}
+    given["ARGUMENTS"] = f"--address {ADDRESS} --no-console --world {world}"
+    script = "\n".join(["set -eo pipefail", *before, 'echo "the robot is at $ROBOGLOT_ADDRESS"'])
+    shell = ["bash", "-c"]
+    try:
+        done = subprocess.run(
+            [*shell, script],
+            env=os.environ | given,
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+    finally:
+        ended = subprocess.run(
+            [*shell, "\n".join(template["after_script"])],
+            env=os.environ | given,
+            cwd=tmp_path,
+            capture_output=True,
+            timeout=60,
+            check=False,
+        )
+    assert (done.returncode, ended.returncode) == (status, 0), done.stderr
+    assert (f"the robot is at {ADDRESS}" in done.stdout) is (status == 0)
+
+
 def test_action_and_template_call_what_is_there() -> None:
     action = yaml.safe_load((ROOT / "action.yml").read_text())
     steps = action["runs"]["steps"]

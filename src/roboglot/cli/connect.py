@@ -7,7 +7,7 @@ import itertools
 import os
 import sqlite3
 import sys
-from collections.abc import Coroutine, Iterator
+from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from functools import partial
 from ipaddress import IPv4Address, IPv4Network
@@ -19,6 +19,7 @@ import typer
 from roboglot.access.tunnel.connector import AnnouncedGateway, KnownGateways, NotTrusted, Refused
 from roboglot.access.tunnel.dialling import Dialling, OnePlace, Place, Places, Unusable
 from roboglot.config import is_loopback
+from roboglot.hosting.event_loop import run
 from roboglot.hosting.logs import set_up_logging
 from roboglot.hosting.visible import visible
 
@@ -62,21 +63,11 @@ def command(
             print(f"roboglot connect: everyone who reaches {place} uses your token", file=sys.stderr)
     where = registered(registry) if registry else _one(gateway)
     try:
-        _run(_keep_all(where, dict(zip(names, places, strict=True)), token.strip(), once=once))
+        run(_keep_all(where, dict(zip(names, places, strict=True)), token.strip(), once=once))
     except KeyboardInterrupt:
         sys.exit(130)
     except (NotTrusted, Refused, Unusable, OSError, ValueError, sqlite3.Error) as refused:
         sys.exit(f"roboglot connect: {refused}")
-
-
-def _run(work: Coroutine[object, None, None]) -> None:
-    """Run ``work`` on uvloop, or on asyncio's own loop in an installation without it."""
-    try:
-        import uvloop
-    except ImportError:
-        asyncio.run(work)
-    else:
-        uvloop.run(work)
 
 
 def addresses(count: int, first: str, network: str) -> list[str]:

@@ -13,6 +13,7 @@ from urllib.parse import parse_qsl, urlsplit
 
 from roboglot.clients.errors import ClientError, LinkLost
 from roboglot.model.clock import Clock
+from roboglot.recording.redaction import FILES
 from roboglot.wire.foxglove.messages import SUBPROTOCOLS, ClientOpcode
 from roboglot.wire.robomaster.replies import Reply
 
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
 PATIENCE = 60.0  # s for an answer
 LINE_MAX = 1 << 20
 FRAMES, LOG = "/programs", "/log"  # paths of a WebSocket
-FILES = ("4002", "4004")  # what a dog serves by ``getFile``, too
 PORTS = {"slamware": 1448, "robomaster": 40923, "cyberdog": 50052, "visual": 50053}
 SHOWN = re.compile(r'"op":"(?:advertise|status)"')  # Foxglove's server has its topics, or says why not
 BINARY = tuple(bytes([opcode]) for opcode in ClientOpcode)  # with which Foxglove's messages begin that are no text

@@ -229,7 +229,8 @@ class Recorder:
         if self._samplers:
             self._look_again()
             return
-        self._samplers = [Sampler(robot, self._put, video=self._config.video) for robot in self._robots.values()]
+        video, photos = self._config.video, self._config.photos
+        self._samplers = [Sampler(robot, self._put, video=video, photos=photos) for robot in self._robots.values()]
         self._truth = TruthSampler(self._stage, self._put) if self._stage and self._config.truth else None
         if self._outside is not None:
             self._looking.append(self._outside.listen(self._note_input))

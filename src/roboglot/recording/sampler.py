@@ -23,6 +23,7 @@ from roboglot.model.sensing import LaserScan
 from roboglot.model.tap import Exchange
 from roboglot.recording.entries import Entry
 from roboglot.recording.messages import plain
+from roboglot.recording.redaction import FILES, without_picture
 
 POSE_PERIOD = 0.1  # s
 CAMERA_PERIOD = 1.0  # s between two checks for a camera
@@ -50,8 +51,9 @@ class Stamps:
 class Sampler:
     """One robot's. ``close`` ends it."""
 
-    def __init__(self, robot: Robot, put: Put, *, video: bool = False) -> None:
-        self._robot, self._put = robot, put
+    def __init__(self, robot: Robot, put: Put, *, video: bool = False, photos: bool = False) -> None:
+        """``video``: with the camera; ``photos``: those of a real robot, too."""
+        self._robot, self._put, self._photos = robot, put, photos
         self._stamps = Stamps(robot)
         self._topic = f"/{robot.id}"
         self._before: dict[str, object] = {}
@@ -99,6 +101,8 @@ class Sampler:
     # -- events --------------------------------------------------------------------------------------------------------
 
     def _note_exchange(self, exchange: Exchange) -> None:
+        if not self._photos and exchange.operation in FILES and Link in self._robot:  # it is a real one
+            exchange = without_picture(exchange)
         self._send(exchange.door, "exchange", exchange, self._stamps.at(exchange.stamp), time.time_ns())
 
     def _note_input(self, given: Input) -> None:

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import os
 import signal
 import sys
@@ -18,9 +19,11 @@ import typer
 from typer.core import TyperGroup
 
 from roboglot.config import default_data_folder
+from roboglot.hosting.event_loop import run
 from roboglot.hosting.local_socket import ask
 from roboglot.protocols.record_desk import NAME, Answer, Request
 
+SWITCH = 0.0002  # s that the thread which writes keeps what passes waiting; Python's own 5 ms can be seen
 PATIENCE = 30.0  # s: a long ring takes a while to write
 EPILOG = "A URL instead of a command records a real robot: roboglot record slamware://192.168.11.1 --listen 127.0.0.9"
 
@@ -95,23 +98,40 @@ def proxy(
     ],
     listen: Annotated[str, typer.Option(help="The address of this machine that the client is to use.")],
     to: Annotated[Path, typer.Option(help="The recording, a new file.")] = Path("robot.mcap"),
+    redact: Annotated[
+        list[str] | None, typer.Option(help="One more field whose values are left out; may be given several times.")
+    ] = None,
+    photos: Annotated[bool, typer.Option("--photos", help="Keep photos and films that the client fetches.")] = False,
     data: Data = None,
 ) -> None:
     """Stand between a client and a robot: pass every byte, and record what it means, until Ctrl-C."""
     from roboglot.recording.lines import Target
     from roboglot.recording.proxy.relay import Book, Relay
 
+    if to.exists():
+        sys.exit(f"roboglot record: {to} exists already; --to names a new file")
+    book: Book | None = None
     try:
         target = Target(url)
-        book = Book(to, target, metadata.version("roboglot"))
+        book = Book(to, target, metadata.version("roboglot"), redact=redact or (), photos=photos)
         relay = _dog_relay(target, listen, book, data) if target.door == "cyberdog" else Relay(target, listen, book)
-        asyncio.run(_pass(relay, f"{listen} passes everything to {url} and back; it is recorded in {to}"))
+        run(_pass(relay, f"{listen} passes everything to {url} and back; it is recorded in {to}"))
     except (OSError, ValueError) as error:
-        sys.exit(f"roboglot record: {error}")
+        if book is not None:  # nothing has passed
+            book.close()
+            to.unlink(missing_ok=True)
+        sys.exit(f"roboglot record: {in_words(error)}")
     book.close()
     if book.thread.failure:
         sys.exit(f"roboglot record: the recording ended early: {book.thread.failure}")
     print(f"{book.files.written} messages are in {to}")
+
+
+def in_words(error: Exception) -> str:
+    """Return what went wrong, with the file that the system names and without its number."""
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    return str(error)
 
 
 def _dog_relay(target: Target, listen: str, book: Book, data: Path | None) -> DogRelay:
@@ -133,6 +153,8 @@ async def _pass(relay: Relay | DogRelay, words: str) -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, stop.set)
     await relay.open()
+    sys.setswitchinterval(SWITCH)
+    gc.freeze()  # what is loaded stays: no collection need walk it again
     print(words, flush=True)
     await stop.wait()
     await relay.close()

@@ -38,6 +38,14 @@ class Proof:
     callers: bytes
 
 
+@dataclass(slots=True)
+class _Asked:
+    """A request: when it came, and its code once that has been read."""
+
+    at: float
+    code: str = ""
+
+
 class DogRelay:
     """Listens at ``address`` as the robot does, and on ``app_port`` of this machine as the app does.
 
@@ -119,26 +127,52 @@ class DogRelay:
     async def _ask(self, request: bytes, context: grpc.aio.ServicerContext) -> AsyncIterator[bytes]:
         """The app asks the robot."""
         self._app_host = _host(context.peer()) or self._app_host
-        code, began = self._note_request(context.peer(), request)
+        asked = self._note_request(context.peer(), request)
         async for message in self._called_through(self._robot, "sendMsg", request, context):
-            read = _read(pb.RecResponse, message)
-            answer = message if read is None else read.data.encode()
-            self._book.note(_name(context.peer()), Direction.REPLY, code, answer, status_of("cyberdog", answer), began)
+            self._soon(self._note_answer, context.peer(), asked, message)
             yield message
 
     async def _fetch(self, request: bytes, context: grpc.aio.ServicerContext) -> AsyncIterator[bytes]:
         """The app fetches a file."""
-        code, began = self._note_request(context.peer(), request)
+        asked = self._note_request(context.peer(), request)
         async for message in self._called_through(self._robot, "getFile", request, context):
-            self._book.note(_name(context.peer()), Direction.REPLY, code, message, "ok", began)
+            self._soon(self._note_chunk, context.peer(), asked, message)
             yield message
 
     async def _push(self, request: bytes, context: grpc.aio.ServicerContext) -> AsyncIterator[bytes]:
         """The robot tells the app something."""
-        code, text = _said(request)
-        self._book.note(f"{self._app_host}:{self._called}", Direction.PUSH, code, text, "", None)
+        self._soon(self._note_push, f"{self._app_host}:{self._called}", request)
         async for message in self._called_through(self._app(), "sendMsg", request, context):
             yield message
+
+    # -- noting: once what came is on its way --------------------------------------------------------------------------
+
+    def _soon(self, note: Callable[..., object], *said: object) -> None:
+        """Note it in the next round of the loop, with the time of now."""
+        asyncio.get_running_loop().call_soon(note, self._book.clock.time(), *said)
+
+    def _note_request(self, peer: str, request: bytes) -> _Asked:
+        asked = _Asked(self._book.clock.time())
+
+        def note() -> None:
+            asked.code, text = _said(request)
+            self._book.note(_name(peer), Direction.REQUEST, asked.code, text, "", None, asked.at)
+
+        asyncio.get_running_loop().call_soon(note)
+        return asked
+
+    def _note_answer(self, now: float, peer: str, asked: _Asked, message: bytes) -> None:
+        read = _read(pb.RecResponse, message)
+        answer = message if read is None else read.data.encode()
+        status = status_of("cyberdog", answer)
+        self._book.note(_name(peer), Direction.REPLY, asked.code, answer, status, asked.at, now)
+
+    def _note_chunk(self, now: float, peer: str, asked: _Asked, message: bytes) -> None:
+        self._book.note(_name(peer), Direction.REPLY, asked.code, message, "ok", asked.at, now)
+
+    def _note_push(self, now: float, to: str, request: bytes) -> None:
+        code, text = _said(request)
+        self._book.note(to, Direction.PUSH, code, text, "", None, now)
 
     async def _beat(self, request: bytes, context: grpc.aio.ServicerContext) -> bytes:
         """The robot's heartbeat; without an app no one takes it."""
@@ -170,10 +204,6 @@ class DogRelay:
             await context.abort(error.code(), error.details() or "")
         finally:
             call.cancel()
-
-    def _note_request(self, peer: str, request: bytes) -> tuple[str, float]:
-        code, text = _said(request)
-        return code, self._book.note(_name(peer), Direction.REQUEST, code, text, "", None)
 
 
 def _read(kind: type[Message], data: bytes) -> Message | None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import cast
@@ -18,10 +19,11 @@ from roboglot.recording.lines import Target
 from roboglot.recording.proxy.discovery import PORT as DISCOVERY
 from roboglot.recording.proxy.discovery import Announcer
 from roboglot.recording.proxy.sniffers import SNIFFERS, Sniffer
-from roboglot.recording.redaction import Redaction
+from roboglot.recording.redaction import FIELDS, Redaction, without_picture
 from roboglot.recording.thread import WriterThread
 
 log = logging.getLogger(__name__)
+ROBOT = "a"  # its name in the recording
 CONNECT_SECONDS = 10.0
 CONNECTIONS_MAX = 256
 BUFFER_MAX = 1 << 20  # bytes queued for the slower end before the faster one is paused
@@ -32,26 +34,38 @@ EVENTS, PUSHES = 40925, 40924
 class Book:
     """Book of exchanges, with the time of this machine."""
 
-    def __init__(self, path: Path, target: Target, version: str, robot: str = "a") -> None:
-        """Raises OSError where the file cannot be written."""
+    def __init__(
+        self, path: Path, target: Target, version: str, *, redact: Sequence[str] = (), photos: bool = False
+    ) -> None:
+        """``redact``: further fields to leave out; ``photos``: with photos and films.
+
+        Raises OSError where the file cannot be written.
+        """
         facts = {"version": version, "robot": f"{target.door}://{target.host}:{target.port}", "clock": "x1"}
-        self.files = Files(path, Origin(facts), Redaction(), Limits())
+        self.files = Files(path, Origin(facts), Redaction((*FIELDS, *redact)), Limits())
         self.clock = RealClock()
-        self._door, self._robot = target.door, robot
+        self._door, self._photos = target.door, photos
         self.files.open(time.time_ns())
         self.thread = WriterThread(self.files)
         self._epoch = self.clock.epoch() - self.clock.time()
 
     def note(
-        self, connection: str, direction: Direction, operation: str, payload: bytes, status: str, began: float | None
+        self,
+        connection: str,
+        direction: Direction,
+        operation: str,
+        payload: bytes,
+        status: str,
+        began: float | None,
+        now: float | None = None,
     ) -> float:
-        """Write one exchange soon; returns its time."""
-        now = self.clock.time()
+        """Write one exchange soon; returns its time, which is ``now`` where that is given."""
+        now = self.clock.time() if now is None else now
         seconds = 0.0 if began is None else now - began
         client = f"{self._door} {connection.rpartition(':')[0]}"
         found = Exchange(
             now,
-            self._robot,
+            ROBOT,
             self._door,
             connection,
             client,
@@ -62,8 +76,10 @@ class Book:
             "",
             seconds,
         )
+        if not self._photos:
+            found = without_picture(found)
         at = round((self._epoch + now) * 1e6) * 1000
-        self.thread.put(Entry(f"/{self._robot}/{self._door}", "exchange", at, time.time_ns(), found))
+        self.thread.put(Entry(f"/{ROBOT}/{self._door}", "exchange", at, time.time_ns(), found))
         return now
 
     def close(self) -> None:
@@ -151,7 +167,11 @@ class Relay:
         main = self._target.port
         for port in (main, *(p for p in SIDE_PORTS.get(self._target.door, ()) if p != main)):
             loop = asyncio.get_running_loop()
-            self._servers.append(await loop.create_server(partial(_Client, self, port), self._address, port))
+            try:
+                self._servers.append(await loop.create_server(partial(_Client, self, port), self._address, port))
+            except OSError as error:
+                why = os.strerror(error.errno) if error.errno else str(error)
+                raise OSError(f"cannot listen at {self._address}:{port}: {why}") from error
         if self._target.door == "robomaster":
             self._announcer = Announcer(self._target.host, self._address, partial(self._pushed, DISCOVERY))
             await self._announcer.open()
