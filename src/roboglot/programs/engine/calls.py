@@ -153,8 +153,8 @@ class Calls:
         interrupted = bool(self._history) and self._history[0].body is None
         if self._history and not self._replay(call, args, kwargs):
             return
-        position = self._position
-        self._waiting = event = Call(call.id, call.name, args, kwargs, position.line, position.unit, interrupted)
+        unit, line = self._position.now
+        self._waiting = event = Call(call.id, call.name, args, kwargs, line, unit, interrupted)
         delay, deliver = self._rate.delay(size), partial(self._put, event)
         if delay > 0:
             self._loop.call_later(delay, self._account.go_on, deliver)

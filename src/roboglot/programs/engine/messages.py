@@ -53,9 +53,9 @@ class CallMessage(msgspec.Struct, tag_field="t", tag="call", forbid_unknown_fiel
             if len(packed) > ARGUMENTS_MAX or len(named) > ARGUMENTS_MAX:
                 raise ProtocolViolation("too many arguments")
             for value in packed:
-                args.append((yield from unpacking(value)))  # noqa: PERF401 - it yields
+                args.append(value if type(value) in _ALONE else (yield from unpacking(value)))  # noqa: PERF401 - it yields
             for key, value in named.items():
-                kwargs[key] = yield from unpacking(value)
+                kwargs[key] = value if type(value) in _ALONE else (yield from unpacking(value))
         except (ValueError, msgspec.MsgspecError, RecursionError) as error:
             raise ProtocolViolation(str(error)[:200]) from None
         return tuple(args), kwargs
@@ -94,6 +94,7 @@ class CheckedMessage(msgspec.Struct, tag_field="t", tag="checked", forbid_unknow
 
 Message = OutputMessage | CallMessage | VariablesMessage | FinishedMessage | FailedMessage | CheckedMessage
 _decoder: msgspec.json.Decoder[Message] = msgspec.json.Decoder(Message)
+_ALONE = {bool, float, str, type(None)}  # types that are packed as they are, whatever the value
 _list = msgspec.json.Decoder(list).decode
 _dict = msgspec.json.Decoder(dict).decode
 

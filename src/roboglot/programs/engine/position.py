@@ -23,6 +23,12 @@ class Position:
         self.watched = watched
 
     @property
+    def now(self) -> tuple[str, int]:
+        """The unit and the line in one look."""
+        unit, line = self._page.place
+        return self._program.unit_name(unit), line
+
+    @property
     def line(self) -> int:
         """The line that is running or waiting now, 0 before the first."""
         return self._page.place[1]
