@@ -56,13 +56,19 @@ class Seen:
     """What all clients of one kind saw: s of each answer, and pushes of each robot a second."""
 
     waits: list[float] = field(default_factory=list)
+    late: list[float] = field(default_factory=list)  # s after its beat that a client itself came to send
     pushes: list[float] = field(default_factory=list)
     pictures: list[float] = field(default_factory=list)
     refused: int = 0
 
     def percentile(self, share: float) -> float:
         """ms that so many of the requests waited at most."""
-        return 1e3 * sorted(self.waits)[min(len(self.waits) - 1, int(share * len(self.waits)))]
+        return percentile(self.waits, share)
+
+
+def percentile(values: list[float], share: float) -> float:
+    """Return the ms that so many of these s are at most."""
+    return 1e3 * sorted(values)[min(len(values) - 1, int(share * len(values)))]
 
 
 class App(service.GrpcAppServicer):
@@ -121,6 +127,7 @@ class Class:
         for beat in range(round(self.lesson.seconds * RATE)):
             await asyncio.sleep(began + beat / RATE - time.perf_counter())
             sent = time.perf_counter()
+            seen.late.append(sent - began - beat / RATE)
             seen.refused += not await request(beat)
             seen.waits.append(time.perf_counter() - sent)
 

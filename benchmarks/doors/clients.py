@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from _claim import Claims
-from _pupils import GRPC, REST, TEXT, Lesson, Seen, in_a_process
+from _pupils import GRPC, REST, TEXT, Lesson, Seen, in_a_process, percentile
 
 from roboglot.clients.cyberdog import Certificates
 from roboglot.hosting import local_socket
@@ -121,6 +121,8 @@ def report(claims: Claims, part: Part, seen: dict[str, Seen]) -> None:
         print(f"{name}: {len(seen[kind].waits)} answers, {seen[kind].refused} of them refusals", end="; ")
         print(f"median {seen[kind].percentile(0.5):.1f} ms, all within {seen[kind].percentile(1.0):.0f} ms")
         claims.at_most(f"{name}, p99", seen[kind].percentile(0.99), limit, "ms")
+    late = [seconds for kind in LIMITS for seconds in seen[kind].late]
+    print(f"reference: the clients' own process was late by {percentile(late, 0.99):.1f} ms (p99)")
     claims.at_least("pushes, worst robot", min(seen[TEXT].pushes), 9.9, "Hz")
     claims.at_least("heartbeats of dogs, worst robot", min(seen[GRPC].pushes), 0.95, "x 2 Hz")
     if seen[TEXT].pictures:

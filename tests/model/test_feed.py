@@ -69,6 +69,17 @@ async def test_iterating_waits_and_ends_with_the_feed():
     assert [number async for number in viewer] == [11]
 
 
+async def test_unread_while_no_viewer_has_read_the_newest() -> None:
+    feed: Feed[int] = Feed(lambda: None, lambda: None, queue_max=2)
+    quick, slow = feed.subscribe(), feed.subscribe()
+    assert not feed.unread
+    feed.push(1)
+    assert feed.unread
+    assert await anext(quick) == 1
+    assert not feed.unread  # one of them waits for more
+    assert slow.waiting == 1
+
+
 async def test_viewers_are_limited():
     source = Source()
     for _ in range(VIEWERS_MAX):

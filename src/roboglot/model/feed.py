@@ -45,6 +45,11 @@ class Viewer(Generic[T]):
             await self._wakeup.wait()
         return self._queue.popleft()
 
+    @property
+    def waiting(self) -> int:
+        """Number of items that are queued now."""
+        return len(self._queue)
+
     def drain(self) -> list[T]:
         """Return all that is queued now, oldest first, without waiting."""
         items = list(self._queue)
@@ -89,6 +94,11 @@ class Feed(Generic[T]):
     def viewers(self) -> int:
         """Number of viewers."""
         return len(self._viewers)
+
+    @property
+    def unread(self) -> bool:
+        """True while every viewer has something that it has not read yet."""
+        return all(viewer.waiting for viewer in self._viewers)
 
     def subscribe(self) -> Viewer[T]:
         """Look from now on. Raises Busy when VIEWERS_MAX look already."""

@@ -312,6 +312,15 @@ async def test_real_time_pictures_come_from_thread_until_close():
     world.close()
 
 
+async def test_real_time_camera_waits_for_slow_encoder():
+    world, robot, _ = await lab(room(), clock=RealClock())
+    with robot[Camera].subscribe() as viewer:
+        await asyncio.wait_for(anext(viewer), 30)
+        await robot.clock.sleep(0.3)  # the time of nine pictures
+        assert robot[Camera].drawn <= 3  # the one that was read, and one that waits
+    world.close()
+
+
 @pytest.mark.parametrize("name", ["office", "empty"])
 async def test_every_floor_of_shipped_worlds_can_be_drawn(name):
     from roboglot.simulation.world.world_files import load_world

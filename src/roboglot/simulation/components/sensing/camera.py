@@ -186,6 +186,8 @@ class SimulatedCamera(Camera):
             shortfall = Shortfall(self._hull.name, self.rate)
             self._feed.push(await self.capture())
             async for now in self._clock.every(1.0 / self.rate):  # which skips beats while a picture takes too long
+                if self._feed.unread and isinstance(self._clock, RealClock):
+                    continue  # the encoder does not keep up: a picture that it would drop is not worth drawing
                 self._feed.push(await self.capture())
                 shortfall.note(now)
         except Exception:
