@@ -115,6 +115,14 @@ class OperationTable(Generic[K]):
 
         return register
 
+    def implemented(self) -> set[K]:
+        """Keys of the operations that are wholly there."""
+        return {operation.key for operation in self if not operation.partial}
+
+    def partly(self) -> dict[K, str]:
+        """Keys of those that are there in part, with what is missing."""
+        return {operation.key: operation.partial for operation in self if operation.partial}
+
     def get(self, key: K) -> Operation[K] | None:
         """The operation under ``key``, or None."""
         return self._operations.get(key)

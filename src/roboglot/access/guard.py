@@ -10,7 +10,7 @@ import asyncio
 import logging
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Set
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -288,7 +288,7 @@ class RobotAdmission(Admission):
         self._listeners.append(listener)
         return lambda: self._listeners.remove(listener) if listener in self._listeners else None
 
-    def renew(self, book: Book, replaced: set[str] = frozenset()) -> None:  # type: ignore[assignment]
+    def renew(self, book: Book, replaced: Set[str] = frozenset()) -> None:
         """The rights are these now; who had more, or shows an old proof, is stopped and cut off."""
         before = self._rights
         self._allowed.clear()

@@ -132,7 +132,7 @@ def _marks() -> str:
 
 def _cut(entry: Entry) -> Entry:
     """Bound every text, and replace what no database keeps."""
-    return Entry(*(_plain(field) if isinstance(field, str) else field for field in entry))  # type: ignore[arg-type]
+    return Entry._make(_plain(field) if isinstance(field, str) else field for field in entry)
 
 
 def _plain(text: str) -> str:

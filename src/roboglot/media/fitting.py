@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from functools import partial
 from typing import TYPE_CHECKING
 
 from roboglot.extras import lazy
@@ -54,7 +55,7 @@ class FittedPictures:
         try:
             with self._camera.subscribe() as pictures:
                 async for frame in pictures:
-                    self._feed.push(await beside(self._clock, lambda f=frame: self.fit(f)))  # type: ignore[misc]
+                    self._feed.push(await beside(self._clock, partial(self.fit, frame)))
         except Exception:
             log.exception("the fitted pictures broke")
         self._fitting = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
+from functools import partial
 from typing import Protocol, TypeVar
 
 from roboglot.media.h264 import H264Encoder, VideoPacket
@@ -80,11 +81,7 @@ class VideoStream(Component):
                 encoder = await beside(self._clock, lambda: H264Encoder(camera.width, camera.height, camera.rate))
                 async for frame in pictures:
                     keyframe, self._keyframe_wanted = self._keyframe_wanted, False
-                    packet = await beside(
-                        self._clock,
-                        lambda f=frame, k=keyframe: encoder.encode(f, keyframe=k),  # type: ignore[misc]
-                    )
-                    self._feed.push(packet)
+                    self._feed.push(await beside(self._clock, partial(encoder.encode, frame, keyframe=keyframe)))
         except Exception:
             log.exception("the video broke")
         self._encoding = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from ipaddress import IPv4Address, ip_address
 from pathlib import Path
 from typing import Any
@@ -138,10 +138,3 @@ def _addresses(first: str, count: int) -> Iterator[str]:
     if int(start) + count > int(IPv4Address("255.255.255.255")):
         raise ValueError(f"there are no {count} addresses from {first} on")
     return (str(start + number) for number in range(count))
-
-
-def robots_of(shards: Sequence[ShardPlan]) -> Iterator[tuple[ShardPlan, dict[str, object]]]:
-    """Return every robot's settings with its shard."""
-    for shard in shards:
-        for robot in shard.settings["robots"]:
-            yield shard, robot

@@ -30,7 +30,6 @@ REDIAL_MAX = 2000  # ms between two attempts to connect
 PUSH_MAX = 5_242_880  # bytes per message
 FOUND_PERIOD = 0.05  # s between two checks whether the robot has called
 IN_BAND = re.compile(r'"error_code"\s*:\s*([1-9]\d*)')
-POLITE = "the app sends no heartbeats"
 
 
 @dataclass(frozen=True, slots=True)

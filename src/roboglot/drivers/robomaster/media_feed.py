@@ -10,6 +10,7 @@ import contextlib
 import logging
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from typing import Generic, TypeVar
 
 from roboglot.clients.errors import ClientError
@@ -107,7 +108,7 @@ class DecodedFeed(Feed[T], Generic[P, D, T]):
             with self._packet_feed.subscribe() as packets:
                 decoder = await beside(self._clock, self._decoder)
                 async for packet in packets:
-                    for item in await beside(self._clock, lambda p=packet: self._decode(decoder, p)):  # type: ignore[misc]
+                    for item in await beside(self._clock, partial(self._decode, decoder, packet)):
                         self.push(item)
         except Exception:
             log.exception("decoding failed")

@@ -48,9 +48,9 @@ def ability_set() -> Prelude:
 
 def implemented() -> set[str]:
     """The manual's names that work as a whole, for the coverage page."""
-    return {operation.key for operation in ABILITIES if not operation.partial}
+    return ABILITIES.implemented()
 
 
 def partly() -> dict[str, str]:
     """The manual's names that work in part, with what they cannot do yet."""
-    return {operation.key: operation.partial for operation in ABILITIES if operation.partial}
+    return ABILITIES.partly()

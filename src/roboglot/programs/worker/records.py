@@ -88,8 +88,6 @@ class ProgramRecord:
             getattr(self, name) == getattr(other, name) for name in type(self).__slots__
         )
 
-    __hash__ = None  # type: ignore[assignment]  # records can be changed
-
 
 class Records:
     """The record types of one run, built when first needed."""

@@ -9,14 +9,7 @@ SENT = frozenset({"serverInfo", "status", "advertise", "messageData", "time", "p
 REFUSALS = frozenset({"serviceCallFailure"})  # the door sends these; there is no other service
 
 
-def implemented() -> set[str]:
-    """Keys of the operations that are there."""
-    return {operation.key for operation in TABLE if not operation.partial}
-
-
-def partly() -> dict[str, str]:
-    """Keys of those that are there in part, with what is missing."""
-    return {operation.key: operation.partial for operation in TABLE if operation.partial}
+implemented, partly = TABLE.implemented, TABLE.partly
 
 
 class Messages:

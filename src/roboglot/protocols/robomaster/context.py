@@ -10,6 +10,7 @@ import itertools
 import logging
 from collections.abc import Callable, Hashable
 from contextvars import ContextVar
+from functools import partial
 from typing import Any, Protocol, TypeVar
 
 from roboglot.model.actions import Action
@@ -73,7 +74,7 @@ class Context:
         self.origin = ORIGIN  # of chassis positions, in the odometry's frame
         self.pushes = Pushes(robot.clock, profile, self.send)
         for module, reads in readings.PUSHED.items():
-            self.pushes.offer(module, [(name, lambda read=read: read(self)) for name, read in reads.items()])  # type: ignore[misc]
+            self.pushes.offer(module, [(name, partial(read, self)) for name, read in reads.items()])
         self._mode = FollowMode.CHASSIS_LEAD
         self._parts: dict[type[Part], Any] = {}
         self._undo: dict[str, Callable[[], object]] = {}

@@ -23,14 +23,10 @@ MESSAGES = frozenset(
 
 def implemented() -> set[str]:
     """The contract's keys that this door serves wholly, commands and messages."""
-    return {row.key for row in contract("robomaster")} & (
-        {operation.key for operation in TABLE if not operation.partial} | MESSAGES
-    )
+    return {row.key for row in contract("robomaster")} & (TABLE.implemented() | MESSAGES)
 
 
-def partly() -> dict[str, str]:
-    """Keys that are there in part, with what they cannot do yet."""
-    return {operation.key: operation.partial for operation in TABLE if operation.partial}
+partly = TABLE.partly
 
 
 def key_of(message: bytes) -> str:

@@ -10,14 +10,7 @@ PUBLISHED = frozenset(
 )
 
 
-def implemented() -> set[str]:
-    """Keys of the operations that are there."""
-    return {operation.key for operation in TABLE if not operation.partial}
-
-
-def partly() -> dict[str, str]:
-    """Keys of those that are there in part, with what is missing."""
-    return {operation.key: operation.partial for operation in TABLE if operation.partial}
+implemented, partly = TABLE.implemented, TABLE.partly
 
 
 class Messages:

@@ -35,10 +35,7 @@ NO_CONTENT = NoContent.NO_CONTENT
 
 def implemented() -> set[str]:
     """Return the keys of the contract's operations that do all that the manual says."""
-    beyond = {row.key for row in BEYOND}
-    return {operation.key for operation in TABLE if not operation.partial and operation.key not in beyond}
+    return TABLE.implemented() - {row.key for row in BEYOND}
 
 
-def partly() -> dict[str, str]:
-    """Return the keys that are there in part, with what they cannot do yet."""
-    return {operation.key: operation.partial for operation in TABLE if operation.partial}
+partly = TABLE.partly

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from html import escape
 from xml.etree import ElementTree
 
@@ -61,17 +60,6 @@ def junit(comparison: Comparison) -> bytes:
                 why = f"{row.checks - row.agreed} of {row.checks} do not agree"
                 ElementTree.SubElement(case, "failure", message=why).text = _clean(text)
     return bytes(ElementTree.tostring(suites, encoding="utf-8", xml_declaration=True))
-
-
-def markdown(comparisons: Sequence[tuple[str, Comparison]]) -> str:
-    """Return rows of a table: what was compared, by protocol, values compared, and the share that agrees."""
-    lines = ["| what | protocol | values compared | agree |", "|---|---|---|---|"]
-    for name, comparison in comparisons:
-        for door in comparison.doors:
-            of_door = comparison.of(door)
-            checks = sum(row.checks for row in of_door.rows)
-            lines.append(f"| {name} | {door} | {checks} | {percent(of_door.fidelity)} |")
-    return "\n".join(lines)
 
 
 def _share(row: Row) -> float:

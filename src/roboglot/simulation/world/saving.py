@@ -34,7 +34,7 @@ def _floor_now(number: int, floor: Floor, population: Population, environment: E
     boxes = [
         Box(
             at=(_rounded(solid.pose.x), _rounded(solid.pose.y)),
-            size=tuple(_rounded(extent) for extent in solid.size),  # type: ignore[arg-type]
+            size=(_rounded(solid.size[0]), _rounded(solid.size[1]), _rounded(solid.size[2])),
             facing=_degrees(solid.pose.yaw),
         )
         for level, solid in population.physics.obstacles.values()

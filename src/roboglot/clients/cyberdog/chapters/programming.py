@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from typing import Any
 
 from roboglot.clients.cyberdog.calls import Calls, CyberDogRefused, NoAnswer
 from roboglot.clients.cyberdog.values import Frame
@@ -52,8 +51,8 @@ class Programs(Calls):
         await self.operate("task", "run", task)
 
 
-async def _with_id(frames: Viewer[Any], id: str) -> Frame:
+async def _with_id(frames: Viewer[object], id: str) -> Frame:
     async for frame in frames:
-        if frame.feedback.get("id") == id:
-            return frame  # type: ignore[no-any-return]
+        if isinstance(frame, Frame) and frame.feedback.get("id") == id:
+            return frame
     raise TimedOut("the client was closed")

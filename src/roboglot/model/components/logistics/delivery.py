@@ -152,11 +152,6 @@ class Order:
     began_at: float = 0.0  # s since 1970; 0 before it began
     changed_at: float = 0.0
 
-    @property
-    def boxes_done(self) -> int:
-        """Number of its boxes with a result."""
-        return sum(result.box is not None for result in self.results)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Policy:

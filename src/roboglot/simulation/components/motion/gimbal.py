@@ -81,7 +81,8 @@ class SimulatedGimbal(Gimbal):
 
         async def run(action: Action) -> None:
             def turn() -> bool:
-                goal: GimbalAngles = action.goal  # type: ignore[assignment]
+                goal = action.goal
+                assert isinstance(goal, GimbalAngles)
                 self.axes.aim(Aim(None, goal.pitch), Aim(None, goal.yaw))
                 return goal == GimbalAngles()
 

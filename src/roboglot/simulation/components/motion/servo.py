@@ -66,7 +66,7 @@ class SimulatedServos(Servos):
         index = self._index(number)
         if not math.isfinite(speed):
             raise InvalidGoal("a speed is finite")
-        cut = max(-self.speed, min(self.speed, speed))
+        cut = float(max(-self.speed, min(self.speed, speed)))
         action = self._turning.get(index)
         if action and action.may_go_on(source) and action.status is ActionStatus.EXECUTING and not action.paused:
             action.goal = cut
@@ -74,7 +74,8 @@ class SimulatedServos(Servos):
 
         async def run(action: Action) -> None:
             def turn() -> bool:
-                self._speeds[index] = rate = float(action.goal)  # type: ignore[arg-type]
+                assert isinstance(action.goal, float)
+                self._speeds[index] = rate = action.goal
                 self.turning.begin()
                 return rate == 0.0
 

@@ -95,7 +95,7 @@ class SimulatedVision(Vision):
         self._section, self._robot, self._camera, self._hull = section, robot, camera, hull
         self._around, self._chances = around, chances
         self._numbers: dict[str, int] = {}
-        self._detectors: list[SimulatedDetector[object]] = []
+        self._closing: list[Callable[[], None]] = []  # ends of the detectors
         self.people = self._detector("people", see_people)
         self.faces = self._detector("faces", see_faces)
         self.gestures = self._detector("gestures", see_gestures)
@@ -107,8 +107,8 @@ class SimulatedVision(Vision):
 
     def close(self) -> None:
         """Stop all detectors."""
-        for detector in self._detectors:
-            detector.close()
+        for close in self._closing:
+            close()
 
     def _detector(self, name: str, see: Callable[[Glance], list[T]]) -> SimulatedDetector[T]:
         random = self._chances.of(self._robot.id, "vision", name)
@@ -118,7 +118,7 @@ class SimulatedVision(Vision):
             return see(Glance(self._around, self._hull, view, random, self._numbers, known))
 
         detector = SimulatedDetector(name, self._section.rate, self._robot.clock, look)
-        self._detectors.append(detector)  # type: ignore[arg-type]
+        self._closing.append(detector.close)
         return detector
 
     def _faces(self) -> dict[bytes, str]:

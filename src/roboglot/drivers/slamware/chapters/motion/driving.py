@@ -6,7 +6,7 @@ Autonomy's driving does not fit: it needs a base that steers and drives at the s
 from __future__ import annotations
 
 import math
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from dataclasses import astuple, dataclass
 
@@ -104,11 +104,19 @@ class SlamwareDriving(Driving):
 
         return self._start("move by", run, goal=offset, source=source, on_busy=on_busy)
 
-    def _start(self, name: str, run: object, *, goal: object, source: str, on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+    def _start(
+        self,
+        name: str,
+        run: Callable[[Action], Awaitable[None]],
+        *,
+        goal: object,
+        source: str,
+        on_busy: OnBusy = OnBusy.REPLACE,
+    ) -> Action:
         async def braked(action: Action) -> None:
             async with self._braking():
                 with robot_errors():
-                    await run(action)  # type: ignore[operator]
+                    await run(action)
 
         return self._robot.actions.start(name, braked, resources={BASE}, goal=goal, source=source, on_busy=on_busy)
 

@@ -74,18 +74,18 @@ async def get_operation_result(context: Context, cargo_id: str, box_id: int) -> 
     """The last opening or closing of the box; 404 while there was none."""
     id = _box_id(context, cargo_id, box_id)
     if (action := context.boxes.last(id)) is None:
-        raise NotFound(f"nobody has operated box {id}")
+        raise NotFound(f"box {id} has not been operated yet")
     opening = action.name == OPEN
     box = box_of(context.robot[CargoComponent].box(id))
-    kind = "OPEN" if opening else "CLOSE"
+    kind: Literal["OPEN", "CLOSE"] = "OPEN" if opening else "CLOSE"
     if not action.status.ended:
-        return OperationResult(kind, "IN_PROGRESS", "", cargo_id, box)  # type: ignore[arg-type]
+        return OperationResult(kind, "IN_PROGRESS", "", cargo_id, box)
     if action.status is ActionStatus.SUCCEEDED:
-        return OperationResult(kind, "DONE", "", cargo_id, box)  # type: ignore[arg-type]
+        return OperationResult(kind, "DONE", "", cargo_id, box)
     reason = "FAILED_TO_OPEN_DOOR" if opening else "CLOSE_DOOR_STALLED"
     if action.status is ActionStatus.CANCELED:
         reason = action.reason or "canceled"
-    return OperationResult(kind, "FAILED", reason, cargo_id, box)  # type: ignore[arg-type]
+    return OperationResult(kind, "FAILED", reason, cargo_id, box)
 
 
 @TABLE.on(f"GET {CARGOS}/assigned", right=Right.SEE, needs=(Delivery, Places))

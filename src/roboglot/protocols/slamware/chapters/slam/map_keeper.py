@@ -196,10 +196,6 @@ class MapKeeper:
                 return
         raise NotFound(f"no floor {floor!r} of {building!r} is loaded")
 
-    def forget_floors(self) -> None:
-        """Forget the loaded floors; the map in memory stays."""
-        self.floors, self.status, self.current = (), MapLoadStatus.NOT_LOADED, FloorName()
-
     async def _parse(self, data: bytes) -> list[FloorMap]:
         """The floors in a file, which may take seconds for a hostile one: other requests do not wait for it."""
         if isinstance(self._robot.clock, LockstepClock):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from roboglot.model.components.system.network import Network, NetworkMode, Uplink
 from roboglot.model.errors import ComponentMissing, InvalidGoal
 from roboglot.operations import Right
@@ -19,7 +21,7 @@ from roboglot.wire.slamware.chapters.system.network import (
 )
 
 API = "/api/core/system/v1/network"
-PRIORITIES = {Uplink.WIFI: "wifi", Uplink.MOBILE: "4g"}
+PRIORITIES: dict[Uplink, Literal["wifi", "4g"]] = {Uplink.WIFI: "wifi", Uplink.MOBILE: "4g"}
 BEST, WORST = -50.0, -100.0  # dBm that count as 100 and as 0
 
 
@@ -56,7 +58,7 @@ async def set_network_status(context: Context, body: NetworkRequest) -> bool:
 @TABLE.on(f"GET {API}/route", right=Right.SEE, needs=(Network,))
 async def get_network_route(context: Context) -> RouteStatus:
     """Return the preferred way to the internet."""
-    return RouteStatus(PRIORITIES[context.robot[Network].priority])  # type: ignore[arg-type]
+    return RouteStatus(PRIORITIES[context.robot[Network].priority])
 
 
 @TABLE.on(f"PUT {API}/route", right=Right.ADMIN, needs=(Network,))
