@@ -112,7 +112,7 @@ def parse_interface(text: str) -> Interface:
     parameters = tuple(part.strip() for part in match[2].split(",")) if match[2] else ()
     for name in (match[1], *parameters):
         if not name.isidentifier() or keyword.iskeyword(name):
-            raise BadCondition(f"{name!r} is no name")
+            raise BadCondition(f"{name!r} is not a name")
     if len(set(parameters)) != len(parameters):
         raise BadCondition("a parameter is named twice")
     return Interface(match[1], parameters)
@@ -123,7 +123,7 @@ def _values(field: str, low: int, high: int) -> frozenset[int]:
     for item in field.split(","):
         match = _ITEM.fullmatch(item)
         if match is None:
-            raise BadCondition(f"{item!r} is no value, range or step")
+            raise BadCondition(f"{item!r} is not a value, range or step")
         first = int(match["first"] or low)
         last = int(match["last"] or (high if match["first"] is None or match["step"] else first))
         step = int(match["step"] or 1)

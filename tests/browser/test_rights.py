@@ -200,7 +200,7 @@ async def test_guesses_are_limited_and_differ_from_nothing(guarded: Guarded, ope
     guarded.forget_tries()
     page = await open_page()
     await sign_in(page, "ben", "a wrong password")
-    await page.wait_for_selector("text=lets nobody in")
+    await page.wait_for_selector("text=is not valid")
     for name in ("unknown", "ben"):
         body = json.dumps({"name": name, "password": "a wrong password"})
         assert await page.evaluate(TRY, body) == 401

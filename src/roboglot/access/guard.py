@@ -251,7 +251,7 @@ class RobotAdmission(Admission):
         if right not in self._rights.get(who, NOTHING):
             why = f"{who or 'somebody without a name'} has no right to {right} on robot {self._name}"
         elif not self._guard.requests.take(who):
-            why = f"{who} asks more than {self._guard.config.requests} times a second"
+            why = f"{who} sends more than {self._guard.config.requests} requests a second"
         else:
             if len(self._allowed) >= ALLOWED_MAX:
                 self._allowed.clear()

@@ -48,7 +48,7 @@ class Proofs:
         if found is None and proof.kind is HTTP:
             found = await self._by_password(proof, host)
         if found is None:
-            raise Unknown("this password, token or certificate lets nobody in")
+            raise Unknown("this password, token or certificate is not valid")
         if proof.kind is HTTP:
             if len(self._owners) >= PROOFS_MAX:
                 self._owners.pop(next(iter(self._owners)))

@@ -233,5 +233,5 @@ def _nothing_here() -> Problem:
 
 def _whole(text: str) -> int:
     if not text.isdecimal() or len(text) > 12:
-        raise NotFound(f"{text!r} is no number of an exchange")
+        raise NotFound(f"{text!r} is not the number of an exchange")
     return int(text)

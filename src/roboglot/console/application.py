@@ -118,10 +118,10 @@ class Application:
 
     async def _serve_metrics(self, scope: Scope, send: Send) -> None:
         if scope["method"] != "GET":
-            raise Problem(405, "metrics are only read")
+            raise Problem(405, "metrics accept GET only")
         for robot in self._desk.robots.values():
             if not robot.admission.may(Right.SEE):
-                raise Problem(403, "metrics are for who may see every robot")
+                raise Problem(403, "metrics need the right to see every robot")
         try:
             metrics = await self.metrics()
         except MissingExtra as missing:
@@ -145,7 +145,7 @@ class Application:
         if asset is None:
             raise Problem(404, "there is no such page")
         if scope["method"] not in ("GET", "HEAD"):
-            raise Problem(405, "pages are only read")
+            raise Problem(405, "pages accept GET only")
         headers = dict(scope["headers"])
         more = [
             (b"etag", asset.tag.encode()),

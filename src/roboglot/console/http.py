@@ -45,7 +45,7 @@ async def read_json(receive: Receive) -> Mapping[str, object]:
     try:
         return msgspec.json.decode(body, type=dict) if body else {}
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
-        raise Problem(400, f"the body is no JSON object: {error}") from None
+        raise Problem(400, f"the body is not a JSON object: {error}") from None
 
 
 async def answer(send: Send, status: int, content_type: bytes, body: bytes, more: Rows | None = None) -> None:

@@ -65,7 +65,7 @@ def check_requests(
     taken = {box: order.number for order in open_orders for box in order.request.boxes}
     for request in requests:
         if policy.work_mode is WorkMode.DISPATCH and not request.remote:
-            raise Refused("in this work mode orders come from afar only")
+            raise Refused("in this work mode only remote orders are accepted")
         if policy.work_mode is WorkMode.RECYCLE and request.kind is not OrderKind.RECYCLE and not request.remote:
             raise Refused("in this work mode the robot only collects dishes")
         if len(request.stops) > STOPS_MAX or len(request.boxes) > BOXES_MAX:

@@ -73,7 +73,7 @@ class QueueDelivery(Delivery):
             if any(request.kind in BOXED for request in requests) and level <= self.policy.level_no_takeout:
                 raise Refused("the battery is too low for takeouts")
             if any(request.remote for request in requests) and level <= self.policy.level_no_cloud:
-                raise Refused("the battery is too low for orders from afar")
+                raise Refused("the battery is too low for remote orders")
             known = {order.number for order in self._book.orders}
             if any(request.number in known for request in requests if request.number):
                 raise Refused("there is an order of that number already")

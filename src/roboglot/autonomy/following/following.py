@@ -268,7 +268,7 @@ class SightFollowing(Following):
 
 def _check(distance: float) -> None:
     if not DISTANCE_MIN <= distance <= DISTANCE_MAX:
-        raise InvalidGoal(f"one follows at {DISTANCE_MIN} to {DISTANCE_MAX} m, not {distance}")
+        raise InvalidGoal(f"the following distance is {DISTANCE_MIN} to {DISTANCE_MAX} m, not {distance}")
 
 
 def _within(limit: float, value: float) -> float:

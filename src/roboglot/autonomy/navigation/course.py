@@ -66,7 +66,7 @@ class Course:
         while self.planner is None or not self.belief.revision:
             self.check_available()
             if clock.time() > deadline:
-                raise NotLocalized("no scan came to make a map of")
+                raise NotLocalized("no scan arrived to make a map from")
             await clock.sleep(0.1)
         return self.planner
 

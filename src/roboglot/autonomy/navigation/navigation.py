@@ -97,7 +97,7 @@ class GridNavigation(Navigation):
         stops = (self._robot[Localization].pose.point, *places)
         costs = await (self._lengths(stops) if len(places) <= EXACT_MAX else self._course.lengths(stops, NEAR))
         if round_trip and not np.isfinite(costs).all():
-            raise Unreachable("no way leads to one of the places")
+            raise Unreachable("one of the places is unreachable")
         straight = np.array([[a.distance_to(b) for b in stops] for a in stops])
         costs = np.where(np.isfinite(costs), costs, NO_WAY + straight)
         work = partial(visiting_order, np.ascontiguousarray(costs), TOUR_PASSES, round_trip)
@@ -129,7 +129,7 @@ def _checked(goals: Sequence[Point], options: NavigationOptions) -> Goal:
         if not math.hypot(goal.x, goal.y) <= POSITION_MAX:
             raise InvalidGoal(f"not a place on this map: {goal}")
     if options.yaw is not None and not math.isfinite(options.yaw):
-        raise InvalidGoal("the final yaw is no number")
+        raise InvalidGoal("the final yaw is not a number")
     if not 0.0 < options.speed_ratio <= 1.0:
         raise InvalidGoal(f"a share of the top speed is above 0 and at most 1, not {options.speed_ratio}")
     if not 0.0 < options.tolerance <= POSITION_MAX:

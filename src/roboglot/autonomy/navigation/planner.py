@@ -361,7 +361,7 @@ class Planner:
         top, bottom = min(0, min(rows) - ROOM), max(height, max(rows) + ROOM)
         left, right = min(0, min(columns) - ROOM), max(width, max(columns) + ROOM)
         if is_too_large(bottom - top, right - left):
-            raise Unreachable("the goal lies too far from all that is known")
+            raise Unreachable("the goal is too far from the known map")
         standing, driven = np.maximum(self._scans.seen(grid), self._low.seen(grid)), self._trodden.of(grid)
         if (top, bottom, left, right) == (0, height, 0, width):
             return known, standing, driven.copy(), grid.corner

@@ -95,7 +95,7 @@ class LidarLocalization(Localization):
             if self._robot.clock.time() > deadline:
                 if not self.started:
                     raise NotReady("localization is warming up: no scan has been compared with the map yet")
-                raise NotLocalized("what the lidar sees fits nowhere")
+                raise NotLocalized("the scan fits nowhere on the map")
             await self._robot.clock.sleep(SEARCH_PERIOD)
 
     async def _search_driving(self, region: Region | None, source: str) -> None:
@@ -118,7 +118,7 @@ class LidarLocalization(Localization):
             if not await go_on(self._robot, self._belief.reader, source):
                 await self._robot.clock.sleep(SEARCH_PERIOD)
         count = len(hypotheses.places)
-        why = f"{count} places still look alike" if count else "what the lidar sees fits nowhere"
+        why = f"{count} places still look alike" if count else "the scan fits nowhere on the map"
         raise NotLocalized(f"{why} after {AROUND_SECONDS:g} s of looking around")
 
     async def _look(self, region: Region | None) -> tuple[list[Match], Pose]:

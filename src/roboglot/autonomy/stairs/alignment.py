@@ -48,7 +48,7 @@ class SeenStairAlignment(StairAlignment):
         if (refusal := robot[Base].refusal) is not None:
             raise refusal
         if (Legs not in robot or robot[Legs].posture is Posture.STANDING) and not self._sight.hints(direction):
-            raise NotFound(f"no step {direction} is to be seen ahead")
+            raise NotFound(f"no step {direction} is visible ahead")
 
         async def run(action: Action) -> None:
             await _Approach(robot, self._sight, direction, action).run()
@@ -85,7 +85,7 @@ class _Approach:
         looks, deadline = 0, self._clock.time() + LOOK_SECONDS
         while looks < LOOKS_MIN or self._clock.time() - self._seen_at > BLIND:
             if self._clock.time() >= deadline:
-                raise NotFound(f"no step {self._direction} is to be seen ahead")
+                raise NotFound(f"no step {self._direction} is visible ahead")
             looks += self._look()
             await self._clock.sleep(PERIOD)
 

@@ -229,7 +229,7 @@ class Classes:
 
     def _check_teacher(self) -> None:
         if not self._desk.may_teach:
-            raise Forbidden("a class is opened and led by those who have the right to admin on all robots")
+            raise Forbidden("opening and leading a class needs the right admin on all robots")
 
 
 async def _release(robot: Robot) -> None:

@@ -43,7 +43,7 @@ class Signing:
         if scope["path"] not in (SIGN_IN, SIGN_OUT):
             return False
         if scope["method"] != "POST":
-            raise Problem(405, "signing in and out is posted")
+            raise Problem(405, "signing in and out needs POST")
         name = cookie_name((scope.get("server") or ("", 0))[1] or 0)
         secure = scope.get("scheme") == "https"
         if scope["path"] == SIGN_OUT:

@@ -72,7 +72,7 @@ def _read_class(folder: Path) -> Sheet | None:
     try:
         sheet = _read(folder / CLASS, Sheet)
         if sheet.code != folder.name:
-            raise ValueError(f"it is of class {sheet.code!r}")
+            raise ValueError(f"it belongs to class {sheet.code!r}")
         files = sorted(file for file in folder.glob("*.json") if file.name != CLASS)
         sheet.bags = [_read(file, Bag) for file in files[:BAGS_MAX]]
     except (OSError, ValueError, msgspec.MsgspecError) as error:

@@ -218,7 +218,7 @@ class Classroom:
                 await asyncio.to_thread(self._files.keep, code, pupil.bag)
         except OSError as error:
             log.error("cannot keep what %s handed in: %s", pupil.name, error)
-            raise Refused("it cannot be kept: the disk of the teacher's machine does not take it") from None
+            raise Refused("it cannot be saved on the disk of the teacher's machine") from None
 
     def place(self, joined: Class, pupil: Pupil, at: str) -> World | None:
         """Return the world that a pupil is to go to from the page's: their own, else one that the fewest share."""
@@ -282,7 +282,7 @@ class Seat:
     async def _open(self, wish: Member, may_teach: bool) -> None:
         """Open a class, or with its code come back to it as its teacher."""
         if not may_teach:
-            raise Refused("only who may do everything with the robots opens a class")
+            raise Refused("opening a class needs the right admin on the robots")
         opened = self._room.find(wish.code) if wish.code else await self._room.begin(wish.name.strip())
         self.leave()
         self._class = opened

@@ -140,7 +140,7 @@ class TaskRun:
     def check_watched(self) -> None:
         """Raise ProgramError for one that cannot be stepped through."""
         if not self.watched:
-            words = f"{self.task.id} runs at full speed: say where it is to stop before it starts, or debug it"
+            words = f"{self.task.id} runs at full speed: set breakpoints before it starts, or debug it"
             raise NotAllowed(words)
 
     @property

@@ -91,7 +91,7 @@ class Faults:
         world = self._world
         if not KINDS[kind].of_robot:
             if robot is not None:
-                raise ValueError(f"{kind} happens to the building, not to a robot")
+                raise ValueError(f"{kind} affects the building, not a robot")
             return [Target(world, None)]
         return [Target(world, name) for name in ([robot] if robot is not None else world.robots)]
 

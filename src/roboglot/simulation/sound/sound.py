@@ -66,7 +66,7 @@ class Air:
         over = source.start - LINGER
         self._sources = [other for other in self._sources if other.start + other.sound.seconds > over]
         if len(self._sources) >= SOURCES_MAX:
-            raise ValueError(f"{SOURCES_MAX} sounds at once are enough")
+            raise ValueError(f"at most {SOURCES_MAX} sounds at once")
         self._sources.append(source)
 
     def silence(self, source: Source) -> None:

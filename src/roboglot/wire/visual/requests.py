@@ -134,7 +134,7 @@ class _Checker:
         if len(value) > limit:
             self.refuse(state, f"{name} is longer than {limit} characters")
         if _SURROGATE.search(value) or "\0" in value:
-            self.refuse(state, f"{name} contains characters that are none")
+            self.refuse(state, f"{name} contains invalid characters")
         return value
 
     def kind(self) -> Kind:

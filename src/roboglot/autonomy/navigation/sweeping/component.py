@@ -97,7 +97,7 @@ class LaneSweeping(Sweeping):
                 await self._drive(action, [open_ for lane in left for open_ in open_stretches(lane, floor, frame)])
             swept.report(final=True)
         if swept.done == 0.0:
-            raise Unreachable("no way led to any lane")
+            raise Unreachable("no lane was reachable")
 
     async def _drive(self, action: Action, lanes: Sequence[Stretch]) -> None:
         """Along ``lanes`` in turn, on to the next where one cannot be driven."""

@@ -181,7 +181,7 @@ async def _find_itself(session: Session, stored: StoredMap, assisted: bool, inte
             await session.complete(localization.relocalize(sky.region if sky else None, source=session.source))
             if sky is None or sky.allows(localization.pose.point):
                 return
-            raise NotLocalized("the satellites see the robot elsewhere")
+            raise NotLocalized("by satellite the robot is elsewhere")
         except NotLocalized:
             if not assisted or clock.time() >= deadline:
                 raise
@@ -199,7 +199,7 @@ async def _go(session: Session, point: Point, yaw: float | None) -> None:
 async def _cancel(robot: Robot) -> None:
     for action in robot.actions.running():
         if isinstance(action.feedback, NavigationFeedback):
-            action.cancel("a program called it off")
+            action.cancel("a program cancelled it")
             await action.done()
 
 

@@ -146,7 +146,7 @@ def _named(robot: Robot, people: list[str]) -> set[str]:
     names = {member.name for member in members}
     if not people:
         if not names:
-            raise NotFound("the robot knows nobody yet")
+            raise NotFound("the robot knows no members yet")
         return names
     by_id = {str(member.id): member.name for member in members}
     unknown = [person for person in people if person not in names and person not in by_id]

@@ -59,7 +59,7 @@ class ExerciseWatch:
     def open(self, sport_type: int, counts: int, timeout: int) -> None:
         """Begin to count; what was counted before is forgotten. Raises InvalidGoal, ComponentMissing, Busy."""
         if sport_type not in SPORTS:
-            raise InvalidGoal(f"sport_type = {sport_type} is no sport")
+            raise InvalidGoal(f"sport_type = {sport_type} does not exist")
         if not 1 <= counts <= COUNTS_MAX:
             raise InvalidGoal(f"counts = {counts} is outside of 1 to {COUNTS_MAX}")
         seconds = usable(timeout)

@@ -75,7 +75,7 @@ class SimulatedRemoteControl(RemoteControl):
 
     def _stop(self) -> None:
         if self._driving is not None:
-            self._driving.cancel("the stick was let go")
+            self._driving.cancel("the stick was released")
             self._driving = None
 
 

@@ -97,7 +97,7 @@ class SimulatedCargo(Cargo):
         """Have the box be so full (0..1). Refused while its door is not open. ValueError for other numbers."""
         box = self._get(id)
         if not 0.0 <= fill <= 1.0:
-            raise ValueError("a box is filled between 0 and 1")
+            raise ValueError("the fill level of a box is 0 to 1")
         if box.opening < 0.5:
             raise Refused(f"the door of box {id} is not open")
         box.fill = fill

@@ -60,7 +60,7 @@ class SimulatedTrafficRadio(TrafficRadio):
 
     def announce(self, announcement: Announcement | None) -> None:
         if announcement is not None and len(announcement.way) > WAY_MAX:
-            raise InvalidGoal(f"the radio carries ways of {WAY_MAX} points")
+            raise InvalidGoal(f"the radio carries routes of {WAY_MAX} points")
         self._announced = announcement
 
     def heard(self) -> Sequence[Announcement]:

@@ -128,7 +128,7 @@ class SimulatedBluetooth(Bluetooth):
         async def run(action: Action) -> None:
             gadget, newest = self.gadget, self.update_available
             if gadget is None or not newest:
-                raise Refused("there is no device that could be updated")
+                raise Refused("no device can be updated")
             if gadget.battery < UPDATE_BATTERY:
                 raise Refused("the device's battery is too low for an update")
             for percent in range(101):

@@ -167,7 +167,7 @@ class SimulatedFirmware(Firmware):
         self._wake()
         installed = self._progress.state in (FirmwareState.INSTALLED, FirmwareState.REBOOTING)
         if installed or self._robot.actions.running(FIRMWARE):
-            raise Refused("firmware is not thrown away while an update is under way")
+            raise Refused("firmware cannot be removed while an update is under way")
         self._robot[Disk].release(PACKAGE)
         self._become(FirmwareProgress())
         await self._record.put_downloaded(None)

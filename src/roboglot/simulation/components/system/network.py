@@ -181,7 +181,7 @@ class SimulatedNetwork(Network):
         if on == state.dhcp:
             return
         if not on and not (state.mode is NetworkMode.STATION and state.address):
-            raise Refused("there is no address yet that could be kept")
+            raise Refused("there is no address yet to keep")
         await self._keep(address="" if on else state.address)
 
     async def set_priority(self, priority: Uplink) -> None:
@@ -193,7 +193,7 @@ class SimulatedNetwork(Network):
         if self._section.modem is None:
             raise ComponentMissing(MobileState)
         if not 1 <= len(apn) <= APN_MAX or not apn.isprintable() or " " in apn:
-            raise InvalidGoal(f"{apn!r} is no access point name")
+            raise InvalidGoal(f"{apn!r} is not an access point name")
         await self._keep(apn=apn)
 
     def sense(self, stamp: float, _seconds: float) -> None:

@@ -56,7 +56,7 @@ class CyberDogSpeaker(Speaker):
         return self._robot.actions.start("say", run, resources={SPEAKER}, goal=text, source=source)
 
     def play(self, sound: Sound, *, source: str = "") -> Action:
-        raise Refused("this dog plays no sounds but its own")
+        raise Refused("this dog plays its own sounds only")
 
     async def _speak(self, text: str) -> None:
         client = self._client

@@ -95,4 +95,4 @@ async def _in_sight(pushes: Viewer[values.Tracking], person: int | None) -> valu
 
 def _check(distance: float) -> None:
     if not DISTANCE_MIN <= distance <= DISTANCE_MAX:
-        raise InvalidGoal(f"one follows at {DISTANCE_MIN} to {DISTANCE_MAX} m")
+        raise InvalidGoal(f"the following distance is {DISTANCE_MIN} to {DISTANCE_MAX} m")

@@ -46,10 +46,10 @@ class CyberDogPower(Power):
             await self._status.ask()
 
     def save(self, *, source: str = "") -> Action:
-        raise Refused("this dog goes to low power by itself alone")
+        raise Refused("this dog enters low power only by itself")
 
     def sleep(self, *, source: str = "") -> Action:
-        raise Refused("this dog knows no sleep but low power")
+        raise Refused("this dog's only sleep mode is low power")
 
     def wake(self, *, source: str = "") -> Action:
         return self._start("wake up", self._wake, source)
@@ -58,7 +58,7 @@ class CyberDogPower(Power):
         if not 0.0 <= after <= AFTER_MAX:
             raise Refused("that is too far away")
         if restart_after:
-            raise Refused("this dog restarts at once or not at all")
+            raise Refused("this dog can only restart at once")
 
         async def command() -> None:
             await self._robot.clock.sleep(after)

@@ -53,7 +53,7 @@ class SlamwarePower(Power):
             raise Refused("this robot does not save power by itself")
 
     def save(self, *, source: str = "") -> Action:
-        raise Refused("this robot sleeps or is awake, and nothing between")
+        raise Refused("this robot is either asleep or awake")
 
     def sleep(self, *, source: str = "") -> Action:
         return self._start("go asleep", self._client.hibernate, PowerMode.ASLEEP, source)
