@@ -143,7 +143,7 @@ class Walker:
     def walk(self, seconds: float, robots: Sequence[Placed], free: Free) -> bool:
         """Go on for ``seconds`` among the ``robots`` of the floor; whether the pose changed."""
         self.walking, moved, self.displaced = False, self.displaced, False
-        if self.doing is None and not self._begin():
+        if self.doing is None and ((self._told is None and not self._script) or not self._begin()):
             return moved
         before, self._elapsed = self.pose, self._elapsed + seconds
         if self._do(seconds, robots, free):
@@ -173,10 +173,12 @@ class Walker:
         doing = self.doing
         if isinstance(doing, Walk):  # the most frequent step
             return self._walk_on(doing, robots, seconds, free)
+        if isinstance(doing, Wait):  # and what else they do much
+            return self._elapsed >= doing.seconds
         match doing:
             case Look(at=at):
                 return self._turn(self.pose.point.bearing_to(Point(*at)), TURN_RATE * seconds)
-            case Wait(seconds=span) | Show(seconds=span):
+            case Show(seconds=span):
                 return self._elapsed >= span
             case Say(text=text):
                 return self._elapsed >= speaking_time(text)

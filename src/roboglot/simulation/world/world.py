@@ -253,8 +253,9 @@ class World:
         robots: dict[int, list[Hull]] = {}
         for hull in self._physics.hulls.values():
             robots.setdefault(hull.floor, []).append(hull)
+        free = self._environment.surroundings.lines.leads
         for walker in self._walkers:
-            if walker.walk(TICK, robots.get(walker.floor, ()), self._environment.surroundings.lines.leads):
+            if walker.walk(TICK, robots.get(walker.floor, ()), free):
                 self._physics.move_person(walker.body, walker.pose, walker.floor)
             if walker.aloud:
                 for step in walker.fetch():
