@@ -1,4 +1,4 @@
-"""A robot is shown where it believes to be, and nowhere before it has said so."""
+"""A robot is shown where it believes to be; nothing is made up of one that was never heard."""
 
 from __future__ import annotations
 
@@ -11,7 +11,11 @@ from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.system.health import Health
 from roboglot.model.components.system.link import Link, LinkState
 from roboglot.model.geometry import Pose
+from roboglot.protocols.vda5050.vocabulary import position, velocity
+from roboglot.recording.entries import Entry
+from roboglot.recording.sampler import Sampler
 from roboglot.testing import Forward
+from roboglot.wire.vda5050.versions import V3
 
 
 @pytest.mark.world("empty", body="robomaster_ep")
@@ -30,14 +34,35 @@ async def test_robot_without_localization_is_shown_by_its_odometry(fleet: Fleet,
 
 
 @pytest.mark.world("empty")
-async def test_robot_that_was_never_heard_has_no_pose(fleet: Fleet, forward: Forward) -> None:
+async def test_nothing_is_made_up_of_an_unheard_robot(fleet: Fleet, forward: Forward) -> None:
     robot = fleet.robots["a"]
     link = robot.add(Link, Link("slamware://127.0.0.1:9", robot.clock, robot.events, robot[Health]))
-    view = RobotView(robot, fleet.world.hands)
+    view, sent = RobotView(robot, fleet.world.hands), list[Entry]()
     view.settle()
+    sampler = Sampler(robot, sent.append)
+    sampler.beat(0)
     assert (view.motion, view.anchor) == ([None] * 6, None)
+    assert (told(view, "battery"), told(view, "place", "quality"), told(view, "safety", "docked")) == (None, None, None)
+    assert not {"battery", "pose", "transforms"} & {entry.kind for entry in sent}
+    assert position(robot, V3, "map") == velocity(robot) == {}
+
     link.move_to(LinkState.UP)
     link.heard("pose")
     link.move_to(LinkState.LOST, "the cable")
+    sampler.beat(0)
     assert view.motion[0] is not None
+    assert told(view, "battery", "charge")
+    assert told(view, "safety", "docked") is True
+    assert {"battery", "pose", "transforms"} <= {entry.kind for entry in sent}
+    assert position(robot, V3, "map")
+    sampler.close()
     view.end()
+
+
+def told(view: RobotView, *path: str) -> object:
+    """Return a value of the state that pages get."""
+    value: object = view.state()
+    for key in path:
+        assert isinstance(value, dict)
+        value = value[key]
+    return value

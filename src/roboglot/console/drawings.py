@@ -7,8 +7,7 @@ from roboglot.model.components.mapping.annotations import Annotations, MapAnnota
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.sensing.odometry import Odometry
-from roboglot.model.components.system.link import require_heard
-from roboglot.model.errors import RobotError
+from roboglot.model.components.system.link import was_heard
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
 from roboglot.model.stage import Stage
@@ -75,9 +74,7 @@ def whereabouts(robot: Robot) -> Pose | None:
 
     A robot that cannot localize itself reckons from where it woke up, which is where its map would begin.
     """
-    try:
-        require_heard(robot)
-    except RobotError:
+    if not was_heard(robot):
         return None
     if Localization in robot:
         return robot[Localization].pose

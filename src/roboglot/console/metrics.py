@@ -16,7 +16,7 @@ from prometheus_client.registry import Collector
 
 from roboglot.console.desk import Desk
 from roboglot.model.components.energy.battery import Battery
-from roboglot.model.components.system.link import Link, LinkState
+from roboglot.model.components.system.link import Link, LinkState, was_heard
 from roboglot.model.events import ActionChanged
 from roboglot.model.robot import Robot
 from roboglot.model.tap import Direction, Exchange
@@ -127,7 +127,7 @@ class _Now(Collector):
         age = GaugeMetricFamily("roboglot_link_age_seconds", "Since the robot was last heard.", labels=("robot",))
         for name, robot in self._desk.robots.items():
             running.add_metric((name,), len(robot.actions.running()))
-            if Battery in robot:
+            if Battery in robot and was_heard(robot):
                 battery.add_metric((name,), robot[Battery].state.percentage)
             if Link in robot:
                 link = robot[Link]

@@ -26,7 +26,7 @@ from roboglot.model.components.sensing.microphone import Microphone
 from roboglot.model.components.system.firmware import Firmware
 from roboglot.model.components.system.health import Health
 from roboglot.model.components.system.lease import Lease
-from roboglot.model.components.system.link import Link
+from roboglot.model.components.system.link import Link, was_heard
 from roboglot.model.robot import Robot
 
 PARTS = {  # by which a page chooses its panels
@@ -106,7 +106,7 @@ def _faults(robot: Robot) -> list[dict[str, object]]:
 
 
 def _battery(robot: Robot) -> dict[str, object] | None:
-    if Battery not in robot:
+    if Battery not in robot or not was_heard(robot):
         return None
     state = robot[Battery].state
     return {
@@ -122,7 +122,7 @@ def _battery(robot: Robot) -> dict[str, object] | None:
 
 
 def _place(robot: Robot) -> dict[str, object]:
-    known = Localization in robot
+    known = Localization in robot and was_heard(robot)
     lost = robot[Localization].lost if known else None
     return {
         "quality": round(robot[Localization].quality, 2) if known else None,
@@ -138,7 +138,7 @@ def _safety(robot: Robot) -> dict[str, object]:
     return {
         "emergency_stop": known and robot[EmergencyStop].engaged,
         "brake_released": known and robot[EmergencyStop].brake_released,
-        "docked": DockContact in robot and robot[DockContact].docked,
+        "docked": robot[DockContact].docked if DockContact in robot and was_heard(robot) else None,
         "power": str(robot[Power].mode) if Power in robot else "",
     }
 

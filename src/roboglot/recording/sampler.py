@@ -14,7 +14,7 @@ from roboglot.model.components.sensing.barometer import Barometer
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.health import Health
 from roboglot.model.components.system.lease import Lease
-from roboglot.model.components.system.link import Link
+from roboglot.model.components.system.link import Link, was_heard
 from roboglot.model.events import ActionChanged, Event, ScanTaken
 from roboglot.model.geometry import ORIGIN, Pose
 from roboglot.model.inputs.outside import Input
@@ -137,6 +137,8 @@ class Sampler:
 
     def _note_places(self, at: int, wall: int) -> None:
         robot, name = self._robot, self._robot.id
+        if not was_heard(robot):
+            return
         frames: list[tuple[str, str, Pose]] = []
         odometry = robot[Odometry].reading.pose if Odometry in robot else None
         pose = robot[Localization].pose if Localization in robot else None
@@ -156,7 +158,7 @@ class Sampler:
             plate = robot.description
             figure = (robot.id, f"{robot.id}/base_link", ORIGIN, plate.radius, plate.height, True)
             self._send("body", "scene", (figure,), at, wall)
-        if Battery in robot:
+        if Battery in robot and was_heard(robot):
             self._send_changed("battery", "battery", plain(robot[Battery].state), at, wall)
         if Barometer in robot:
             self._send("pressure", "pressure", plain(robot[Barometer].reading), at, wall)

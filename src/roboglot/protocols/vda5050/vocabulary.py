@@ -15,6 +15,7 @@ from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.components.sensing.bumper import Bumper
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.lease import Lease
+from roboglot.model.components.system.link import was_heard
 from roboglot.model.geometry import wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.protocols.vda5050.order_book import ActionState, OrderBook
@@ -35,8 +36,8 @@ def timestamp(epoch: float) -> str:
 
 
 def position(robot: Robot, version: Version, map_id: str) -> dict[str, object]:
-    """Return where the robot is, under the version's name; nothing for a robot that cannot know."""
-    if Localization not in robot:
+    """Return where the robot is, under the version's name; nothing for a robot that cannot know, or was never heard."""
+    if Localization not in robot or not was_heard(robot):
         return {}
     localization = robot[Localization]
     pose = localization.pose
@@ -56,7 +57,7 @@ def position(robot: Robot, version: Version, map_id: str) -> dict[str, object]:
 
 def velocity(robot: Robot) -> dict[str, object]:
     """Return how the robot moves, in its own axes."""
-    if Odometry not in robot:
+    if Odometry not in robot or not was_heard(robot):
         return {}
     twist = robot[Odometry].reading.twist
     return {"velocity": {"vx": round(twist.x, 3), "vy": round(twist.y, 3), "omega": round(twist.yaw, 3)}}

@@ -78,7 +78,7 @@ function State() {
       <${Row} name=${t("speed")}>${Math.hypot(pose[3], pose[4]).toFixed(2)} m/s · ${Math.round(pose[5] * 180 / Math.PI)}°/s<//>`}
       ${place.quality !== null && html`<${Row} name=${t("place.fit")} kind=${place.lost ? "bad" : ""}>${place.lost ? t("place.lost", { why: robotWord(place.lost) }) : `${Math.round(place.quality * 100)} %`}<//>`}
       ${place.floor !== null && html`<${Row} name=${t("floor")}>${place.floor}<//>`}
-      <${Row} name=${t("dock")}>${safety.docked ? t("docked") : t("undocked")}<//>
+      ${safety.docked !== null && html`<${Row} name=${t("dock")}>${safety.docked ? t("docked") : t("undocked")}<//>`}
       <${Row} name=${t("model")}>${about.maker} ${about.model}<small>${about.serial} · ${t("firmware")} ${about.firmware}</small><//>
     </dl>
     <div class="buttons">

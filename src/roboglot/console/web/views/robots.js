@@ -28,7 +28,7 @@ function Tile({ robot }) {
   const worst = ["FATAL", "ERROR", "WARNING"].find((level) => faults.some((f) => f.level === level));
   const open = () => { choose(robot.name); location.hash = "#/live"; };
   return html`<li class=${`tile ${worst ? worst.toLowerCase() : ""}`}>
-    ${state.parts.includes("mapping") && html`<${Thumbnail} name=${robot.name} />`}<h2>${t("robot.named", { name: robot.name })}<small>${about.maker} ${about.model}</small></h2>
+    ${pose && state.parts.includes("mapping") && html`<${Thumbnail} name=${robot.name} />`}<h2>${t("robot.named", { name: robot.name })}<small>${about.maker} ${about.model}</small></h2>
     <dl><div class="row"><dt>${t("battery")}</dt><dd class=${battery?.low ? "bad" : ""}>${battery ? `${Math.round(battery.charge * 100)} %` : "–"}${battery?.charging ? ` · ${t("charging")}` : ""}</dd></div>
       <div class="row"><dt>${t("task")}</dt><dd>${task ? robotWord(task.name) : safety.docked ? t("docked") : t("task.none")}</dd></div>
       <div class="row"><dt>${t("control")}</dt><dd>${control.taken_by || control.holder || t("control.nobody")}</dd></div>

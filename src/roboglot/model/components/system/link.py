@@ -13,7 +13,7 @@ from roboglot.model.errors import Busy, Refused, Unconnected
 from roboglot.model.events import EventStream, LinkChanged
 from roboglot.model.robot import Robot
 
-__all__ = ["FAULT", "OTHERS", "STALE_AFTER", "US", "Link", "LinkState", "require_heard"]
+__all__ = ["FAULT", "OTHERS", "STALE_AFTER", "US", "Link", "LinkState", "require_heard", "was_heard"]
 
 FAULT = "link lost"
 US, OTHERS = "us", "another client"
@@ -128,6 +128,11 @@ class Link(Component):
         self._health.set(FAULT, False, "link", FaultLevel.ERROR)
         if self._state is not LinkState.UP:
             self._health.set(FAULT, True, "link", FaultLevel.ERROR, f"{self.name}: {self._reason or self._state}")
+
+
+def was_heard(robot: Robot) -> bool:
+    """Return False for a real robot that has reported nothing yet: what its components hold are no reports."""
+    return Link not in robot or not math.isinf(robot[Link].age())
 
 
 def require_heard(robot: Robot) -> None:
