@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import sqlite3
 import subprocess
 import sys
@@ -309,3 +310,33 @@ def test_audit_counts_entries_pushed_out_by_others(tmp_path: Path, monkeypatch: 
     rows = audited(tmp_path, entries)
     assert {row.operation: row.repeats for row in rows} == {f"op {number}": 8 for number in range(6)}
     assert len(rows) == 12
+
+
+def test_counts_are_written_while_other_rows_come(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No quiet second is needed: a count that waits for one is lost by ``kill -9``."""
+    ticks = itertools.count()
+    monkeypatch.setattr(audit, "now", lambda: 0.1 * next(ticks))
+
+    class Busy:
+        def __init__(self) -> None:
+            self.rows: list[Entry] = []
+            self.done = threading.Event()
+
+        def add(self, entries: list[Entry]) -> None:
+            self.rows += entries
+            if len(self.rows) >= 100 or self.counted:
+                self.done.set()
+            else:
+                kept.note(Entry(0.0, "bert", "", "a", "slamware", f"op {len(self.rows)}", "done"))
+
+        @property
+        def counted(self) -> bool:
+            return any(row.who == "anna" and row.at == 0.5 for row in self.rows)
+
+    busy = Busy()
+    kept = audit.Audit(busy)  # type: ignore[arg-type]
+    kept.note(Entry(0.0, "anna", "", "a", "robomaster", "chassis speed", "done"))
+    kept.note(Entry(0.5, "anna", "", "a", "robomaster", "chassis speed", "done"))
+    assert busy.done.wait(10.0)
+    assert busy.counted
+    kept.close()

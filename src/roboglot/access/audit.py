@@ -93,18 +93,25 @@ class Audit:
         self._queue.put(entry)
 
     def _write(self) -> None:
-        ended = False
+        ended, settled = False, now()
         while not ended:
-            try:
-                taken = [self._queue.get(timeout=REPEATED_WITHIN)]
-                while len(taken) < TOGETHER_MAX and taken[-1] is not None and not self._queue.empty():
-                    taken.append(self._queue.get())  # this thread is the only reader
-            except queue.Empty:
+            taken = self._take()
+            if not taken or now() - settled >= REPEATED_WITHIN:
                 self._settle(now())
-                continue
-            ended = taken[-1] is None
+                settled = now()
+            ended = bool(taken) and taken[-1] is None
             if entries := [entry for entry in taken if entry is not None]:
                 self._keep(entries)
+
+    def _take(self) -> list[Entry | None]:
+        """Return rows as soon as there are some; none after a while without. The writing thread is the only reader."""
+        try:
+            taken = [self._queue.get(timeout=REPEATED_WITHIN)]
+        except queue.Empty:
+            return []
+        while len(taken) < TOGETHER_MAX and taken[-1] is not None and not self._queue.empty():
+            taken.append(self._queue.get())
+        return taken
 
     def _keep(self, entries: list[Entry]) -> None:
         """Write rows, and try again until that works; while the program ends, once more."""
