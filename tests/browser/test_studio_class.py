@@ -12,6 +12,10 @@ from tests.browser.test_studio import FOREVER, Open, loaded, phase, studio
 
 __all__ = ["studio"]  # the fixture
 pytestmark = pytest.mark.asyncio(loop_scope="session")
+UNDER = """[...document.querySelectorAll('.pupils li > *')].filter(part => { // hidden by something, or out of its card
+    const box = part.getBoundingClientRect(), card = part.parentElement.getBoundingClientRect();
+    return box.right > card.right || part.contains(document.elementFromPoint(box.right - 6, box.top + 6)) === false;
+}).map(part => part.outerHTML)"""
 WRONG = {
     "blocks": {
         "languageVersion": 0,
@@ -63,6 +67,8 @@ async def test_a_class_from_its_code_to_its_results(studio: Open) -> None:
     await until(teacher, f"document.querySelector('.pupils li.bad')?.textContent.includes({failure!r})")
     await anna.click("#panel .button.main")
     await until(teacher, f"{row}.includes('handed in')")
+    await teacher.set_viewport_size({"width": 1600, "height": 900})  # narrow cards, three in a row
+    assert await teacher.evaluate(UNDER) == []
     async with teacher.expect_download() as saved:
         await teacher.click("text=Results as a table")
     text = await asyncio.to_thread(Path(await (await saved.value).path()).read_text, "utf-8-sig")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 
 from tests.browser.served import until
-from tests.browser.test_studio import FOREVER, Open, loaded, studio
+from tests.browser.test_studio import COUNTING, FOREVER, Open, loaded, studio
 
 __all__ = ["studio"]  # the fixture
 pytestmark = pytest.mark.asyncio(loop_scope="session")
@@ -50,4 +52,23 @@ async def test_line_of_the_lit_block_stays_marked(studio: Open) -> None:
     await page.keyboard.press("Shift+F5")
     await until(page, f"{marked} === ''")
     assert await page.query_selector(".value-bubble") is None  # waiting answers nothing
+    assert page.errors == []
+
+
+async def test_values_fit_in_bubbles_in_every_look(studio: Open) -> None:
+    named = json.dumps(COUNTING).replace('"name": "n"', '"name": "distance of the wall"')
+    page = await loaded(await studio(), json.loads(named))
+    over = """[...document.querySelectorAll('.value-bubble')].map(one => {
+        const [box, words] = [...one.children].map(part => part.getBoundingClientRect());
+        return Math.max(words.right - box.right, box.left - words.left);
+    })"""
+    for look in ("plain", "contrast", "dyslexia"):
+        await page.select_option(".looks select", look)
+        await page.evaluate("studio.editor.toggleBreak('say')")
+        await page.keyboard.press("F5")
+        await until(page, "studio.runner.phase.value === 'paused' && document.querySelector('.value-bubble')")
+        assert max(await page.evaluate(over)) <= 0, look
+        await page.keyboard.press("Shift+F5")
+        await until(page, "studio.runner.phase.value === 'idle'")
+        await page.evaluate("studio.editor.toggleBreak('say')")
     assert page.errors == []

@@ -84,7 +84,7 @@ async function look(name) {
     const found = await ask({ type: "class", do: "look", name });
     if (!found.style) { say(t("studio.class.nothing")); return; }
     const given = JSON.parse(found.style);
-    show({ ...given, id: undefined, name: `${name}: ${given.name}`.slice(0, 60), lesson: undefined });
+    show({ ...given, id: undefined, name: [name, given.name].filter(Boolean).join(": ").slice(0, 60), lesson: undefined });
   } catch (error) { say(t("refused", { why: error.message }), true); }
 }
 
@@ -103,8 +103,8 @@ function Teacher() {
   return html`<h2>${name || t("studio.tab.group")} <code class="code">${grid.value.code}</code></h2><p class="muted">${t("studio.class.tell")}</p>
     <div class="buttons"><${Button} kind="danger" icon="stop" label=${t("stop.all")} onClick=${() => wish({ do: "stop_all" })} /><${Button} label=${t("studio.class.export")} onClick=${exported} /><${Button} label=${t("studio.class.leave")} onClick=${leave} /><${Button} label=${t("studio.class.end")} onClick=${() => { if (confirm(t("studio.class.end.sure"))) wish({ do: "close" }); }} /></div>
     ${pupils.length ? html`<ul class="rows pupils">${pupils.map((p) => html`<li key=${p.name} class=${p.error ? "bad" : ""}>${maps.value[p.name] ? html`<img class="map" alt=${t("studio.class.map", { name: p.name })} src=${`data:image/png;base64,${maps.value[p.name]}`} />` : html`<span class="map"></span>`}<span class="grow"><b>${p.name}${p.here ? "" : ` (${t("studio.class.away")})`}</b>
-        <small>${p.world ? `${p.world} · ` : ""}${p.robot} · ${t(`studio.phase.${p.phase}`)}${p.lit ? ` · ${p.lit}` : ""}</small><small>${p.program}${p.error ? ` · ${p.error}` : ""}</small></span>
-        <span>${p.stars} ★${p.handed ? ` · ${t("studio.class.handed")}` : ""}</span><${Button} compact icon="eye" label=${t("studio.class.look.at", { name: p.name })} onClick=${() => look(p.name)} /></li>`)}</ul>` : html`<p class="muted">${t("studio.class.empty")}</p>`}`;
+        <small>${p.world ? `${p.world} · ` : ""}${p.robot} · ${t(`studio.phase.${p.phase}`)}${p.lit ? ` · ${p.lit}` : ""}</small><small>${[p.program, p.error].filter(Boolean).join(" · ")}</small>
+        <small class="done">${p.stars} ★${p.handed ? ` · ${t("studio.class.handed")}` : ""}</small></span><${Button} compact icon="eye" label=${t("studio.class.look.at", { name: p.name })} onClick=${() => look(p.name)} /></li>`)}</ul>` : html`<p class="muted">${t("studio.class.empty")}</p>`}`;
 }
 
 export function Group() {
