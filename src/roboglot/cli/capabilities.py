@@ -92,7 +92,7 @@ def page(tell: Callable[[int, str], None] = lambda _done, _name: None) -> str:
     lines = [
         "# Capabilities",
         "",
-        "For who chooses a robot and a protocol: what each can do with which.",
+        "For anyone who chooses a robot and a protocol: what each can do with which.",
         "",
         "Made by `roboglot capabilities --write` from the code; do not edit. Columns are simulated bodies and drivers",
         "of real robots, rows the chapters of a protocol. A cell counts the requests that such a robot has the parts",

@@ -66,7 +66,7 @@ def page(measured: dict[str, Coverage]) -> str:
     lines = [
         "# Coverage",
         "",
-        "For who asks whether an operation is there.",
+        "For anyone who wants to know whether an operation is there.",
         "",
         "Made by `roboglot coverage --write` from the code's own tables; do not edit. A row counts when the operation",
         "does all that its manual says. What works in part says what it cannot do; everything else answers the",

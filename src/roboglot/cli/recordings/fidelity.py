@@ -212,7 +212,7 @@ def _page(verdicts: Sequence[Verdict], selves: Sequence[tuple[str, int, float]])
 HEAD = (
     "# Fidelity",
     "",
-    "For who asks whether a robot that is not there is like theirs. After this page you know what was compared with",
+    "For anyone who asks how close our robots are to real ones. After this page you know what was compared with",
     "what, and can add a recording of your own robot.",
     "",
     "Made by `roboglot fidelity --write` from this version's doors; do not edit.",

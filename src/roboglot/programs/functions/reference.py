@@ -13,7 +13,7 @@ from roboglot.programs.functions.table import ABILITIES
 
 _HEAD = """# Functions of robot programs
 
-For who writes block programs and looks a function up.
+For authors of block programs who look up a function.
 
 Made from the declarations by `python -m roboglot.programs.functions.reference docs/reference/programs.md`.
 How the language looks is in [programs](../programs/programs.md), what the functions do with the robot in
