@@ -68,6 +68,7 @@ def test_address_moves_first_robot_of_a_file(tmp_path: Path) -> None:
     ("text", "complaint"),
     [
         ("worldx = 'office'", "worldx is not a setting"),
+        ("address = '127.0.0.5'", r"address is a setting of one robot: it stands below \[\[robots\]\]"),
         ("[slamware]\nprt = 1", r"slamware\.prt is not a setting"),
         ("[[robots]]\nnamex = 'a'", r"robots\.namex is not a setting"),
         ("seed = 'x'", "seed"),

@@ -356,6 +356,8 @@ def _refuse_unknown(
     fields |= doors
     for key, value in values.items():
         if key not in fields:
+            if not prefix and key in {field.name for field in dataclasses.fields(RobotConfig)}:
+                raise ValueError(f"{key} is a setting of one robot: it stands below [[robots]]")
             raise ValueError(f"{prefix}{key} is not a setting; there are {', '.join(fields)}")
         nested = fields[key]
         if isinstance(value, dict) and isinstance(nested, type) and dataclasses.is_dataclass(nested):

@@ -3,7 +3,12 @@
 import subprocess
 import sys
 
+import click
 import pytest
+from rich.text import Text
+from typer.main import get_command
+
+from roboglot.cli import COMMANDS, loaded
 
 
 def ended(*arguments: str, reader: str = "cat") -> "subprocess.CompletedProcess[str]":
@@ -22,3 +27,12 @@ def test_usage_names_the_command_as_it_is_installed(name: str) -> None:
 @pytest.mark.parametrize("words", [("--help",), ("--version",), ("coverage",)])
 def test_reader_that_goes_is_no_error_worth_traceback(words: tuple[str, ...]) -> None:
     assert ended(*words, reader="true").stderr == ""
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_shows_words_in_square_brackets(name: str) -> None:
+    """Help is markup, in which ``[access]`` is a style and not shown."""
+    command = get_command(loaded(name))
+    commands = command.commands.values() if isinstance(command, click.Group) else [command]
+    texts = [text for each in commands for part in (each, *each.params) if (text := getattr(part, "help", None))]
+    assert [Text.from_markup(text).plain for text in texts] == [text.replace("\\[", "[") for text in texts]

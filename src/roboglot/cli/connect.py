@@ -32,7 +32,7 @@ ROBOTS_MAX = 100
 
 def command(
     gateway: Annotated[
-        str, typer.Argument(help="HOST or HOST:PORT of the robots' gateway ([access] gateway there).")
+        str, typer.Argument(help="HOST or HOST:PORT of the robots' gateway (\\[access] gateway there).")
     ] = "",
     robot: Annotated[list[str] | None, typer.Option(help="Its name there; repeat for more. Default: a.")] = None,
     token_file: Annotated[Path | None, typer.Option(help="A file with the token; else ROBOGLOT_TOKEN.")] = None,

@@ -81,7 +81,7 @@ def command(
         typer.Option(
             "--insecure",
             envvar="ROBOGLOT_INSECURE",
-            help="Let anyone drive robots outside loopback, whatever [access] says.",
+            help="Let anyone drive robots outside loopback, whatever \\[access] says.",
         ),
     ] = False,
     console: Annotated[bool, typer.Option(help="Pages to see and drive the robots in a browser.")] = True,
