@@ -5,13 +5,13 @@ from __future__ import annotations
 import sys
 import urllib.error
 import urllib.request
-from dataclasses import astuple
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import msgspec
 import typer
+from msgspec.structs import astuple
 
 from roboglot.cli.maps.merge import merged
 from roboglot.cli.maps.ros_map import write_ros_map

@@ -7,6 +7,8 @@ import math
 from collections.abc import Mapping, Sequence
 from enum import Enum
 
+import msgspec
+
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.motion.navigation import NavigationFeedback
 from roboglot.model.geometry import Path, Point, Pose
@@ -73,4 +75,6 @@ def plain(value: object) -> object:
             return [plain(entry) for entry in list(value)[:ENTRIES_MAX]]
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    if isinstance(value, msgspec.Struct):
+        return {name: plain(field) for name, field in msgspec.structs.asdict(value).items()}
     return str(value)[:TEXT_MAX]

@@ -1,10 +1,16 @@
-"""Points, poses, twists and the arithmetic between frames. Metres and radians, in the plane."""
+"""Points, poses, twists and the arithmetic between frames. Metres and radians, in the plane.
+
+Those three are msgspec's structs: a robot on its way makes a thousand a second, each in a tenth of the time that a
+frozen dataclass takes.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+
+from msgspec import Struct
 
 
 def wrap_angle(angle: float) -> float:
@@ -15,8 +21,7 @@ def wrap_angle(angle: float) -> float:
     return math.pi if wrapped == -math.pi else wrapped
 
 
-@dataclass(frozen=True, slots=True)
-class Point:
+class Point(Struct, frozen=True, gc=False):
     """A place in the plane, in metres."""
 
     x: float = 0.0
@@ -31,8 +36,7 @@ class Point:
         return math.atan2(other.y - self.y, other.x - self.x)
 
 
-@dataclass(frozen=True, slots=True)
-class Pose:
+class Pose(Struct, frozen=True, gc=False):
     """Position (m) and heading (rad, counter-clockwise, 0 along +x) in some frame."""
 
     x: float = 0.0
@@ -67,8 +71,7 @@ class Pose:
         return math.hypot(other.x - self.x, other.y - self.y)
 
 
-@dataclass(frozen=True, slots=True)
-class Twist:
+class Twist(Struct, frozen=True, gc=False):
     """Velocity in base_link: ``x`` forward and ``y`` left in m/s, ``yaw`` counter-clockwise in rad/s."""
 
     x: float = 0.0

@@ -140,6 +140,8 @@ def plain(value: Any, depth: int = 0) -> Any:
 def _plain_inside(value: object, depth: int) -> object:
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {f.name: plain(getattr(value, f.name), depth) for f in dataclasses.fields(value)}
+    if isinstance(value, msgspec.Struct):
+        return {name: plain(item, depth) for name, item in msgspec.structs.asdict(value).items()}
     if isinstance(value, Mapping):
         return {str(key): plain(item, depth) for key, item in list(value.items())[:ITEMS_MAX]}
     if isinstance(value, list | tuple | set | frozenset):

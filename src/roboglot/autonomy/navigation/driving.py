@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import math
-from dataclasses import astuple, dataclass, field
+from dataclasses import dataclass, field
+
+from msgspec.structs import astuple
 
 from roboglot.autonomy.navigation.base_actions import PERIOD, stand_still, start_on_base
 from roboglot.autonomy.navigation.latency_prediction import Foresight

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from roboglot.model.components.motion.base import WheelSpeeds
 from roboglot.model.geometry import Twist
@@ -28,11 +28,11 @@ class Wheels:
 
     def kill(self, wheels: frozenset[str]) -> None:
         """These motors give nothing from now on: their wheels drag."""
-        if wheels - set(WheelSpeeds.__slots__):
-            raise ValueError(f"a wheel is one of {', '.join(WheelSpeeds.__slots__)}")
+        if wheels - set(WheelSpeeds.__struct_fields__):
+            raise ValueError(f"a wheel is one of {', '.join(WheelSpeeds.__struct_fields__)}")
         if not self.mecanum:  # one motor per side
             sides = {wheel.split("_")[1] for wheel in wheels}
-            wheels = frozenset(wheel for wheel in WheelSpeeds.__slots__ if wheel.split("_")[1] in sides)
+            wheels = frozenset(wheel for wheel in WheelSpeeds.__struct_fields__ if wheel.split("_")[1] in sides)
         self.dead = wheels
 
     def driven(self, wheels: WheelSpeeds) -> WheelSpeeds:

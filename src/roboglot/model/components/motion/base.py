@@ -5,6 +5,8 @@ from __future__ import annotations
 from abc import abstractmethod
 from dataclasses import dataclass
 
+from msgspec import Struct
+
 from roboglot.model.components.component import Component
 from roboglot.model.errors import Blocked, Refused
 from roboglot.model.geometry import STILL, Twist
@@ -23,8 +25,7 @@ class BaseLimits:
     holonomic: bool = True
 
 
-@dataclass(frozen=True, slots=True)
-class WheelSpeeds:
+class WheelSpeeds(Struct, frozen=True, gc=False):
     """Four mecanum wheels, rad/s, positive drives forward."""
 
     front_left: float = 0.0

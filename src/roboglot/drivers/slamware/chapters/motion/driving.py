@@ -8,7 +8,9 @@ from __future__ import annotations
 import math
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
+
+from msgspec.structs import astuple
 
 from roboglot.drivers.slamware.chapters.motion.base import SlamwareBase
 from roboglot.drivers.slamware.state import ReportedState

@@ -42,7 +42,7 @@ class SpeedLimits:
         if Base in self._robot:
             base = self._robot[Base]
             speed, turning = self._configured()
-            twist = replace(self._built, x=speed or self._built.x, yaw=turning or self._built.yaw)
+            twist = Twist(speed or self._built.x, self._built.y, turning or self._built.yaw)
             base.limits = replace(base.limits, twist=twist)
 
     def _configured(self) -> tuple[float | None, float | None]:
@@ -65,5 +65,5 @@ class SpeedLimits:
         self.check(speed, turning)
         base = self._robot[Base]
         now = base.limits.twist
-        twist = replace(now, x=now.x if speed is None else speed, yaw=now.yaw if turning is None else turning)
+        twist = Twist(now.x if speed is None else speed, now.y, now.yaw if turning is None else turning)
         base.limits = replace(base.limits, twist=twist)
