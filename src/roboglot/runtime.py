@@ -187,7 +187,7 @@ class Runtime:
         return residence
 
     def _build_guard(self) -> Guard:
-        """Return who asks at all doors; its list is where robots are kept. Raises OSError, ValueError."""
+        """Return the guard of all doors; its list is stored where the robots' data are. Raises OSError, ValueError."""
         database = self.config.database
         if database and self._registry is not None and self.config.registry in ("", database):
             self._shared = self._registry

@@ -35,7 +35,7 @@ class Book:
         return identity is not None and identity.kind is kind
 
     def rights(self, robot: str, now: float, *, local: bool) -> Rights:
-        """Return who has which rights on ``robot`` at ``now`` (Unix s)."""
+        """Return the rights on ``robot`` by identity at ``now`` (Unix s)."""
         found: Rights = {LOCAL: EVERYTHING} if local else {}
         for identity in self._identities.values():
             valid = [

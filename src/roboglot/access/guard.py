@@ -112,7 +112,7 @@ class Guard:
             opened.close()
 
     def reload(self) -> None:
-        """Read the list anew: who lost a right loses it now, on open connections, too."""
+        """Reload the list: lost rights end now, on open connections, too."""
         self._adopt(self._store.snapshot())
 
     def _adopt(self, newer: Snapshot) -> None:
@@ -208,11 +208,11 @@ class RobotAdmission(Admission):
         robot.tap.listen(self._note_reply)
 
     def known(self, address: str, proof: Proof = NO_PROOF) -> str | None:
-        """Return who the client is, if that needs no work."""
+        """Return the client's identity if that takes no work."""
         return self._guard.known(address, proof)
 
     async def admit(self, address: str, proof: Proof = NO_PROOF) -> str:
-        """Return who the client is. Raises Unknown."""
+        """Return the client's identity. Raises Unknown."""
         try:
             return await self._guard.admit(address, proof)
         except Unknown as unknown:
@@ -242,7 +242,7 @@ class RobotAdmission(Admission):
         await self._guard.shut_out(name)
 
     def check(self, door: str, operation: str, right: Right | None) -> None:
-        """Raises Forbidden, and notes it, unless who asks has ``right``."""
+        """Raises Forbidden, and records it, unless the client has ``right``."""
         who = identity()
         if self._allowed.get((who, operation)) is right is not None and self._guard.requests.take(who):
             return
@@ -284,12 +284,12 @@ class RobotAdmission(Admission):
         return self._offers.get(port)
 
     def on_lost(self, listener: Callable[[str], None]) -> Callable[[], None]:
-        """Call ``listener`` with who lost a right."""
+        """Call ``listener`` with each identity that loses a right."""
         self._listeners.append(listener)
         return lambda: self._listeners.remove(listener) if listener in self._listeners else None
 
     def renew(self, book: Book, replaced: Set[str] = frozenset()) -> None:
-        """The rights are these now; who had more, or shows an old proof, is stopped and cut off."""
+        """Replace the rights; clients that lost some, or use an old proof, are stopped and disconnected."""
         before = self._rights
         self._allowed.clear()
         self._rights = book.rights(self._name, self._guard.now(), local=self._guard.config.local)

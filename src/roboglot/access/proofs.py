@@ -41,7 +41,7 @@ class Proofs:
         return self._owners.get(proof.value) if proof.kind is HTTP else self._certified(proof)
 
     async def find(self, proof: Proof, host: str) -> str:
-        """Return who shows ``proof`` from ``host``. Raises Unknown, and LockedOut after too many that were wrong."""
+        """Return the identity of ``proof`` from ``host``. Raises Unknown, and LockedOut after too many wrong ones."""
         if proof.kind is ProofKind.NONE:
             raise Unknown("say who you are: a name and password, a token, or have your address allowed")
         found = self._by_token(proof)
@@ -71,7 +71,7 @@ class Proofs:
         return name if secret and self._book.by_token(token_hash(secret)) == name else None
 
     async def _by_password(self, proof: Proof, host: str) -> str | None:
-        """Return who has this password; what is wrong counts against the host and the name. Raises LockedOut."""
+        """Return the owner of this password; a wrong one counts against the host and the name. Raises LockedOut."""
         name, password = basic_of(proof.value)
         if not self._tries.take(host):
             raise LockedOut("too many wrong passwords and tokens from your address: wait a minute")

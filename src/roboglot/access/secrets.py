@@ -1,4 +1,4 @@
-"""Passwords and tokens, as they are kept: never in a form that lets anybody in."""
+"""Passwords and tokens as stored: never in a form that grants access."""
 
 from __future__ import annotations
 

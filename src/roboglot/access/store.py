@@ -45,7 +45,7 @@ class Grant:
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """One who may come in. ``password`` and ``token`` are what is kept of them, not what lets in."""
+    """An identity. ``password`` and ``token`` are their stored forms, which grant no access."""
 
     name: str
     kind: Kind
@@ -128,7 +128,7 @@ class AccessStore:
         return name
 
     def put(self, identity: Identity) -> None:
-        """Let it in, in place of who had this name. Raises ValueError."""
+        """Add it, replacing the identity of this name. Raises ValueError."""
         _checked(identity)
         self._database.run_now(lambda connection: _put(connection, identity))
 

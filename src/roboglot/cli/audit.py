@@ -27,7 +27,7 @@ def command(
         str, typer.Option(envvar="ROBOGLOT_DATABASE", help="In place of the folder's: postgresql://host/name.")
     ] = "",
 ) -> None:
-    """Print the rows, oldest first. They are there for robots that ask who drives them (--access)."""
+    """Print the rows, oldest first. Robots with access control (--access) have them."""
     folder = data or Config().data
     if not database and not (folder / FILE).exists():
         sys.exit(f"roboglot audit: there is none in {folder}: robots keep one with --access")

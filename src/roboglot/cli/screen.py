@@ -13,7 +13,7 @@ from roboglot.protocols.door import Endpoint
 
 
 def warn_if_open(config: Config) -> None:
-    """Say in red, on standard error, what is open to whom; nothing for robots on loopback, or that ask who comes."""
+    """Print in red, on standard error, what is open to whom; nothing for robots on loopback or with access control."""
     if config.access.on:
         return
     console = Console(stderr=True, highlight=False, soft_wrap=True)

@@ -1,4 +1,4 @@
-"""The console as an ASGI application: pages, the interface for scripts, the live socket. Checks who asks first."""
+"""The console as an ASGI application: pages, the interface for scripts, the live socket. Checks the client first."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ class Application:
         task.add_done_callback(self._ending.discard)
 
     async def _stop(self, name: str) -> None:
-        """End every program and motion of a robot; who asks has been found to be its teacher. Raises RobotError."""
+        """End every program and motion of a robot; the caller is its teacher. Raises RobotError."""
         await end_all(self._desk, name)
 
     def _refusal(self, scope: Scope, method: str) -> str:

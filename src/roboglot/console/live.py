@@ -80,7 +80,7 @@ class Page:
     """One open page."""
 
     def __init__(self, desk: Desk, send: Send, named: str) -> None:
-        """``named``: who the client showed to be; it may call itself anything where that is empty."""
+        """``named``: the client's proven identity; if it is empty, the client may choose any name."""
         self._desk, self._send, self._named = desk, send, named
         self._source = f"{CLIENT} page {next(_numbers)}"
         self._client = client()

@@ -30,7 +30,7 @@ async def start(desk: Desk, name: str, source: str) -> dict[str, object]:
 
 
 async def end_all(desk: Desk, name: str) -> None:
-    """End every program and motion of a robot; who asks may do so. Raises NotFound, RobotError."""
+    """End every program and motion of a robot; the caller's right has been checked. Raises NotFound, RobotError."""
     robot = desk.robots.get(name)
     if robot is None:
         raise NotFound(f"there is no robot {name!r}")

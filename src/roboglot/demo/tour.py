@@ -83,7 +83,7 @@ class Tour:
         return all(agreed)
 
     async def picture(self, path: Path, title: str) -> None:
-        """Draw the map that the robot made, and who drove where."""
+        """Draw the robot's map and the clients' tracks."""
         explored = decode_explore_map(await self._rest.map())
         grid = OccupancyGrid(-explored.cells, explored.resolution, Point(explored.x, explored.y))
         tracks: dict[str, Track] = {name.partition(":")[0]: track for name, track in self._tracks.items()}

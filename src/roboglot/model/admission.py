@@ -47,7 +47,7 @@ class LockedOut(Unknown):
 
 
 class Admission:
-    """For one robot: this one lets everybody in who reaches its doors, and everybody may do everything."""
+    """Admission to one robot. This base class admits every client, with all rights."""
 
     asks = False
     connections_max = 0  # per address, where ``asks``
@@ -99,5 +99,5 @@ class Admission:
         return None
 
     def on_lost(self, listener: Callable[[str], None]) -> Callable[[], None]:
-        """Call ``listener`` with who lost a right; returns what ends that."""
+        """Call ``listener`` with each identity that loses a right; returns a function that ends this."""
         return lambda: None

@@ -37,7 +37,7 @@ def connection() -> str:
 
 
 def identity() -> str:
-    """Return who it is, as admitted; empty: no client asked, the robot or a program acts by itself."""
+    """Return the client's admitted identity; empty if no client is acting: the robot or a program acts by itself."""
     return _identity.get()
 
 

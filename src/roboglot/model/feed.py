@@ -111,7 +111,7 @@ class Feed(Generic[T]):
         return viewer
 
     def push(self, item: T) -> None:
-        """Hand ``item`` to everybody who looks."""
+        """Give ``item`` to every viewer."""
         joinable = self._joinable(item)
         for viewer in tuple(self._viewers):
             viewer._push(item, joinable)

@@ -250,7 +250,7 @@ class Stage(ABC):
 
     @abstractmethod
     def remove_person(self, name: str) -> None:
-        """Take a person away. Raises NotFound; ValueError for one who wears a gadget."""
+        """Remove a person. Raises NotFound; ValueError if the person wears a gadget."""
 
     @abstractmethod
     def move_thing(self, name: str, position: Vector3) -> None:

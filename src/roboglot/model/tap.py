@@ -78,7 +78,7 @@ NO_ANSWER = _Answer()
 
 
 class Tap:
-    """One robot's exchanges. ``watched`` says whether anybody follows; doors look at it first."""
+    """One robot's exchanges. ``watched`` is True while there is a viewer; doors check it first."""
 
     def __init__(self, robot: str, clock: Clock) -> None:
         self.watched = False

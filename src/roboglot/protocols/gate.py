@@ -82,7 +82,7 @@ class Gate:
             self._leave = None
 
     def enter(self, transport: asyncio.Transport, port: Port) -> str | None:
-        """Return who is at the other end, its host where that is not known; None: it may not come in."""
+        """Return the client's identity, or its host if unknown; None if it is not admitted."""
         peer = transport.get_extra_info("peername") or ("", 0)
         address, admission = f"{peer[0]}:{peer[1]}", self._admission
         who = admission.known(address)

@@ -123,7 +123,7 @@ class Opening:
             self._authenticate(protocol, request, channel, headers.get("authorization", ""))
 
     def _authenticate(self, protocol: ServerProtocol, request: Request, channel: Channel, authorization: str) -> None:
-        """Find out who it is, in the background where that is not known at once."""
+        """Identify the client, in the background if that takes time."""
         proof = Proof(ProofKind.HTTP, authorization) if authorization else NO_PROOF
         who = self._entrance.admission.known(self._name, proof)
         if who is not None:

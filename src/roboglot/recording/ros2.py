@@ -48,7 +48,7 @@ class _Battery(TypedDict, total=False):
 
 
 class RosMessage(NamedTuple):
-    """One message; ``kept``: who comes late gets the last one (transient local)."""
+    """One message; ``kept``: late subscribers get the last one (transient local)."""
 
     topic: str
     type: str

@@ -83,7 +83,7 @@ class _Ends:
         self._seen: set[bytes] = set()
 
     def note(self, record: Record) -> None:
-        """Remember who says it."""
+        """Remember its sender."""
         if record.schema in SAID and (found := ADDRESS.search(str(record.json()["connection"]).encode())):
             self._seen.add(found[0])
 

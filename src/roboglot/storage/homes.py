@@ -147,7 +147,7 @@ def _locked(connection: Connection, silent: Mapping[str, int], holder: str = "")
 
 
 def _take(connection: Connection, robot: str, address: str, holder: str, free: Collection[str]) -> int:
-    """Return the new epoch; 0 if a holder has it who is none of those in ``free``."""
+    """Return the new epoch; 0 if another holder than those in ``free`` has it."""
     marks = ", ".join("?" * len(free))
     taken = connection.execute(
         "UPDATE robot_home SET holder=?, address=?, epoch=epoch+1, gateway='', certificate=''"

@@ -239,7 +239,7 @@ class TlsCall(TlsEnd):
         self._shake_hands(0)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Notify the inner protocol, and who waits."""
+        """Notify the inner protocol and the waiter."""
         super().connection_lost(exc)
         if not self.over.done():
             self.over.set_exception(ConnectionError(f"no TLS with {self._host}: {exc or 'it hung up'}"))

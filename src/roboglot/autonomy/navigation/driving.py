@@ -159,7 +159,7 @@ class OdometryDriving(Driving):
             self._brake()
 
     def _check_free(self, command: Twist | WheelSpeeds) -> None:
-        """Raise at once what the base would refuse with: who drives by hand waits for no end."""
+        """Raise the base's refusal at once: manual driving does not wait for the end of an action."""
         if (refusal := self._robot[Base].refusal) is not None:
             raise type(refusal)(*refusal.args)
         self._robot[Base].check_free(command)

@@ -104,7 +104,7 @@ class Lookout:
         self.blocked = blocked
 
     def _mind_others(self, follower: Follower, pose: Pose, path: NDArray[np.float64]) -> None:
-        """Stop for what moves and for who goes first, and tell them where this one goes."""
+        """Stop for moving objects and for robots that go first, and announce this robot's route."""
         traffic = self._traffic
         free = follower.along + traffic.free(path, pose, follower.speed, self._planner.radius)
         follower.stop_at = min(follower.stop_at, free)

@@ -71,7 +71,7 @@ class RestrictedAreas:
                 self._held = action, name
 
     def _wait(self, areas: Mapping[str, Area], now: float) -> None:
-        """Go on as soon as there is room, which is then claimed before anybody else can."""
+        """Continue as soon as there is room, and claim it first."""
         assert self._held is not None
         action, name = self._held
         area = areas.get(name)

@@ -62,7 +62,7 @@ class ScanReader:
         self._directions = (np.empty(0), np.empty(0))  # x and y components of each ray
 
     def read(self, scan: LaserScan) -> ScanPoints:
-        """The scan's points, computed once for all who ask; none if hardly a ray came back."""
+        """The scan's points, computed once; none if hardly a ray returned."""
         if self._last is None or self._last[0] is not scan:
             self._last = scan, self._compute(scan)
         return self._last[1]

@@ -1,4 +1,4 @@
-"""Going aside for who goes first, or for who stands face to face, and waiting there until they have passed."""
+"""Moving aside for robots that go first or stand face to face, and waiting until they have passed."""
 
 from __future__ import annotations
 

@@ -71,7 +71,7 @@ class Traffic:
     # -- others --------------------------------------------------------------------------------------------------------
 
     def observe(self, echoes: Points, pose: Pose, stamp: float) -> None:
-        """Look where everybody goes; ``echoes`` (n, 2; map) in the order of the scan."""
+        """Track the motion of others; ``echoes`` (n, 2; map) in the order of the scan."""
         if not self._trail or self._trail[-1].distance_to(pose) > TRAIL_STEP:
             self._trail.append(pose.point)
         heard = self._announcer.heard(stamp)
@@ -101,7 +101,7 @@ class Traffic:
         return other.stamp - self._went.get(other.robot, -math.inf) <= LIVELY
 
     def _expected(self, mover: Mover, pose: Pose, stamp: float, *, inside: bool) -> Way:
-        """Way of one that is not heard: who is where two cannot pass goes first, if the robot is not."""
+        """Route of a robot that announces none: it goes first if it is in a narrow place and this robot is not."""
         stood = stamp - mover.moved_at
         if not inside and stood <= STOPPED:
             points = straight_on(mover, THROUGH)
@@ -166,7 +166,7 @@ class Traffic:
         return self._narrow.at(self._belief.map, path, self._robot.clock.time())
 
     def shunned(self) -> list[tuple[Points, float]]:
-        """Ways, and the metres around them, that are better not driven along: of who goes first, or is unheard of."""
+        """Routes to avoid, with the metres around them: of robots that go first or announce nothing."""
         mine = self._robot.description.radius
         return [
             (way.points if way.outranks else shifted(way), mine + way.radius + CLEAR)
@@ -175,7 +175,7 @@ class Traffic:
         ]
 
     def to_leave(self) -> list[tuple[Points, float]]:
-        """Ways that who gives way must be beside, with the metres."""
+        """Routes that a robot giving way must leave clear, with the metres."""
         mine = self._robot.description.radius
         return [(way.points, mine + way.radius + 2 * CLEAR) for way in self._ways if way.outranks or not way.name]
 

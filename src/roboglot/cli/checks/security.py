@@ -38,7 +38,7 @@ def examine_security(config: Config) -> Iterator[Finding]:
 
 
 def reach_of(address: str) -> str:
-    """Return who can reach what listens at this address."""
+    """Return which clients can reach this address."""
     if is_loopback(address):
         return "programs on this machine"
     return "every network of this machine" if address in ("0.0.0.0", "::") else f"the network of {address}"

@@ -49,7 +49,7 @@ class Asked(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Session(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Requests of one connection, and who published what they are answered."""
+    """Requests of one connection, and the source of their answers."""
 
     door: str
     source: str

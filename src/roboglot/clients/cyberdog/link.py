@@ -148,7 +148,7 @@ class Link:
         await self._server.start()
 
     async def close(self) -> None:
-        """Hang up in both directions. Who stops waiting for it stops nothing, and may come again."""
+        """Hang up in both directions. Cancelling the wait stops nothing; it may be called again."""
         server, self._server = self._server, None
         if server:
             self._stopping = asyncio.ensure_future(server.stop(None))

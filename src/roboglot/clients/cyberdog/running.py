@@ -136,6 +136,6 @@ class RunningTask:
 
 
 def _noticed(reading: asyncio.Task[None]) -> None:
-    """Mark the error as retrieved: ``succeeded`` raises it for those who wait."""
+    """Mark the error as retrieved: ``succeeded`` raises it for its callers."""
     if not reading.cancelled():
         reading.exception()

@@ -59,7 +59,7 @@ class _Connection(asyncio.Protocol):
             self._fail(BadAnswer(f"not HTTP: {error.__context__ or error}"))
 
     async def ask(self, head: bytes, body: bytes) -> Answer:
-        """Send a request and wait for the answer; who stops waiting closes the connection."""
+        """Send a request and wait for the answer; cancelling the wait closes the connection."""
         assert self.transport is not None
         self._parser, self._answer, self._head_bytes = httptools.HttpResponseParser(self), Answer(), 0
         self._waiting = asyncio.get_running_loop().create_future()

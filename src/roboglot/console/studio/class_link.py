@@ -79,7 +79,7 @@ class Stopped(msgspec.Struct, tag=True, frozen=True):
 
 
 class Shows(msgspec.Struct, tag=True, frozen=True):
-    """Message to the classroom: one who signs in shows a class's code."""
+    """Message to the classroom: a pupil signs in with a class's code."""
 
     id: int
     code: str
@@ -157,7 +157,7 @@ class LinkedRoom:
         self.send(Closed(code))
 
     async def admit(self, code: str, name: str) -> Place:
-        """Return where one who shows a class's code is to be. Raises NotFound, Refused."""
+        """Return the world of a pupil with a class's code. Raises NotFound, Refused."""
         if len(self._admitting) >= ADMITTING_MAX:
             raise Refused("too many sign in at once")
         self._next += 1

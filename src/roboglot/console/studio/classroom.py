@@ -50,7 +50,7 @@ class Place:
 
 @dataclass(slots=True)
 class Pupil:
-    """One who has joined; ``seat`` is None while the page is away."""
+    """A pupil who has joined; ``seat`` is None while the page is away."""
 
     name: str
     world: str = ""
@@ -136,7 +136,7 @@ class Room(Protocol):
         """End a class, with what was handed in."""
 
     async def admit(self, code: str, name: str) -> Place:
-        """Return where one who shows a class's code is to be. Raises NotFound, Refused."""
+        """Return the world of a pupil with a class's code. Raises NotFound, Refused."""
 
 
 class Classroom:
@@ -199,7 +199,7 @@ class Classroom:
             await asyncio.to_thread(self._files.end, code)
 
     async def admit(self, code: str, name: str, at: str = "") -> Place:
-        """Return where one who shows a class's code at a world's sign-in is to be. Raises NotFound, Refused."""
+        """Return the world of a pupil who signs in at some world with a class's code. Raises NotFound, Refused."""
         joined = self.find(code)
         seconds = joined.until - self.now()
         if seconds <= 0.0:

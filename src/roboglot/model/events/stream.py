@@ -68,7 +68,7 @@ class Subscription(Generic[E_]):
 
 
 class EventStream:
-    """Hands every event to those who asked for its type."""
+    """Delivers every event to the subscribers of its type."""
 
     def __init__(self) -> None:
         self._subscriptions: list[Subscription[Event]] = []

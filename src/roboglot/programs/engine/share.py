@@ -17,13 +17,13 @@ T = TypeVar("T")
 SHARE_MAX = 0.2
 """Of the server's thread, for all programs together."""
 BURST = 0.1
-"""Seconds worth of the share that may be taken before anybody waits; in turns nevertheless."""
+"""Seconds of the share that may be used in advance without waiting; programs still take turns."""
 LIGHT_BURST = 0.02
 """Seconds worth of LIGHT that a program may take before it has to queue."""
 STEP = 0.0005
 """Seconds of work after which the others get their turn."""
 GAP = 0.0005
-"""Seconds between two turns, in which everybody else is looked after."""
+"""Seconds between two turns, for all other work."""
 LIGHT = 0.05
 """Of the server's thread: a program that takes less does not queue, however many others do."""
 

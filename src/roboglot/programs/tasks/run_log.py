@@ -43,7 +43,7 @@ class RunLog:
         meter.stop()
 
     async def _let_readers_catch_up(self) -> None:
-        """Wait for those who follow the log, and no longer than the program lives."""
+        """Wait for readers of the log, at most while the program runs."""
         self._catching_up = asyncio.ensure_future(self.pace.wait())
         await asyncio.wait((self._catching_up,))
         self._catching_up = None

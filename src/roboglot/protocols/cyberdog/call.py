@@ -29,7 +29,7 @@ class Call:
     began: float | None = None  # robot time at which followers were notified
 
     def refused(self, answer: Answer, why: str) -> Answer:
-        """Return ``answer``, which says no; ``why`` is for the log and who watches the exchange."""
+        """Return ``answer``, a refusal; ``why`` is for the log and for viewers of the exchange."""
         self.why = why
         return answer
 

@@ -66,7 +66,7 @@ async def answer(call: Call) -> object | None:
 
 
 async def _outcome(call: Call) -> object | None:
-    """Return the last answer, of the robot or of another who answers in its place."""
+    """Return the last answer, of the robot or its stand-in."""
     if (stand_in := call.context.robot.stand_in) is None:
         return await _answered(call)
     try:

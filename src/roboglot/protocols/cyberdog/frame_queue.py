@@ -45,7 +45,7 @@ class _Rank(IntEnum):
 
 @dataclass(slots=True, order=True)
 class _Frame:
-    """One that waits; ordered by who goes first."""
+    """A queued frame; ordered by precedence."""
 
     rank: _Rank
     number: int

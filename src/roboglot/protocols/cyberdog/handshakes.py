@@ -103,7 +103,7 @@ def _own(address: str) -> IPAddress | None:
 
 
 def _peers(own: IPAddress | None, port: int) -> dict[str, str]:
-    """Return who is connected there, or was a moment ago, as gRPC writes it; and the connection's state."""
+    """Return the peer of that connection, also a recent one, in gRPC's form, and the connection's state."""
     peers: dict[str, str] = {}
     for table in TABLES:
         try:

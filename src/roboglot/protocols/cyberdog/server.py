@@ -288,7 +288,7 @@ class _Service(GrpcAppServicer):
             await pay(admission.spend(identity() or host_of(peer), size))
 
     async def _enter(self, rpc: grpc.aio.ServicerContext, peer: str) -> None:
-        """From here on it is asked for who calls; only who may see becomes the app that the robot talks to."""
+        """Act for the caller from here on; only one with the right to see becomes the robot's app."""
         admission, app = self._context.robot.admission, self._context.app
         if not admission.asks:
             app.seen(peer)
@@ -317,7 +317,7 @@ def _as_client(store: CertificateStore) -> object:
 
 
 def _as_server(store: CertificateStore, handshakes: Handshakes) -> object:
-    """Return how it proves itself to who calls, and whom it lets in; looked up again at every connection."""
+    """Return its certificates and those that it accepts; read again at every connection."""
 
     def configured(proof: Certificates) -> object:
         return grpc.ssl_server_certificate_configuration(((proof.key, proof.certificate),), proof.callers)

@@ -42,7 +42,7 @@ _speaker: ContextVar[str] = ContextVar("speaker", default="nobody")
 
 
 def speak_as(name: str, identity: str = "") -> None:
-    """From here on, what this task commands was commanded by ``name``, who showed to be ``identity``."""
+    """Attribute this task's commands to ``name`` with the proven ``identity`` from here on."""
     _speaker.set(name)
     ask_for(f"robomaster {identity or name}", name, identity)
 
@@ -57,7 +57,7 @@ class Outlets(Protocol):
         """A datagram for the client at ``host``."""
 
     def tell(self, event: bytes) -> None:
-        """An event for everybody on the event port."""
+        """Send an event to all readers of the event port."""
 
 
 class Context:

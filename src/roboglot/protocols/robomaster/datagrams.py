@@ -35,5 +35,5 @@ class Datagrams:
 
 
 def broadcast_address(address: str) -> str:
-    """Return where everybody hears it who shares a network with ``address``."""
+    """Return the broadcast address of the network of ``address``."""
     return "127.255.255.255" if IPv4Address(address).is_loopback else "255.255.255.255"

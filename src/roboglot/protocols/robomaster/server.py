@@ -151,14 +151,14 @@ class RoboMasterDoor:
             self._datagrams.send(datagram, host, self._config.push_port)
 
     def tell(self, event: bytes) -> None:
-        """An event to everybody on the event port, and down the serial line."""
+        """Send an event to all readers of the event port and down the serial line."""
         self._note(event, f"event port {self._config.event_port}")
         self._events.tell(event)
         if self._serial:
             self._serial.write(event + LINE_END)
 
     def _play(self, operation: str, message: bytes) -> None:
-        """Send what a stand-in pushes: events to who reads them, the rest to every client's host."""
+        """Send a stand-in's pushes: events to their readers, the rest to every client's host."""
         if operation.endswith(" event"):
             self.tell(message)
         elif operation != "> robot ip":  # this robot is elsewhere and reports it itself

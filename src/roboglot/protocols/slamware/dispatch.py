@@ -158,7 +158,7 @@ class Application:
         )
 
     async def _enter(self, scope: Scope, peer: tuple[str, int]) -> None:
-        """From here on it is asked for who the client showed to be. Raises HttpError 401: unknown client."""
+        """Act for the client's proven identity from here on. Raises HttpError 401: unknown client."""
         address = f"{peer[0]}:{peer[1]}"
         shown = next((value.decode("latin-1") for name, value in scope["headers"] if name == b"authorization"), "")
         proof = Proof(ProofKind.HTTP, shown) if shown else NO_PROOF

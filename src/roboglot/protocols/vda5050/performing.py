@@ -37,7 +37,7 @@ class Performing(Protocol):
 
 
 async def ended(action: RobotAction) -> None:
-    """Wait until what the robot does for an action has succeeded; it is cancelled with who waits."""
+    """Wait until the robot's part of an action has succeeded; cancelling the wait cancels it."""
     try:
         await action.succeeded()
     finally:

@@ -138,7 +138,7 @@ class Dispatch:
 
 
 def _right_of(request: Request) -> Right | None:
-    """Return what a front end needs for a frame: looking is free to all who see."""
+    """Return the right that a frame needs: inquiries only need the right to see."""
     operation = TABLE.get(key_of(request))
     return operation.right if operation else Right.ADMIN
 

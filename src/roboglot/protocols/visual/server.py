@@ -131,7 +131,7 @@ class VisualDoor:
         return {path: noted(channel, outside, self.name, path) for path, channel in found.items()}
 
     def _end_programs_of(self, who: str) -> None:
-        """End the programs of those who lost a right: what they run might count on it."""
+        """End the programs of clients that lost a right: they might depend on it."""
         ending = self._service.end_of(who, f"{who} lost rights on this robot")
         task = asyncio.create_task(ending, name=f"end programs of {who}")
         self._recording.add(task)

@@ -31,7 +31,7 @@ class SidePaths:
         self._leave: Callable[[], None] = lambda: None
 
     def start(self) -> None:
-        """Send what programs print to all who read the log."""
+        """Send the output of programs to all readers of the log."""
         self._leave = self._service.log_entries.join(self._logged)
 
     def close(self) -> None:
@@ -53,7 +53,7 @@ class SidePaths:
         }
 
     def print(self, line: str) -> None:
-        """Send one line of a log to all who read there."""
+        """Send one line of a log to all its readers."""
         if self._service.robot.tap.watched:
             self._service.robot.tap.push(DOOR, READERS, LOG, line)
         for send in tuple(self._readers):
@@ -66,7 +66,7 @@ class SidePaths:
     def _noted(
         self, path: str, answer: Callable[[str, Send], Awaitable[None]]
     ) -> Callable[[str, Send], Awaitable[None]]:
-        """Have those who follow the robot hear of it, and another answer where one stands in for the robot."""
+        """Report it to the robot's followers, and let a stand-in answer if there is one."""
 
         async def receive(text: str, send: Send) -> None:
             tap, stand_in = self._service.robot.tap, self._service.robot.stand_in

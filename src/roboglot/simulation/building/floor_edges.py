@@ -49,7 +49,7 @@ class Footing:
         self._shaft = shaft_of(world.lift) if world.lift else None
 
     def ends_near(self, x: float, y: float, floor: int, elevation: float, reach: float) -> bool:
-        """True if the floor may end within ``reach`` m of one who stands so high: quick, for a first look."""
+        """True if the floor may end within ``reach`` m at this elevation: a quick first check."""
         edge = self._edges[floor]
         if edge is not None and not (
             edge.x + reach <= x <= edge.x + edge.width - reach and edge.y + reach <= y <= edge.y + edge.depth - reach
@@ -70,11 +70,11 @@ class Footing:
         return nearest
 
     def carries(self, elevation: float) -> bool:
-        """True if the lift's car is what one stands on who stands so high (m), between two floors."""
+        """True if the ground at this elevation (m) is the lift's car between two floors."""
         return self._lift is not None and abs(self._lift.elevation - elevation) <= STEP
 
     def missing(self, x: float, y: float, floor: int, elevation: float) -> bool:
-        """True if there is nothing to stand on for one who stands so high (m)."""
+        """True if there is no ground at this elevation (m)."""
         edge = self._edges[floor]
         if edge is not None and edge.distance_to(x, y) > 0.0:
             return True

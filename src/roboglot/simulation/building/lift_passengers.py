@@ -19,7 +19,7 @@ SILL = 0.05  # m in front of and behind the door that must be free as well
 
 
 class Car(Protocol):
-    """The lift's car, as who rides in it sees it."""
+    """The lift's car, as its passengers see it."""
 
     @property
     def section(self) -> Lift:

@@ -124,7 +124,7 @@ def see_robots(glance: Glance) -> list[RobotSeen]:
 
 
 def _everybody(glance: Glance) -> Iterator[_Somebody]:
-    """Return those who are seen, nearest first."""
+    """Return the people in sight, nearest first."""
     near = []
     for walker in glance.around.walkers:
         away = math.dist((walker.pose.x, walker.pose.y), glance.view.at[:2])

@@ -101,7 +101,7 @@ class Stage:
         return self._floors[number]
 
     def _figures(self, number: int, viewer: Hull, sector: _Sector) -> Iterator[Figure]:
-        """All who are in the sector, and others; robots, with all that they carry, take long to look at."""
+        """All objects in the sector, and possibly more; testing robots with their fittings takes long."""
         yield from self._people(number)
         yield from self._robots(number, viewer, sector)
         yield from self._loose(number)

@@ -9,7 +9,7 @@ from roboglot.simulation.building.blueprint import Solid
 
 
 def overlap(a: Solid, b: Solid) -> bool:
-    """True if a point lies in both; who only touches does not."""
+    """True if a point lies inside both; touching does not count."""
     if a.base >= b.base + b.size[2] or b.base >= a.base + a.size[2]:
         return False
     away = a.pose.distance_to(b.pose)

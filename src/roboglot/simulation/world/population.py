@@ -71,7 +71,7 @@ class Population:
         raise NotFound(f"no person here is named {name!r}")
 
     def add_walker(self, pose: Pose, floor: int, name: str) -> Walker:
-        """Put a person there who is in no file. Raises ValueError for a name that is taken, or too many."""
+        """Add a person who is not in the world file. Raises ValueError for a taken name, or too many."""
         body = self.physics.spare_person({walker.body for walker in self.walkers})
         if any(walker.key == (name or body) for walker in self.walkers):
             raise ValueError(f"there is a person {name or body} already")

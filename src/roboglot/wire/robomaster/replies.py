@@ -69,7 +69,7 @@ class Profile:
         return f"game msg push {list(numbers)};".encode()
 
     def broadcast(self, address: str) -> bytes:
-        """``robot ip 192.168.1.102``: where the robot is, for who looks for it."""
+        """``robot ip 192.168.1.102``: the robot's address, for clients that search for it."""
         return _joined(f"robot ip {address}", None, self.broadcast_end)
 
     def _numbers(self, values: Sequence[Number | str]) -> str:

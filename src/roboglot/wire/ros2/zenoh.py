@@ -58,5 +58,5 @@ def mangled(name: str) -> str:
 
 
 def attachment(sequence: int, at: int, gid: bytes) -> bytes:
-    """Return what comes beside a message: its number, its time (ns since 1970), and who sends it (16 bytes)."""
+    """Return a message's attachment: number, time (ns since 1970) and sender (16 bytes)."""
     return _ATTACHMENT.pack(sequence, at, len(gid), gid)

@@ -20,7 +20,7 @@ class EmergencyStop(Component):
 
     @abstractmethod
     def engage(self) -> None:
-        """Stop at once; who drives is cancelled."""
+        """Stop at once; running drives are cancelled."""
 
     @abstractmethod
     def release(self) -> None:

@@ -103,7 +103,7 @@ async def add_personnel(session: Session, preset_name: str = "") -> Record:
 
 @ABILITIES.on("cyberdog.follow.delete_personnel")
 async def delete_personnel(session: Session, preset_name: str = "") -> Record:
-    """Take that back; who is being followed is followed no more."""
+    """Revert it; following ends."""
     following = session.part(FollowedMember)
     if preset_name not in following.people:
         return state(StateCode.FAIL, f"{preset_name!r} was not added")

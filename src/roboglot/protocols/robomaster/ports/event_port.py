@@ -23,7 +23,7 @@ class Readers:
         self._transports: set[asyncio.Transport] = set()
 
     def __bool__(self) -> bool:
-        """Return whether anybody reads."""
+        """Return whether there is a reader."""
         return bool(self._transports)
 
     def connect(self) -> asyncio.Protocol:
@@ -31,7 +31,7 @@ class Readers:
         return _Reader(self._transports)
 
     def tell(self, message: bytes) -> None:
-        """One write to each; who lets EVENT_BACKLOG_MAX bytes wait is cut off."""
+        """Write once to each reader; one with EVENT_BACKLOG_MAX unread bytes is disconnected."""
         for transport in tuple(self._transports):
             if transport.get_write_buffer_size() > EVENT_BACKLOG_MAX:
                 log.warning("robomaster: disconnected a client that does not read its events")

@@ -58,7 +58,7 @@ async def _items(robot: Robot, request: Request) -> list[Item]:
 
 
 def _people(members: Members, kind: str) -> list[Item]:
-    """``kind`` is personnel (everybody), face or voiceprint (who has entered one). Never 2: entering goes unnoticed."""
+    """``kind`` is personnel (all members), face or voiceprint (members with one). Never 2: entering is not observed."""
     people = [
         {
             "id": str(member.id),

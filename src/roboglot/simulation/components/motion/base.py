@@ -92,7 +92,7 @@ class SimulatedBase(Base):
 
     @property
     def refusal(self) -> Refused | None:
-        """The first lock but the legs': who starts to drive makes them stand up."""
+        """The first lock except that of the legs, which stand up when a drive starts."""
         return self.locks.first(but=LEGS)
 
     @property

@@ -148,7 +148,7 @@ class SimulatedLegs(Legs):
         await self._torso.follow(track, action, self._clock, LOOK)
 
     async def _brake(self) -> None:
-        """Return when the wheels stand still; who cancels meanwhile finds the robot standing as before."""
+        """Return when the wheels stand still; if cancelled meanwhile, the robot stands as before."""
         self._base.locks.lock(LEGS, "the robot changes its posture")
         try:
             while self._base.velocity != STILL:

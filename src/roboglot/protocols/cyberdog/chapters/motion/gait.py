@@ -82,7 +82,7 @@ class Gaits:
 
     @property
     def motion(self) -> int:
-        """The number of what the body does now, no matter who commanded it."""
+        """The number of the body's present motion, no matter who commanded it."""
         if Legs in self._robot and (figure := self._robot[Legs].performing):
             return NUMBERS.get(figure, int(Motion.STAND_UP))
         if self.posture is not Posture.CHANGING and (state := entered(self._robot)):

@@ -31,7 +31,7 @@ class Pursuit:
         self._seen: tuple[PersonSeen, ...] = ()
 
     async def watch(self) -> None:
-        """Push who is seen, until cancelled."""
+        """Push the people in sight until cancelled."""
         reported_at = -PERIOD
         with self._robot[Vision].people.subscribe() as sightings:
             async for sighting in sightings:
