@@ -77,7 +77,13 @@ function paint(canvas, scene, path) {
   pen.fillStyle = c.box;
   for (const [x, y, w, d] of scene.boxes) { const [px, py] = at(x - w / 2, y + d / 2); pen.fillRect(px, py, w * scale, d * scale); }
   pen.strokeStyle = c.goal; pen.fillStyle = c.goal; pen.lineWidth = 3;
-  scene.goals.forEach(([x, y], i) => { const [px, py] = at(x, y); pen.beginPath(); pen.arc(px, py, 9, 0, 7); pen.stroke(); pen.font = "bold 16px sans-serif"; pen.fillText(String(i + 1), px + 12, py - 8); });
+  scene.goals.forEach(([x, y], i) => { // flags, with numbers where there are several
+    const [px, py] = at(x, y);
+    pen.beginPath(); pen.moveTo(px, py); pen.lineTo(px, py - 32); pen.stroke();
+    pen.beginPath(); pen.moveTo(px, py - 34); pen.lineTo(px + 24, py - 25); pen.lineTo(px, py - 16); pen.fill();
+    pen.beginPath(); pen.arc(px, py, 5, 0, 7); pen.fill();
+    if (scene.goals.length > 1) { pen.font = "bold 16px sans-serif"; pen.fillText(String(i + 1), px + 9, py); }
+  });
   pen.strokeStyle = c.path; pen.lineWidth = 4; pen.beginPath();
   path.forEach(([x, y], i) => { const [px, py] = at(x, y); if (i) pen.lineTo(px, py); else pen.moveTo(px, py); });
   pen.stroke();
