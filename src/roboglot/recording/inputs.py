@@ -115,8 +115,9 @@ class Inputs:
                     await self._see(given)
             case outside.CALLED_OFF:
                 place = given.robot, given.name, given.connection
-                asked = given.values.get("operation"), given.values.get("asked")
-                if (call := self._calls.pop((place, *asked), None)) is not None:  # type: ignore[arg-type]
+                code, began = given.values.get("operation"), given.values.get("asked")
+                called = place, str(code), began if isinstance(began, float) else 0.0
+                if (call := self._calls.pop(called, None)) is not None:
                     call.cancel()
                     await self._see(given)
             case _:

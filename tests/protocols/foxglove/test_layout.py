@@ -1,4 +1,4 @@
-"""The layout that ships shows and drives what the door has."""
+"""The layouts that ship show and drive what the door has, in panels that each app has."""
 
 from __future__ import annotations
 
@@ -6,18 +6,31 @@ import json
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from roboglot.protocols.foxglove.chapters.publishing import TOPICS
 from tests.protocols.foxglove.conftest import Scene
 
-LAYOUT = Path(__file__).parents[3] / "examples" / "foxglove" / "layout.json"
+FOLDER = Path(__file__).parents[3] / "examples" / "foxglove"
+LAYOUT, LICHTBLICK = FOLDER / "layout.json", FOLDER / "lichtblick.json"
+TEXTS = {path: path.read_text(encoding="utf-8") for path in (LAYOUT, LICHTBLICK)}
+PANELS = {"3D", "Image", "Teleop", "Plot", "RawMessages"}  # of both apps; Lichtblick's list has no Parameters
 
 
 def panels(node: Any) -> set[str]:
     return {node} if isinstance(node, str) else panels(node["first"]) | panels(node["second"])
 
 
-async def test_its_topics_are_there(scene: Scene) -> None:
-    layout = json.loads(LAYOUT.read_text(encoding="utf-8"))
+@pytest.mark.parametrize(("file", "more"), [(LAYOUT, {"Parameters"}), (LICHTBLICK, set())])
+def test_each_app_knows_the_panels(file: Path, more: set[str]) -> None:
+    configs = json.loads(TEXTS[file])["configById"]
+    assert {name.partition("!")[0] for name in configs} == PANELS | more
+
+
+@pytest.mark.parametrize("file", [LAYOUT, LICHTBLICK])
+async def test_its_topics_are_there(scene: Scene, file: Path) -> None:
+    layout = json.loads(TEXTS[file])
+    assert set(layout) == {"configById", "layout", "globalVariables", "userNodes", "playbackConfig"}
     configs = layout["configById"]
     assert panels(layout["layout"]) == set(configs)
     three = configs["3D!robot"]
@@ -38,7 +51,7 @@ async def test_its_topics_are_there(scene: Scene) -> None:
 
 
 async def test_camera_is_there_and_films_only_for_viewers(scene: Scene) -> None:
-    topic = json.loads(LAYOUT.read_text(encoding="utf-8"))["configById"]["Image!camera"]["imageMode"]["imageTopic"]
+    topic = json.loads(TEXTS[LAYOUT])["configById"]["Image!camera"]["imageMode"]["imageTopic"]
     viewer = await scene.connect()
     number = await viewer.subscribe(topic)
     assert viewer.channels[topic]["schemaName"] == "foxglove.CompressedVideo"

@@ -86,8 +86,8 @@ def configuration(recording: Recording, folder: Path) -> Config:
     if why := _why_not(recording, config):
         raise NoRerun(why)
     record = dataclasses.replace(config.record, to=str(folder / NEW), ring=False)
-    alone = {"console": ConsoleConfig(enabled=False), "database": "", "registry": "", "doors": _alone(config.doors)}
-    return dataclasses.replace(config, record=record, **alone)  # type: ignore[arg-type]
+    console, doors = ConsoleConfig(enabled=False), _alone(config.doors)
+    return dataclasses.replace(config, record=record, console=console, database="", registry="", doors=doors)
 
 
 def _why_not(recording: Recording, config: Config) -> str:
