@@ -93,7 +93,7 @@ def command(
     record_ring: Annotated[
         bool, typer.Option("--record-ring", help="Keep the last five minutes, and write them at a fault.")
     ] = False,
-    config: Annotated[Path | None, typer.Option(help="A TOML file with any of these and more.")] = None,
+    config: Annotated[Path | None, typer.Option(help="A TOML file: see docs/settings.md.")] = None,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Log every request.")] = False,
     **doors: object,
 ) -> None:
