@@ -25,7 +25,7 @@ class Book:
         return self._tokens.get(kept)
 
     def password_of(self, name: str) -> str:
-        """Return what is kept of a person's password; empty: there is no such person."""
+        """Return the stored form of a person's password; empty if there is no such person."""
         identity = self._identities.get(name)
         return identity.password if identity is not None and identity.kind is Kind.PERSON else ""
 

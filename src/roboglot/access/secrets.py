@@ -19,7 +19,7 @@ def new_token() -> str:
 
 
 def token_hash(token: str) -> str:
-    """Return what is kept of a token; its 256 bits need no slow hash."""
+    """Return the stored form of a token; its 256 bits need no slow hash."""
     return hashlib.sha256(token.encode("utf-8", "surrogatepass")).hexdigest()
 
 

@@ -38,7 +38,7 @@ def command(
     out: Annotated[Path, typer.Option(help="Of table and report; what is in it is not played again.")] = OUT,
     longest: Annotated[float, typer.Option(min=1, help="Real seconds after which a trial is ended.")] = 600.0,
 ) -> None:
-    """Play scenarios with many seeds. Ctrl-C leaves what is done; the same command goes on."""
+    """Play scenarios with many seeds. Ctrl-C keeps the results so far; the same command resumes."""
     from roboglot.testing.campaign.table import OtherCampaign, Table
     from roboglot.testing.campaign.trials import trials_of
     from roboglot.testing.scenarios import files
@@ -81,7 +81,7 @@ def _player(on: str, folders: Sequence[Path], workers: int, longest: float) -> P
 
 
 def _play(left: list[Trial], table: Table, player: Player) -> bool:
-    """Play what is left, with a line for each that did not pass; whether it was interrupted."""
+    """Play the remaining trials, with a line for each failure; returns whether it was interrupted."""
     from roboglot.testing.campaign.trials import Outcome
 
     kept: Counter[str] = Counter()

@@ -31,7 +31,7 @@ class Stepper:
         return str((await self._ask("break", lines=list(self._lines), first=self._first))["error"])
 
     async def halted(self) -> bool:
-        """Show where, and do what is typed; False ends the program. Without a terminal it goes on."""
+        """Show the place and run the typed command; False ends the program. Without a terminal it continues."""
         where = await self._ask("where")
         if where["state"] != "suspend":
             return True

@@ -60,7 +60,7 @@ class IceCandidate:
 
 
 class _PacketTrack(MediaStreamTrack, Generic[P]):
-    """Hands a stream's packets over as they are; looks at the stream from the first ``recv`` on."""
+    """Passes a stream's packets on unchanged; views the stream from the first ``recv``."""
 
     base: Fraction  # s, the unit of a packet's time
 

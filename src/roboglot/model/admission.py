@@ -92,7 +92,7 @@ class Admission:
         return True
 
     def offer(self, server: Server, factory: Callable[[], Protocol]) -> None:
-        """A door listens by ``server``; what comes to its port gets ``factory``'s protocols."""
+        """Register a door's ``server``; connections to its port get ``factory``'s protocols."""
 
     def offered(self, port: int) -> tuple[Server, Callable[[], Protocol]] | None:
         """Return what was offered last for ``port``."""

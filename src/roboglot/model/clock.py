@@ -292,7 +292,7 @@ class LockstepClock(Clock):
             self._letting_in = asyncio.get_running_loop().create_task(self._let_in(), name="lockstep")
 
     async def _let_in(self) -> None:
-        """Let in what comes while time stands still."""
+        """Admit outside events while time stands still."""
         ready = _ready()
         try:
             while self._arrived:

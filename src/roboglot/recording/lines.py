@@ -107,7 +107,7 @@ class TextLine(Line):
         return [(reply, status_of("robomaster", reply))]
 
     async def drain(self) -> None:
-        """Read what comes, and forget it, until the robot hangs up."""
+        """Read and discard data until the robot hangs up."""
         while await self._reader.read(LINE_MAX):
             pass
 
@@ -208,7 +208,7 @@ class FrameLine(Line):
         return message.encode() if isinstance(message, str) else bytes(message)
 
     async def drain(self) -> None:
-        """Read what comes, and forget it, until the robot hangs up."""
+        """Read and discard data until the robot hangs up."""
         self._draining = []
         await _drain(self._sockets[self.path])
 
@@ -269,7 +269,7 @@ class FoxgloveLine(Line):
         return []
 
     async def drain(self) -> None:
-        """Read what comes, and forget it, until the robot hangs up."""
+        """Read and discard data until the robot hangs up."""
         await _drain(self._socket)
 
     async def close(self) -> None:

@@ -109,7 +109,7 @@ def decode_exchange(data: bytes) -> Exchange:
 
 
 def encode_input(given: Input) -> bytes:
-    """Return what came from outside as a message of the file."""
+    """Return an input from outside as a message of the file."""
     return _encode(given._asdict())
 
 

@@ -56,7 +56,7 @@ class Ring:
             self._bytes = 0
 
     def save(self, path: Path) -> int:
-        """Write what is kept into a new file; returns how many entries. Raises OSError."""
+        """Write the ring's entries into a new file; returns their number. Raises OSError."""
         with self._lock:
             blocks, rest = [data for _, data in self._blocks], list(self._open)
             standing = list(self._standing.values())

@@ -26,7 +26,7 @@ UNCOUNTED = ("connection", "client", "turn")  # of exchanges and inputs: ends of
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """The first one: what was recorded and what came now, in words, and what both agreed on just before."""
+    """The first difference: the recorded and the new message, in words, and the last ones on which both agree."""
 
     topic: str
     before: Sequence[str]

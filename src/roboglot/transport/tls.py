@@ -147,7 +147,7 @@ class TlsEnd(asyncio.Protocol):
         return True
 
     def _read(self) -> None:
-        """Hand on what came. An attempt to read what is not there costs more than a message, so none is made."""
+        """Pass received data on. Reading without data costs more than a message, so it is not attempted."""
         assert self._tunnel is not None
         incoming = self._incoming
         try:

@@ -116,7 +116,7 @@ class Stream(asyncio.Protocol):
         self._throttle()
 
     def close(self) -> None:
-        """The far connection is over; what came before is still delivered."""
+        """The far connection has ended; earlier data is still delivered."""
         self._over = True
         self._forget(self._number)
         if self._transport is not None:

@@ -1,4 +1,4 @@
-"""Follow-up of failed orders: notifies people, and brings what is left in boxes back to the reception."""
+"""Follow-up of failed orders: notifies people, and returns uncollected parcels to the reception."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from roboglot.model.robot import Robot
 
 
 async def follow_up(robot: Robot, book: OrderBook, driver: Driver, readiness: Readiness, order: Order) -> None:
-    """Report that it was not collected, and have a COLLECT order bring back what is left."""
+    """Report that it was not collected, and have a COLLECT order return the parcels."""
     kind = order.request.kind
     if order.failure is Failure.INTERRUPTED:
         readiness.rest_due = False  # another client is driving the robot

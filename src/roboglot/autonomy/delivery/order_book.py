@@ -123,7 +123,7 @@ class OrderBook:
 
 
 def _revived(document: object) -> Order:
-    """Return the order as it goes on after the robot went down."""
+    """Return the order as it continues after the robot was off."""
     order = msgspec.convert(document, Order)
     if order.status is OrderStatus.RUNNING:
         return replace(order, status=OrderStatus.READY)

@@ -1,4 +1,4 @@
-"""Docking at marks: to a place from where the mark is seen, onto its axis, then along it by what is seen on the way."""
+"""Docking at marks: to a place with a view of the mark, onto its axis, then along it with further sightings."""
 
 from __future__ import annotations
 

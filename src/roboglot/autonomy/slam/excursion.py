@@ -40,7 +40,7 @@ class View:
 
 
 class Excursion:
-    """Maps what is seen from where it begins; its first scan is its origin."""
+    """A separate map that begins with its first scan, at its own origin."""
 
     def __init__(self, noise: LearntNoise) -> None:
         self._noise = noise

@@ -143,7 +143,7 @@ class LoopCloser:
 
     @property
     def straightening(self) -> bool:
-        """True while the work on a closed loop goes on."""
+        """True while a closed loop is being processed."""
         return self._work is not None and self._belief.map is self._map
 
     def _keep(self, frame: Keyframe) -> int:

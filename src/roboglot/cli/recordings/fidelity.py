@@ -128,7 +128,7 @@ def _request(door: str, text: str) -> tuple[str, bytes]:
 
 
 def _facts(asked: Asked, answers: Sequence[tuple[bytes, str]]) -> list[tuple[bool, str]]:
-    """Return each known fact: whether it holds, and what came instead."""
+    """Return each known fact: whether it holds, and the answer received instead."""
     if asked.silent:
         return [(not answers, f"{len(answers)} answers")]
     if not answers:

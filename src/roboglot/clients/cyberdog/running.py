@@ -82,7 +82,7 @@ class RunningTask:
         await self._calls.do(Code.STOP_TASK, {"type": int(self.kind), **more}, within=STOP_MAX)
 
     def leave(self) -> None:
-        """Read no further; the task goes on."""
+        """Read no further; the task continues."""
         if self._reading:
             self._reading.cancel()
 

@@ -137,7 +137,7 @@ class RoboMasterClient:
         self._listeners.close()
 
     def note_in(self, line: Line) -> None:
-        """Note there what is asked, answered and heard from now on; before ``connect``."""
+        """Record commands, answers and pushes there from now on; call before ``connect``."""
         self._noting = self._listeners.noting = Noting(line)
 
     @property

@@ -33,7 +33,7 @@ class PushPort:
         self._socket: socket.socket | None = None
 
     def attach(self, robot: str, heard: Heard) -> Callable[[], None]:
-        """Hand what comes from the address ``robot`` to ``heard``; returns what ends it. Raises LinkLost."""
+        """Pass datagrams from the address ``robot`` to ``heard``; returns what ends it. Raises LinkLost."""
         if self._socket is None:
             self._socket = _bound(self._host, self._port, "share one PushPort between the clients of a program")
             asyncio.get_running_loop().add_reader(self._socket, self._read)

@@ -83,7 +83,7 @@ class SlamwareClient(
         self._link.close()
 
     def note_in(self, line: Line) -> None:
-        """Note there what is asked and answered."""
+        """Record requests and answers there."""
         self._link.line = line
 
     async def begin(

@@ -318,7 +318,7 @@ class Session:
         self._leaving, self._programs = [], None
 
     def close(self) -> None:
-        """The page is gone; what it began on the robot goes on."""
+        """The page is gone; actions that it began continue."""
         self._leave()
         self._trial.close()
         self._seat.leave()

@@ -210,7 +210,7 @@ class Classroom:
         return Place(joined.code, "" if elsewhere is None else elsewhere.page, seconds)
 
     async def keep(self, code: str, pupil: Pupil) -> None:
-        """Write down what is kept of a pupil, if there is anything. Raises Refused if it cannot be kept."""
+        """Save a pupil's data, if there are any. Raises Refused if it cannot be kept."""
         if self._files is None or not (pupil.bag.style or pupil.bag.handed):
             return
         try:

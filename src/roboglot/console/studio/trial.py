@@ -46,7 +46,7 @@ class Trial:
         self._playing: asyncio.Task[Played] | None = None
 
     async def take(self, wish: TrialWish, studio: Studio, programs: Programs) -> None:
-        """Try it and tell what came of it. Raises NotFound, Busy, ValueError, ProgramError."""
+        """Try it and report the result. Raises NotFound, Busy, ValueError, ProgramError."""
         if self._playing is not None:
             raise Busy("a program is being tried already")
         lesson = studio.lessons().get(wish.lesson) if wish.lesson else None

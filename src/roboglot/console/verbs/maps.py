@@ -1,4 +1,4 @@
-"""Verbs that change a robot's map and what is drawn on it."""
+"""Verbs that change a robot's map and its annotations."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ VERBS: OperationTable[str] = OperationTable("console", Right.DRIVE)
 
 
 class Started(msgspec.Struct):
-    """An action that was accepted; how it goes on is in the robot's state."""
+    """An accepted action; its progress is in the robot's state."""
 
     action: int
 

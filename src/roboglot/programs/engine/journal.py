@@ -66,7 +66,7 @@ def header_of(
 
 
 class Journal:
-    """Journal of one run. What cannot be written is given up: the program goes on, but not after a crash."""
+    """Journal of one run. After a failed write the program continues, but cannot be recovered after a crash."""
 
     def __init__(self, store: JournalStore, id: str) -> None:
         self._store = store
@@ -83,7 +83,7 @@ class Journal:
         await self._store.begin(self._id, msgspec.json.encode(header).decode())
 
     async def reopen(self, header: str) -> History:
-        """The run that was lost: its journal goes on. Raises ValueError for a header of another version."""
+        """The lost run, whose journal is continued. Raises ValueError for a header of another version."""
         entries = await self._store.entries(self._id)
         answers = [Answer(entry.name, entry.answer) for entry in entries]
         interrupted = answers[-1].name if answers and answers[-1].body is None else ""

@@ -109,7 +109,7 @@ class Account:
 
 
 class Meter:
-    """Charges an account for what is done between two looks."""
+    """Charges an account for the work between two checks."""
 
     __slots__ = ("_account", "_began", "_until")
 

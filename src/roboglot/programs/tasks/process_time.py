@@ -24,7 +24,7 @@ class ProcessTime:
         self._look()
 
     def stop(self, stopped: bool) -> None:
-        """Note that it is suspended, or goes on."""
+        """Note that it is suspended or resumed."""
         self._stopped = stopped
         self._look()
 

@@ -96,7 +96,7 @@ class ProgramService:
                 self._timetable.wait(task)
 
     async def close(self) -> None:
-        """End every run; the tasks are as if a user had ended them. What waits for its time goes on waiting."""
+        """End every run; the tasks are as if a user had ended them. Scheduled tasks stay scheduled."""
         self._turns.closed = True
         self._timetable.clear()
         async with self._lock:

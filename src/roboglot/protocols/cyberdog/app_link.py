@@ -147,7 +147,7 @@ class AppLink:
                 pause = min(2.0 * pause, REDIAL_MAX)
 
     async def _hear(self, patience: float | None = None) -> None:
-        """Wait for news of the app's address, or ``patience`` seconds; what came while it was dialled counts too."""
+        """Wait for a change of the app's address, or ``patience`` seconds; changes during dialling count, too."""
         try:
             await (self._news.wait() if patience is None else self._clock.wait_for(self._news.wait(), patience))
         except TimeoutError:

@@ -357,5 +357,5 @@ def _greet(context: Context) -> None:
 
 
 def _leave_stairs(robot: Robot) -> None:
-    """No client is left that could stop it; what another client asked for goes on."""
+    """Stop the robot, as no client is left that could; actions of other clients continue."""
     call_off(robot, "the app is lost", SOURCE)

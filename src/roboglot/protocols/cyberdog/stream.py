@@ -30,12 +30,12 @@ class Stream:
         self.unbind()
 
     def unbind(self) -> None:
-        """The reader's stream ends without a further word; the work goes on."""
+        """End the reader's stream silently; the work continues."""
         self._pass_on(None)
         self._reader = None
 
     def attach(self) -> Reader:
-        """Take over: the latest feedback, then what comes, to the result."""
+        """Take over: the latest feedback, then all further ones up to the result."""
         self.unbind()
         self._reader = asyncio.Queue(UNREAD_MAX)
         if self._last is not None:

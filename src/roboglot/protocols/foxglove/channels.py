@@ -58,7 +58,7 @@ class Listener(Protocol):
         """Send a message; ``at``: ns since 1970."""
 
     def beat(self, at: int, *, seldom: bool) -> None:
-        """Robot time goes on; ``seldom``: about once a second."""
+        """Advance with robot time; ``seldom``: about once a second."""
 
     def played(self, state: Playback) -> None:
         """A recording is played so from now on."""

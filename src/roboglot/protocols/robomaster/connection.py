@@ -139,7 +139,7 @@ class ControlConnection(asyncio.Protocol):
             self._worker.add_done_callback(self._go_on)
 
     async def _work(self) -> None:
-        """Answer what waits, but not too much at a stretch: the next task goes on."""
+        """Answer waiting commands, a bounded number at a stretch; the next task continues."""
         speak_as(self._name, self._context.robot.admission.known(self._name) or "")
         for _ in range(BATCH_MAX):
             if not self._commands:

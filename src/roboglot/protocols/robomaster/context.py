@@ -132,7 +132,7 @@ class Context:
         return any(action.source == f"{self._name} {name}" for action in self.robot.actions.running())
 
     def stop_speaker(self, name: str) -> None:
-        """Stop what ``name`` commanded: it is gone. What others commanded goes on."""
+        """Stop the motions commanded by ``name``, which is gone. Those of others continue."""
         for action in self.robot.actions.running():
             if action.source == f"{self._name} {name}":
                 action.cancel("its client is gone", hard=True)

@@ -9,7 +9,7 @@ from roboglot.protocols.robomaster.limits import WAIT_MAX
 
 
 async def ended(context: Context, action: Action) -> None:
-    """Return when it has succeeded; raise why it hasn't, or after WAIT_MAX that it goes on."""
+    """Return when it has succeeded; raise the reason if it failed, or after WAIT_MAX while it still runs."""
     try:
         status = await context.robot.clock.wait_for(action.done(), WAIT_MAX)
     except TimeoutError:

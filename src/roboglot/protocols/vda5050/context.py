@@ -175,13 +175,13 @@ class Context:
         self.touch()
 
     async def cancel_order(self, order_id: str) -> None:
-        """Stop and forget what is left; returns when the robot stands. Raises Rejected if nothing is left."""
+        """Stop and drop the rest of the order; returns when the robot stands. Raises Rejected if nothing is left."""
         if self.book.idle or self.book.canceling or order_id not in ("", self.book.order_id):
             raise Rejected(ErrorKind.NO_ORDER, "there is no such order to cancel")
         await self.clear_order()
 
     async def clear_order(self) -> None:
-        """Stop, and forget what is left of the order, if anything is."""
+        """Stop, and drop the rest of the order, if there is any."""
         self.book.canceling = True
         try:
             await self._route.stop()

@@ -158,7 +158,7 @@ class OrderBook:
         return None if self.placed_at is None else self.measure() - self.placed_at
 
     def drop_rest(self) -> None:
-        """Forget what is left, as cancelOrder wants; actions that wait fail."""
+        """Drop the rest of the order for cancelOrder; waiting actions fail."""
         self.nodes, self.edges, self.cancelled = [], [], True
         for state in self.actions.values():
             if not state.status.ended:

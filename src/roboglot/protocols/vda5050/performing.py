@@ -52,7 +52,7 @@ class Performer:
         self._asked: dict[str, asyncio.Future[bool]] = {}  # actions in RETRIABLE: True to try again
 
     async def perform(self, state: ActionState, operation: Operation[str], *, instant: bool = False) -> None:
-        """Do ``state``'s action until it has ended; one that may be retried waits after a failure for what comes."""
+        """Perform ``state``'s action to its end; a retriable one waits for instructions after a failure."""
         may_wait = state.action.retriable and self._context.version.new_words
         await self._try(state, operation, instant)
         while may_wait and state.status is ActionStatus.FAILED:

@@ -154,7 +154,7 @@ class Vda5050Door:
             await answer(self._context, str(message.topic).rpartition("/")[2], message.payload)
 
     async def _introduce(self, address: str) -> None:
-        """From here on, what is done is done for the fleet control behind this broker."""
+        """Act for the fleet control behind this broker from here on."""
         who = ""
         with contextlib.suppress(Unknown):
             who = await self._robot.admission.admit(address)

@@ -109,7 +109,7 @@ def loads(robot: Robot, known: Mapping[str, str]) -> dict[str, object]:
 
 
 def progress(book: OrderBook) -> dict[str, object]:
-    """Return what is left of the order."""
+    """Return the rest of the order."""
     way = book.way_since_node
     return {
         **({} if way is None else {"distanceSinceLastNode": round(way, 3)}),

@@ -39,7 +39,7 @@ class CloudMirror:
         self._away_until = -1.0
 
     def start(self) -> None:
-        """Send what waits, and what comes."""
+        """Send the waiting frames, and all later ones."""
         self._sender = asyncio.create_task(self._drain(), name="cloud")
 
     async def close(self) -> None:

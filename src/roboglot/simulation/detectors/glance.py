@@ -82,7 +82,7 @@ class Glance:
         return seen
 
     def overlooked(self) -> bool:
-        """Return True now and then: a detector misses what is there."""
+        """Return True now and then: detectors miss some objects."""
         return bool(self.random.random() < MISSED)
 
     def shaken(self, box: Box) -> Box:

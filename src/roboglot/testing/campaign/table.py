@@ -111,7 +111,7 @@ class Table:
         os.fsync(self._file.fileno())
 
     def _read(self) -> Sequence[Row]:
-        """Read what is there; half a line, which a kill left, is cut off."""
+        """Read the table; a partial line left by a kill is cut off."""
         self._file.seek(0)
         data, head = self._file.read(), ",".join(HEAD).encode() + b"\n"
         if not (data.startswith(head) or head.startswith(data)):

@@ -12,7 +12,7 @@ from roboglot.model.components.motion.navigation import Tracks
 
 
 class OrderKind(StrEnum):
-    """Kind of a delivery order, by what is done at the target."""
+    """Kind of a delivery order, by its purpose at the target."""
 
     TAKEOUT = "takeout"  # people take their parcels out of boxes, one box after the other
     DISTRIBUTE = "distribute"  # all boxes open; people help themselves

@@ -137,7 +137,7 @@ class Annotations:
 
 
 class MapAnnotations(Component):
-    """The annotations of the map that the robot uses; navigation minds them. Publishes ``AnnotationsChanged``."""
+    """The annotations of the map in use; navigation obeys them. Publishes ``AnnotationsChanged``."""
 
     @property
     @abstractmethod

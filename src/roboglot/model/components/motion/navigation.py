@@ -37,7 +37,7 @@ class NavigationOptions:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NavigationFeedback:
-    """``stage`` in the planner's words, what is left to drive, goals still to reach, seconds to go."""
+    """``stage`` in the planner's words, the remaining path, remaining goals, and seconds left."""
 
     stage: str  # "planning", "driving", "waiting" (blocked), "turning"
     remaining: Path

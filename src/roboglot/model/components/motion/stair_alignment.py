@@ -27,7 +27,7 @@ class AlignmentStage(StrEnum):
 
 
 class StairAlignment(Component):
-    """Made of Base, Odometry and what looks at the ground ahead; climbs nothing."""
+    """Alignment from Base, Odometry and sensors of the ground ahead; climbs nothing."""
 
     @abstractmethod
     def align(self, direction: StairDirection, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:

@@ -16,7 +16,7 @@ MODULES_MAX = 64
 
 
 class Module(StrEnum):
-    """A part of the firmware that can be restarted while the rest goes on."""
+    """A part of the firmware that can be restarted while the rest keeps running."""
 
     SOFTWARE = "software"  # mapping, planning and everything above the drive
     BASE = "base"  # the drive's controller

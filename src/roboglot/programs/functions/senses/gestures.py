@@ -70,7 +70,7 @@ class GestureWatch:
 
 @ABILITIES.on("cyberdog.gesture.turn_on_recognition", needs=(Vision,))
 async def turn_on_recognition(session: Session, duration: int = 60) -> Record:
-    """Look for gestures for ``duration`` s (30 to 300), while the program goes on."""
+    """Look for gestures for ``duration`` s (30 to 300) while the program continues."""
     return _switched(lambda: session.part(GestureWatch).open(_seconds("duration", duration)))
 
 

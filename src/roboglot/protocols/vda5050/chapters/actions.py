@@ -30,7 +30,7 @@ async def stop_pause(context: Context) -> str:
 
 @TABLE.on("cancelOrder", right=Right.DRIVE)
 async def cancel_order(context: Context, *, orderId: str = "") -> str:  # noqa: N803 - the standard's word
-    """Stop, and forget what is left of the order; done when the robot stands."""
+    """Stop, and drop the rest of the order; done when the robot stands."""
     await context.cancel_order(orderId)
     return ""
 

@@ -181,7 +181,7 @@ class Tasks:
             self.current.feedback(code, message)
 
     def unbind(self) -> None:
-        """The app is gone: streams end, the task goes on."""
+        """The app is gone: streams end, the task continues."""
         if self.current:
             self.current.stream.unbind()
 

@@ -57,7 +57,7 @@ class MotionStart:
         return self._ahead.lift(wish.lift) if motion in SEEING else wish.lift
 
     async def _look_ahead(self, motion: int, wish: Wish) -> None:
-        """Lift the feet over what comes, until cancelled."""
+        """Lift the feet over obstacles ahead, until cancelled."""
         async for _ in self._robot.clock.every(LOOK):
             self._robot[Legs].walk(WALKS[motion], self._lift(motion, wish))
 

@@ -85,7 +85,7 @@ async def update_time(call: Call) -> dict[str, int]:
 
 @TABLE.on(Code.START_UPDATE, right=Right.ADMIN, needs=(Firmware,))
 async def start_update(call: Call, *, operate: str = "", id: Id = "", data: object = None) -> object:
-    """Answers ``accepted``, feedback, result; the work goes on if the stream breaks."""
+    """Answers ``accepted``, feedback, result; the work continues if the stream breaks."""
     call.context.robot[Firmware]
     if operate not in OPERATIONS:
         return call.refused({"accepted": int(Accepted.NO)}, f"operate is one of {', '.join(OPERATIONS)}")

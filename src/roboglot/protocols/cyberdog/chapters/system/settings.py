@@ -72,7 +72,7 @@ async def set_microphone(call: Call, *, enable: bool) -> dict[str, bool]:
 
 @TABLE.on(Code.SET_VOICE_CONTROL, right=Right.EDIT)
 async def set_voice_control(call: Call, *, enable: bool) -> dict[str, bool]:
-    """Switch voice control: the wake word, and doing what is said after it."""
+    """Switch voice control: the wake word, and the commands after it."""
     call.context.robot[Hearing]
     await call.context.robot[Settings].put(VOICE_CONTROL, enable)
     call.context.voice.adapt()

@@ -76,17 +76,17 @@ class UpdateJobs:
         return stream
 
     def unbind(self) -> None:
-        """The app is gone: its stream ends, the work goes on."""
+        """The app is gone: its stream ends, the work continues."""
         if self.stream:
             self.stream.unbind()
 
     def close(self) -> None:
-        """Say no more; what is under way goes on."""
+        """Send no more reports; running work continues."""
         if self._running:
             self._running.cancel()
 
     async def _run(self, goal: Goal, stream: Stream) -> None:
-        """Feedback as the firmware goes on, and the result of the goal."""
+        """Feedback on the firmware's progress, and the result of the goal."""
         named = {"id": goal.id, "operate": goal.operate}
         leave = self._robot.events.listen(
             FirmwareChanged, lambda event: stream.tell({**named, **_progress(event.progress)})

@@ -127,7 +127,7 @@ class Updates:
         self._working = asyncio.get_running_loop().create_task(self._install(), name="install")
 
     def close(self) -> None:
-        """Say no more; what is under way goes on."""
+        """Send no more reports; running work continues."""
         self._leave()
         if self._working:
             self._working.cancel()

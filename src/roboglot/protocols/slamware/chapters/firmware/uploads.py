@@ -18,14 +18,14 @@ class Upload:
         self._digest = hashlib.md5(usedforsecurity=False)
 
     def write(self, chunk: bytes) -> None:
-        """Add what came next."""
+        """Add the next piece."""
         self.file.write(chunk)
         self._digest.update(chunk)
         self.size += len(chunk)
 
     @property
     def digest(self) -> str:
-        """MD5 of what came, in hex: the name of a package."""
+        """MD5 of the received data, in hex: the name of a package."""
         return self._digest.hexdigest()
 
     def close(self) -> None:

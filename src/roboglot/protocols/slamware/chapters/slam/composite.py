@@ -1,4 +1,4 @@
-"""Between composite maps and the model: the grid, and what is drawn on it, of one floor. Knows no robot."""
+"""Conversion between composite maps and the model: grid and drawings of one floor. Knows no robot."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class FloorName:
 
 @dataclass(frozen=True, slots=True)
 class FloorMap:
-    """One floor: its grid, what is drawn on it, and the layers of unknown kinds."""
+    """One floor: its grid, its drawings, and the layers of unknown kinds."""
 
     name: FloorName = field(default_factory=FloorName)
     grid: OccupancyGrid | None = None
@@ -220,5 +220,5 @@ def _texts(metadata: dict[str, str]) -> dict[str, str]:
 
 
 def clean(text: str) -> str:
-    """Return what is left of a file's text once it is Unicode."""
+    """Return a file's text as Unicode, with invalid bytes replaced."""
     return text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")

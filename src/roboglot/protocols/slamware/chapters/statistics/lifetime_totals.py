@@ -23,7 +23,7 @@ class Totals:
         self._keeping: asyncio.Task[object] | None = None
 
     def start(self) -> None:
-        """Remember what was before, and keep what comes."""
+        """Load the earlier totals, and save them from now on."""
         if Settings in self._robot:
             metres, seconds = self._robot[Settings].get(TOTALS, (0.0, 0.0))
             self._before = (float(metres), float(seconds))
