@@ -62,6 +62,13 @@ CLOTHS = tuple(int(cloth) for cloth in RADII[:, 2].repeat(3)) + (0,) * 5 + (2,) 
 
 def person(index: int, joints: Floats) -> Mesh:
     """A person whose JOINTS are there, in their own frame (x ahead); ``index`` chooses clothes, hair and skin."""
+    return posing(index, np.asarray(joints, np.float64).tobytes())
+
+
+@lru_cache(maxsize=16)
+def posing(index: int, packed: bytes) -> Mesh:
+    """The same for the bytes of the joints: one who stands looks the same in the next picture."""
+    joints = np.frombuffer(packed).reshape(-1, 3)
     wrists, ankles, elbows = (joints[[LEFT[part], RIGHT[part]]] for part in range(3))
     shoulders, hips, ears = (_between(joints, part) for part in ("shoulder", "hip", "ear"))
     starts = np.concatenate((joints[STARTS], wrists, ankles + HEEL, shoulders[None]))
