@@ -23,6 +23,7 @@ async def test_other_programs_are_counted_listed_first_and_ended(studio: Open) -
     await other.keyboard.press("F5")
     await until(page, "document.querySelector('.controls .count')?.textContent === '1'")
     assert await other.query_selector(".controls .count") is None
+    await page.wait_for_selector(".controls [role=status]:text-is('Other programs run on this robot: 1')")  # is read
     button = page.get_by_role("button", name="Other programs run on this robot: 1")
     before = await page.evaluate("document.querySelector('.workspace').clientHeight")
     await button.click()

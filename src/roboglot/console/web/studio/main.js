@@ -62,6 +62,7 @@ function Bar() {
     <${Button} icon="stop" label=${t("studio.stop")} title="Shift+F5" disabled=${phase === "idle"} onClick=${() => runner.stop()} />
     ${program.value.kind === "blocks" && html`<${Button} compact icon="dot" label=${t("studio.break.on")} title="F9" onClick=${() => editor.toggleBreak()} />`}
     <span class=${`phase ${phase} ${runner.failure.value ? "failed" : ""}`} role="status" aria-live="polite" title=${word + held()}>${word}${held()}</span>
+    <span class="unseen" role="status" aria-live="polite">${others > 0 && t("studio.others", { n: others })}</span>
     <span class="grow"></span>
     ${program.value.kind === "blocks" && html`<label class="search"><span class="unseen">${t("studio.search")}</span><input type="search" placeholder=${t("studio.search")} value=${sought.value} onInput=${(e) => { sought.value = e.target.value; editor.search(e.target.value); }} /></label>`}
     <${Button} compact icon="undo" label=${t("studio.undo")} onClick=${() => editor.undo(false)} /><${Button} compact icon="redo" label=${t("studio.redo")} onClick=${() => editor.undo(true)} />
