@@ -256,13 +256,14 @@ def _keeper(plan: FleetPlan, folder: Path, memory_max: int, on: str, detached: b
 async def _serve(keeper: Callable[[], Keeper], folder: Path) -> int:
     from roboglot.shards.classes import FleetClasses
     from roboglot.shards.desk import FleetDesk
-    from roboglot.shards.supervisor import State
+    from roboglot.shards.overview import Overview
 
     began, stop = time.monotonic(), asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, stop.set)
     supervisor = keeper()
     desk, classes = FleetDesk(supervisor, folder), FleetClasses(folder)
+    page = Overview(supervisor, _first_address(supervisor))
     ending = asyncio.ensure_future(stop.wait())
     await classes.open()  # shards look for this socket when they start
     starting = asyncio.ensure_future(supervisor.start())
@@ -270,23 +271,36 @@ async def _serve(keeper: Callable[[], Keeper], folder: Path) -> int:
         await desk.open()
         await asyncio.wait([ending, starting], return_when=asyncio.FIRST_COMPLETED)
         if starting.done():
-            warm = starting.result()
-            shards = list(supervisor.shards.values())
-            ready = sum(shard.state is State.READY for shard in shards)
-            print(
-                f"{ready} of {len(shards)} worlds with {sum(len(s.plan.robots) for s in shards)} robots are up after"
-                f" {time.monotonic() - began:.1f} s ({warm:.1f} s of it to load); robots on"
-                f" {shards[0].plan.settings['robots'][0]['address']} and up. `roboglot fleet list` shows them."
-            )
+            page.open()
+            print(_up(supervisor, time.monotonic() - began, starting.result(), page.address))
             print("ready", flush=True)
             await ending
     finally:
         starting.cancel()
         ending.cancel()
+        await page.close()
         await desk.close()
         await supervisor.close()
         await classes.close()
     return 0
+
+
+def _first_address(keeper: Keeper) -> str:
+    return str(keeper.plan.shards[0].settings["robots"][0]["address"])
+
+
+def _up(keeper: Keeper, seconds: float, warm: float, page: str) -> str:
+    """Return what `fleet up` says when all worlds are up or have failed."""
+    from roboglot.shards.supervisor import State
+
+    shards = list(keeper.shards.values())
+    ready, robots = sum(shard.state is State.READY for shard in shards), sum(len(s.plan.robots) for s in shards)
+    where = f"; all on one page: {page}" if page else ""
+    return (
+        f"{ready} of {len(shards)} worlds with {robots} robots are up after {seconds:.1f} s"
+        f" ({warm:.1f} s of it to load); robots on {_first_address(keeper)} and up{where}."
+        " `roboglot fleet list` shows them."
+    )
 
 
 def _ask(verb: Verb, data: Path | None, **wish: str) -> Answer:

@@ -43,7 +43,7 @@ class Asset:
 def _paths() -> dict[str, Path]:
     files = ((path.relative_to(FOLDER).as_posix().removesuffix(".gz"), path) for path in sorted(FOLDER.rglob("*")))
     found = {f"/{name}": path for name, path in files if Path(name).suffix in TYPES}
-    for folder in ("/", "/studio/"):
+    for folder in ("/", "/studio/", "/fleet/"):
         found[folder] = found[f"{folder}index.html"]
     found["/studio"] = found["/studio/"]
     return found
@@ -67,7 +67,7 @@ def _tag(plain: bytes) -> str:
 @cache
 def _studio_files() -> Asset:
     """The list of what the studio needs: its files and those it shares with the console, and two answers."""
-    console = ("/views/", "/app.js", "/index.html", "/studio/index.html")
+    console = ("/views/", "/app.js", "/index.html", "/studio/index.html", "/fleet/")
     paths = [path for path in _paths() if path not in ("/", "/studio") and not path.startswith(console)]
     plain = json.dumps([*paths, "/api/blocks", "/api/lessons"]).encode()
     return Asset(TYPES[".json"], plain, gzip.compress(plain, 9, mtime=0), _tag(plain))

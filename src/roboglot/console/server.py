@@ -61,7 +61,7 @@ class Console:
         if self._config.otlp and not is_there("opentelemetry.proto"):
             raise MissingExtra(in_words("[console] otlp", ["opentelemetry-proto"], "otlp"))
         try:
-            self._socket = _bound(self._config.address, self._config.port)
+            self._socket = bound(self._config.address, self._config.port)
         except OSError as error:
             log.warning("the console did not open: %s", error)
             return
@@ -171,7 +171,7 @@ def _load() -> None:
         importlib.import_module(library)
 
 
-def _bound(address: str, first: int) -> socket.socket:
+def bound(address: str, first: int) -> socket.socket:
     """A socket that listens on ``first``, or on the next free port. Raises OSError."""
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     for port in range(first, first + (PORTS_TRIED_MAX if first else 1)):

@@ -11,8 +11,7 @@ Verb = Literal["look", "stop", "restart", "reset", "move"]
 
 
 class Request(msgspec.Struct, forbid_unknown_fields=True):
-    """Request to a fleet. ``shard``: a shard's name, or a robot's for its shard; ``to``: where a robot moves. ``shard``
-    is a shard's name, or a robot's, which means its shard; ``to`` is where a robot moves.
+    """Request to a fleet. ``shard``: a shard's name, or a robot's for its shard; ``to``: where a robot moves.
 
     ``robot`` is for ``move`` alone. An empty ``shard`` of ``stop`` and ``restart`` means all.
     """

@@ -1,0 +1,79 @@
+"""Glances at the robots of all worlds, by their consoles' own interface: once a second at most, and only on demand."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Coroutine
+from typing import Generic, TypeVar
+
+from roboglot.agents.console import ConsoleClient, Refused
+from roboglot.shards.keeper import Keeper
+from roboglot.shards.supervisor import Shard, State
+
+PERIOD = 1.0  # s that a glance is shown again
+AT_ONCE_MAX = 8  # requests to consoles in progress
+SHOWN = ("about", "battery", "actions", "faults", "safety", "control", "parts", "pose")
+T = TypeVar("T")
+
+
+class _Newest(Generic[T]):
+    """Newest answer of each robot: less than ``PERIOD`` old, or under way."""
+
+    def __init__(self) -> None:
+        self._found: dict[str, tuple[float, asyncio.Task[T]]] = {}  # with when it was begun, s of the loop
+
+    async def get(self, robot: str, look: Callable[[], Coroutine[None, None, T]]) -> T:
+        """Return what ``look`` finds, or found just now. Raises what it does."""
+        loop = asyncio.get_running_loop()
+        began, task = self._found.get(robot, (-PERIOD, None))
+        if task is None or (task.done() and loop.time() - began >= PERIOD):
+            task = loop.create_task(look())
+            self._found[robot] = loop.time(), task
+        return await asyncio.shield(task)
+
+
+class Glances:
+    """Looks at the robots of one fleet, however many pages ask."""
+
+    def __init__(self, keeper: Keeper, client: Callable[[str], ConsoleClient] = ConsoleClient) -> None:
+        self._keeper, self._client = keeper, client
+        self._states: _Newest[dict[str, object]] = _Newest()
+        self._pictures: _Newest[bytes] = _Newest()
+        self._turns = asyncio.Semaphore(AT_ONCE_MAX)
+
+    async def state(self, robot: str) -> dict[str, object]:
+        """Return how a robot is, as its console says; ``{"error": why}`` if it does not. Raises LookupError."""
+        console = self._console(self._home(robot))
+
+        async def look() -> dict[str, object]:
+            if console is None:
+                return {"error": "this world has no console"}
+            try:
+                async with self._turns:
+                    found = await console.get(dict, "robots", robot)
+            except Refused as refused:
+                return {"error": str(refused)}
+            return {name: found[name] for name in SHOWN if name in found}
+
+        return await self._states.get(robot, look)
+
+    async def picture(self, robot: str) -> bytes:
+        """Return the small picture of a robot's map, a PNG. Raises LookupError, Refused."""
+        console = self._console(self._home(robot))
+        if console is None:
+            raise Refused("this world has no console")
+
+        async def look() -> bytes:
+            async with self._turns:
+                return await console.fetch("robots", robot, "map.png")
+
+        return await self._pictures.get(robot, look)
+
+    def _home(self, robot: str) -> Shard:
+        return self._keeper.shards[self._keeper.plan.home_of(robot).name]
+
+    def _console(self, shard: Shard) -> ConsoleClient | None:
+        """Return the console of a world that is up and has one."""
+        if shard.state is not State.READY or shard.ready is None or not shard.ready.console:
+            return None
+        return self._client(shard.ready.console)

@@ -1,0 +1,113 @@
+"""The page of all worlds: lists them, asks consoles once a second at most, and says why a world is not there."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from types import SimpleNamespace
+from typing import Any, ClassVar
+
+import pytest
+
+from roboglot.agents.console import ConsoleClient, Refused
+from roboglot.shards.glances import Glances
+from roboglot.shards.messages import Beat, Ready
+from roboglot.shards.overview import PAGE, SEEN_MAX, Overview
+from roboglot.shards.plan import plan_fleet
+from roboglot.shards.supervisor import Shard, State
+
+PICTURE = b"\x89PNG"
+
+
+class Console(ConsoleClient):
+    """A world's console that counts what it is asked."""
+
+    asked: ClassVar[list[tuple[str, ...]]] = []
+
+    async def fetch(self, *path: str, body: bytes | None = None) -> bytes:  # noqa: ARG002
+        self.asked.append(path)
+        await asyncio.sleep(0)
+        if path[1] == "a2":
+            raise Refused("sign in first")
+        return PICTURE if path[-1] == "map.png" else b'{"battery": {"charge": 0.5}, "history": ["long"]}'
+
+
+@pytest.fixture
+def keeper(tmp_path) -> Any:
+    plan = plan_fleet(3, 1, {}, tmp_path, first="127.16.3.1")
+    shards = {p.name: Shard(number, p, tmp_path) for number, p in enumerate(plan.shards, start=1)}
+    for shard in list(shards.values())[:2]:
+        shard.state, shard.ready, shard.beat = State.READY, Ready({}, "http://127.16.3.1:50080"), Beat(1.0, 0, 0.0)
+    shards["w3"].state, shards["w3"].reason = State.FAILED, "the disk is full"
+    Console.asked = []
+    return SimpleNamespace(plan=plan, shards=shards)
+
+
+async def test_many_pages_cost_a_world_one_request(keeper) -> None:
+    glances = Glances(keeper, Console)
+    states = await asyncio.gather(*(glances.state("a1") for _ in range(20)))
+    assert states == [{"battery": {"charge": 0.5}}] * 20  # and no history, which no tile shows
+    assert await glances.picture("a1") == await glances.picture("a1") == PICTURE
+    assert Console.asked == [("robots", "a1"), ("robots", "a1", "map.png")]
+
+
+async def test_worlds_that_do_not_answer_say_why(keeper) -> None:
+    glances = Glances(keeper, Console)
+    assert await glances.state("a2") == {"error": "sign in first"}
+    assert await glances.state("a3") == {"error": "this world has no console"}
+    with pytest.raises(Refused, match="sign in first"):
+        await glances.picture("a2")
+    with pytest.raises(LookupError):
+        await glances.state("nobody")
+
+
+async def request(page: Overview, line: str, host: str = "127.16.3.1") -> tuple[int, bytes]:
+    address, port = page.address.removeprefix("http://").removesuffix(PAGE).split(":")
+    reader, writer = await asyncio.open_connection(address, int(port))
+    writer.write(f"{line} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n".encode())
+    head, _, body = (await reader.read()).partition(b"\r\n\r\n")
+    writer.close()
+    return int(head.split()[1]), body
+
+
+async def test_page_lists_all_worlds_and_changes_nothing(keeper) -> None:
+    page = Overview(keeper, "127.16.3.1", 0)
+    page._glances = Glances(keeper, Console)
+    page.open()
+    await page.ready()
+    try:
+        status, body = await request(page, "GET /api/fleet?seen=a1,a2,a3")
+        found = json.loads(body)
+        assert status == 200
+        assert [(world["name"], world["state"], world["reason"]) for world in found["worlds"]] == [
+            ("w1", "ready", ""),
+            ("w2", "ready", ""),
+            ("w3", "failed", "the disk is full"),
+        ]
+        assert found["worlds"][1]["robots"] == [{"name": "a2", "body": "universal", "address": "127.16.3.2"}]
+        assert found["robots"]["a2"] == {"error": "sign in first"}
+        assert await request(page, "GET /api/fleet/a1/map.png") == (200, PICTURE)
+        statuses = {
+            line: (await request(page, line))[0]
+            for line in (
+                "GET /",
+                f"GET {PAGE}",
+                "GET /fleet/fleet.js",
+                "GET /nothing",
+                "POST /api/fleet",
+                "GET /api/fleet/nobody/map.png",
+                "GET /api/fleet/a2/map.png",
+                f"GET /api/fleet?seen={'a1,' * (SEEN_MAX + 1)}",
+            )
+        }
+        assert list(statuses.values()) == [303, 200, 200, 404, 405, 404, 502, 400]
+        assert (await request(page, "GET /api/fleet", host="rebound.example"))[0] == 403
+    finally:
+        await page.close()
+
+
+async def test_page_is_for_this_machine_alone(keeper) -> None:
+    page = Overview(keeper, "192.0.2.1")
+    page.open()
+    assert page.address == ""
+    await page.close()
