@@ -77,7 +77,7 @@ async def stand() -> AsyncIterator[Make]:
         each.world.close()
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))])
 @pytest.mark.parametrize(
     ("way", "before", "degrees", "aside"),
     [

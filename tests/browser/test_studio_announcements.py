@@ -72,7 +72,9 @@ async def test_messages_of_a_window_are_told_in_it(studio: Open) -> None:
     assert page.errors == []
 
 
-@pytest.mark.parametrize(("language", "width"), [("en", 360), ("zh", 360), ("en", 820)])
+@pytest.mark.parametrize(
+    ("language", "width"), [("zh", 360), ("en", 820), pytest.param("en", 360, marks=pytest.mark.slow)]
+)
 async def test_small_screens_show_names_and_panels_whole(studio: Open, language: str, width: int) -> None:
     page = await studio(language=language)
     await page.set_viewport_size({"width": width, "height": 740})

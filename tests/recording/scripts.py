@@ -143,16 +143,26 @@ SCRIPTS = {
         [CERTIFICATES, f"{PYTHON} block_program.py"],
         {"block_program.py": (ROOT / "examples/block_program.py").read_text()},
         random=r"task_\d{16}",
-    ),
-    "courier": Script(REST, [f"{PYTHON} examples/ci/courier.py http://127.0.0.1:1448 0.6 0.2"]),
+    ).later,
+    "courier": Script(REST, [f"{PYTHON} examples/ci/courier.py http://127.0.0.1:1448 0.6 0.2"]).later,
     "courier-round": Script(REST, [f"{APP} {PYTHON} round.py"], {"round.py": ROUND}).later,
     "courier-refused": Script(REST, [f"{APP} {PYTHON} low.py"], {"low.py": LOW}, random=r"line \d+|/\S+").later,
     "courier-arm": Script(TEXT, [f"{APP} {PYTHON} arm.py"], {"arm.py": ARM}).later,
     "courier-both": Script(TEXT, [f"{APP} {PYTHON} both.py"], {"both.py": BOTH}).later,
-    **{f"program-{name}": program(name) for name in ("battery_watch", "measure_room")},
+    **{f"program-{name}": program(name) for name in ("battery_watch",)},
     **{
         f"program-{name}": program(name).later
-        for name in ("compass", "dance", "dice", "explorer", "light_show", "own_steps", "patrol", "polygon")
+        for name in (
+            "measure_room",
+            "compass",
+            "dance",
+            "dice",
+            "explorer",
+            "light_show",
+            "own_steps",
+            "patrol",
+            "polygon",
+        )
     },
     "program-list": Script(
         FRAMES,

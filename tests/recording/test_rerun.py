@@ -76,7 +76,8 @@ def rerun(file: Path, *options: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
 
 
-@pytest.mark.parametrize("seconds", [15.0, pytest.param(600.0, marks=pytest.mark.slow)])
+@pytest.mark.slow  # a session of REST, text, dog and programs, in test_rerun_everything, is run again in the suite
+@pytest.mark.parametrize("seconds", [15.0, 600.0])
 async def test_the_same_inputs_give_the_same_bytes(tmp_path: Path, seconds: float) -> None:
     file = await session(tmp_path, seconds)
     done = await asyncio.to_thread(rerun, file)
@@ -147,7 +148,8 @@ async def read_all(socket: ClientConnection) -> None:
         pass
 
 
-@pytest.mark.parametrize("turns", [2, pytest.param(90, marks=pytest.mark.slow)])  # 13 s and ten minutes
+@pytest.mark.slow  # test_rerun_everything runs programs again in the suite
+@pytest.mark.parametrize("turns", [2, 90])  # 13 s and ten minutes
 async def test_programs_do_the_same_again(tmp_path: Path, turns: int) -> None:
     file = await with_programs(tmp_path, turns)
     ends = [e.payload for e in read_recording(file).of(door="visual") if b'"stop"' in e.payload]

@@ -76,7 +76,12 @@ async def test_robot_whose_neighbours_move_along_believes_its_wheels() -> None:
 
 @pytest.mark.parametrize(
     ("body", "other"),
-    [("hermes", "hermes"), ("hermes", "cyberdog2"), ("hermes", "robomaster_ep"), ("cyberdog2", "robomaster_ep")],
+    [
+        ("hermes", "hermes"),
+        ("cyberdog2", "robomaster_ep"),
+        pytest.param("hermes", "cyberdog2", marks=pytest.mark.slow),
+        pytest.param("hermes", "robomaster_ep", marks=pytest.mark.slow),
+    ],
 )
 async def test_a_robot_in_the_way_is_driven_around(body: str, other: str) -> None:
     clock, database = LockstepClock(), Database(":memory:")

@@ -89,7 +89,11 @@ def _reached(now: Twist, asked: Twist, limits: BaseLimits) -> Twist:
     return Twist(now.x + share * dx, now.y + share * dy, now.yaw + turn)
 
 
-@pytest.mark.parametrize("spots", [THERE_AND_BACK, hard_lists(1), hard_lists(2)], ids=["and back", "1", "2"])
+@pytest.mark.parametrize(
+    "spots",
+    [THERE_AND_BACK, hard_lists(1), pytest.param(hard_lists(2), marks=pytest.mark.slow)],
+    ids=["and back", "1", "2"],
+)
 @pytest.mark.parametrize(
     "body", [pytest.param(body, marks=pytest.mark.world("empty", body=body), id=body) for body in BODIES]
 )

@@ -19,7 +19,9 @@ async def building() -> OccupancyGrid:
     return await survey(TIGHT)
 
 
-@pytest.mark.parametrize("bodies", [("universal", "hermes"), ("cyberdog2", "cyberdog2")])
+@pytest.mark.parametrize(
+    "bodies", [("universal", "hermes"), pytest.param(("cyberdog2", "cyberdog2"), marks=pytest.mark.slow)]
+)
 @pytest.mark.asyncio(loop_scope="module")
 async def test_two_pass_a_corridor_for_one(building: OccupancyGrid, bodies: tuple[str, ...]) -> None:
     """Each wants to where the other one is; the corridor between them has room for one."""

@@ -149,7 +149,14 @@ async def test_order_goes_on_after_a_corrected_pose(
 
 
 @pytest.mark.world("office", body="hermes")
-@pytest.mark.parametrize(("language", "word"), [(None, "您的物品到了"), ("en-US", "I am here"), ("zh-TW", "到了")])
+@pytest.mark.parametrize(
+    ("language", "word"),
+    [
+        (None, "您的物品到了"),
+        ("en-US", "I am here"),
+        pytest.param("zh-TW", "到了", marks=pytest.mark.slow),
+    ],
+)
 async def test_the_voice_speaks_the_language_that_was_set(
     screen: Screen, robot: Robot, forward: Forward, language: str | None, word: str
 ) -> None:

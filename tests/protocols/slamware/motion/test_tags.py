@@ -117,7 +117,9 @@ async def test_from_a_place_by_its_name(client: httpx.AsyncClient, world: World,
 
 
 @pytest.mark.world(MARKS, body="hermes")
-@pytest.mark.parametrize(("more", "x"), [({}, 7.5), ({"dock_allowance": 0.2}, 7.12)])
+@pytest.mark.parametrize(  # without an allowance: tests/autonomy/test_tag_docking.py
+    ("more", "x"), [pytest.param({}, 7.5, marks=pytest.mark.slow), ({"dock_allowance": 0.2}, 7.12)]
+)
 async def test_under_a_shelf(
     client: httpx.AsyncClient, world: World, forward: Forward, more: dict[str, float], x: float
 ) -> None:
