@@ -31,7 +31,11 @@ def inline(page: Path, words: str) -> str:
     return str(found)
 
 
-@pytest.mark.parametrize("page", STARTS, ids=lambda page: page.name)
+@pytest.mark.parametrize(  # the Chinese page drives by the same commands
+    "page",
+    [STARTS[0], *(pytest.param(page, marks=pytest.mark.slow) for page in STARTS[1:])],
+    ids=lambda page: page.name,
+)
 async def test_the_first_drive_ends_where_it_says(tmp_path: Path, page: Path) -> None:
     async with terminal(tmp_path, "127.0.0.71") as user:
         said = await user.type_block(block_with(page, "MoveToAction"))
@@ -81,6 +85,7 @@ async def test_the_dogs_page_localizes_and_goes(tmp_path: Path) -> None:
         assert_pose(user.moved, x=1.5, y=0.2, within=GOAL)
 
 
+@pytest.mark.slow  # the command goes there in tests/cli/test_cyberdog_cli.py, the English page's messages above
 async def test_the_dogs_chinese_page_goes_there_too(tmp_path: Path) -> None:
     [line] = re.findall(r"^.*cyberdog go 1.5 0.2", block_with(DOCS / "cyberdog.zh.md", "cyberdog go"), re.MULTILINE)
     async with terminal(tmp_path, "127.0.0.75", body="cyberdog2") as user:

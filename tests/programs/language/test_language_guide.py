@@ -41,7 +41,7 @@ class Guide:
 
 
 @pytest.mark.world("empty", body="cyberdog2")
-@pytest.mark.parametrize("page", ["language.md", "language.zh.md"])
+@pytest.mark.parametrize("page", ["language.md", pytest.param("language.zh.md", marks=pytest.mark.slow)])
 async def test_programs_show_what_the_page_says(page: str, robot: Robot, clock: LockstepClock) -> None:
     async with Engine() as engine:
         guide = Guide(engine, robot, clock)

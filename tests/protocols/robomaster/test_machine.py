@@ -281,5 +281,13 @@ class Machine(RuleBasedStateMachine):
 
 
 PHASES = (Phase.explicit, Phase.reuse, Phase.generate)  # shrinking would take minutes
-Machine.TestCase.settings = settings(max_examples=30, stateful_step_count=50, deadline=None, phases=PHASES)
+Machine.TestCase.settings = settings(max_examples=12, stateful_step_count=50, deadline=None, phases=PHASES)
 TestMachine = Machine.TestCase
+
+
+class LongMachine(Machine):
+    """The same with more examples, each a world of its own and real sockets."""
+
+
+LongMachine.TestCase.settings = settings(Machine.TestCase.settings, max_examples=60)
+TestLongMachine = pytest.mark.slow(LongMachine.TestCase)
