@@ -202,7 +202,8 @@ async def test_many_jumps_at_once_are_one_read(playing: Scene, film: Path, monke
     viewer = await playing.connect()
     pose = await viewer.subscribe("/a/pose")
     await ask(viewer, PAUSED, seek=recording.first + NANO)
-    await viewer.settled()
+    there = recorded(film, "/a/pose", lambda at: at < recording.first + NANO)[-1][0]
+    await viewer.until(lambda: there in [at for at, _ in viewer.data.get(pose, ())])  # or it comes among those below
     look, free, looks = Reel.last, threading.Event(), list[int]()
 
     def slowly(reel: Reel, at: int, topics: Collection[int]) -> list[Shot]:
