@@ -27,6 +27,7 @@ from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2_grpc as service
 
 REST, TEXT, GRPC = "hermes", "robomaster_ep", "cyberdog2"  # the bodies that each kind of client is for
+LOOK = 0.01  # s between two looks at how late the clients' own loop is
 RATE = 10  # Hz, of requests and of pushes
 CLIENTS = 1 << 10  # that their addresses are above those of the robots
 PICTURE = b"\x00\x00\x00\x01\x09"  # a delimiter stands before each
@@ -56,7 +57,6 @@ class Seen:
     """What all clients of one kind saw: s of each answer, and pushes of each robot a second."""
 
     waits: list[float] = field(default_factory=list)
-    late: list[float] = field(default_factory=list)  # s after its beat that a client itself came to send
     pushes: list[float] = field(default_factory=list)
     pictures: list[float] = field(default_factory=list)
     refused: int = 0
@@ -69,6 +69,14 @@ class Seen:
 def percentile(values: list[float], share: float) -> float:
     """Return the ms that so many of these s are at most."""
     return 1e3 * sorted(values)[min(len(values) - 1, int(share * len(values)))]
+
+
+@dataclass(slots=True)
+class Burden:
+    """The clients' own process: how late its loop was when nothing but itself held it up (s), and its cores."""
+
+    late: list[float] = field(default_factory=list)
+    cores: float = 0.0
 
 
 class App(service.GrpcAppServicer):
@@ -100,10 +108,11 @@ class Class:
 
     lesson: Lesson
     seen: dict[str, Seen] = field(default_factory=lambda: {kind: Seen() for kind in (REST, TEXT, GRPC)})
+    own: Burden = field(default_factory=Burden)
     ready: asyncio.Event = field(default_factory=asyncio.Event)
     began: float = 0.0
 
-    async def run(self) -> dict[str, Seen]:
+    async def run(self) -> tuple[dict[str, Seen], Burden]:
         """Have every client do its part."""
         app, lesson = App(), self.lesson
         server = await app.serve(lesson.app, lesson.proof)
@@ -112,13 +121,16 @@ class Class:
         await asyncio.sleep(lesson.settle)
         self.began = time.perf_counter()
         self.ready.set()
-        before = dict(app.beats)
-        await asyncio.sleep(lesson.seconds)
+        before, used = dict(app.beats), time.process_time()
+        while (due := time.perf_counter() + LOOK) < self.began + lesson.seconds:
+            await asyncio.sleep(LOOK)
+            self.own.late.append(time.perf_counter() - due)
+        self.own.cores = (time.process_time() - used) / lesson.seconds
         for serial, count in app.beats.items():
             self.seen[GRPC].pushes.append((count - before.get(serial, 0)) * HEARTBEAT_PERIOD / lesson.seconds)
         await asyncio.gather(*tasks)
         await server.stop(None)
-        return self.seen
+        return self.seen, self.own
 
     async def beats(self, number: int, kind: str, request: Callable[[int], Awaitable[bool]]) -> None:
         """Send a request at every beat, each client a little later than the one before; only then count."""
@@ -127,7 +139,6 @@ class Class:
         for beat in range(round(self.lesson.seconds * RATE)):
             await asyncio.sleep(began + beat / RATE - time.perf_counter())
             sent = time.perf_counter()
-            seen.late.append(sent - began - beat / RATE)
             seen.refused += not await request(beat)
             seen.waits.append(time.perf_counter() - sent)
 
@@ -208,14 +219,14 @@ class Class:
             await self.beats(number, GRPC, lambda _: tell(Code.SERVO, SERVO))
 
 
-def attend(lesson: Lesson) -> dict[str, Seen]:
+def attend(lesson: Lesson) -> tuple[dict[str, Seen], Burden]:
     """Run the clients of a lesson in this process."""
     import uvloop
 
     return uvloop.run(Class(lesson).run())
 
 
-def in_a_process(lesson: Lesson) -> dict[str, Seen]:
+def in_a_process(lesson: Lesson) -> tuple[dict[str, Seen], Burden]:
     """Run the clients of a lesson in a process of their own."""
     with get_context("spawn").Pool(1) as pool:
         return pool.apply(attend, (lesson,))
