@@ -18,6 +18,8 @@ from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
+from hypothesis.internal.conjecture import providers
+from hypothesis.internal.constants_ast import Constants
 
 from tests import warm_start
 
@@ -32,7 +34,19 @@ if importlib.util.find_spec("sniffio") is None:
 
 warm_start.install()
 
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Keep constants of our source out of hypothesis' examples, but for ``--hypothesis-profile explore``.
+
+    Which modules a worker has imported depends on its earlier tests, so examples would not be the same in every run;
+    and reading them all takes each worker 5 s.
+    """
+    if config.getoption("hypothesis_profile", None) != "explore":
+        providers._get_local_constants = lambda: NO_CONSTANTS
+
+
 TESTS = Path(__file__).parent
+NO_CONSTANTS = Constants()
 PROCESSES = (
     "access",
     "browser",

@@ -95,6 +95,7 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("roboglot.access.tunnel.heartbeat.QUIET_AFTER", 20.0)  # a busy machine is no silent line
 
 
+@pytest.mark.slow  # real time behind a bad line; test_tunnel.py has the tunnel itself
 async def test_robomasterpy_sees_what_it_sees_without(tmp_path: Path, vendor_ports: None) -> None:
     async with behind_a_bad_line(tmp_path, "robomaster_ep", "office") as runtime:
         hands = runtime.fleet.world.hands
@@ -107,6 +108,7 @@ async def test_robomasterpy_sees_what_it_sees_without(tmp_path: Path, vendor_por
         check(said, HERE, late=True)
 
 
+@pytest.mark.slow  # real time behind a bad line; test_tunnel.py has the tunnel itself
 async def test_rest_a_phone_and_programs_work(tmp_path: Path) -> None:
     async with behind_a_bad_line(tmp_path, "universal", "empty") as runtime:
         async with asyncio.timeout(60.0):

@@ -87,6 +87,7 @@ def test_others_are_served_while_one_floods(attacked: tuple[ServedRobot, Path], 
     assert "x" in json.loads(answer.partition(b"\r\n\r\n")[2])
 
 
+@pytest.mark.slow  # a load; in short: test_guard.py
 def test_a_flood_of_guesses_leaves_few_rows(attacked: tuple[ServedRobot, Path]) -> None:
     robot, phone = attacked
     FLOODS["log-ins"](ADDRESS, COUNT, phone)

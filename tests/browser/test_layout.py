@@ -58,7 +58,7 @@ async def test_phone_shows_and_can_touch_everything(served: Served, open_console
     assert await page.evaluate(SMALL_TARGETS) == []
 
 
-@pytest.mark.parametrize("theme", ["dark", "light"])
+@pytest.mark.parametrize("theme", ["dark", pytest.param("light", marks=pytest.mark.slow)])
 async def test_axe_finds_nothing_serious(theme: str, served: Served, open_console: OpenConsole) -> None:
     await served.clock.advance(1.0)
     page = await open_console(color_scheme=theme)

@@ -107,6 +107,7 @@ async def test_a_killed_server_gives_the_program_back(server: tuple[str, Life], 
     await context.close()
 
 
+@pytest.mark.slow  # long; test_key_pressed_without_link_counts_after_reconnection is near
 async def test_pages_open_and_keep_programs_without_the_server(server: tuple[str, Life], browser: Any) -> None:
     url, start = server
     first = await start()

@@ -75,6 +75,7 @@ async def test_the_text_page_begins_with_a_drive(page: str, tmp_path: Path) -> N
         assert_pose(user.moved, x=0.5, y=0.0, deg=0)
 
 
+@pytest.mark.slow  # a long story; tests/protocols/cyberdog/maps has the tasks
 async def test_the_dogs_page_localizes_and_goes(tmp_path: Path) -> None:
     page = DOCS / "cyberdog.md"
     async with terminal(tmp_path, "127.0.0.74") as user:
@@ -103,6 +104,7 @@ async def test_the_consoles_page_drives_and_drains(tmp_path: Path) -> None:
         assert user.robot[Battery].state.percentage < 20
 
 
+@pytest.mark.slow  # a long story; tests/cli/test_program.py has the commands
 async def test_the_page_of_programs_runs_and_keeps_them(tmp_path: Path) -> None:
     async with terminal(tmp_path, "127.0.0.80", body="cyberdog2") as user:
         (tmp_path / "my_program.py").write_text("cyberdog.motion.go_straight(0.5, 0.5)\nprint('there')\n")
@@ -118,6 +120,7 @@ async def test_the_page_of_programs_runs_and_keeps_them(tmp_path: Path) -> None:
         assert_pose(user.moved, x=0.5, y=0.0)
 
 
+@pytest.mark.slow  # a long story; tests/drivers has the lease
 async def test_the_drivers_page_takes_and_releases_control(tmp_path: Path) -> None:
     block = block_with(DOCS.parent / "drivers.md", "lease b --take").replace("lease b", "lease a")
     async with terminal(tmp_path, "127.0.0.81", body="hermes") as user:
@@ -127,6 +130,7 @@ async def test_the_drivers_page_takes_and_releases_control(tmp_path: Path) -> No
         assert released == looked
 
 
+@pytest.mark.slow  # a long story; test_docs_first_calls has the page's first call
 async def test_the_dogs_page_photographs_and_films(tmp_path: Path) -> None:
     async with terminal(tmp_path, "127.0.0.82", body="cyberdog2") as user:
         block = block_with(DOCS / "cyberdog.md", "cyberdog photo")
@@ -135,6 +139,7 @@ async def test_the_dogs_page_photographs_and_films(tmp_path: Path) -> None:
         assert (tmp_path / "walk.mp4").stat().st_size > 10_000
 
 
+@pytest.mark.slow  # a long story; tests/recording has the commands
 async def test_the_page_of_recordings_records_what_runs(tmp_path: Path) -> None:
     async with terminal(tmp_path, "127.0.0.83", body="hermes") as user:
         await user.type_block(block_with(DOCS.parent / "recording.md", "record mark", "bash"))
@@ -142,6 +147,7 @@ async def test_the_page_of_recordings_records_what_runs(tmp_path: Path) -> None:
         assert ended.status == 0, ended
 
 
+@pytest.mark.slow  # a long story; tests/cli/test_access_command.py has the commands
 async def test_page_of_access_lets_in_and_throws_out(tmp_path: Path) -> None:
     page = DOCS.parent / "access.md"
     pose = "http://127.0.0.1:1448/api/core/slam/v1/localization/pose"
@@ -199,6 +205,7 @@ async def test_the_rest_client_goes_and_looks(tmp_path: Path) -> None:
         assert_pose(user.moved, x=1.0, y=0.5, deg=90)
 
 
+@pytest.mark.slow  # a long story; tests/clients/cyberdog has the calls
 async def test_the_dogs_client_goes_photographs_and_walks(tmp_path: Path) -> None:
     async with terminal(tmp_path, "127.0.0.78", body="cyberdog2") as user:
         assert (await user.type(".venv/bin/roboglot certs --export phone")).status == 0

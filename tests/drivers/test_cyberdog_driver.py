@@ -107,6 +107,7 @@ async def done(action: Action, until: Until) -> None:
     assert action.status is ActionStatus.SUCCEEDED, action.reason
 
 
+@pytest.mark.slow  # long; test_matrix.py drives one by this driver
 async def test_it_drives_an_asymmetric_path(driven: Robot, until: Until, world: World) -> None:
     start = world.truth.pose_of("a")
     for offset in (Pose(0.6), Pose(yaw=math.pi / 2), Pose(0.3), Pose(0.0, -0.2)):
@@ -201,6 +202,7 @@ async def test_postures_figures_and_gaits_are_the_dogs(driven: Robot, robot: Rob
     await done(driven[Legs].stand(source="test"), until)
 
 
+@pytest.mark.slow  # a long story
 @pytest.mark.world("playground", body="cyberdog2")
 async def test_follows_and_docks_by_own_skills_when_localized(
     driven: Robot, robot: Robot, until: Until, world: World

@@ -60,6 +60,7 @@ def distances_between(points: np.ndarray, others: np.ndarray) -> np.ndarray:
     return np.linalg.norm(points[:, None] - others[None], axis=2).min(axis=1)
 
 
+@pytest.mark.slow  # long; test_matrix.py drives one by this driver
 async def test_a_robomaster_script_drives_an_asymmetric_path(
     driven: Robot, text_door: Open, world: World, forward: Forward
 ) -> None:
@@ -75,6 +76,7 @@ async def test_a_robomaster_script_drives_an_asymmetric_path(
     assert position[1] == pytest.approx(-here.y, abs=0.02)
 
 
+@pytest.mark.slow  # long; test_matrix.py drives a way by this driver
 async def test_a_square_ends_where_it_began(driven: Robot, text_door: Open, world: World, forward: Forward) -> None:
     script, start = Script(await text_door(driven), forward), world.truth.pose_of("a")
     for _ in range(4):

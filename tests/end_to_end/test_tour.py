@@ -12,7 +12,8 @@ from PIL import Image
 DEPOT = Path(__file__).parents[1] / "data" / "maps" / "depot.yaml"
 
 
-@pytest.mark.parametrize("world", ["office", pytest.param(str(DEPOT), marks=pytest.mark.slow)], ids=["office", "depot"])
+@pytest.mark.slow  # a long story; tests/docs has the first call of each client
+@pytest.mark.parametrize("world", ["office", str(DEPOT)], ids=["office", "depot"])
 def test_four_clients_drive_one_robot(world: str, tmp_path: Path, vendor_ports: None) -> None:
     out = tmp_path / "tour.png"
     command = [sys.executable, "-m", "roboglot", "demo", "--world", world, "--speed", "6"]

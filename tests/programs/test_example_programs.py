@@ -199,7 +199,12 @@ CASES = {
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(name, marks=pytest.mark.world(case.world, body="cyberdog2")) for name, case in CASES.items()],
+    [  # one example in three; the others are slow
+        pytest.param(
+            name, marks=[pytest.mark.world(case.world, body="cyberdog2"), *([pytest.mark.slow] if n % 3 else [])]
+        )
+        for n, (name, case) in enumerate(CASES.items())
+    ],
 )
 async def test_an_example_does_what_it_says(name: str, robot: Robot, world: World, clock: LockstepClock) -> None:
     case, scene = CASES[name], Scene(robot, world, clock)

@@ -54,7 +54,17 @@ ASK_THEMSELVES = {
 }
 
 every_body = pytest.mark.parametrize(
-    "body", [pytest.param(b, marks=pytest.mark.world("office", body=b)) for b in BODIES]
+    "body",
+    [  # the two that share least; the others are slow
+        pytest.param(
+            body,
+            marks=[
+                pytest.mark.world("office", body=body),
+                *([] if body in ("cyberdog2", "robomaster_ep") else [pytest.mark.slow]),
+            ],
+        )
+        for body in BODIES
+    ],
 )
 
 

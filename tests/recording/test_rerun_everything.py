@@ -12,7 +12,8 @@ from tests.recording.everything import hold
 from tests.recording.test_rerun import rerun
 
 
-@pytest.mark.parametrize("rounds", [1, pytest.param(30, marks=pytest.mark.slow)])  # 20 s and ten minutes
+@pytest.mark.slow  # in short: tests/recording/test_rerun.py
+@pytest.mark.parametrize("rounds", [1, 30])  # 20 s and ten minutes
 async def test_everything_happens_again(tmp_path: Path, rounds: int) -> None:
     session = await hold(tmp_path, rounds)
     assert session.pushed

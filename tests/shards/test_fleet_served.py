@@ -188,6 +188,7 @@ def test_logs_and_top_tell_of_a_shard(fleet: Fleet) -> None:
     assert any(float(row.split()[4]) > 0 for row in table.splitlines() if row.startswith("w"))  # cores
 
 
+@pytest.mark.slow  # long; in short: test_a_hung_shard_is_killed_and_started_again
 def test_killed_parents_leave_no_orphan_and_no_lock(fleet: Fleet) -> None:
     """The nursery first: the supervisor starts it again, and the shards. Then the supervisor: everything ends."""
     nursery, *shards = fleet.processes()

@@ -85,6 +85,7 @@ async def battle(simulate, seed):
     return felt
 
 
+@pytest.mark.slow  # long; test_world_trace.py has the same seed's trace
 async def test_the_same_seed_gives_the_same_battle(simulate):
     first = await battle(simulate, 3)
     assert first == await battle(simulate, 3)

@@ -51,6 +51,7 @@ async def test_the_presets_differ_as_they_should() -> None:
     assert 0.02 < hard[1] < 0.15
 
 
+@pytest.mark.slow  # long; test_world_trace.py has the same seed's trace
 async def test_usual_realism_is_default_and_seeds_are_repeatable() -> None:
     assert (await circled("hermes"))[2] == (await circled("hermes+usual"))[2]
     assert (await circled("hermes+hard"))[2] == (await circled("hermes+hard"))[2]

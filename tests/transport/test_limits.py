@@ -37,6 +37,7 @@ def test_a_debt_is_paid_with_time(amounts: list[int]) -> None:
     assert sum(amounts) <= 50.0 + 100.0 * now + 1e-6
 
 
+@pytest.mark.slow  # a load
 def test_many_clients_take_bounded_memory() -> None:
     limiter = Limiter(1.0, 5.0, time.monotonic)
     for number in range(3 * BUCKETS_MAX):

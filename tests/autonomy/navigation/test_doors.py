@@ -88,6 +88,7 @@ async def test_person_in_the_only_door_is_waited_for(tour: Tour) -> None:
     assert not tour.bumps
 
 
+@pytest.mark.slow  # in short: test_person_in_the_only_door_is_waited_for
 @pytest.mark.world(WIDE)
 async def test_person_who_stays_in_only_door_is_reported(tour: Tour) -> None:
     tour.world.hands.add_obstacle(Pose(4.0, 3.0, 0.0), PERSON)
@@ -117,6 +118,7 @@ async def test_goal_in_wall_met_on_way_is_unreachable(tour: Tour) -> None:
     assert not tour.bumps
 
 
+@pytest.mark.slow  # a long story
 @pytest.mark.world("office", body="cyberdog2")
 async def test_a_search_through_unknown_floor_is_bounded(tour: Tour) -> None:
     await tour.clock.advance(2.0)

@@ -112,12 +112,13 @@ async def test_a_lift_out_of_service_is_not_boarded(tour: Tour) -> None:
     assert tour.truth.x > 2.4
 
 
+@pytest.mark.slow  # the ride itself: test_up_and_down_with_maps_and_docks
 @pytest.mark.parametrize(
     ("fault", "options", "stage", "floor"),
     [
         ("lift_occupied", {}, RideStage.BOARDING, 0),
-        pytest.param("lift_door_blocked", {}, RideStage.BOARDING, 0, marks=pytest.mark.slow),
-        pytest.param("lift_door_blocked", {"floor": 1}, RideStage.LEAVING, 1, marks=pytest.mark.slow),
+        ("lift_door_blocked", {}, RideStage.BOARDING, 0),
+        ("lift_door_blocked", {"floor": 1}, RideStage.LEAVING, 1),
     ],
 )
 async def test_a_ride_that_is_in_somebodys_way(

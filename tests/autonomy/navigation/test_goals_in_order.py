@@ -134,6 +134,7 @@ async def test_second_try_continues_at_the_next_goal(tour: Tour) -> None:
     assert west > 3.3
 
 
+@pytest.mark.slow  # a long story
 @pytest.mark.world("empty")
 async def test_goal_on_way_that_is_walled_in_fails(tour: Tour) -> None:
     for x, y in ((5.6, 5.0), (4.4, 5.0), (5.0, 5.6), (5.0, 4.4)):

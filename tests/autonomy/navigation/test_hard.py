@@ -20,6 +20,7 @@ BODY = "universal+hard"
 OFF, TURNED = 0.10, math.radians(4.0)  # m, rad: twice what navigation keeps
 
 
+@pytest.mark.slow  # a long story; in short: tests/simulation/test_realism.py
 @pytest.mark.world("office", body=BODY)
 async def test_goals_and_dock_are_met_with_bad_sensors(tour: Tour) -> None:
     for x, y, deg in ((19.0, 9.8, 90.0), (12.0, 6.5, -45.0), (25.5, 10.0, 180.0)):

@@ -43,6 +43,7 @@ async def test_goals_are_reached_within_5_cm_2_degrees(tour: Tour) -> None:
     await visits_three_places(tour)
 
 
+@pytest.mark.slow  # further seeds of test_goals_are_reached_within_5_cm_2_degrees
 @pytest.mark.world("office", seed=7)
 async def test_goals_are_reached_with_other_luck_too(tour: Tour) -> None:
     await visits_three_places(tour)
@@ -189,6 +190,7 @@ async def test_speed_ratio_slows(tour: Tour) -> None:
     assert 0.25 < fastest < 0.32
 
 
+@pytest.mark.slow  # long; in short: test_second_try_continues_at_the_next_goal
 @pytest.mark.world(CORRIDOR)
 async def test_retries_try_again(tour: Tour) -> None:
     action = tour.head_for((8.5, 1.2), retries=8)
@@ -215,6 +217,7 @@ async def test_lost_robot_stops_and_goes_on_when_found(tour: Tour) -> None:
     assert tour.error[0] < 0.05
 
 
+@pytest.mark.slow  # long; in short: test_it_gives_up_after_half_a_minute
 @pytest.mark.world("empty")
 async def test_navigation_gives_up_on_a_foreign_map(tour: Tour) -> None:
     await tour.clock.advance(3.0)

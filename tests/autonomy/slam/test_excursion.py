@@ -47,6 +47,7 @@ def walls_in(tour: Tour, corners: tuple[tuple[float, float], tuple[float, float]
     return cells[((cells >= corners[0]) & (cells <= corners[1])).all(axis=1)]
 
 
+@pytest.mark.slow  # a long story
 @pytest.mark.world("office")
 async def test_sightings_while_lost_are_joined_to_the_map(tour: Tour) -> None:
     news: list[LocalizationLost | LocalizationRecovered] = []

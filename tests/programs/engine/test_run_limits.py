@@ -210,6 +210,7 @@ async def test_a_slow_reader_makes_the_program_wait(engine: Engine) -> None:
     assert run.exit_reason is ExitReason.FINISHED
 
 
+@pytest.mark.slow  # real time
 async def test_time_limit_of_a_run_pauses_during_suspension(engine: Engine) -> None:
     run = await started(engine, BUSY, Limits(wall=60.0))  # a busy machine may take its time to get there
     await run.suspend()

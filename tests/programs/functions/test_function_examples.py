@@ -90,7 +90,7 @@ def test_every_function_has_an_example_that_uses_it() -> None:
 
 
 @pytest.mark.world("empty", body="cyberdog2")
-@pytest.mark.parametrize("part", range(2))
+@pytest.mark.parametrize("part", [0, pytest.param(1, marks=pytest.mark.slow)])
 async def test_examples_of_motions(player: Player, part: int, monkeypatch: pytest.MonkeyPatch) -> None:
     for motion, spec in MOTION_SPECS.items():
         if not spec.jumps:

@@ -118,6 +118,7 @@ async def _idle(robot: ServedRobot) -> None:
             return
 
 
+@pytest.mark.slow  # a load
 async def test_ten_thousand_streams_at_robot_of_its_own(tmp_path: Path, messages: Messages) -> None:
     """All ask for something that takes long: some wait in line, and other apps are answered all the same."""
     arguments = ("--robot", "a=cyberdog2", "--world", "empty")

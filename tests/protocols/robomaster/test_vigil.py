@@ -30,7 +30,9 @@ def network() -> None:
 
 
 @pytest.mark.parametrize(
-    ("groups", "ordered", "stopped"), [("0 0", 0.5, 0.6), ("", 1.6, 1.7)], ids=["with echoes", "without"]
+    ("groups", "ordered", "stopped"),
+    [("0 0", 0.5, 0.6), pytest.param("", 1.6, 1.7, marks=pytest.mark.slow)],
+    ids=["with echoes", "without"],
 )
 def test_the_robot_stops_when_the_cable_is_cut(network: None, groups: str, ordered: float, stopped: float) -> None:
     """0.5 s is the claim; standing still takes the brakes a moment more."""

@@ -16,6 +16,8 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from tests.protocols.visual.front_end import Frame
 
 KILLS = int(os.environ.get("ROBOGLOT_KILLS", "6"))
@@ -151,6 +153,7 @@ class Ledger:
         return {id: state for kind, id, _, state in rows if kind == "task"}
 
 
+@pytest.mark.slow  # more kills than test_killed_runs.py
 async def test_kills(tmp_path: Path) -> None:
     chance = random.Random(7)
     ledger, database = Ledger(chance), tmp_path / "robot.db"

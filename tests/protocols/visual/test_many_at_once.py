@@ -60,6 +60,7 @@ async def test_whatever_comes_the_states_agree(app: FrontEnd, seed: int) -> None
         assert all(begin[1] == end[1] for begin, end in zip(marks[::2], marks[1::2], strict=True))
 
 
+@pytest.mark.slow  # a load; in short: tests/programs/engine/test_engine.py
 async def test_each_of_twenty_busy_programs_is_stopped_individually(app: FrontEnd) -> None:
     ids = [f"t{number}" for number in range(20)]
     for id in ids:

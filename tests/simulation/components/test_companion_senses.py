@@ -136,6 +136,7 @@ async def test_no_gps_indoors(simulate):
     assert sim.robot[Gps].reading.fix is GpsFix.NONE
 
 
+@pytest.mark.slow  # minutes of robot time
 async def test_motors_warm_up_with_the_load(dog):
     motors = dog.robot[Motors]
     assert len(motors.temperatures) == 12

@@ -21,6 +21,7 @@ async def test_an_old_battery_holds_less(robot):
     assert state.capacity == pytest.approx(100 / (6 * 3.6) * state.health)
 
 
+@pytest.mark.slow  # minutes of robot time
 @pytest.mark.world("empty")
 async def test_time_left_follows_what_the_robot_does(robot, world, forward):
     world.hands.place("a", Pose(5, 5))

@@ -111,6 +111,7 @@ async def test_a_task_of_a_cabinet(screen: Screen, robot: Robot, cloud: Path) ->
     assert [(task["task"]["type"], task["task"]["order_id"]) for task in tasks] == [("STATION_TAKEOUT", "17")]
 
 
+@pytest.mark.slow  # a long story; in short: test_a_task_of_a_cabinet
 async def test_a_cabinet_that_gives_nothing(screen: Screen, cloud: Path) -> None:
     await screen.prepare(cabinet=(1.5, 0.0, ""), R101=(3.0, 0.0, "ROOM"))
     await screen.wait_for_pickups(seconds=40)
@@ -124,6 +125,7 @@ async def test_a_cabinet_that_gives_nothing(screen: Screen, cloud: Path) -> None
     assert (await screen.box(0))["door_status"] == "CLOSED"
 
 
+@pytest.mark.slow  # a long story; in short: test_a_task_of_a_cabinet
 async def test_an_industrial_round(screen: Screen, cloud: Path) -> None:
     await screen.prepare(saw=(1.5, 0.0, ""), press=(3.0, 0.0, ""))
     targets = [{"target_name": "saw", "action": "load", "wait_time": 20}, {"target_name": "press", "action": "unload"}]

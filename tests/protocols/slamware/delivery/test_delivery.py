@@ -50,6 +50,7 @@ async def test_takeout_from_door_of_box_to_way_home(screen: Screen, robot: Robot
     assert "DELIVERY_TASK_START" in await screen.events()
 
 
+@pytest.mark.slow  # a long story
 async def test_unclaimed_parcel_goes_back_to_reception(screen: Screen, robot: Robot) -> None:
     await screen.prepare(R101=(2.0, 0.0, "ROOM"), desk=(0.0, 1.0, "RECEPTION"))
     cargo: Any = robot[Cargo]

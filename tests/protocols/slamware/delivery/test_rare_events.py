@@ -35,6 +35,7 @@ async def move(client: httpx.AsyncClient, x: float, y: float) -> None:
     assert reply.status_code == 200
 
 
+@pytest.mark.slow  # a long story
 @pytest.mark.world(ALLEY)
 async def test_a_narrow_corridor_is_reported_once_each_way(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward
@@ -92,9 +93,8 @@ async def test_a_dock_without_current(robot: Robot, client: httpx.AsyncClient, w
 
 
 @pytest.mark.world("office", body="hermes")
-@pytest.mark.parametrize(
-    "helped_by", ["reset", *(pytest.param(help, marks=pytest.mark.slow) for help in ("pose", "dock"))]
-)
+@pytest.mark.slow  # a long story
+@pytest.mark.parametrize("helped_by", ["reset", "pose", "dock"])
 async def test_a_lost_robot_lets_orders_wait(
     screen: Screen, robot: Robot, world: World, forward: Forward, monkeypatch: pytest.MonkeyPatch, helped_by: str
 ) -> None:
@@ -132,6 +132,7 @@ async def test_a_lost_robot_lets_orders_wait(
     assert (await screen.task(second))["status"] == "SUCCEEDED"
 
 
+@pytest.mark.slow  # a long story
 @pytest.mark.world("office", body="hermes")
 async def test_order_goes_on_after_a_corrected_pose(
     screen: Screen, robot: Robot, world: World, forward: Forward

@@ -146,6 +146,7 @@ async def two_floors(robot: Robot, client: httpx.AsyncClient, origin: Pose) -> N
     assert (await client.post(f"{MULTI}/stcm/:reload", json={"pose": pose})).status_code == 200
 
 
+@pytest.mark.slow  # a long story; in short: test_into_car_that_others_command_and_out_again
 async def test_to_a_place_on_another_floor_and_back(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward, origin: Pose
 ) -> None:

@@ -37,6 +37,7 @@ def test_the_shipped_map_is_of_the_shipped_office() -> None:
     assert SHIPPED.read_bytes() == surveyed(load_world("office")), "roboglot map survey examples/maps/office.stcm"
 
 
+@pytest.mark.slow  # a long story
 async def test_a_robot_rides_by_the_shipped_map(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward
 ) -> None:
