@@ -58,7 +58,7 @@ async def test_worlds_that_do_not_answer_say_why(keeper) -> None:
     with pytest.raises(Refused, match="sign in first"):
         await glances.picture("a2")
     with pytest.raises(LookupError):
-        await glances.state("nobody")
+        await glances.state("zoe")
 
 
 async def request(page: Overview, line: str, host: str = "127.16.3.1") -> tuple[int, bytes]:
@@ -95,7 +95,7 @@ async def test_page_lists_all_worlds_and_changes_nothing(keeper) -> None:
                 "GET /fleet/fleet.js",
                 "GET /nothing",
                 "POST /api/fleet",
-                "GET /api/fleet/nobody/map.png",
+                "GET /api/fleet/zoe/map.png",
                 "GET /api/fleet/a2/map.png",
                 f"GET /api/fleet?seen={'a1,' * (SEEN_MAX + 1)}",
             )
