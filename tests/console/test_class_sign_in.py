@@ -81,7 +81,7 @@ async def test_a_code_lets_pupils_into_their_worlds(tmp_path: Path, monkeypatch:
                 answer = await page.frame(**SAVE, id="1", body="print(1)\n")
                 assert answer["feedback"]["state"] == 0
                 await asked(page, do="open", id=4, name="mine")
-                assert "opens a class" in (await page.kind("refused"))["why"]
+                assert "opening a class needs the right admin" in (await page.kind("refused"))["why"]
                 await asked(teacher, do="close")
                 assert (await teacher.kind("ended"))["type"] == "ended"
                 with pytest.raises(ConnectionClosed):  # his right has ended with the class
