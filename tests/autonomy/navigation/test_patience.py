@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from types import SimpleNamespace
 from typing import Any
 
@@ -85,3 +86,20 @@ def test_strict_tracks_make_patient() -> None:
     tuning = PilotTuning()
     assert tuning.patience_for(Tracks.STRICT) == tuning.patience_on_tracks
     assert tuning.patience_for(Tracks.FREE) == tuning.patience
+
+
+async def test_nothing_succeeds_while_place_is_uncertain() -> None:
+    clock = LockstepClock()
+    patience = made(clock, is_certain=False)
+    believed: Any = patience._belief
+    waiting = asyncio.ensure_future(patience.be_certain())
+    await clock.advance(10.0)
+    assert not waiting.done()
+    believed.is_certain = True
+    await clock.advance(0.2)
+    assert waiting.done()
+    believed.is_certain = False
+    waiting = asyncio.ensure_future(patience.be_certain())
+    await clock.advance(PilotTuning().found_seconds + 1.0)
+    with pytest.raises(NotLocalized, match="do not confirm the place"):
+        await waiting

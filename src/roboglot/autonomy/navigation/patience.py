@@ -10,6 +10,8 @@ from roboglot.autonomy.slam.belief import Belief
 from roboglot.model.clock import Clock
 from roboglot.model.errors import Blocked, NotLocalized
 
+LOOK = 0.1  # s between two looks at whether the place is certain
+
 
 class Patience:
     """Gets a look at every step of a drive; ``seconds``: without getting closer that it bears."""
@@ -46,6 +48,16 @@ class Patience:
         if now - self._lost_at > (tuning.lost_seconds if belief.lost is None else tuning.found_seconds):
             why = belief.lost or "the scans do not fit the map"
             raise NotLocalized(f"{why} (quality {belief.quality:.2f})")
+
+    async def be_certain(self) -> None:
+        """Return when nothing speaks against the place any more; the robot stands meanwhile. Raises NotLocalized."""
+        belief, begun = self._belief, self._clock.time()
+        while not belief.is_certain:
+            self.check_place()
+            if self._clock.time() - begun > self._tuning.found_seconds:
+                why = "the scans do not confirm the place"
+                raise NotLocalized(f"{why} (quality {belief.quality:.2f})")
+            await self._clock.sleep(LOOK)
 
     def look(self, follower: Follower) -> bool:
         """Note how far it is; True if it came closer. Raises Blocked when wheels turn and nothing moves."""

@@ -209,7 +209,8 @@ class Pilot:
         return Twist(speed * math.cos(bearing), speed * math.sin(bearing), follower.turn(error))
 
     async def _arrive(self, follower: Follower) -> State:
-        """Judge where it stands: well enough, once more, or Blocked."""
+        """Judge where it stands, once that is certain: well enough, once more, or Blocked."""
+        await self._patience.be_certain()
         pose, goal, tolerance = self._belief.pose, self._goal.points[-1], self._goal.options.tolerance
         good = self._tuning.good
         if pose.distance_to(follower.end) <= good or pose.distance_to(goal) <= max(good, tolerance / 2):

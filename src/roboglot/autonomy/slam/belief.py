@@ -34,6 +34,7 @@ class Belief:
     closing_loops: bool = True
     lost: LostReason | None = None  # why the pose in the map is unknown
     confirmed: bool = True  # whether scans have confirmed a pose that was set, or found after a displacement
+    contradicted: bool = False  # whether odometry contradicts the newest scan, and is believed
     search: bool = False  # match the next scan in a wide window
     map: EvidenceGrid = field(default_factory=EvidenceGrid)
     revision: int = 0  # of the map
@@ -47,6 +48,11 @@ class Belief:
     def in_doubt(self) -> bool:
         """True if the pose says little: the place is not known, or scans have not confirmed it yet."""
         return self.localizing and (self.lost is not None or not self.confirmed)
+
+    @property
+    def is_certain(self) -> bool:
+        """True if nothing speaks against the pose now: robots that end somewhere ask before they say so."""
+        return not self.localizing or not (self.in_doubt or self.contradicted)
 
     @property
     def pose(self) -> Pose:

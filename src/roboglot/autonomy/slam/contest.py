@@ -1,21 +1,25 @@
 """Odometry against the scan, where they contradict: in a crowd that moves along, most points say that the robot stands.
 
-A world that stands still speaks with one voice. Where the points that tell both poses apart do not, some of them lie on
-things that move, and the wheels are believed. Robots that drive ahead drag matches back by millimetres a step, which no
-single step shows: hence the way of the last second is judged too. Needs the kernels.
+A static world speaks with one voice. Where the points that distinguish both poses disagree, some of them lie on things
+that move, and the wheels are believed: their pose, matched to walls alone, for a match with all points near it would be
+misled as well. Robots that drive ahead drag matches back by millimetres a step, which no single step shows: hence the
+last seconds are judged too. Needs the kernels.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
-from roboglot.autonomy.slam.matcher import Match, fit
+from roboglot.autonomy.slam.matcher import MATCH_POINTS_MAX, POINTS_MIN, Match, fit
+from roboglot.autonomy.slam.odometry.learner import OdometryLearner
 from roboglot.autonomy.slam.scan_points import ScanPoints
+from roboglot.autonomy.slam.walls import on_walls
 from roboglot.kernels.matching import gaps
 from roboglot.model.geometry import Pose
 
@@ -27,18 +31,33 @@ MAD, NOISES = 1.48, 1.5  # standard deviation from a median; the number of them 
 FITS = 0.04  # m from a surface within which a point votes
 ONE_VOICE = 0.9  # share of the votes that the scan's pose needs
 VOTES_MIN = 4  # votes for odometry below which it is ignored
+SIGMAS = 1.0  # of odometry: smaller contradictions are its own errors
 WAY_MAX, TURN_MAX = 0.3, 0.3  # m, rad: longer steps of odometry are no evidence against a scan
-PAST = 1.0  # s of history over which odometry is compared again
-PAST_TURN_MAX = 2.0  # rad turned within it, at most
+PASTS = (1.0, 4.0)  # s of history over which odometry is compared again
+PAST_TURN_MAX = 2.0  # rad turned within them, at most
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """Place of base_link at ``stamp``, by the ``wheels`` alone and as believed (map); all until then is summed.
+
+    ``way``: m driven; ``variance``: m2, of the wheels' noise.
+    """
+
+    stamp: float
+    wheels: Pose
+    pose: Pose
+    way: float
+    variance: float
 
 
 class WheelWitness:
-    """Asks the wheels about every match: over the newest step, and over the last second."""
+    """Asks the wheels about every match: over the newest step, and over the last seconds."""
 
-    def __init__(self) -> None:
-        # stamp, base_link by odometry alone, its believed pose (map), m driven
-        self._past: deque[tuple[float, Pose, Pose, float]] = deque()
-        self._wheels = Pose()
+    def __init__(self, odometry: OdometryLearner) -> None:
+        self._odometry = odometry
+        self._past: deque[Moment] = deque()
+        self._wheels, self._variance = Pose(), 0.0
 
     def forget(self) -> None:
         """The pose was set, or is in doubt: the wheels know nothing of that."""
@@ -46,9 +65,10 @@ class WheelWitness:
 
     def note(self, stamp: float, pose: Pose, way: float) -> None:
         """The robot is believed to have been at ``pose`` (map), after ``way`` m."""
-        while self._past and stamp - self._past[0][0] > PAST:
+        while self._past and stamp - self._past[0].stamp > PASTS[-1]:
             self._past.popleft()
-        self._past.append((stamp, self._wheels, pose, way))
+        self._variance += self._odometry.noise.newest.way
+        self._past.append(Moment(stamp, self._wheels, pose, way, self._variance))
 
     def contest(
         self, grid: EvidenceGrid, scan: ScanPoints, before: Pose, best: Match, prior: NDArray[np.float64], step: Pose
@@ -61,32 +81,49 @@ class WheelWitness:
         if way > WAY_MAX or abs(step.yaw) > TURN_MAX:
             self.forget()
             return None
-        driven = contested(grid, scan, before, best, prior, way)
+        newest = self._odometry.noise.newest.way
+        driven = contested(grid, scan, before, best, prior, way, self._sigma(way, newest))
         if not self._past:
             return driven
-        self._wheels = self._wheels.compose(before.relative_to(self._past[-1][2]))
-        _, wheels, pose, way_then = self._past[0]
-        moved = self._wheels.relative_to(wheels)
-        if driven is not None or abs(moved.yaw) > PAST_TURN_MAX:
-            return driven
-        by_wheels = pose.compose(moved)
-        far = Pose(by_wheels.x, by_wheels.y, before.yaw)
-        return contested(grid, scan, far, best, prior, self._past[-1][3] - way_then + way)
+        last = self._past[-1]
+        self._wheels = self._wheels.compose(before.relative_to(last.pose))
+        for seconds in PASTS:
+            if driven is not None:
+                break
+            then = next(moment for moment in self._past if last.stamp - moment.stamp < seconds)
+            moved, driven_way = self._wheels.relative_to(then.wheels), last.way - then.way + way
+            if abs(moved.yaw) > PAST_TURN_MAX:
+                break
+            by_wheels = then.pose.compose(moved)
+            far = Pose(by_wheels.x, by_wheels.y, before.yaw)
+            sigma = self._sigma(driven_way, last.variance - then.variance + newest)
+            driven = contested(grid, scan, far, best, prior, driven_way, sigma)
+        return driven
+
+    def _sigma(self, way: float, variance: float) -> float:
+        """Return the standard deviation (m) of wheels after ``way`` m, with ``variance`` (m2) by noise."""
+        return STILL + math.sqrt(variance) + self._odometry.bias.scale_doubt * way
 
 
 def contested(
-    grid: EvidenceGrid, scan: ScanPoints, before: Pose, best: Match, prior: NDArray[np.float64], way: float
+    grid: EvidenceGrid,
+    scan: ScanPoints,
+    before: Pose,
+    best: Match,
+    prior: NDArray[np.float64],
+    way: float,
+    sigma: float,
 ) -> Match | None:
     """Return the pose by odometry, if the scan's points do not clearly speak for the ``best`` match; else None.
 
-    Odometry says ``before`` (``prior``: its covariance) after ``way`` m.
+    Odometry says ``before`` (``prior``: its covariance; ``sigma``: its standard deviation, m) after ``way`` m.
     """
-    if best.pose.distance_to(before) < CONTRADICTION:
+    if best.pose.distance_to(before) < max(CONTRADICTION, SIGMAS * sigma):
         return None
     tight = prior.copy()
     tight[:2, :] = tight[:, :2] = 0.0
     tight[0, 0] = tight[1, 1] = (STILL + ALONG * way) ** 2
-    driven = fit(grid, scan, before, tight)
+    driven = _by_walls(grid, scan, before, tight)
     apart = driven.pose.distance_to(best.pose)
     if apart < CONTRADICTION:
         return None
@@ -95,11 +132,20 @@ def contested(
     if apart < NOISES * MAD * float(np.median(off_scan)):  # within the lidar's noise
         return None
     least = max(GAP_MIN, TELLING * apart)
-    for_wheels = int(((off_scan - off_wheels > least) & (off_wheels < FITS)).sum())
-    for_scan = int(((off_wheels - off_scan > least) & (off_scan < FITS)).sum())
+    for_wheels = np.count_nonzero((off_scan - off_wheels > least) & (off_wheels < FITS))
+    for_scan = np.count_nonzero((off_wheels - off_scan > least) & (off_scan < FITS))
     if for_wheels < VOTES_MIN or for_scan >= ONE_VOICE * (for_scan + for_wheels):
         return None
     return driven
+
+
+def _by_walls(grid: EvidenceGrid, scan: ScanPoints, before: Pose, tight: NDArray[np.float64]) -> Match:
+    """Return where the wheels put the robot, as far as walls say nothing else; judged by the whole scan."""
+    points = scan.points[:: math.ceil(len(scan.points) / MATCH_POINTS_MAX)]
+    walls = np.ascontiguousarray(points[on_walls(points)])
+    if len(walls) >= POINTS_MIN:
+        before = fit(grid, replace(scan, points=walls), before, tight).pose
+    return fit(grid, scan, before, tight, iterations=0)
 
 
 def _off(grid: EvidenceGrid, scan: ScanPoints, points: NDArray[np.float64], pose: Pose) -> NDArray[np.float64]:

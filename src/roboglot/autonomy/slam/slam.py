@@ -80,10 +80,9 @@ class Slam:
         self._step = Pose()  # motion by odometry since the last match, in base_link at that time
         self._matched_at = self._searched_at = -math.inf
         self._agreement = self._known = 1.0
-        self._contradicted = False  # whether the newest match was rejected in favour of odometry
-        self._witness = WheelWitness()
         self._newest: ScanTaken | None = None
         self.odometry = OdometryLearner(belief.odometry.noise)
+        self._witness = WheelWitness(self.odometry)
         self.whereabouts = Whereabouts(belief, robot.events)
         self._looked_at, self._looking = -math.inf, False
         self._mapped_from = 0.0  # m driven from which scans are added to the map again
@@ -232,12 +231,13 @@ class Slam:
         if belief.localizing:
             best = self._doubted(best, scan, before, stamp)
             driven = self._contested(best, scan, before, prior)
-        best, self._contradicted = driven or best, driven is not None
+        best, belief.contradicted = driven or best, driven is not None
         self._agreement, self._known = best.agreement, best.known / max(1, best.points)
         usual = belief.quality
         belief.quality += (1.0 if belief.search else QUALITY_GAIN) * (best.quality - belief.quality)
         belief.search = False
         if not belief.localizing:
+            self._witness.forget()
             return
         self._judge(best, scan, odometry, stamp, usual)
         if best.fit < POINTS_MIN or best.agreement < AGREEMENT_MIN:
@@ -345,7 +345,7 @@ class Slam:
         if not self._belief.map.scans or not self._belief.localizing:
             return True
         fits = self._agreement >= AGREEMENT_TO_MAP or self._known <= NEW_GROUND
-        return self.whereabouts.sure and not self._contradicted and self._way >= self._mapped_from and fits
+        return self.whereabouts.sure and not self._belief.contradicted and self._way >= self._mapped_from and fits
 
     def _straighten(self, odometry: Pose, stamp: float) -> None:
         """Go on with what a closed loop needs; when it is done, the robot stands elsewhere on a better map."""

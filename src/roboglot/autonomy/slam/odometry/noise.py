@@ -136,6 +136,11 @@ class LearntBias:
         """Values to store for the next start."""
         return {"turn": self.turn, "scale_x": self.scale_x, "scale_y": self.scale_y}
 
+    @property
+    def scale_doubt(self) -> float:
+        """Standard deviation of what is not learnt yet of the scale, as a share of the way."""
+        return math.sqrt(max(self._unknown["scale_x"], self._unknown["scale_y"]))
+
     def restore(self, kept: Mapping[str, object]) -> None:
         """Go on from ``kept``; what is no sensible number is left out."""
         for name in self.kept:

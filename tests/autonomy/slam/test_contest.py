@@ -1,0 +1,88 @@
+"""Wheels against scans among things that move along, in a corridor whose walls show no way."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from roboglot.autonomy.slam.evidence import EvidenceGrid
+from roboglot.autonomy.slam.scan_points import ScanPoints
+from roboglot.model.geometry import Point, Pose
+
+HALF, RAYS, REACH = 0.9, 720, 6.0  # m from the middle to a wall; m that the lidar sees
+ALONG = ((1.3, 0.45), (2.1, -0.45), (-1.1, -0.4), (-1.9, 0.45))  # robots that drive as fast, from the robot
+PILLARS = ((3.1, 0.55), (-2.9, -0.55), (0.9, -0.7), (-0.5, 0.7))  # in map
+RADIUS, PILLAR = 0.25, 0.12  # m
+
+
+def scanned(x: float, robots: tuple[tuple[float, float], ...] = ALONG) -> ScanPoints:
+    """The scan of a robot in the middle of the corridor, ``x`` m along it; ``robots`` relative to it."""
+    angles = np.arange(RAYS) * math.tau / RAYS
+    c, s = np.cos(angles), np.sin(angles)
+    with np.errstate(divide="ignore"):
+        away = np.minimum(REACH + 1.0, HALF / np.abs(s))
+    things = [(px, py, RADIUS) for px, py in robots] + [(px - x, py, PILLAR) for px, py in PILLARS]
+    for px, py, radius in things:
+        middle, beside = c * px + s * py, c * py - s * px
+        hits = (middle > 0.0) & (np.abs(beside) < radius)
+        front = middle - np.sqrt(np.maximum(radius**2 - beside**2, 0.0))
+        away = np.where(hits, np.minimum(away, front), away)
+    ends = np.stack([c * np.minimum(away, REACH), s * np.minimum(away, REACH)], axis=1)
+    hit = (away < REACH).astype(np.uint8)
+    return ScanPoints(ends, hit, np.ascontiguousarray(ends[hit > 0]), Point())
+
+
+@pytest.fixture(scope="module")
+def painted() -> EvidenceGrid:
+    """A map in which the robots that are about to drive along stand like furniture."""
+    from roboglot.autonomy.slam.painting import paint
+
+    grid = EvidenceGrid()
+    for _ in range(10):
+        paint(grid, scanned(0.0), Pose(), fill=True)
+    return grid
+
+
+@pytest.mark.parametrize("driven", [0.06, 0.1, 0.15])
+def test_wheels_are_believed_where_robots_drive_along(painted: EvidenceGrid, driven: float) -> None:
+    """What is believed instead of a misled match is what the wheels say, and no match that is misled as well."""
+    from roboglot.autonomy.slam.contest import contested
+    from roboglot.autonomy.slam.matcher import FREE, fit
+
+    scan, prior = scanned(driven), np.diag((0.02**2, 0.02**2, 0.01**2))
+    best = fit(painted, scan, Pose(driven), FREE)
+    assert abs(best.pose.x - driven) > 0.04  # otherwise this proves nothing
+    found = contested(painted, scan, Pose(driven, 0.01), best, prior, 0.5, 0.01)
+    assert found is not None
+    assert found.pose.distance_to(Pose(driven)) < 0.01  # and the walls say how far beside the middle it is
+
+
+def test_wheels_that_slip_are_not_believed_alone(painted: EvidenceGrid) -> None:
+    from roboglot.autonomy.slam.contest import contested
+    from roboglot.autonomy.slam.matcher import FREE, fit
+
+    scan, prior = scanned(0.0), np.diag((0.02**2, 0.02**2, 0.01**2))
+    best = fit(painted, scan, Pose(0.02), FREE)
+    assert contested(painted, scan, Pose(0.1), best, prior, 0.5, 0.01) is None
+
+
+def line(start: tuple[float, float], end: tuple[float, float], step: float = 0.03) -> NDArray[np.float64]:
+    count = math.ceil(math.dist(start, end) / step)
+    return np.linspace(start, end, count, endpoint=False)
+
+
+def test_walls_are_straight_and_wider_than_robots() -> None:
+    from roboglot.autonomy.slam.walls import on_walls
+
+    noise = np.random.default_rng(1).normal(0.0, 0.01, (1000, 2))
+    corner = np.concatenate([line((-2.0, 1.5), (1.0, 1.5)), line((1.0, 1.5), (1.0, -1.0))])
+    bend = np.linspace(-1.6, 1.6, 60)
+    row = [np.stack([3.0 - 0.3 * np.cos(bend), y + 0.3 * np.sin(bend)], axis=1) for y in (-2.0, -1.4, -0.8)]
+    board = line((-1.0, -3.0), (-0.3, -3.0))
+    for points, expected in ((corner, True), (np.concatenate(row), False), (board, False)):
+        found = on_walls(points + noise[: len(points)])
+        assert found.mean() > 0.95 if expected else not found.any()
+    assert not on_walls(np.empty((0, 2))).any()
