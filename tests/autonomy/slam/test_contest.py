@@ -48,7 +48,7 @@ def painted() -> EvidenceGrid:
 
 @pytest.mark.parametrize("driven", [0.06, 0.1, 0.15])
 def test_wheels_are_believed_where_robots_drive_along(painted: EvidenceGrid, driven: float) -> None:
-    """What is believed instead of a misled match is what the wheels say, and no match that is misled as well."""
+    """The wheels are believed instead of a misled match, and no match that is misled as well."""
     from roboglot.autonomy.slam.contest import contested
     from roboglot.autonomy.slam.matcher import FREE, fit
 

@@ -16,12 +16,13 @@ from roboglot.autonomy.navigation.route import Route
 from roboglot.autonomy.navigation.rules import Frame, Layers, layers
 from roboglot.autonomy.navigation.scan_memory import Cells, ScanMemory
 from roboglot.autonomy.navigation.terms import Shunned, Terms
-from roboglot.autonomy.slam.belief import Belief
+from roboglot.autonomy.slam.belief import Belief, Disc
 from roboglot.autonomy.slam.evidence import RESOLUTION, is_too_large
 from roboglot.autonomy.slam.scan_points import ScanPoints
+from roboglot.autonomy.traffic.doubtful import without_doubtful, without_gone
 from roboglot.autonomy.traffic.waiting_place import shun, waiting_place
 from roboglot.kernels.distance import distances
-from roboglot.kernels.obstacles import free_way, inflated_cost, nearest_open, reopen, without_things
+from roboglot.kernels.obstacles import free_way, inflated_cost, nearest_open, reopen
 from roboglot.kernels.search import shortest_path, ways_from
 from roboglot.kernels.smoothing import corners, line_cost
 from roboglot.model.components.mapping.annotations import Annotations
@@ -37,7 +38,7 @@ SLACK = 1.02  # a straight line may cost this much more than the cells that it r
 ESCAPE_MAX = 0.8  # m to the nearest open cell, for a robot that stands too close to an obstacle
 OBSTACLE_SECONDS = 10.0  # how long an obstacle out of sight is remembered
 MOVING_SECONDS, MOVING_REACH = 1.0, 0.4  # … one that moves, and m around its centre that it occupies
-GONE_NEAR = 0.1  # m around the place of a removed leg where the map no longer counts
+INNER = 0.6  # of a hull's radius: half the side of a square in it
 SLOW = 0.35  # m/s past obstacles
 HALF_DIAGONAL = 0.036  # m from a cell's centre to its corner: the cell may reach into a goal's tolerance
 DOUBT = 5.0  # s
@@ -45,10 +46,11 @@ THIN = 0.1  # m: the radius of a hull that passes most gaps
 TREAD_MAX = 0.3  # m between two scans; a larger step is a correction of the estimated pose
 SQUEEZE = 0.06  # m less than the hull's radius that the map may show where the robot has been: walls are whole cells
 TRODDEN_QUALITY = 0.5  # quality of localization from which the robot's own track counts
-THING_CELLS = 20  # cells up to which an isolated object may be a person
 OFF_MAP = 30.0  # m beyond the known map within which a goal may lie
 ROOM = 20  # cells of margin around start and goal that the grid must hold
 ROUGH_CELLS = 16_000  # of the coarse grid on which many routes are measured at once
+
+Window = tuple[NDArray[np.int16], NDArray[np.float32], NDArray[np.uint8], Point]
 
 
 @dataclass(frozen=True, slots=True)
@@ -274,7 +276,7 @@ class Planner:
         gone = self._load.gone_from(grid)
         doubts = now < self._doubted_until and self._doubted.shape == grid.evidence.shape
         shown = self._doubted if doubts else grid.evidence
-        evidence = _without(shown, grid.corner, gone) if len(gone) else shown
+        evidence = without_gone(shown, grid.corner, gone) if len(gone) else shown
         return self._scans.observe(grid, evidence, scan, pose, now)
 
     def forget_soon(self, places: Sequence[Point], now: float) -> None:
@@ -294,6 +296,14 @@ class Planner:
         for place in places:
             seen[frame.around((place,), MOVING_REACH)] = 0.0
 
+    def remember(self, discs: Sequence[Disc], now: float) -> None:
+        """Remember robots that stand, in sight or not, until a second after they were announced last."""
+        grid, stamp = self._belief.map, max(now - OBSTACLE_SECONDS + MOVING_SECONDS, 1e-3)
+        seen, frame = self._scans.seen(grid), Frame(grid.corner, grid.evidence.shape)
+        for x, y, radius in discs:
+            cells = seen[frame.around((Point(x, y),), INNER * radius)]
+            np.maximum(cells, stamp, out=cells)
+
     def observe_low(self, view: LowView, echoes: NDArray[np.float64], pose: Pose, now: float) -> NDArray[np.float64]:
         """Remember what stands beside the lidar's plane and is not among ``echoes`` (map); returns it in map (n, 2)."""
         return self._low.observe(self._belief.map, view, echoes, pose, now)
@@ -301,7 +311,7 @@ class Planner:
     def doubt(self, now: float) -> bool:
         """Look for a while whether what stands alone on the map is there at all; True if that was done already."""
         already = now < self._doubted_until
-        self._doubted, self._doubted_until = without_things(self._belief.map.evidence, THING_CELLS), now + DOUBT
+        self._doubted, self._doubted_until = without_doubtful(self._belief.map), now + DOUBT
         return already
 
     def tread(self, pose: Pose) -> None:
@@ -329,9 +339,9 @@ class Planner:
 
     def task(self, start: Point, goals: Sequence[Point], terms: Terms) -> Task:
         """Return the planning task, on copies of the map and of the obstacles seen."""
-        evidence, seen, trodden, corner = self._window(start, *goals)
-        if not (terms.obstacles and terms.things):
-            evidence = without_things(evidence, THING_CELLS)
+        grid = self._belief.map
+        shown = grid.evidence if terms.obstacles and terms.things else without_doubtful(grid)
+        evidence, seen, trodden, corner = self._window(shown, start, *goals)
         return Task(
             evidence,
             seen if terms.obstacles else np.zeros_like(seen),
@@ -351,10 +361,10 @@ class Planner:
             terms.shunned,
         )
 
-    def _window(self, *points: Point) -> tuple[NDArray[np.int16], NDArray[np.float32], NDArray[np.uint8], Point]:
-        """Copies of map and memory, with unknown cells around so that they hold ``points``, as far as allowed."""
+    def _window(self, shown: NDArray[np.int16], *points: Point) -> Window:
+        """Copies of what is ``shown`` on the map and of memory, around all ``points`` as far as allowed."""
         grid = self._belief.map
-        known = _without(grid.evidence, grid.corner, self._load.gone_from(grid))
+        known = without_gone(shown, grid.corner, self._load.gone_from(grid))
         height, width = known.shape
         rows = [math.floor(p.y / RESOLUTION) - grid.first_row for p in points]
         columns = [math.floor(p.x / RESOLUTION) - grid.first_column for p in points]
@@ -370,17 +380,6 @@ class Planner:
         inner = (slice(-top, height - top), slice(-left, width - left))
         evidence[inner], seen[inner], trodden[inner] = known, standing, driven
         return evidence, seen, trodden, Point(grid.corner.x + left * RESOLUTION, grid.corner.y + top * RESOLUTION)
-
-
-def _without(evidence: NDArray[np.int16], corner: Point, gone: NDArray[np.float64]) -> NDArray[np.int16]:
-    """A copy in which nothing stands around ``gone`` (n, 2; map, m) any more."""
-    kept = evidence.copy()
-    reach = math.ceil(GONE_NEAR / RESOLUTION)
-    for x, y in ((gone - (corner.x, corner.y)) / RESOLUTION).tolist():
-        row, column = math.floor(y), math.floor(x)
-        part = kept[max(0, row - reach) : max(0, row + reach + 1), max(0, column - reach) : max(0, column + reach + 1)]
-        part[part > 0] = -1
-    return kept
 
 
 def _mark_line(trodden: NDArray[np.uint8], corner: Point, start: Point, end: Point) -> None:

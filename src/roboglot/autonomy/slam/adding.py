@@ -42,6 +42,9 @@ class Adding:
         belief = self._belief
         drawn = self._robot[MapAnnotations].current if MapAnnotations in self._robot else Annotations()
         maintained = drawn.areas_of(AreaKind.MAINTENANCE)
+        scan = scan.beside(pose, belief.others)
+        if not len(scan.ends):
+            return
         paint(belief.map, scan, pose, fill=fill, maintained=maintained)
         belief.revision += 1
         if belief.localizing and not maintained:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,6 +16,8 @@ from roboglot.model.geometry import ORIGIN, Pose
 
 SURE = (0.003**2, 0.003**2, 0.002**2)  # m2, m2, rad2: lower bounds of the variances
 SET_BY_CLIENT = (0.15**2, 0.15**2, 0.1**2)  # variances of a pose set by a client
+
+Disc = tuple[float, float, float]  # x, y of the middle (map), radius: m
 
 
 def _sure() -> NDArray[np.float64]:
@@ -39,6 +42,7 @@ class Belief:
     map: EvidenceGrid = field(default_factory=EvidenceGrid)
     revision: int = 0  # of the map
     frame: str = ""  # identifies the loaded map: robots that loaded the same one share coordinates
+    others: Sequence[Disc] = ()  # other robots, which are kept off the map
     reader: ScanReader = field(init=False)
 
     def __post_init__(self) -> None:
@@ -72,7 +76,7 @@ class Belief:
     def take_map(self, grid: EvidenceGrid, pose: Pose) -> None:
         """Use ``grid`` from now on; the client says that the robot is at ``pose`` in it."""
         self.take_pose(pose)
-        self.map, self.frame = grid, grid.fingerprint()
+        self.map, self.frame, grid.given = grid, grid.fingerprint(), grid.evidence < 0
         self.revision += 1
 
     def start_anew(self) -> None:

@@ -38,6 +38,7 @@ class EvidenceGrid:
         self.first_column = 0  # of column 0, counted from the map's origin
         self.first_row = 0
         self.scans = 0
+        self.given: NDArray[np.bool_] | None = None  # free floor of the loaded map, if there is one
         self.frozen = False  # whether some cells are protected from scans
         self.full = False  # whether something was omitted because of CELLS_MAX or GRID_MAX
         self._drawn = OccupancyGrid(np.zeros((0, 0), np.int8), RESOLUTION, Point())
@@ -92,13 +93,17 @@ class EvidenceGrid:
             evidence[old], surface[old], marks[old] = self.evidence, self.surface, self.marks
         self.evidence, self.surface, self.marks = evidence, surface, marks
         self.first_row, self.first_column = rows[0], columns[0]
+        if self.given is not None:
+            given = np.zeros(shape, bool)
+            given[old] = self.given
+            self.given = given
 
     def seen_from(self, column: int, row: int) -> EvidenceGrid:
         """The same map with its origin at the corner of that cell, counted from the present origin."""
         moved = EvidenceGrid()
         moved.evidence, moved.surface, moved.marks = self.evidence, self.surface, self.marks
         moved.first_column, moved.first_row = self.first_column - column, self.first_row - row
-        moved.scans, moved.full = self.scans, self.full
+        moved.scans, moved.full, moved.given = self.scans, self.full, self.given
         return moved
 
     def copy(self) -> EvidenceGrid:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,6 +37,18 @@ class ScanPoints:
         turned: NDArray[np.float64] = points @ np.array([[c, s], [-s, c]])
         turned += (pose.x, pose.y)
         return turned
+
+    def beside(self, pose: Pose, discs: Sequence[tuple[float, float, float]]) -> ScanPoints:
+        """The same without the rays that end in one of ``discs`` (x, y, radius; m), base_link at ``pose`` there."""
+        if not discs or not len(self.ends):
+            return self
+        ends, kept = self.in_frame(pose, self.ends), np.ones(len(self.ends), bool)
+        for x, y, radius in discs:
+            kept &= np.hypot(ends[:, 0] - x, ends[:, 1] - y) > radius
+        if kept.all():
+            return self
+        ends, hit = np.ascontiguousarray(self.ends[kept]), np.ascontiguousarray(self.hit[kept])
+        return ScanPoints(ends, hit, np.ascontiguousarray(ends[hit > 0]), self.sensor)
 
     def nearby(self, most: int) -> NDArray[np.float64]:
         """Return at most so many of the points that a search or a judgement looks at, evenly chosen."""

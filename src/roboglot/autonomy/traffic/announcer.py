@@ -16,6 +16,7 @@ from roboglot.model.robot import Robot
 HEARD_MAX = 1.0  # s for which an announcement counts
 HEARD_REACH = 12.0  # m within which announcements matter
 PERIOD = 0.2  # s between two announcements
+AROUND = 0.1  # m around an announced hull in which echoes are its own
 
 
 class Announcer:
@@ -71,4 +72,8 @@ class Announcer:
         if event.stamp - self._announced_at < PERIOD - 0.01 or TrafficRadio not in self._robot:
             return
         self._announced_at = event.stamp
+        self._belief.others = [
+            (other.pose.x, other.pose.y, other.radius + AROUND + PERIOD * other.speed)
+            for other in self.heard(event.stamp)
+        ]
         self._robot[TrafficRadio].announce(self.announcement(event.stamp) if self.frame else None)

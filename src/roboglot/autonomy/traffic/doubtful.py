@@ -1,0 +1,42 @@
+"""Things on a map that may be gone: they stand alone, in it or in what scans added to a loaded one.
+
+Needs the kernels.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
+from roboglot.kernels.obstacles import without_things
+from roboglot.model.geometry import Point
+
+THING_CELLS = 20  # the size up to which what stands alone may be a person, or a robot
+FREE = np.int16(-1)
+GONE_NEAR = 0.1  # m around where a leg stood that is taken away: what the map shows there counts no more
+
+
+def without_doubtful(grid: EvidenceGrid) -> NDArray[np.int16]:
+    """A copy of the map's evidence that is free where something stands alone that may go away.
+
+    Who stood in a door is no part of its wall: the map that was given had floor there.
+    """
+    shown: NDArray[np.int16] = without_things(grid.evidence, THING_CELLS)
+    if grid.given is not None:
+        added = np.where(grid.given, grid.evidence, FREE)
+        shown[(added > 0) & (without_things(added, THING_CELLS) < 0)] = FREE
+    return shown
+
+
+def without_gone(evidence: NDArray[np.int16], corner: Point, gone: NDArray[np.float64]) -> NDArray[np.int16]:
+    """A copy in which nothing stands around ``gone`` (n, 2; map, m) any more."""
+    kept = evidence.copy()
+    reach = math.ceil(GONE_NEAR / RESOLUTION)
+    for x, y in ((gone - (corner.x, corner.y)) / RESOLUTION).tolist():
+        row, column = math.floor(y), math.floor(x)
+        part = kept[max(0, row - reach) : max(0, row + reach + 1), max(0, column - reach) : max(0, column + reach + 1)]
+        part[part > 0] = -1
+    return kept
