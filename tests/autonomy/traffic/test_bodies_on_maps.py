@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from typing import Any
-
 import numpy as np
 import pytest
 
-from roboglot.autonomy.docking.shelf_legs import Load
-from roboglot.autonomy.navigation.terms import Terms
 from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
 from roboglot.config import RobotConfig
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.mapping.annotations import Annotations
 from roboglot.model.components.mapping.mapping import Mapping
-from roboglot.model.errors import Unreachable
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid
 from roboglot.storage.database import Database
@@ -53,27 +46,6 @@ def test_given_floor_keeps_its_place_while_map_grows() -> None:
     assert grid.given is not None
     assert grid.given.shape == grid.evidence.shape
     assert ((grid.evidence < 0) == grid.given).all()
-
-
-def test_plans_mind_who_stands_out_of_sight() -> None:
-    """A robot that announces that it stands in a corridor closes it, for a second after it was heard last."""
-    from roboglot.autonomy.navigation.planner import Planner
-
-    grid = walled(given=True)
-    grid.evidence[[0, -1]] = grid.evidence[:, [0, -1]] = 500
-    belief: Any = SimpleNamespace(map=grid, localizing=True, quality=1.0)
-    planner = Planner(belief, 0.27, Load())
-    start, goal = Point(1.5, 2.5), (Point(4.0, 2.5),)
-
-    def length(now: float) -> float:
-        terms = Terms(now=now, top=1.0, acceleration=1.0, tolerance=0.05, drawn=Annotations())
-        return planner.task(start, goal, terms).solve().length
-
-    assert length(100.0) < 2.6
-    planner.remember([(2.52, 2.5, 0.27)], 100.0)
-    with pytest.raises(Unreachable):
-        length(100.5)
-    assert length(101.5) < 2.6
 
 
 @pytest.mark.parametrize(("body", "painted"), [("universal", False), ("cyberdog2", True)])

@@ -78,7 +78,6 @@ class Lookout:
         self._traffic.observe(points, pose, event.stamp)
         self._planner.forget_soon(self._traffic.moving, event.stamp)
         self._planner.forget(self._traffic.far(pose))
-        self._planner.remember(self._traffic.standing, event.stamp)
         if self.follower:
             self._look_ahead(self.follower, pose, points)
             if (width := self._narrow.entered(scan.points)) is not None:

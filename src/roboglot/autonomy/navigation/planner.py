@@ -16,7 +16,7 @@ from roboglot.autonomy.navigation.route import Route
 from roboglot.autonomy.navigation.rules import Frame, Layers, layers
 from roboglot.autonomy.navigation.scan_memory import Cells, ScanMemory
 from roboglot.autonomy.navigation.terms import Shunned, Terms
-from roboglot.autonomy.slam.belief import Belief, Disc
+from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.evidence import RESOLUTION, is_too_large
 from roboglot.autonomy.slam.scan_points import ScanPoints
 from roboglot.autonomy.traffic.doubtful import without_doubtful, without_gone
@@ -38,7 +38,6 @@ SLACK = 1.02  # a straight line may cost this much more than the cells that it r
 ESCAPE_MAX = 0.8  # m to the nearest open cell, for a robot that stands too close to an obstacle
 OBSTACLE_SECONDS = 10.0  # how long an obstacle out of sight is remembered
 MOVING_SECONDS, MOVING_REACH = 1.0, 0.4  # … one that moves, and m around its centre that it occupies
-INNER = 0.6  # of a hull's radius: half the side of a square in it
 SLOW = 0.35  # m/s past obstacles
 HALF_DIAGONAL = 0.036  # m from a cell's centre to its corner: the cell may reach into a goal's tolerance
 DOUBT = 5.0  # s
@@ -295,14 +294,6 @@ class Planner:
         seen, frame = self._scans.seen(grid), Frame(grid.corner, grid.evidence.shape)
         for place in places:
             seen[frame.around((place,), MOVING_REACH)] = 0.0
-
-    def remember(self, discs: Sequence[Disc], now: float) -> None:
-        """Remember robots that stand, in sight or not, until a second after they were announced last."""
-        grid, stamp = self._belief.map, max(now - OBSTACLE_SECONDS + MOVING_SECONDS, 1e-3)
-        seen, frame = self._scans.seen(grid), Frame(grid.corner, grid.evidence.shape)
-        for x, y, radius in discs:
-            cells = seen[frame.around((Point(x, y),), INNER * radius)]
-            np.maximum(cells, stamp, out=cells)
 
     def observe_low(self, view: LowView, echoes: NDArray[np.float64], pose: Pose, now: float) -> NDArray[np.float64]:
         """Remember what stands beside the lidar's plane and is not among ``echoes`` (map); returns it in map (n, 2)."""

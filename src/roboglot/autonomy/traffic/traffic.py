@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.autonomy.navigation.route import SPACING
-from roboglot.autonomy.slam.belief import Belief, Disc
+from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.traffic.announcer import Announcer
 from roboglot.autonomy.traffic.right_of_way import (
     CLEAR,
@@ -121,11 +121,6 @@ class Traffic:
     def moving(self) -> list[Point]:
         """Return the current places of robots that have a goal."""
         return [Point(*way.points[0].tolist()) for way in self._ways if len(way.points) >= 2]
-
-    @property
-    def standing(self) -> list[Disc]:
-        """Return robots that announce that they have no goal."""
-        return [(*way.points[0].tolist(), way.radius) for way in self._ways if way.name and not way.lively]
 
     def far(self, pose: Pose) -> list[Point]:
         """Places of those that will be elsewhere before the robot comes there."""
