@@ -145,7 +145,7 @@ async def test_without_a_robot_it_happens_to_all(sim):
         (lambda faults: faults.inject("low_battery", chrge=0.1), "did you mean 'charge'"),
         (lambda faults: faults.inject("low_battery", charge=3.0), "between 0 and 1"),
         (lambda faults: faults.inject("low_battery", duration=0.0), "more than 0 s"),
-        (lambda faults: faults.inject("lift_out_of_service", "a"), "not to a robot"),
+        (lambda faults: faults.inject("lift_out_of_service", "a"), "affects the building, not a robot"),
         (lambda faults: faults.inject("cliff", "a", zone="above"), "a zone is one of front"),
         (lambda faults: faults.inject("motor_fault", "a", wheel="fifth"), "a wheel is one of"),
         (lambda faults: [faults.inject("lidar_gone", "a") for _ in range(2)], "already on a"),

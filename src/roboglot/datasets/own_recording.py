@@ -6,6 +6,7 @@ Of several robots the one with most scans is read. The lidar's limits are not in
 from __future__ import annotations
 
 import math
+import struct
 from collections import Counter
 from collections.abc import Iterator
 from importlib import import_module
@@ -75,6 +76,7 @@ def _messages(path: Path) -> Iterator[tuple[str, bytes]]:
         from mcap.exceptions import McapError
         from mcap.records import Channel, Message, Schema
         from mcap.stream_reader import StreamReader
+        from zstandard import ZstdError
     schemas: dict[int, str] = {}
     channels: dict[int, str] = {}
     with path.open("rb") as file:
@@ -86,7 +88,7 @@ def _messages(path: Path) -> Iterator[tuple[str, bytes]]:
                     channels[record.id] = schemas.get(record.schema_id, "")
                 elif isinstance(record, Message) and (kind := channels.get(record.channel_id)) in (SCAN, TRANSFORMS):
                     yield str(kind), record.data
-        except (McapError, ValueError, EOFError, KeyError, OverflowError):
+        except (McapError, ZstdError, struct.error, ValueError, EOFError, KeyError, OverflowError, MemoryError):
             return  # the program was killed; the complete records count
 
 
