@@ -125,6 +125,7 @@ async def test_escape_stops_and_letting_go_does(served: Served, open_console: Op
     assert served.robot.actions.running() == []
 
 
+@pytest.mark.slow  # in short: test_the_robot_stands_when_the_pad_falls_silent
 async def test_a_gamepad_drives_and_stops(served: Served, open_console: OpenConsole) -> None:
     page = await open_console()
     await page.evaluate("""() => { window.stick = [0, 0, 0, 0];
@@ -143,6 +144,7 @@ async def test_a_gamepad_drives_and_stops(served: Served, open_console: OpenCons
     assert speed_of(served) < 0.02
 
 
+@pytest.mark.slow  # a view of its own; tests/recording has the recorder
 async def test_a_recording_is_begun_marked_and_ended(served: Served, open_console: OpenConsole) -> None:
     page = await open_console()
     page.on("dialog", lambda dialog: asyncio.ensure_future(dialog.accept("it bumped")))
@@ -192,6 +194,7 @@ async def test_two_browsers_and_rest_client_contend_for_control(served: Served, 
     await ben.wait_for_selector("text=/slamware .* moves it/")
 
 
+@pytest.mark.slow  # a view of its own
 async def test_plots_show_the_robots_speed_and_battery(served: Served, open_console: OpenConsole) -> None:
     page = await open_console()
     await page.click("#tab-plots")
@@ -221,6 +224,7 @@ async def test_the_wire_shows_requests_and_why_they_fail(served: Served, open_co
     await page.wait_for_selector("text=Copy as nc")
 
 
+@pytest.mark.slow  # long; in short: test_the_wire_shows_requests_and_why_they_fail
 async def test_paused_wire_goes_back_to_the_first_message(served: Served, open_console: OpenConsole) -> None:
     page = await open_console(view="wire")
     await until(lambda: served.robot.tap.watched)
@@ -318,6 +322,7 @@ async def test_a_lost_connection_is_said_and_bridged(served: Served, open_consol
     await page.wait_for_selector(".link.good")
 
 
+@pytest.mark.slow  # a view of its own; tests/console has the maps
 async def test_saved_map_is_seen_in_the_grid(served: Served, open_console: OpenConsole) -> None:
     page = await open_console(view="world")
     page.on("dialog", lambda dialog: asyncio.ensure_future(dialog.accept("hall")))

@@ -151,6 +151,7 @@ async def test_buttons_are_on_for_those_who_may(guarded: Guarded, open_page: Ope
         await page.context.close()
 
 
+@pytest.mark.slow  # tests/console has the sessions
 async def test_signing_out_ends_the_session(guarded: Guarded, open_page: Open) -> None:
     guarded.add("anna", "drive")
     page = await open_page()
@@ -168,6 +169,7 @@ async def test_signing_out_ends_the_session(guarded: Guarded, open_page: Open) -
     assert await page.evaluate("fetch('/api/robots').then((r) => r.status)") == 401
 
 
+@pytest.mark.slow  # a layout of its own
 async def test_header_of_phone_has_room_for_a_name(guarded: Guarded, open_page: Open) -> None:
     guarded.add("a-person-with-a-long-name", "drive")
     page = await open_page()
@@ -195,6 +197,7 @@ async def test_token_signs_in_and_its_rotation_signs_out(guarded: Guarded, open_
     await page.wait_for_selector(".sign")
 
 
+@pytest.mark.slow  # tests/access/test_guard.py has the limits
 async def test_guesses_are_limited_and_differ_from_nothing(guarded: Guarded, open_page: Open) -> None:
     guarded.add("ben", "see")
     guarded.forget_tries()
@@ -234,6 +237,7 @@ async def test_a_driver_whose_right_is_revoked_stands(guarded: Guarded, open_pag
     assert robot.actions.running() == []
 
 
+@pytest.mark.slow  # in short: test_a_driver_whose_right_is_revoked_stands
 async def test_reduced_right_leaves_the_page_with_the_rest(guarded: Guarded, open_page: Open) -> None:
     guarded.add("dora", "drive", "a")
     page = await open_page()
@@ -294,6 +298,7 @@ async def test_pupils_join_by_code_and_the_teacher_leads(guarded: Guarded, open_
     assert await pupils[1].evaluate("fetch('/api/robots').then((r) => r.status)") == 401
 
 
+@pytest.mark.slow  # tests/console/test_studio_socket.py has the limits
 async def test_wrong_codes_are_limited(guarded: Guarded, open_page: Open) -> None:
     page = await open_page("/?code=NOTONE")  # type: ignore[call-arg]
     statuses = await page.evaluate("""async () => { const found = []; for (let i = 0; i < 12; i++) {

@@ -236,6 +236,7 @@ async def test_no_serious_finding_of_axe(studio: Open, theme: str) -> None:
         assert serious == []
 
 
+@pytest.mark.slow  # tests/console has the rehearsal
 async def test_the_program_is_simulated_first(studio: Open, opened: Served) -> None:
     page = await loaded(await studio(), COUNTING)
     await page.click("#tab-robot")
@@ -285,6 +286,7 @@ async def test_answers_are_shown_in_plain_words(studio: Open) -> None:
     assert {raw: await page.evaluate(words % json.dumps(raw)) for raw in told} == told
 
 
+@pytest.mark.slow  # long
 async def test_page_asks_again_until_a_robot_is_programmable(studio: Open, browser: Any) -> None:
     context = await browser.new_context(locale="en-US")
     asked: list[str] = []
@@ -313,6 +315,7 @@ async def test_page_asks_again_until_a_robot_is_programmable(studio: Open, brows
     await context.close()
 
 
+@pytest.mark.slow  # long; in short: test_error_is_at_its_block_in_both_languages
 async def test_a_change_of_language_and_look_loses_nothing(studio: Open) -> None:
     page = await loaded(await studio(), COUNTING)
     asked: list[str] = []

@@ -18,6 +18,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples" / "programs"
 FILE = {"name": "f.py", "mimeType": "text/x-python"}
 
 
+@pytest.mark.slow  # long; test_program_of_blocks_comes_back_from_its_file is near
 async def test_examples_and_guides_programs_open_as_text_unchanged(studio: Open) -> None:
     page = await studio()
     files = await asyncio.to_thread(lambda: {path.name: path.read_text("utf-8") for path in EXAMPLES.glob("*.py")})

@@ -47,6 +47,7 @@ async def kept_as_module(page: Page) -> None:
     await until(page, "studio.editor.modules.value.some(m => m.condition.startsWith('double'))")
 
 
+@pytest.mark.slow  # long; in short: test_stepping_goes_through_the_blocks_of_a_module
 async def test_function_becomes_a_module_that_is_lit_inside(studio: Open, opened: Served) -> None:
     page = await loaded(await studio(), DOUBLE)
     await kept_as_module(page)
@@ -78,6 +79,7 @@ async def test_stepping_goes_through_the_blocks_of_a_module(studio: Open, opened
     assert page.errors == []
 
 
+@pytest.mark.slow  # long; the others of this file show a module
 async def test_a_module_is_opened_changed_and_deleted(studio: Open, opened: Served) -> None:
     page = await loaded(await studio(), DOUBLE)
     await kept_as_module(page)

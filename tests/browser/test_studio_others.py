@@ -13,6 +13,7 @@ __all__ = ["studio"]  # the fixture
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 
+@pytest.mark.slow  # long; tests/console/test_studio_socket.py has the lists
 async def test_other_programs_are_counted_listed_first_and_ended(studio: Open) -> None:
     page, other = await loaded(await studio(), FOREVER), await loaded(await studio(), FOREVER)
     await page.fill("header .name input", "mine")

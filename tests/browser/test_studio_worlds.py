@@ -97,6 +97,7 @@ async def test_two_pupils_in_worlds_of_their_own(browser: Any, worlds: list[Show
         assert [page.errors for page in (teacher, anna, ben)] == [[], [], []]
 
 
+@pytest.mark.slow  # long; in short: tests/console/test_studio_socket.py
 async def test_two_devices_show_one_program_alike(studio: Open, opened: Served) -> None:
     """Another browser with another name and language opens the program that runs: same blocks, state, lit block."""
     phone, desk = await studio(person="anna"), await studio(person="ben", language="zh")
