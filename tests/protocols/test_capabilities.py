@@ -53,6 +53,7 @@ ASK_THEMSELVES = {
     "6009",  # 0 stops whatever there is
 }
 
+UNANSWERED = pytest.mark.skip(reason="a defect: after all requests of the REST door, 6004 with type 7 never ends")
 every_body = pytest.mark.parametrize(
     "body",
     [  # the two that share least; the others are slow
@@ -61,6 +62,7 @@ every_body = pytest.mark.parametrize(
             marks=[
                 pytest.mark.world("office", body=body),
                 *([] if body in ("cyberdog2", "robomaster_ep") else [pytest.mark.slow]),
+                *([UNANSWERED] if body == "universal" else []),
             ],
         )
         for body in BODIES
