@@ -37,6 +37,13 @@ async def test_relocalisation_goes_through_its_feedback(client, robot, forward, 
     assert await state(client) == 101
 
 
+async def test_relocalisation_waits_for_the_first_scan(client, passing: Passing) -> None:
+    stream = Stream(client, 6004, {"type": 7})
+    await until(lambda: 3100 in stream.codes)  # before the lidar has turned once
+    await passing(lambda: stream.ended)
+    assert stream.codes == LOCALIZED
+
+
 async def test_navigation_needs_localization(client, robot, forward, caplog) -> None:
     caplog.set_level("INFO")
     await forward(seconds=1)

@@ -27,6 +27,7 @@ GOOD_FIT = 0.5  # quality of localization from which the robot counts as localiz
 GIVE_UP_AFTER = 120.0  # s
 NEAR = 0.5  # m around the believed pose that are searched first
 LOOK_AT_MOST = 1.5  # s
+FIRST_SCAN_MAX, FIRST_SCAN_PERIOD = 3.0, 0.1  # s that a robot just switched on may take to begin its map; s between looks
 PATH_PERIOD = 1.0  # s between two paths
 
 
@@ -53,7 +54,7 @@ async def relocalize(context: Context, task: Task, *, outdoor: bool) -> TaskResu
         load_map(robot, stored, Pose())
         context.stored_map = stored.name
     # Without a stored map the one in memory serves, unless it is of the other kind or was deleted.
-    if not has_map(robot) or (stored is None and (outdoor or context.stored_map or context.map_deleted)):
+    if not await _has_begun_map(robot) or (stored is None and (outdoor or context.stored_map or context.map_deleted)):
         task.feedback(Feedback.LOCALIZATION_MAP_UNUSABLE)
         return TaskResult.FAILED
     task.feedback(Feedback.LOCALIZATION_MAP_GOOD)
@@ -69,6 +70,14 @@ async def relocalize(context: Context, task: Task, *, outdoor: bool) -> TaskResu
     await keep_dock(context)
     task.feedback(Feedback.LOCALIZATION_DONE)
     return TaskResult.SUCCESS
+
+
+async def _has_begun_map(robot: Robot) -> bool:
+    """Return whether anything is known of the surroundings, after the first scan of a robot just switched on."""
+    deadline = robot.clock.time() + FIRST_SCAN_MAX
+    while not has_map(robot) and not robot[Localization].started and robot.clock.time() < deadline:
+        await robot.clock.sleep(FIRST_SCAN_PERIOD)
+    return has_map(robot)
 
 
 async def _still_there(robot: Robot, task: Task, place: GlobeAnchor | None) -> bool:
