@@ -15,7 +15,7 @@ import uvloop
 
 from roboglot.config import RobotConfig
 from roboglot.fleet import build_fleet
-from roboglot.hosting.logs import NamesRobot
+from roboglot.hosting.logs import LINES_MAX, PERIOD, BoundsLines, NamesRobot
 from roboglot.hosting.open_files import OpenFiles, ran_out
 from roboglot.model.client_context import concerned, concerning
 from roboglot.model.clock import LockstepClock
@@ -119,3 +119,36 @@ async def test_what_happens_in_world_belongs_to_a_robot() -> None:
         for part in ("control", "senses")
         for when in ("", "timer of ")
     }
+
+
+def test_flood_of_lines_is_bounded_and_counted() -> None:
+    now = 0.0
+    heard: list[str] = []
+    log = logging.getLogger("flood")
+
+    class Ear(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            heard.append(record.getMessage())
+
+    handler = Ear()
+    handler.addFilter(BoundsLines(lambda: now))
+    log.addHandler(handler)
+    log.setLevel(logging.INFO)
+    try:
+        with concerning("a"):
+            for number in range(300):
+                log.info("%d connected", number)
+            log.info("another kind")
+            assert len(heard) == LINES_MAX + 1
+            assert heard[LINES_MAX - 1] == "49 connected; further lines like this are left out for up to 10 s"
+            now = PERIOD
+            log.info("%d connected", 300)
+        assert heard[-1] == "300 connected; 250 lines like this were left out before"
+        with concerning("b"):
+            log.info("%d connected", 301)
+        assert heard[-1] == "301 connected"
+        for number in range(100):  # at a start, a line for each robot
+            log.info("robot %d stands", number)
+        assert len(heard) == LINES_MAX + 3 + 100
+    finally:
+        log.removeHandler(handler)

@@ -1,13 +1,62 @@
-"""Log lines: one an event, on standard error, with the robot that it is about."""
+"""Log lines: one an event, on standard error, with the robot that it is about, and not too many of a kind."""
 
 from __future__ import annotations
 
 import logging
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
 
 from roboglot.hosting.visible import VisibleFormatter
 from roboglot.model.client_context import concerned
 
 NOISY = ("uvicorn", "websockets", "httpx", "grpc", "asyncio", "numba")
+LINES_MAX = 50  # of a kind about one robot in PERIOD
+ALL_LINES_MAX = 250  # of a kind about no robot in particular: a start says things of each of 100
+PERIOD = 10.0  # s
+KINDS_MAX = 1024
+
+
+@dataclass(slots=True)
+class _Window:
+    """Lines of one kind since ``began``, s."""
+
+    began: float
+    lines: int = 0
+    left_out: int = 0
+
+
+class BoundsLines(logging.Filter):
+    """Leaves out further lines of a kind that come too fast, as clients can cause, and says how many."""
+
+    def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
+        super().__init__()
+        self._now = now
+        self._windows: dict[tuple[str, str, str], _Window] = {}  # by logger, message and robot
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        key, now, missing = (record.name, str(record.msg), concerned()), self._now(), 0
+        window = self._windows.get(key)
+        if window is None or now - window.began >= PERIOD:
+            missing = window.left_out if window else 0
+            self._windows.pop(key, None)
+            if len(self._windows) >= KINDS_MAX:
+                del self._windows[next(iter(self._windows))]
+            window = self._windows[key] = _Window(now)
+        window.lines += 1
+        most = LINES_MAX if concerned() else ALL_LINES_MAX
+        if window.lines > most:
+            window.left_out += 1
+            return False
+        if missing:
+            _append(record, f"; {missing} lines like this were left out before")
+        if window.lines == most:
+            _append(record, f"; further lines like this are left out for up to {PERIOD:g} s")
+        return True
+
+
+def _append(record: logging.LogRecord, text: str) -> None:
+    record.msg, record.args = record.getMessage() + text, None
 
 
 class NamesRobot(logging.Filter):
@@ -23,6 +72,8 @@ def set_up_logging(verbose: bool) -> None:
     """One readable line per event, on standard error."""
     handler = logging.StreamHandler()
     handler.setFormatter(VisibleFormatter("%(asctime)s %(levelname)-7s %(message)s  (%(name)s)", "%H:%M:%S"))
+    if not verbose:
+        handler.addFilter(BoundsLines())
     handler.addFilter(NamesRobot())
     logging.basicConfig(level=logging.DEBUG if verbose else logging.INFO, handlers=[handler])
     for name in NOISY:

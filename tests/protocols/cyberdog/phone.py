@@ -49,7 +49,7 @@ class Client:
     """An app's calls to the robot."""
 
     def __init__(self, channel: grpc.aio.Channel, messages: Messages) -> None:
-        self._messages = messages
+        self._channel, self._messages = channel, messages
         serialize = messages.SendRequest.SerializeToString
         self._send = channel.unary_stream(
             "/grpcapi.GrpcApp/sendMsg",
@@ -88,6 +88,11 @@ class Client:
     async def file(self, code: int, params: object = None) -> list[Any]:
         async with asyncio.timeout(4 * PATIENCE):
             return [chunk async for chunk in self.fetch(code, params)]
+
+    async def send(self, method: str, request: bytes) -> list[bytes]:
+        """Return the answers to these bytes, as they come."""
+        async with asyncio.timeout(PATIENCE):
+            return [answer async for answer in self._channel.unary_stream(f"/grpcapi.GrpcApp/{method}")(request)]
 
     async def heartbeat(self) -> None:
         async with asyncio.timeout(PATIENCE):

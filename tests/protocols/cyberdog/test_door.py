@@ -16,6 +16,7 @@ from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.protocols.cyberdog.table import extras, implemented, partly
 from roboglot.simulation.world.world import World
 from roboglot.wire.contracts import contract
+from roboglot.wire.cyberdog.codes import FileError
 from tests.protocols.cyberdog.phone import ADDRESS, Client, until
 
 
@@ -83,6 +84,19 @@ async def test_a_taken_port_is_named(door, robot, data) -> None:
 @pytest.mark.parametrize("text", ["", "{", "nonsense", "{'a': 1}", '{"a":NaN}', "[" * 50_000, "{}{}", '"\\ud800"'])
 async def test_bad_json_is_answered_under_code_0(client, text) -> None:
     assert await client.raw(10001, text or " ") == [(0, '{"error_code":323}')]
+
+
+@pytest.mark.parametrize("sent", [b"\x12\x02\xff\xfe", b"\x0d\x11\x27\x00\x00\x12\x01\xff", b"nonsense", b"\x12\x7f"])
+async def test_unreadable_requests_are_answered_in_band(sent, client, messages, caplog) -> None:
+    with caplog.at_level("INFO"):
+        (said,) = await client.send("sendMsg", sent)
+    assert messages.RecResponse.FromString(said) == messages.RecResponse(nameCode=0, data='{"error_code":323}')
+    assert "cannot read a request of 127.0.0.1: it is no SendRequest, or its params are not UTF-8" in caplog.text
+    (chunk,) = await client.send("getFile", sent)
+    assert messages.FileChunk.FromString(chunk).error_code == FileError.ARGUMENTS
+    with pytest.raises(grpc.aio.AioRpcError) as caught:
+        await client.send("heartbeat", sent)
+    assert caught.value.code() is grpc.StatusCode.UNIMPLEMENTED
 
 
 @pytest.mark.parametrize("text", ["[]", "5", "null", '"text"', '{"motion_id":null}'])

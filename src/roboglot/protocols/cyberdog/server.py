@@ -49,13 +49,13 @@ from roboglot.protocols.cyberdog.handshakes import Handshakes
 from roboglot.protocols.cyberdog.played import PlayedPushes
 from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.protocols.cyberdog.reflection import add_reflection
+from roboglot.protocols.cyberdog.requests import add_calls
 from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.protocols.door import Endpoint
 from roboglot.transport.limiter import pay
 from roboglot.wire.cyberdog.channel import MESSAGE_MAX, ROBOT_NAME, server_options
-from roboglot.wire.cyberdog.codes import InBandError, MachineState
+from roboglot.wire.cyberdog.codes import FileError, InBandError, MachineState
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
-from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import GrpcAppServicer, add_GrpcAppServicer_to_server
 from roboglot.wire.cyberdog.text import NotJson, read_params, write
 from roboglot.wire.visual.relay import FrameRelay
 
@@ -96,7 +96,7 @@ class CyberDogDoor:
         self._server = server = grpc.aio.server(options=server_options(), maximum_concurrent_rpcs=CALLS_MAX)
         self._handshakes = Handshakes(self._address, self._config.port)
         self._cleanup.append(self._handshakes.close)
-        add_GrpcAppServicer_to_server(_Service(self._context, self._handshakes), self._server)
+        add_calls(server, _Service(self._context, self._handshakes))
         if self._config.reflection:
             add_reflection(self._server)
         self.port = self._bind(server, certificates)
@@ -224,17 +224,22 @@ def _reads() -> set[str]:
     return {str(int(operation.key)) for operation in TABLE if operation.right is Right.SEE}
 
 
-class _Service(GrpcAppServicer):
+class _Service:
     """The three calls of the service as the robot serves them."""
 
     def __init__(self, context: Context, handshakes: Handshakes) -> None:
         self._context, self._handshakes = context, handshakes
 
-    async def sendMsg(self, request: pb.SendRequest, rpc: grpc.aio.ServicerContext) -> None:  # noqa: N802 - the service's name
+    async def sendMsg(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext) -> None:  # noqa: N802 - the service's name
         """One request: any number of answers; the status is always OK."""
-        peer, code = rpc.peer(), request.nameCode
+        peer = rpc.peer()
         self._handshakes.asked(peer)
         await self._enter(rpc, peer)
+        if request is None:
+            _note_unreadable(peer)
+            await self._say(rpc, _answer(0, error(InBandError.BAD_PARAMETERS)))
+            return
+        code = request.nameCode
         await self._count(peer, len(request.params))
         tap = self._context.robot.tap
 
@@ -255,11 +260,15 @@ class _Service(GrpcAppServicer):
         if last is not None:
             await self._say(rpc, _answer(code, last))
 
-    async def getFile(self, request: pb.SendRequest, rpc: grpc.aio.ServicerContext) -> None:  # noqa: N802
+    async def getFile(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext) -> None:  # noqa: N802
         """Photos and recordings in chunks; errors are chunks, too."""
         peer, tap = rpc.peer(), self._context.robot.tap
         self._handshakes.asked(peer)
         await self._enter(rpc, peer)
+        if request is None:
+            _note_unreadable(peer)
+            await self._say(rpc, pb.FileChunk(error_code=FileError.ARGUMENTS))
+            return
         began = tap.request("cyberdog", str(int(request.nameCode)), request.params) if tap.watched else None
         try:
             fields = read_params(request.params)
@@ -305,9 +314,13 @@ class _Service(GrpcAppServicer):
             app.seen(peer)
             self._context.owner = who
 
-    async def heartbeat(self, _request: pb.Ticks, rpc: grpc.aio.ServicerContext) -> None:
+    async def heartbeat(self, _request: None, rpc: grpc.aio.ServicerContext) -> None:
         """Only the app serves heartbeats."""
         await rpc.abort(grpc.StatusCode.UNIMPLEMENTED, "the robot sends heartbeats, it takes none")
+
+
+def _note_unreadable(peer: str) -> None:
+    log.info("cannot read a request of %s: it is no SendRequest, or its params are not UTF-8", host_of(peer))
 
 
 def _as_client(store: CertificateStore) -> object:

@@ -1,0 +1,43 @@
+"""Requests as gRPC reads them. Bytes that are none reach the door too, so that it answers them in the protocol's form.
+
+gRPC's own answer to them would be the status UNKNOWN with the name of a Python class, and no line in the log.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import grpc
+from google.protobuf.message import DecodeError
+
+from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
+
+SERVICE = "grpcapi.GrpcApp"
+
+
+class Calls(Protocol):
+    """Handlers of the calls. A request is None where its bytes are no message, or its text is not UTF-8."""
+
+    async def sendMsg(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext, /) -> None: ...  # noqa: N802 - the service's name
+    async def getFile(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext, /) -> None: ...  # noqa: N802
+    async def heartbeat(self, request: None, rpc: grpc.aio.ServicerContext, /) -> None: ...
+
+
+def add_calls(server: grpc.aio.Server, calls: Calls) -> None:
+    """Have ``server`` serve ``calls``."""
+    answer, chunk, result = pb.RecResponse, pb.FileChunk, pb.Result
+    methods = {
+        "sendMsg": grpc.unary_stream_rpc_method_handler(calls.sendMsg, _read, answer.SerializeToString),
+        "getFile": grpc.unary_stream_rpc_method_handler(calls.getFile, _read, chunk.SerializeToString),
+        "heartbeat": grpc.unary_unary_rpc_method_handler(calls.heartbeat, lambda _: None, result.SerializeToString),
+    }
+    server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler(SERVICE, methods),))
+
+
+def _read(data: bytes) -> pb.SendRequest | None:
+    request = pb.SendRequest()
+    try:
+        request.ParseFromString(data)
+    except DecodeError:
+        return None
+    return request
