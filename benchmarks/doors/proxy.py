@@ -1,7 +1,8 @@
 """What the recording proxy adds to an answer, by turns with and without it: Slamware, RoboMaster, programs, CyberDog.
 
-Robot, proxy and client are processes of their own, as they are in use; the robot's time stands still, so that no
-simulated world is in the figures. scripts/bench proxy [requests]
+A CyberDog is asked over TLS, with certificates at both ends, and without. Robot, proxy and client are processes of
+their own, as they are in use; the robot's time stands still, so that no simulated world is in the figures.
+scripts/bench proxy [requests]
 """
 
 from __future__ import annotations
@@ -14,12 +15,14 @@ import statistics
 import sys
 import tempfile
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from _claim import Claims
 
 from roboglot.model.clock import RealClock
+from roboglot.protocols.cyberdog.certificates import export_client
 from roboglot.recording.lines import LINES, DogLine, Line, Target
 from roboglot.testing.addresses import free_port
 
@@ -36,11 +39,24 @@ NUMBERS = itertools.count()
 PAUSE = 0.002  # s between two requests, so that the proxy's other work falls between and upon them
 
 
-async def opened(door: str, address: str) -> Line:
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """A robot that runs. ``called``: the port where it calls an app; ``certificates``: a folder with an app's, or none.
+
+    ``data`` is its data folder, whose certificates the proxy shows, too.
+    """
+
+    folder: Path
+    data: Path
+    called: int
+    certificates: str
+
+
+async def opened(door: str, address: str, certificates: str) -> Line:
     """A line to a door of the robot, or of the proxy."""
     line = LINES[door](address, Target(f"{door}://{address}").port, RealClock(), lambda _operation, _data: None)
     if isinstance(line, DogLine):
-        line.options = {}
+        line.options = {"certs": certificates}
     await line.open()
     if door == "robomaster":
         await line.ask("command", b"command;", [b"ok;"])
@@ -75,12 +91,13 @@ async def running(ready: bytes, *words: str) -> AsyncIterator[None]:
     reading.cancel()
 
 
-async def measure(door: str, folder: Path, requests: int, called: int, claims: Claims) -> None:
+async def measure(door: str, robot: Robot, requests: int, claims: Claims) -> None:
     """Ask with and without the proxy in turns."""
-    url = f"cyberdog://{ROBOT}?certs=none&app={called}" if door == "cyberdog" else f"{door}://{ROBOT}"
-    words = ("record", url, "--listen", BETWEEN, "--to", str(folder / f"{door}.mcap"))
+    dog = f"?certs={robot.certificates}&app={robot.called}" if door == "cyberdog" else ""
+    file = robot.folder / f"{door}-{next(NUMBERS)}.mcap"
+    words = ("record", f"{door}://{ROBOT}{dog}", "--listen", BETWEEN, "--to", str(file), "--data", str(robot.data))
     async with running(BETWEEN.encode(), *words):
-        lines = [await opened(door, ROBOT), await opened(door, BETWEEN)]
+        lines = [await opened(door, address, robot.certificates) for address in (ROBOT, BETWEEN)]
         for line in lines:
             for _ in range(20):
                 await timed(line, door)
@@ -94,24 +111,34 @@ async def measure(door: str, folder: Path, requests: int, called: int, claims: C
     medians = [statistics.median(one) for one in times]
     tails = [sorted(one)[round(0.99 * requests) - 1] for one in times]
     (plain, passed) = medians
-    print(f"{door:10} median {plain:.2f} -> {passed:.2f} ms, p99 {tails[0]:.2f} -> {tails[1]:.2f} ms")
-    claims.at_most(f"{door}: the proxy adds, median", passed - plain, ADDED_MAX, "ms")
-    claims.at_most(f"{door}: the proxy adds, p99", tails[1] - tails[0], ADDED_MAX, "ms")
+    name = f"{door} without TLS" if dog and robot.certificates == "none" else door
+    print(f"{name:20} median {plain:.2f} -> {passed:.2f} ms, p99 {tails[0]:.2f} -> {tails[1]:.2f} ms")
+    claims.at_most(f"{name}: the proxy adds, median", passed - plain, ADDED_MAX, "ms")
+    claims.at_most(f"{name}: the proxy adds, p99", tails[1] - tails[0], ADDED_MAX, "ms")
+
+
+async def robot_of(folder: Path, doors: Sequence[str], requests: int, claims: Claims, *, tls: bool) -> None:
+    """Measure these doors of a robot."""
+    called, data, file = free_port(), folder / f"data-{tls}", folder / f"{tls}.toml"
+    file.write_text(
+        f"world = 'empty'\n[console]\nenabled = false\n"
+        f"[cyberdog]\nplaintext = {str(not tls).lower()}\napp_port = {called}\n"
+    )
+    words = ("up", "--lockstep", "--config", str(file), "--address", ROBOT, "--data", str(data))
+    async with running(b"ready", *words):
+        if tls:
+            export_client(data / "cyberdog", folder / "certificates")
+        robot = Robot(folder, data, called, str(folder / "certificates") if tls else "none")
+        for door in doors:
+            await measure(door, robot, requests, claims)
 
 
 async def main(requests: int) -> None:
-    """One robot, four protocols."""
+    """Four protocols."""
     claims = Claims()
     with tempfile.TemporaryDirectory() as folder:
-        called = free_port()
-        file = Path(folder) / "robot.toml"
-        file.write_text(
-            f"world = 'empty'\n[console]\nenabled = false\n[cyberdog]\nplaintext = true\napp_port = {called}\n"
-        )
-        words = ("up", "--lockstep", "--config", str(file), "--address", ROBOT, "--data", f"{folder}/data")
-        async with running(b"ready", *words):
-            for door in REQUESTS:
-                await measure(door, Path(folder), requests, called, claims)
+        await robot_of(Path(folder), tuple(REQUESTS), requests, claims, tls=True)
+        await robot_of(Path(folder), ("cyberdog",), requests, claims, tls=False)
     claims.finish()
 
 

@@ -22,6 +22,7 @@ EXTRA_OF = {
     "foxglove_schemas_protobuf": "recording",
     "google": "cyberdog",  # protobuf
     "grpc": "cyberdog",
+    "hpack": "recording",
     "httpx": "demo",
     "mcap": "recording",
     "mcp": "mcp",
@@ -52,7 +53,7 @@ MODULES: dict[str, tuple[str, ...]] = {
     "video": ("aiortc", "av", "numpy", "PIL"),
     "programs": ("numpy", "websockets"),
     "console": ("numpy", "prometheus_client", "uvicorn", "uvloop", "wsproto"),
-    "recording": ("foxglove_schemas_protobuf", "google", "mcap", "numpy", "zstandard"),
+    "recording": ("foxglove_schemas_protobuf", "google", "hpack", "mcap", "numpy", "zstandard"),
     "logs": ("rosbags",),
     "postgresql": ("psycopg",),
     "testing": ("pytest_asyncio",),

@@ -120,9 +120,9 @@ class TlsEnd(asyncio.Protocol):
         """The encryption; None: there is none yet."""
         return self._tunnel
 
-    def _encrypt(self, context: ssl.SSLContext, *, server_side: bool) -> None:
+    def _encrypt(self, context: ssl.SSLContext, *, server_side: bool, name: str | None = None) -> None:
         self._incoming, self._outgoing = ssl.MemoryBIO(), ssl.MemoryBIO()
-        self._tunnel = context.wrap_bio(self._incoming, self._outgoing, server_side=server_side)
+        self._tunnel = context.wrap_bio(self._incoming, self._outgoing, server_side=server_side, server_hostname=name)
         self._encrypted = self._tunnel.write
 
     def _shake_hands(self, size: int) -> bool:
@@ -225,17 +225,20 @@ class TlsPort(TlsEnd):
 
 
 class TlsCall(TlsEnd):
-    """A connection that is made from here; ``over`` is done when hands are shaken, or with ConnectionError."""
+    """A connection that is made from here; ``over`` is done when hands are shaken, or with ConnectionError.
 
-    def __init__(self, factory: Factory, context: ssl.SSLContext) -> None:
+    ``name``: whose certificate the other end must show, where ``context`` asks for a name.
+    """
+
+    def __init__(self, factory: Factory, context: ssl.SSLContext, name: str = "") -> None:
         super().__init__(factory)
-        self._encryption = context
+        self._encryption, self._name = context, name
         self.over: asyncio.Future[asyncio.Protocol] = asyncio.get_running_loop().create_future()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Begin the handshake."""
         super().connection_made(transport)
-        self._encrypt(self._encryption, server_side=False)
+        self._encrypt(self._encryption, server_side=False, name=self._name or None)
         self._shake_hands(0)
 
     def connection_lost(self, exc: Exception | None) -> None:

@@ -1,209 +1,165 @@
-"""Passes calls between a CyberDog app and its robot, in both directions, and notes what they mean.
+"""Passes the connections of a CyberDog app and its robot, in both directions, and notes what they mean.
 
-Both ends prove themselves to the proxy, and it to them: TLS lets nothing stand between them unnoticed. The messages
-themselves pass as the bytes that they came as.
+Both ends prove themselves to the proxy, and it to them: TLS lets nothing stand between them unnoticed. Inside of it
+every byte of HTTP/2 passes as it came, so calls, deadlines, refusals and pings are those of the two ends.
 """
 
 from __future__ import annotations
 
-import asyncio
 import logging
-from collections.abc import AsyncIterator, Callable
+import os
+import ssl
+import tempfile
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from urllib.parse import unquote
 
-import grpc
 from google.protobuf.message import DecodeError, Message
 
 from roboglot.clients.cyberdog.link import Certificates
 from roboglot.model.tap import Direction
 from roboglot.recording.lines import Target, status_of
+from roboglot.recording.proxy.calls import Call, both
+from roboglot.recording.proxy.ends import Crossing, End, Place
 from roboglot.recording.proxy.relay import Book
-from roboglot.wire.cyberdog.channel import APP_NAME, APP_PORT, ROBOT_NAME, client_options, server_options
+from roboglot.recording.proxy.sniffers import Note, Sniffer
+from roboglot.transport.tls import server_context
+from roboglot.wire.cyberdog.channel import APP_NAME, APP_PORT, ROBOT_NAME
 from roboglot.wire.cyberdog.chapters.system import HEARTBEAT, Beats
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 
 log = logging.getLogger(__name__)
-SERVICE = "grpcapi.GrpcApp"
-CALLS_MAX = 512
+SERVICE = "/grpcapi.GrpcApp/"
+SEND, FETCH, BEAT = SERVICE + "sendMsg", SERVICE + "getFile", SERVICE + "heartbeat"
 
 
 @dataclass(frozen=True, slots=True)
 class Proof:
-    """Certificate and key (PEM) of the proxy as the robot, and whose certificates it believes as apps'."""
+    """Certificate and key (PEM) of the proxy at one end, and whose certificates it believes there."""
 
     certificate: bytes
     key: bytes
-    callers: bytes
-
-
-@dataclass(slots=True)
-class _Asked:
-    """A request: when it came, and its code once that has been read."""
-
-    at: float
-    code: str = ""
+    believed: bytes
 
 
 class DogRelay:
     """Listens at ``address`` as the robot does, and on ``app_port`` of this machine as the app does.
 
-    ``proof`` None, and no ``certs`` in the robot's URL: without TLS. ``app`` of the URL is the port where the robot
-    calls this machine (8981); the app is called at its own host, port ``called``.
+    ``proof`` is the proxy's as the robot; None, and no ``certs`` in the robot's URL: without TLS. ``app`` of the URL is
+    the port where the robot calls this machine (8981); the app is called at its own host, port ``called``.
     """
 
     def __init__(self, target: Target, address: str, book: Book, proof: Proof | None, called: int = APP_PORT) -> None:
         """Raises ValueError where the URL's certificates cannot be read."""
-        self._target, self._address, self._book, self._proof, self._called = target, address, book, proof, called
+        self._target, self._address, self._book, self._called = target, address, book, called
         self._app_port = int(target.options.get("app", APP_PORT))
-        self._own = _certificates(target)
-        self._servers: list[grpc.aio.Server] = []
-        self._robot: grpc.aio.Channel | None = None
-        self._apps: dict[str, grpc.aio.Channel] = {}
+        own = _certificates(target)
+        self._as_robot = _context(proof, server=True)
+        self._to_app = _context(proof, server=False)
+        self._as_app = _context(own, server=True)
+        self._to_robot = _context(own, server=False)
+        self._crossing = Crossing(book.clock)
         self._app_host = ""
         self._beats = Beats()
 
     async def open(self) -> None:
         """Listen at both ends. Raises OSError."""
-        self._robot = self._channel(f"{self._target.host}:{self._target.port}", ROBOT_NAME, self._to_robot())
-        asked = {"sendMsg": self._pass(self._ask, stream=True), "getFile": self._pass(self._fetch, stream=True)}
-        pushed = {"sendMsg": self._pass(self._push, stream=True), "heartbeat": self._pass(self._beat, stream=False)}
-        own = self._own
-        as_app = own and grpc.ssl_server_credentials([(own.key, own.certificate)], own.ca, require_client_auth=True)
-        proof = self._proof
-        as_robot = proof and grpc.ssl_server_credentials(
-            [(proof.key, proof.certificate)], proof.callers, require_client_auth=True
-        )
-        await self._serve(f"{self._address}:{self._target.port}", asked, as_robot)
         where = "127.0.0.1" if self._target.host.startswith("127.") else "0.0.0.0"
-        await self._serve(f"{where}:{self._app_port}", pushed, as_app)
+        for host, port, came, context in (
+            (self._address, self._target.port, self._app_came, self._as_robot),
+            (where, self._app_port, self._robot_came, self._as_app),
+        ):
+            try:
+                await self._crossing.listen(host, port, came, context)
+            except OSError as error:
+                why = os.strerror(error.errno) if error.errno else str(error)
+                raise OSError(f"cannot listen at {host}:{port}: {why}") from error
 
     async def close(self) -> None:
         """Hang up at both ends."""
-        await asyncio.gather(*(server.stop(None) for server in self._servers))
-        for channel in (self._robot, *self._apps.values()):
-            if channel is not None:
-                await channel.close()
+        await self._crossing.close()
 
-    async def _serve(
-        self, where: str, methods: dict[str, grpc.RpcMethodHandler], credentials: grpc.ServerCredentials | None
-    ) -> None:
-        server = grpc.aio.server(options=server_options(), maximum_concurrent_rpcs=CALLS_MAX)
-        server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler(SERVICE, methods),))
-        try:
-            port = server.add_secure_port(where, credentials) if credentials else server.add_insecure_port(where)
-        except RuntimeError:
-            port = 0
-        if not port:
-            raise OSError(f"cannot listen on {where}: it is taken, or not an address of this machine")
-        await server.start()
-        self._servers.append(server)
+    def _app_came(self, app: End) -> None:
+        """Dial the robot; the app that asked last is the one that the robot gets when it calls."""
+        host, port = app.peer
+        self._app_host = host
 
-    def _channel(self, where: str, name: str, credentials: grpc.ChannelCredentials | None) -> grpc.aio.Channel:
-        options = client_options(name)
-        if credentials is None:
-            return grpc.aio.insecure_channel(where, options=options)
-        return grpc.aio.secure_channel(where, credentials, options=options)
+        def note(direction: Direction, operation: str, payload: bytes, status: str, began: float | None) -> float:
+            if direction is Direction.REQUEST:
+                self._app_host = host
+            return self._book.note(f"{host}:{port}", direction, operation, payload, status, began)
 
-    def _to_robot(self) -> grpc.ChannelCredentials | None:
-        own = self._own
-        return own and grpc.ssl_channel_credentials(own.ca, own.key, own.certificate)
+        to = Place(self._target.host, self._target.port, self._to_robot, ROBOT_NAME)
+        self._cross(app, to, AppSniffer(note))
 
-    def _app(self) -> grpc.aio.Channel | None:
-        """The channel to the app that asked last."""
+    def _robot_came(self, robot: End) -> None:
+        """Dial the app; without one no one takes what the robot says."""
         if not self._app_host:
-            return None
-        if self._app_host not in self._apps:
-            proof = self._proof
-            credentials = proof and grpc.ssl_channel_credentials(proof.callers, proof.key, proof.certificate)
-            self._apps[self._app_host] = self._channel(f"{self._app_host}:{self._called}", APP_NAME, credentials)
-        return self._apps[self._app_host]
+            robot.transport.abort()
+            return
+        to = Place(self._app_host, self._called, self._to_app, APP_NAME)
+        self._cross(robot, to, RobotSniffer(partial(self._book.note, f"{to.host}:{to.port}"), self._beats))
 
-    def _pass(self, handler: Callable[..., object], *, stream: bool) -> grpc.RpcMethodHandler:
-        """A method whose messages stay bytes."""
-        return (grpc.unary_stream_rpc_method_handler if stream else grpc.unary_unary_rpc_method_handler)(handler)
+    def _cross(self, came: End, to: Place, sniffer: Sniffer) -> None:
+        made = End()
+        came.look, made.look = sniffer.from_client, sniffer.from_robot
+        self._crossing.cross(came, to, made)
 
-    async def _ask(self, request: bytes, context: grpc.aio.ServicerContext) -> AsyncIterator[bytes]:
-        """The app asks the robot."""
-        self._app_host = _host(context.peer()) or self._app_host
-        asked = self._note_request(context.peer(), request)
-        async for message in self._called_through(self._robot, "sendMsg", request, context):
-            self._soon(self._note_answer, context.peer(), asked, message)
-            yield message
 
-    async def _fetch(self, request: bytes, context: grpc.aio.ServicerContext) -> AsyncIterator[bytes]:
-        """The app fetches a file."""
-        asked = self._note_request(context.peer(), request)
-        async for message in self._called_through(self._robot, "getFile", request, context):
-            self._soon(self._note_chunk, context.peer(), asked, message)
-            yield message
+class GrpcSniffer(Sniffer):
+    """Calls of gRPC."""
 
-    async def _push(self, request: bytes, context: grpc.aio.ServicerContext) -> AsyncIterator[bytes]:
-        """The robot tells the app something."""
-        self._soon(self._note_push, f"{self._app_host}:{self._called}", request)
-        async for message in self._called_through(self._app(), "sendMsg", request, context):
-            yield message
+    def __init__(self, note: Note) -> None:
+        super().__init__(note)
+        asking, answering = both(self.asked, self.answered)
+        self._asking: Callable[[bytes], None] = asking.feed
+        self._answering: Callable[[bytes], None] = answering.feed
 
-    # -- noting: once what came is on its way --------------------------------------------------------------------------
+    def from_client(self, data: bytes) -> None:
+        self._asking(data)
 
-    def _soon(self, note: Callable[..., object], *said: object) -> None:
-        """Note it in the next round of the loop, with the time of now."""
-        asyncio.get_running_loop().call_soon(note, self._book.clock.time(), *said)
+    def from_robot(self, data: bytes) -> None:
+        self._answering(data)
 
-    def _note_request(self, peer: str, request: bytes) -> _Asked:
-        asked = _Asked(self._book.clock.time())
+    def asked(self, call: Call, message: bytes) -> None:
+        """A message of the caller."""
 
-        def note() -> None:
-            asked.code, text = _said(request)
-            self._book.note(_name(peer), Direction.REQUEST, asked.code, text, "", None, asked.at)
+    def answered(self, call: Call, message: bytes) -> None:
+        """A message of the side that was called."""
 
-        asyncio.get_running_loop().call_soon(note)
-        return asked
 
-    def _note_answer(self, now: float, peer: str, asked: _Asked, message: bytes) -> None:
+class AppSniffer(GrpcSniffer):
+    """Questions of an app, and what the robot answers."""
+
+    def asked(self, call: Call, message: bytes) -> None:
+        call.code, text = _said(message) if call.path in (SEND, FETCH) else ("", message)
+        call.at = self._note(Direction.REQUEST, call.code, text, "", None)
+
+    def answered(self, call: Call, message: bytes) -> None:
+        if call.path != SEND:
+            self._note(Direction.REPLY, call.code, message, "ok", call.at)
+            return
         read = _read(pb.RecResponse, message)
         answer = message if read is None else read.data.encode()
-        status = status_of("cyberdog", answer)
-        self._book.note(_name(peer), Direction.REPLY, asked.code, answer, status, asked.at, now)
+        self._note(Direction.REPLY, call.code, answer, status_of("cyberdog", answer), call.at)
 
-    def _note_chunk(self, now: float, peer: str, asked: _Asked, message: bytes) -> None:
-        self._book.note(_name(peer), Direction.REPLY, asked.code, message, "ok", asked.at, now)
 
-    def _note_push(self, now: float, to: str, request: bytes) -> None:
-        code, text = _said(request)
-        self._book.note(to, Direction.PUSH, code, text, "", None, now)
+class RobotSniffer(GrpcSniffer):
+    """Calls of the robot to its app: pushes, and heartbeats, of which those with news are noted."""
 
-    async def _beat(self, request: bytes, context: grpc.aio.ServicerContext) -> bytes:
-        """The robot's heartbeat; without an app no one takes it."""
-        app = self._app()
-        if app is None:
-            await context.abort(grpc.StatusCode.UNAVAILABLE, "no app has come yet")
-            raise AssertionError("abort raises")
-        try:
-            ticks = _read(pb.Ticks, request)
-            if ticks is not None and (news := self._beats.news(ticks)):
-                self._book.note(f"{self._app_host}:{self._called}", Direction.PUSH, HEARTBEAT, news.encode(), "", None)
-            answer: bytes = await app.unary_unary(f"/{SERVICE}/heartbeat")(request, timeout=context.time_remaining())
-        except grpc.aio.AioRpcError as error:
-            await context.abort(error.code(), error.details() or "")
-        return answer
+    def __init__(self, note: Note, beats: Beats) -> None:
+        super().__init__(note)
+        self._beats = beats
 
-    async def _called_through(
-        self, channel: grpc.aio.Channel | None, method: str, request: bytes, context: grpc.aio.ServicerContext
-    ) -> AsyncIterator[bytes]:
-        """Call the other end, and pass its answers and its end as they are."""
-        if channel is None:
-            await context.abort(grpc.StatusCode.UNAVAILABLE, "no app has come yet")
-            raise AssertionError("abort raises")
-        call = channel.unary_stream(f"/{SERVICE}/{method}")(request, timeout=context.time_remaining())
-        try:
-            async for message in call:
-                yield message
-        except grpc.aio.AioRpcError as error:
-            await context.abort(error.code(), error.details() or "")
-        finally:
-            call.cancel()
+    def asked(self, call: Call, message: bytes) -> None:
+        if call.path != BEAT:
+            code, text = _said(message)
+            self._note(Direction.PUSH, code, text, "", None)
+            return
+        ticks = _read(pb.Ticks, message)
+        if ticks is not None and (news := self._beats.news(ticks)):
+            self._note(Direction.PUSH, HEARTBEAT, news.encode(), "", None)
 
 
 def _read(kind: type[Message], data: bytes) -> Message | None:
@@ -221,18 +177,34 @@ def _said(request: bytes) -> tuple[str, bytes]:
     return ("", request) if said is None else (str(said.nameCode), said.params.encode())
 
 
-def _certificates(target: Target) -> Certificates | None:
+def _certificates(target: Target) -> Proof | None:
     folder = target.options.get("certs", "none")
     try:
-        return None if folder == "none" else Certificates.load(Path(folder))
+        if folder == "none":
+            return None
+        own = Certificates.load(Path(folder))
+        return Proof(own.certificate, own.key, own.ca)
     except OSError as error:
         raise ValueError(f"the certificates in {folder} cannot be read: {error.strerror}") from None
 
 
-def _name(peer: str) -> str:
-    """gRPC's name of a peer ("ipv4:127.0.0.1:40312") as host:port."""
-    return unquote(peer.partition(":")[2])
-
-
-def _host(peer: str) -> str:
-    return _name(peer).rpartition(":")[0]
+def _context(proof: Proof | None, *, server: bool) -> ssl.SSLContext | None:
+    """Return TLS whose ends prove themselves to each other. Raises ValueError for certificates that are none."""
+    if proof is None:
+        return None
+    with tempfile.TemporaryDirectory() as folder:  # ssl reads files alone; only this user may
+        names = Path(folder, "certificate.pem"), Path(folder, "key.pem")
+        for name, data in zip(names, (proof.certificate, proof.key), strict=True):
+            name.write_bytes(data)
+        try:
+            if server:
+                context = server_context(*names)
+            else:
+                context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)  # asks for the other end's name and proof
+                context.load_cert_chain(*names)
+            context.load_verify_locations(cadata=proof.believed.decode("ascii", "replace"))
+        except ssl.SSLError as error:
+            raise ValueError(f"the certificates cannot be used: {error.reason or error}") from None
+    context.verify_mode = ssl.CERT_REQUIRED
+    context.set_alpn_protocols(["h2"])
+    return context

@@ -9,7 +9,6 @@ import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import cast
 
 from roboglot.model.clock import RealClock
 from roboglot.model.tap import Direction, Exchange
@@ -18,15 +17,13 @@ from roboglot.recording.files import Files, Limits, Origin
 from roboglot.recording.lines import Target
 from roboglot.recording.proxy.discovery import PORT as DISCOVERY
 from roboglot.recording.proxy.discovery import Announcer
+from roboglot.recording.proxy.ends import Crossing, End, Place
 from roboglot.recording.proxy.sniffers import SNIFFERS, Sniffer
 from roboglot.recording.redaction import FIELDS, Redaction, without_picture
 from roboglot.recording.thread import WriterThread
 
 log = logging.getLogger(__name__)
 ROBOT = "a"  # its name in the recording
-CONNECT_SECONDS = 10.0
-CONNECTIONS_MAX = 256
-BUFFER_MAX = 1 << 20  # bytes queued for the slower end before the faster one is paused
 SIDE_PORTS = {"robomaster": (40921, 40922, 40925)}  # video, audio, events: forwarded; events are also recorded
 EVENTS, PUSHES = 40925, 40924
 
@@ -87,65 +84,6 @@ class Book:
         self.thread.close()
 
 
-class _End(asyncio.Protocol):
-    """One end of a connection; ``other`` gets its bytes first, then the sniffer a copy."""
-
-    transport: asyncio.Transport
-
-    def __init__(self) -> None:
-        self.other: _End | None = None
-        self.look: Callable[[bytes], None] | None = None
-        self.waiting = bytearray()
-        self.gone: Callable[[_End], None] = lambda _: None
-        self.lost: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        self.transport = cast(asyncio.Transport, transport)
-        self.transport.set_write_buffer_limits(high=BUFFER_MAX)
-
-    def data_received(self, data: bytes) -> None:
-        if self.other is None:
-            self.waiting += data
-            if len(self.waiting) > BUFFER_MAX:
-                self.transport.pause_reading()
-        else:
-            self.other.transport.write(data)
-        if self.look is not None:
-            try:
-                self.look(data)
-            except Exception as error:  # noqa: BLE001 - what is not understood passes all the same
-                log.warning("a connection is no longer understood, and still passed: %s", error)
-                self.look = None
-
-    def join(self, other: _End) -> None:
-        """Pass everything to ``other`` from now on, what has come already first."""
-        self.other = other
-        if self.waiting:
-            other.transport.write(bytes(self.waiting))
-            self.waiting.clear()
-            self.transport.resume_reading()
-
-    def pause_writing(self) -> None:
-        if self.other is not None:
-            self.other.transport.pause_reading()
-
-    def resume_writing(self) -> None:
-        if self.other is not None:
-            self.other.transport.resume_reading()
-
-    def eof_received(self) -> bool:
-        if self.other is not None and self.other.transport.can_write_eof():
-            self.other.transport.write_eof()
-        return True
-
-    def connection_lost(self, _exc: Exception | None) -> None:
-        self.gone(self)
-        if not self.lost.done():
-            self.lost.set_result(None)
-        if self.other is not None:
-            self.other.transport.close()
-
-
 class Relay:
     """Listens at ``address`` on the ports of the robot's protocol."""
 
@@ -154,9 +92,7 @@ class Relay:
         if target.door not in SNIFFERS:
             raise ValueError(f"no recording between a client and a robot of {target.door} yet")
         self._target, self._address, self._book = target, address, book
-        self._servers: list[asyncio.Server] = []
-        self._ends: set[_End] = set()
-        self._dialling: set[asyncio.Task[None]] = set()
+        self._crossing = Crossing(book.clock)
         self._hosts: set[str] = set()
         self._datagrams: asyncio.DatagramTransport | None = None
         self._out: asyncio.DatagramTransport | None = None
@@ -166,9 +102,8 @@ class Relay:
         """Listen. Raises OSError."""
         main = self._target.port
         for port in (main, *(p for p in SIDE_PORTS.get(self._target.door, ()) if p != main)):
-            loop = asyncio.get_running_loop()
             try:
-                self._servers.append(await loop.create_server(partial(_Client, self, port), self._address, port))
+                await self._crossing.listen(self._address, port, partial(self._accept, port), None)
             except OSError as error:
                 why = os.strerror(error.errno) if error.errno else str(error)
                 raise OSError(f"cannot listen at {self._address}:{port}: {why}") from error
@@ -176,39 +111,13 @@ class Relay:
             self._announcer = Announcer(self._target.host, self._address, partial(self._pushed, DISCOVERY))
             await self._announcer.open()
 
-    def accept(self, client: _Client, port: int) -> None:
+    def _accept(self, port: int, client: End) -> None:
         """Dial the robot for a client that came; what the client says already waits, and is understood."""
-        peer = client.transport.get_extra_info("peername")
-        name = f"{peer[0]}:{peer[1]}" if peer else ""
-        robot, sniffer = _End(), self._sniffer(name, port)
+        robot, sniffer = End(), self._sniffer("{}:{}".format(*client.peer), port)
         if sniffer is not None:
             client.look, robot.look = sniffer.from_client, sniffer.from_robot
-        dialling = self._dial(client, robot, name, port)
-        task = asyncio.get_running_loop().create_task(dialling, name=f"relay {port}")
-        self._dialling.add(task)
-        task.add_done_callback(self._dialling.discard)
-
-    async def _dial(self, client: _Client, robot: _End, name: str, port: int) -> None:
-        if len(self._ends) >= 2 * CONNECTIONS_MAX:
-            client.transport.abort()
-            return
-        try:
-            dialling = asyncio.get_running_loop().create_connection(lambda: robot, self._target.host, port)
-            await self._book.clock.wait_for(dialling, CONNECT_SECONDS)
-        except (OSError, TimeoutError) as error:
-            log.warning("%s:%d cannot be reached for %s: %s", self._target.host, port, name, error)
-            client.transport.abort()
-            return
-        if client.transport.is_closing():
-            robot.transport.abort()
-            return
-        for end in (client, robot):
-            self._ends.add(end)
-            end.gone = self._ends.discard
-        if self._target.door == "robomaster":
-            await self._listen_for_pushes(robot.transport.get_extra_info("sockname")[0], name.rpartition(":")[0])
-        client.join(robot)
-        robot.join(client)
+        joining = self._listen_for_pushes if self._target.door == "robomaster" else None
+        self._crossing.cross(client, Place(self._target.host, port), robot, joining)
 
     def _sniffer(self, name: str, port: int) -> Sniffer | None:
         def note(direction: Direction, operation: str, payload: bytes, status: str, began: float | None) -> float:
@@ -218,8 +127,9 @@ class Relay:
             return SNIFFERS[self._target.door](note)
         return _Events(note) if port == EVENTS else None
 
-    async def _listen_for_pushes(self, own: str, host: str) -> None:
+    async def _listen_for_pushes(self, client: End, robot: End) -> None:
         """Take the robot's datagrams where it sends them, at our own address, and pass them to the clients' hosts."""
+        own, host = robot.transport.get_extra_info("sockname")[0], client.peer[0]
         self._hosts.add(host)
         if self._datagrams is not None or own == host:
             return
@@ -248,31 +158,10 @@ class Relay:
         """Stop listening and hang up; returns when every connection is gone."""
         if self._announcer is not None:
             self._announcer.close()
-        for server in self._servers:
-            server.close()
-        dialling = tuple(self._dialling)
-        for task in dialling:
-            task.cancel()
-        await asyncio.gather(*dialling, return_exceptions=True)
-        ends = tuple(self._ends)
-        for end in ends:
-            end.transport.abort()
-        await asyncio.gather(*(end.lost for end in ends))
+        await self._crossing.close()
         for transport in (self._datagrams, self._out):
             if transport is not None:
                 transport.close()
-
-
-class _Client(_End):
-    """The end of the client."""
-
-    def __init__(self, relay: Relay, port: int) -> None:
-        super().__init__()
-        self._relay, self._port = relay, port
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        super().connection_made(transport)
-        self._relay.accept(self, self._port)
 
 
 class _Pushes(asyncio.DatagramProtocol):

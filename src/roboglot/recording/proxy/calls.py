@@ -1,0 +1,191 @@
+"""Reads calls of gRPC from a copy of one HTTP/2 connection's bytes. Knows no service, and answers nothing.
+
+Headers are compressed against all that came before on the connection, so each direction is read from its first byte on.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import IntEnum, IntFlag
+
+from hpack import Decoder
+
+PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"  # with which a client begins
+HEAD = 9  # bytes of a frame before its payload
+FRAME_MAX = 1 << 24
+MESSAGE_HEAD = 5  # bytes before a message: whether it is packed, and its length
+MESSAGE_MAX = 16 << 20  # bytes, packed or not
+CALLS_MAX = 1000  # that are open; further ones are not read
+HEADER_TABLE_SIZE = 1  # the name of a setting
+SETTING = 6  # bytes
+
+
+class Frame(IntEnum):
+    """Kinds of frames that are read."""
+
+    DATA = 0
+    HEADERS = 1
+    RST_STREAM = 3
+    SETTINGS = 4
+    CONTINUATION = 9
+
+
+class Flag(IntFlag):
+    """Flags of a frame."""
+
+    END_STREAM = 1  # of data and headers
+    ACK = 1  # of settings
+    END_HEADERS = 4
+    PADDED = 8
+    PRIORITY = 32
+
+
+@dataclass(slots=True)
+class Call:
+    """One call: its path, and what its reader keeps of it."""
+
+    path: str = ""
+    code: str = ""
+    at: float = 0.0
+    ways: dict[str, _Messages] = field(default_factory=dict)
+
+
+@dataclass(slots=True)
+class _Messages:
+    """Messages of one direction of a call, as far as they have come."""
+
+    packing: str = ""
+    waiting: bytearray = field(default_factory=bytearray)
+
+
+Heard = Callable[[Call, bytes], None]
+
+
+class OneWay:
+    """One direction of a connection: ``feed`` it; ``heard`` gets each whole message of a call.
+
+    Raises ValueError, IndexError or hpack's HPACKError where it is not HTTP/2.
+    """
+
+    def __init__(self, name: str, calls: dict[int, Call], heard: Heard, preface: bytes = b"") -> None:
+        self._name, self._calls, self._heard = name, calls, heard
+        self._preface = preface
+        self._rest = bytearray()
+        self._decoder = Decoder()
+        self._headers = bytearray()
+        self._ends = False  # the call, with the headers that are not complete yet
+        self.peer: OneWay | None = None
+
+    def remember(self, size: int) -> None:
+        """The other side allows this one's headers to refer back to so many bytes of earlier ones."""
+        self._decoder.max_allowed_table_size = size
+
+    def feed(self, data: bytes) -> None:
+        """Read what came."""
+        rest = self._rest
+        rest += data
+        at = 0
+        if self._preface:
+            if len(rest) < len(self._preface):
+                return
+            if not rest.startswith(self._preface):
+                raise ValueError("no HTTP/2")
+            at, self._preface = len(self._preface), b""
+        while len(rest) - at >= HEAD:
+            size = int.from_bytes(rest[at : at + 3])
+            end = at + HEAD + size
+            if len(rest) < end:
+                break
+            kind, flags, stream = rest[at + 3], rest[at + 4], int.from_bytes(rest[at + 5 : at + HEAD]) & 0x7FFFFFFF
+            self._frame(kind, Flag(flags), stream, bytes(rest[at + HEAD : end]))
+            at = end
+        del rest[:at]
+
+    def _frame(self, kind: int, flags: Flag, stream: int, payload: bytes) -> None:
+        match kind:
+            case Frame.DATA:
+                if call := self._calls.get(stream):
+                    self._data(call, _unpadded(flags, payload))
+                self._end_with(flags, stream)
+            case Frame.HEADERS:
+                payload = _unpadded(flags, payload)
+                self._headers = bytearray(payload[5:] if flags & Flag.PRIORITY else payload)
+                self._ends = bool(flags & Flag.END_STREAM)
+                self._head(flags, stream)
+            case Frame.CONTINUATION:
+                self._headers += payload
+                if len(self._headers) > FRAME_MAX:
+                    raise ValueError("headers without an end")
+                self._head(flags, stream)
+            case Frame.RST_STREAM:
+                self._calls.pop(stream, None)
+            case Frame.SETTINGS if not flags & Flag.ACK:
+                self._settings(payload)
+
+    def _head(self, flags: Flag, stream: int) -> None:
+        """Headers; those of every call are read, for the next ones refer to them."""
+        if not flags & Flag.END_HEADERS:
+            return
+        found = {_text(name): _text(value) for name, value in self._decoder.decode(bytes(self._headers), raw=True)}
+        self._headers = bytearray()
+        call = self._calls.get(stream)
+        if call is None and ":path" in found and len(self._calls) < CALLS_MAX:
+            call = self._calls[stream] = Call(found[":path"])
+        if call is not None and "grpc-encoding" in found:
+            call.ways.setdefault(self._name, _Messages()).packing = found["grpc-encoding"]
+        if self._ends:
+            self._end_with(Flag.END_STREAM, stream)
+
+    def _end_with(self, flags: Flag, stream: int) -> None:
+        """Forget a call when its answer ends: that of the side that was asked."""
+        if flags & Flag.END_STREAM and self._name == "answers":
+            self._calls.pop(stream, None)
+
+    def _data(self, call: Call, data: bytes) -> None:
+        way = call.ways.setdefault(self._name, _Messages())
+        way.waiting += data
+        while len(way.waiting) >= MESSAGE_HEAD:
+            size = int.from_bytes(way.waiting[1:MESSAGE_HEAD])
+            if size > MESSAGE_MAX:
+                raise ValueError(f"a message of {size} bytes")
+            if len(way.waiting) < MESSAGE_HEAD + size:
+                return
+            message = bytes(way.waiting[MESSAGE_HEAD : MESSAGE_HEAD + size])
+            packed = way.waiting[0] & 1
+            del way.waiting[: MESSAGE_HEAD + size]
+            self._heard(call, _unpacked(way.packing, message) if packed else message)
+
+    def _settings(self, payload: bytes) -> None:
+        """Settings of this side say how far the other side's compression may remember."""
+        for at in range(0, len(payload) - SETTING + 1, SETTING):
+            if int.from_bytes(payload[at : at + 2]) == HEADER_TABLE_SIZE and self.peer is not None:
+                self.peer.remember(int.from_bytes(payload[at + 2 : at + SETTING]))
+
+
+def both(asked: Heard, answered: Heard) -> tuple[OneWay, OneWay]:
+    """Return the two directions of a connection: the caller's, which begins with the preface, and the answers."""
+    calls: dict[int, Call] = {}
+    asking, answering = OneWay("asks", calls, asked, PREFACE), OneWay("answers", calls, answered)
+    asking.peer, answering.peer = answering, asking
+    return asking, answering
+
+
+def _unpadded(flags: Flag, payload: bytes) -> bytes:
+    return payload[1 : len(payload) - payload[0]] if flags & Flag.PADDED else payload
+
+
+def _unpacked(packing: str, message: bytes) -> bytes:
+    """Return what a packed message says; as it is where the packing is not known. Raises ValueError."""
+    if packing not in ("gzip", "deflate"):
+        return message
+    unpacking = zlib.decompressobj(zlib.MAX_WBITS | 32)  # of either form
+    try:
+        return unpacking.decompress(message, MESSAGE_MAX)
+    except zlib.error as error:
+        raise ValueError(f"a packed message: {error}") from None
+
+
+def _text(value: str | bytes) -> str:
+    return value if isinstance(value, str) else value.decode("latin-1")
