@@ -20,6 +20,8 @@ from zoneinfo import ZoneInfo
 
 import msgspec
 
+from roboglot.misfits import misfit
+
 RECORDING = "recording:"  # prefix of the body of a recorded robot
 ROBOTS_MAX = 100
 Limit = Annotated[int, msgspec.Meta(ge=1, le=2**40)]
@@ -272,7 +274,7 @@ def config_of(
     try:
         config = msgspec.convert(values, Config, dec_hook=lambda kind, value: kind(value))
     except msgspec.ValidationError as error:
-        raise ValueError(f"{origin}: {error}") from None
+        raise ValueError(f"{origin}: {misfit(error)}") from None
     sections = {name: _section(name, doors[name], section, origin) for name, section in given.items()}
     return dataclasses.replace(config, robots=with_addresses(config.robots), doors=sections)
 
@@ -290,7 +292,7 @@ def _section(name: str, kind: type, values: object, origin: str) -> object:
     try:
         return msgspec.convert(values, kind)
     except msgspec.ValidationError as error:
-        raise ValueError(f"{origin}: [{name}] {error}") from None
+        raise ValueError(f"{origin}: [{name}] {misfit(error)}") from None
 
 
 def zone_of(name: str) -> tzinfo:

@@ -15,6 +15,8 @@ from typing import Any, Generic, TypeVar
 
 import msgspec
 
+from roboglot.misfits import KINDS, misfit
+
 K = TypeVar("K", bound=Hashable)
 Handler = TypeVar("Handler", bound=Callable[..., Awaitable[object]])
 
@@ -68,12 +70,15 @@ class Operation(Generic[K]):
         """The first line of the handler's docstring."""
         return (self.handler.__doc__ or "").strip().partition("\n")[0]
 
-    def parse(self, values: Mapping[str, object]) -> dict[str, object]:
-        """Convert and check wire values by name; unknown names are ignored. Raises BadParameters."""
+    def parse(self, values: Mapping[str, object], kinds: Mapping[str, str] = KINDS) -> dict[str, object]:
+        """Convert and check wire values by name; unknown names are ignored.
+
+        Raises BadParameters, in the words of ``kinds`` for types.
+        """
         try:
             checked = msgspec.convert(dict(values), self.parameters, strict=False)
         except msgspec.ValidationError as error:
-            raise BadParameters(str(error)) from None
+            raise BadParameters(misfit(error, kinds=kinds)) from None
         return {name: getattr(checked, name) for name in self.names}
 
     async def call(self, context: object, values: Mapping[str, object]) -> Any:

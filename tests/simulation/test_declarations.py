@@ -54,8 +54,8 @@ def test_the_shipped_worlds_load(name):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("furniture = [{ shape", "furnitur = [{ shape", r"world.toml:10: .*`furnitur`.*did you mean `furniture`\?"),
-        ("to = [6, 4] }", "too = [6, 4] }", r"world.toml:8: .*did you mean `to`\?"),
+        ("furniture = [{ shape", "furnitur = [{ shape", r"world.toml:10: .*furnitur is unknown; .* 'furniture'\?"),
+        ("to = [6, 4] }", "too = [6, 4] }", r"world.toml:8: .*did you mean 'to'\?"),
         ("to = [6, 4] }", "to = [6] }", r"world.toml:8: .*walls\[1\].to"),
         ("from = [6, 0]", 'from = [6, "x"]', r"world.toml:8: .*walls\[1\].from\[1\]"),
         ("radius = 0.3", "radius = -0.3", r"world.toml:16: .*furniture\[0\].radius"),
@@ -106,7 +106,7 @@ def test_bodies(write):
     assert load_body("universal").model == "universal"
     with pytest.raises(BadFile, match="no body is named"):
         load_body("../universal")
-    with pytest.raises(BadFile, match="missing required field"):
+    with pytest.raises(BadFile, match="is missing"):
         load_body(str(write("maker = 'x'", "body.toml")))
 
 

@@ -14,14 +14,14 @@ from roboglot.testing.scenarios.files import BadScenario, find, read, schema
 
 SAMPLE = Path(__file__).parents[2] / "examples/ci"
 WRONG = {
-    "name: x": "`when`",
-    "name: x\nwhen: []\nthen: []\n": "length",
-    "name: x\nwhen: []\nthen: [{moved: {z: 1}}]\n": "unknown field `z`",
+    "name: x": "when is missing",
+    "name: x\nwhen: []\nthen: []\n": "then must have at least 1 entries",
+    "name: x\nwhen: []\nthen: [{moved: {z: 1}}]\n": "z is unknown",
     "name: x\nwhen: [{run: a, text: b}]\nthen: [{refused: 0}]\n": "when 1: one of run, rest",
     "name: x\nwhen: [{within: 3}]\nthen: [{refused: 0}]\n": "not none",
     "name: x\nwhen: [{until: {}}]\nthen: [{refused: 0}]\n": "when 1: until: one of pose",
     "name: x\nwhen: []\nthen: [{battery: {at_least: 3, robot: b}}]\n": "no robot 'b', only a",
-    "name: x\nwhen: []\nthen: [{refused: 0}]\ngiven: {robots: []}\n": "length",
+    "name: x\nwhen: []\nthen: [{refused: 0}]\ngiven: {robots: []}\n": "robots must have at least 1 entries",
     "a: [": "while parsing",
     "!!python/object/apply:os.system [true]": "constructor",
 }

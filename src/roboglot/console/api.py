@@ -22,6 +22,7 @@ from roboglot.console.studio.plans import rehearse
 from roboglot.console.thumbnails import thumbnail
 from roboglot.console.verbs.maps import map_archive
 from roboglot.console.wire_log import readable
+from roboglot.misfits import misfit
 from roboglot.model.admission import Right
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
@@ -224,7 +225,7 @@ def _wish(values: Values[str, object], kind: type[T]) -> T:
     try:
         return msgspec.convert(values, kind)
     except msgspec.ValidationError as error:
-        raise BadParameters(str(error)) from None
+        raise BadParameters(misfit(error, "the body")) from None
 
 
 def _nothing_here() -> Problem:

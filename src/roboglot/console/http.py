@@ -8,6 +8,7 @@ from typing import Any
 import msgspec
 
 from roboglot.console.settings import BODY_MAX
+from roboglot.misfits import misfit
 
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
@@ -45,7 +46,7 @@ async def read_json(receive: Receive) -> Mapping[str, object]:
     try:
         return msgspec.json.decode(body, type=dict) if body else {}
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
-        raise Problem(400, f"the body is not a JSON object: {error}") from None
+        raise Problem(400, f"the body is not a JSON object: {misfit(error)}") from None
 
 
 async def answer(send: Send, status: int, content_type: bytes, body: bytes, more: Rows | None = None) -> None:

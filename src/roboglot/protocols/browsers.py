@@ -1,5 +1,4 @@
-"""Protection from foreign web pages. Decides by a request's Host, Origin, Referer and Sec-Fetch-* headers. Decides by a
-request's Host, Origin, Referer and Sec-Fetch-* headers.
+"""Protection from foreign web pages, by a request's Host, Origin, Referer and Sec-Fetch-* headers.
 
 The protocols have no authentication of their own, and every page in every browser of this machine reaches loopback. So
 a request is refused when a page of another host sent it (Origin), or when its Host is a name that may have been rebound

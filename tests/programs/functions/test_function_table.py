@@ -30,9 +30,9 @@ def test_everything_has_a_docstring_for_the_reference() -> None:
         ((1, 2, 3), {}, "takes at most 2 arguments"),
         ((1,), {"angle": 2}, "multiple values for argument 'angle'"),
         ((), {"angel": 2}, "unexpected keyword argument 'angel'"),
-        (("left",), {}, "angle is to be a number, not text"),
-        ((None,), {}, "angle is to be a number, not None"),
-        (([90],), {}, "angle is to be a number, not a list"),
+        (("left",), {}, "angle must be a number, not text"),
+        ((None,), {}, "angle must be a number, not None"),
+        (([90],), {}, "angle must be a number, not a list"),
     ],
 )
 async def test_arguments_bind_as_in_python(

@@ -20,6 +20,7 @@ import msgspec
 
 from roboglot.clients.errors import BadAnswer, ClientError, RefusedByRobot
 from roboglot.clients.slamware.http import Answer, HttpLink
+from roboglot.misfits import misfit
 from roboglot.model.tap import LOST, Line
 from roboglot.wire.slamware.chapters.slam.explore_map import BadMap, ExploreMap, decode_explore_map
 from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap, decode_stcm, encode_stcm
@@ -162,7 +163,7 @@ def _decoder(key: str, kind: object) -> Callable[[Answer], object]:
         try:
             return convert(bytes(answer.body))
         except (msgspec.MsgspecError, BadMap, UnicodeDecodeError, RecursionError) as error:
-            raise BadAnswer(f"{key}: {error}") from None
+            raise BadAnswer(f"{key}: {misfit(error, 'the answer')}") from None
 
     return decode
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 
+from roboglot.misfits import PYTHON
 from roboglot.model.client_context import identity
 from roboglot.model.errors import RobotError
 from roboglot.operations import BadParameters, Operation, OperationTable, Right
@@ -37,13 +37,6 @@ KEYWORDS = {
         for keyword, name in (("journey", "distance"), ("time", "duration"))
     },
 }
-
-_MISFIT = re.compile(r"Expected `(\w+)`, got `(\w+)` - at `\$\.([^`]+)`$")
-_MISSING = re.compile(r"Object missing required field `(\w+)`$")
-_KINDS = {
-    "float": "a number", "int": "a whole number", "str": "text", "bool": "True or False", "array": "a list",
-    "object": "a dictionary", "null": "None",
-}  # fmt: skip
 
 JOINED = frozenset({"cyberdog.audio.play", "cyberdog.audio.instantly_play"})  # one of the examples passes several texts
 
@@ -108,19 +101,9 @@ def bind(operation: Operation[str], args: Sequence[object], kwargs: Mapping[str,
             raise TypeError(f"{operation.key}() got multiple values for argument '{name}'")
         values[name] = value
     try:
-        return operation.parse(values)
+        return operation.parse(values, PYTHON)
     except BadParameters as error:
-        raise TypeError(f"{operation.key}(): {_in_words(str(error))}") from None
-
-
-def _in_words(error: str) -> str:
-    """Return what does not fit, said for pupils."""
-    if misfit := _MISFIT.search(error):
-        wanted, given, name = misfit.groups()
-        found = "a fraction" if (wanted, given) == ("int", "float") else _KINDS.get(given, given)
-        return f"{name} is to be {_KINDS.get(wanted, wanted)}, not {found}"
-    missing = _MISSING.search(error)
-    return f"{missing[1]} is missing" if missing else error
+        raise TypeError(f"{operation.key}(): {error}") from None
 
 
 def state_of(result: object) -> Record | None:

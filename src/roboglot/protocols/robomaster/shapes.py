@@ -16,6 +16,7 @@ from typing import Annotated, Any, get_args, get_origin
 
 import msgspec
 
+from roboglot.misfits import misfit
 from roboglot.operations import BadParameters, Operation
 from roboglot.protocols.robomaster.ranges import OnRobots
 from roboglot.wire.robomaster.commands import Value, parameters_of
@@ -43,7 +44,7 @@ class Shape:
         try:
             checked = msgspec.convert(values, self.struct, strict=False)
         except msgspec.ValidationError as error:
-            raise BadParameters(str(error)) from None
+            raise BadParameters(misfit(error)) from None
         return {name: getattr(checked, name) for name in self.kinds}
 
 

@@ -8,6 +8,7 @@ from urllib.parse import parse_qsl
 
 import msgspec
 
+from roboglot.misfits import misfit
 from roboglot.operations import Operation
 from roboglot.protocols.slamware.bodies import Receive, Scope, chunks, read_body
 from roboglot.protocols.slamware.chapters.firmware.uploads import PACKAGE_MAX, Upload
@@ -52,7 +53,7 @@ class Parameters:
             try:
                 values["body"] = msgspec.convert(whole_numbers(msgspec.json.decode(body)), kind)
             except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
-                why = str(error).replace("`$", "`$.body", 1) if body else "a JSON body is needed"
+                why = misfit(error, "the body") if body else "a JSON body is needed"
                 raise bad_request(operation.key, why) from None
         return values
 

@@ -12,6 +12,7 @@ from typing import Annotated, Any
 
 import msgspec
 
+from roboglot.misfits import misfit
 from roboglot.recording.comparing.trees import kind_of
 
 RULES_MAX = 1000
@@ -87,7 +88,7 @@ def read_mask(path: Path) -> Mask:
     try:
         mask = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), Mask)
     except (msgspec.ValidationError, tomllib.TOMLDecodeError) as error:
-        raise ValueError(f"{path}: {error}") from None
+        raise ValueError(f"{path}: {misfit(error)}") from None
     if len(mask.rule) > RULES_MAX:
         raise ValueError(f"{path}: more than {RULES_MAX} rules")
     return mask

@@ -14,6 +14,8 @@ from typing import TypeVar, cast
 
 import msgspec
 
+from roboglot.misfits import misfit
+
 T = TypeVar("T")
 FILE_BYTES_MAX = 4_000_000
 DECODED_MAX = 8  # files cached
@@ -36,7 +38,7 @@ def read_toml(path: Path, structure: type[T]) -> T:
     try:
         return cast(T, _decoded(text, cast(Hashable, structure)))
     except msgspec.ValidationError as error:
-        raise BadFile(f"{path}{_line_of(text, str(error))}: {_explained(str(error), structure)}") from None
+        raise BadFile(f"{path}{_line_of(text, str(error))}: {_explained(error, structure)}") from None
     except msgspec.DecodeError as error:
         raise BadFile(f"{path}: not TOML: {error}") from None
 
@@ -47,13 +49,14 @@ def _decoded(text: str, structure: object) -> object:
     return msgspec.toml.decode(text, type=structure, strict=False)
 
 
-def _explained(message: str, structure: type) -> str:
-    """msgspec's message, with a guess at what an unknown key was meant to be."""
-    unknown = re.search(r"unknown field `([^`]+)`", message)
+def _explained(error: msgspec.ValidationError, structure: type) -> str:
+    """Return what does not fit, with a guess at what an unknown key was meant to be."""
+    message = misfit(error, "the file")
+    unknown = re.search(r"unknown field `([^`]+)`", str(error))
     if unknown is None:
         return message
     near = difflib.get_close_matches(unknown[1], sorted(_keys_of(structure)), n=1)
-    return message + (f"; did you mean `{near[0]}`?" if near else "")
+    return message + (f"; did you mean '{near[0]}'?" if near else "")
 
 
 def _keys_of(structure: type) -> set[str]:

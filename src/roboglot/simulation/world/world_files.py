@@ -15,6 +15,7 @@ from msgspec import Meta, Struct
 from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
+from roboglot.misfits import misfit
 from roboglot.model.geometry import Point
 from roboglot.model.maps import OccupancyGrid
 from roboglot.simulation.building.rectangles import cover
@@ -114,7 +115,7 @@ def _read(path: Path) -> RosMap:
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise BadFile(f"{path}: not YAML: {error}") from None
     except msgspec.ValidationError as error:
-        raise BadFile(f"{path}: not a ROS map: {error}") from None
+        raise BadFile(f"{path}: not a ROS map: {misfit(error)}") from None
     if ros_map.origin[2]:
         raise BadFile(f"{path}: origin has a yaw of {ros_map.origin[2]}; only maps with yaw 0 can be imported")
     if ros_map.free_thresh >= ros_map.occupied_thresh:

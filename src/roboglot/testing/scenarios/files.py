@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import msgspec
 
+from roboglot.misfits import misfit
 from roboglot.testing.wanted import SPEED, Wanted, WantedFault
 
 BYTES_MAX = 1 << 20
@@ -212,7 +213,7 @@ def read(path: Path) -> Found:
         _check(scenario)
         scenario.given.wanted(path.parent)
     except (OSError, UnicodeDecodeError, yaml.YAMLError, msgspec.ValidationError, BadScenario, RecursionError) as error:
-        raise BadScenario(f"{path}: {' '.join(str(error).split())}") from None
+        raise BadScenario(f"{path}: {' '.join(misfit(error).split())}") from None
     return Found(path, scenario)
 
 

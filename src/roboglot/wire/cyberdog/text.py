@@ -9,6 +9,8 @@ from typing import Annotated, NoReturn
 
 import msgspec
 
+from roboglot.misfits import misfit
+
 # Accepted when the strict reader fails: raw line ends inside a string, as one app sends its SDP.
 _lenient = json.JSONDecoder(strict=False, parse_constant=lambda name: _refuse(name))
 
@@ -65,9 +67,9 @@ def fitting(values: Mapping[str, object], fields: type[msgspec.Struct]) -> Mappi
 def misfits(values: Mapping[str, object], fields: type[msgspec.Struct]) -> list[str]:
     """Describe the errors in those of ``values`` that ``fitting`` leaves out."""
     return [
-        f"{field.name}: {reason}"
+        reason
         for field in _fields(fields)
-        if field.name in values and (reason := _misfit(values[field.name], field.type))
+        if field.name in values and (reason := _misfit(field.name, values[field.name], field.type))
     ]
 
 
@@ -77,16 +79,16 @@ def _fields(kind: type[msgspec.Struct]) -> tuple[msgspec.structs.FieldInfo, ...]
 
 
 def _fits(value: object, kind: object) -> bool:
-    return not _misfit(value, kind)
+    return not _misfit("", value, kind)
 
 
-def _misfit(value: object, kind: object) -> str:
-    """Return why ``value`` is not of that ``kind``; empty if it is."""
+def _misfit(name: str, value: object, kind: object) -> str:
+    """Return why ``value`` of the field ``name`` is not of that ``kind``; empty if it is."""
     try:
         # Some languages write whole numbers in JSON with a decimal point: 303.0 counts as 303.
         msgspec.convert(value, kind, strict=not isinstance(value, float))
     except msgspec.ValidationError as error:
-        return str(error)
+        return misfit(error, field=name)
     return ""
 
 

@@ -8,6 +8,8 @@ from typing import Annotated, Literal, TypeVar
 
 import msgspec
 
+from roboglot.misfits import misfit
+
 MESSAGE_MAX = 1 << 20  # bytes
 NODES_MAX = 1000
 ACTIONS_MAX = 64  # per node; per message
@@ -164,7 +166,7 @@ def read(data: bytes, kind: type[M]) -> M:
     try:
         message = msgspec.json.decode(data, type=kind)
     except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
-        raise Malformed(str(error)) from None
+        raise Malformed(misfit(error, "the message")) from None
     if isinstance(message, Order):
         _check_graph(message)
     _check_ids(message)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 
 import msgspec
 
+from roboglot.misfits import misfit
 from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.operations import Right
 from roboglot.protocols import ros_commands
@@ -55,7 +56,7 @@ async def publish(context: Context, *, channel: int, data: bytes) -> None:
     try:
         TOPICS[_name(context, published.topic)](context, data)
     except (msgspec.DecodeError, RecursionError) as error:  # includes ValidationError
-        raise InvalidGoal(f"{published.topic}: {error}") from None
+        raise InvalidGoal(f"{published.topic}: {misfit(error)}") from None
 
 
 def _name(context: Context, topic: str) -> str:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import msgspec
 
+from roboglot.misfits import misfit
 from roboglot.model.components.logistics.delivery import Delivery, OrderKind, OrderRequest
 from roboglot.model.components.system.network import Network
 from roboglot.model.components.system.settings import Settings
@@ -62,7 +63,7 @@ class CloudFolder:
         try:
             return msgspec.json.decode(data, type=list[VoicePackage]) if data else []
         except msgspec.DecodeError as error:
-            raise InvalidGoal(f"voice.json: {error}") from None
+            raise InvalidGoal(f"voice.json: {misfit(error, 'the list')}") from None
 
     def start(self) -> None:
         """Look for tasks from now on."""
@@ -110,8 +111,8 @@ class CloudFolder:
                 await delivery.accept(request)
             _mark(path)
         except (RobotError, msgspec.DecodeError, RecursionError) as error:
-            log.warning("the cloud's task %s is refused: %s", path.name, error)
-            _mark(path, refused=str(error))
+            log.warning("the cloud's task %s is refused: %s", path.name, misfit(error))
+            _mark(path, refused=misfit(error))
 
 
 def _mark(path: Path, refused: str = "") -> None:

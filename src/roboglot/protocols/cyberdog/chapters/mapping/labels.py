@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import msgspec
 
+from roboglot.misfits import misfit
 from roboglot.model.components.mapping.map_library import Label, MapLibrary, StoredMap
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.errors import NotFound
@@ -110,7 +111,7 @@ async def set_labels(
         labels = msgspec.convert(locationLabelInfo or [], list[WireLabel])
     except msgspec.ValidationError as error:
         # If taken as absent, a label list of the wrong type would delete the whole map.
-        raise BadParameters(str(error)) from None
+        raise BadParameters(misfit(error, field="locationLabelInfo")) from None
     names = [label.labelName for label in labels]
     try:
         stored = await library.get(mapName or await _numbered(library, map_id))

@@ -9,6 +9,7 @@ from functools import partial
 
 import msgspec
 
+from roboglot.misfits import misfit
 from roboglot.model.actions import Action
 from roboglot.model.components.motion.following import Following, FollowSide
 from roboglot.model.errors import NotFound, RobotError
@@ -137,7 +138,7 @@ async def choose_target(call: Call, *, roi: object) -> dict[str, bool]:
     try:
         region = msgspec.convert(roi, Region)
     except msgspec.ValidationError as error:
-        raise BadParameters(str(error)) from None
+        raise BadParameters(misfit(error, field="roi")) from None
     pursuit = call.context.pursuit
     chosen = pursuit is not None and pursuit.choose(region.x_offset, region.y_offset, region.width, region.height)
     return {"success": chosen}

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 import msgspec
 
+from roboglot.misfits import misfit
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.interaction.remote_control import Gear, RemoteControl
 from roboglot.model.components.system.bluetooth import (
@@ -75,7 +76,7 @@ async def connect(call: Call, *, selected_device: object = None) -> dict[str, in
     try:
         device = msgspec.convert(selected_device, WireDevice)
     except msgspec.ValidationError as error:
-        raise BadParameters(str(error)) from None
+        raise BadParameters(misfit(error, field="selected_device")) from None
     connecting = radio.connect(device.mac, source=SOURCE)
     try:
         status = await robot.clock.wait_for(connecting.done(), CONNECT_MAX)

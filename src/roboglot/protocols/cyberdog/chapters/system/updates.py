@@ -8,6 +8,7 @@ import logging
 
 import msgspec
 
+from roboglot.misfits import misfit
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.system.firmware import (
     Firmware,
@@ -191,7 +192,7 @@ def package_of(modules: object) -> tuple[FirmwarePackage, frozenset[str]]:
     try:
         wanted = msgspec.convert(modules if isinstance(modules, list) else [modules], list[WireModule])
     except msgspec.ValidationError as error:
-        raise BadParameters(str(error)) from None
+        raise BadParameters(misfit(error, "the modules")) from None
     files = [file for module in wanted for file in module.latest.packages]
     if not files or len(wanted) > MODULES_MAX:
         raise InvalidGoal(f"an update has files, and at most {MODULES_MAX} modules")

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import msgspec
 
+from roboglot.misfits import misfit
 from roboglot.model.components.logistics.cargo import Cargo
 from roboglot.model.components.logistics.delivery import Delivery, Policy, WorkMode
 from roboglot.model.components.motion.base import Base
@@ -133,7 +134,7 @@ async def set_move_options(context: Context, body: dict[str, object] | None = No
     try:
         how = _effective(msgspec.convert(words, MoveOptions))
     except msgspec.ValidationError as error:
-        raise InvalidGoal(str(error)) from None
+        raise InvalidGoal(misfit(error)) from None
     if how.mode not in range(len(TRACKS)):
         raise InvalidGoal(f"there is no move mode {how.mode}")
     new = replace(

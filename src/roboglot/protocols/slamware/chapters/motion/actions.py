@@ -8,6 +8,7 @@ from typing import Any
 
 import msgspec
 
+from roboglot.misfits import misfit
 from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
 from roboglot.model.components.logistics.jack import Jack
@@ -172,7 +173,7 @@ def create(context: Context, request: ActionRequest) -> Action:
         options = msgspec.convert(request.options or {}, factory.options)
         action = factory.start(context, options)
     except (RobotError, msgspec.ValidationError) as error:
-        raise HttpError(400, BAD_REQUESTS["POST /api/core/motion/v1/actions"], str(error)) from None
+        raise HttpError(400, BAD_REQUESTS["POST /api/core/motion/v1/actions"], misfit(error, field="options")) from None
     for errand in before:
         errand.cancel(f"{action.name} took over")
     return action

@@ -10,6 +10,7 @@ from typing import TypeVar
 import msgspec
 import numpy as np
 
+from roboglot.misfits import misfit
 from roboglot.model.components.mapping.annotations import (
     Annotations,
     Area,
@@ -209,7 +210,7 @@ def _mark(id: str, pose: Pose, metadata: dict[str, str]) -> PointOfInterest:
     try:
         return PointOfInterest(msgspec.convert(clean(id), artifact.Identifier), pose, _texts(metadata))
     except msgspec.ValidationError as error:
-        raise InvalidGoal(f"the name {clean(id)[:40]!r} of a place: {error}") from None
+        raise InvalidGoal(f"the name {clean(id)[:40]!r} of a place: {misfit(error)}") from None
 
 
 def _texts(metadata: dict[str, str]) -> dict[str, str]:

@@ -11,6 +11,7 @@ from typing import Annotated
 
 import msgspec
 
+from roboglot.misfits import misfit
 from roboglot.model.components.sensing.sensor_masks import SensorMasks
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import InvalidGoal, NotFound
@@ -44,7 +45,7 @@ async def set_cube_config(context: Context, body: bytes) -> None:
     try:
         config = msgspec.json.decode(body, type=CubeConfig)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InvalidGoal(f"no configuration that this robot understands: {error}") from None
+        raise InvalidGoal(f"no configuration that this robot understands: {misfit(error)}") from None
     robot = context.robot
     if config.disabled_sensors:
         known = {sensor.id for sensor in robot[SensorMasks].sensors}

@@ -13,6 +13,8 @@ from typing import Annotated, BinaryIO
 
 import msgspec
 
+from roboglot.misfits import misfit
+
 DIRECTORY_MAX = 4 << 20  # bytes of an archive's table of contents
 ENTRY_MAX = 4 << 20  # bytes of a description, unpacked
 TAIL = 22 + 0xFFFF  # bytes at the end of an archive that contain the offset of its table
@@ -38,7 +40,7 @@ def read_firmware(file: BinaryIO) -> FirmwareDescription:
     try:
         return msgspec.json.decode(entry_of(file, DESCRIPTION), type=FirmwareDescription)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise BadPackage(f"{DESCRIPTION}: {error}") from None
+        raise BadPackage(f"{DESCRIPTION}: {misfit(error)}") from None
 
 
 def entry_of(file: BinaryIO, name: str) -> bytes:

@@ -1,0 +1,69 @@
+"""Sentences for values that do not fit: the field's path as its sender wrote it, and what is wanted there.
+
+The library's own messages name Python's types and a path that begins with ``$``. Every door, the console and the
+readers of files answer with these instead. Knows no protocol and no robot.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+import msgspec
+
+KINDS = {
+    "float": "a number", "int": "a whole number", "str": "text", "bool": "true or false", "array": "a list",
+    "object": "an object", "bytes": "base64 text",
+}  # fmt: skip
+PYTHON = {**KINDS, "bool": "True or False", "object": "a dictionary", "null": "None"}  # for programs
+_PLACE = re.compile(r"(?s)(.*?)(?: - at `(key` in `)?\$\.?([^`]*)`)?")
+_FORMS = {  # the library's messages; the first group of a missing or unknown field belongs to the path
+    r"Object missing required field `(.+)`": "{place} is missing",
+    r"Object contains unknown field `(.+)`": "{place} is unknown",
+    r"Expected `(.+)`, got `(.+)`": "{place} must be {}, not {}",
+    r"Expected `array` of length (\d+), got (\d+)": "{place} must have {} entries, not {}",
+    r"Expected `array` of at least length (\d+), got (\d+)": "{place} must have at least {} entries, not {}",
+    r"Expected `str` of length <= (\d+)": "{place} must have at most {} characters",
+    r"Expected `str` of length >= (\d+)": "{place} must have at least {} characters",
+    r"Expected `\w+` of length <= (\d+)": "{place} must have at most {} entries",
+    r"Expected `\w+` of length >= (\d+)": "{place} must have at least {} entries",
+    r"Expected `\w+` <= (.+)": "{place} must be at most {}",
+    r"Expected `\w+` >= (.+)": "{place} must be at least {}",
+    r"Expected `\w+` < (.+)": "{place} must be below {}",
+    r"Expected `\w+` > (.+)": "{place} must be above {}",
+    r"Expected `\w+` that's a multiple of (.+)": "{place} must be a multiple of {}",
+    r"Expected `str` matching regex '(.+)'": "{place} must match {}",
+    r"Invalid (?:enum )?value (.+)": "{place} cannot be {}",
+}
+_MATCHERS = [(re.compile(pattern, re.DOTALL), form) for pattern, form in _FORMS.items()]
+FORMS = frozenset(form.replace("{place}", "{}") for form in _FORMS.values())
+
+
+def misfit(error: Exception, whole: str = "the value", *, field: str = "", kinds: Mapping[str, str] = KINDS) -> str:
+    """Return in plain words why a value did not fit; what any other error says, unchanged.
+
+    ``field`` is the field that the value was sent in, if it is not the whole; ``whole`` names it where no field is
+    wrong. ``kinds`` has the words for types.
+    """
+    if not isinstance(error, msgspec.ValidationError):
+        return str(error)
+    found = _PLACE.fullmatch(str(error))
+    message, key, path = found.groups() if found else (str(error), None, None)
+    path = ".".join(filter(None, (field, path))).replace(".[", "[")
+    place = f"a key of {path or whole}" if key else path or whole
+    for pattern, form in _MATCHERS:
+        if match := pattern.fullmatch(message):
+            values = [_in_words(value, kinds) for value in match.groups()]
+            if len(values) == 1 and form.count("{}") == 0:
+                return form.format(place=f"{path}.{values[0]}" if path else values[0])
+            if values == [kinds["int"], kinds["float"]]:
+                values[1] = "a fraction"
+            return form.format(*values, place=place)
+    return f"{place}: {message}"
+
+
+def _in_words(value: str, kinds: Mapping[str, str]) -> str:
+    """A type or several as words, a limit without its zeros."""
+    if set(value.split(" | ")) <= {*kinds, "null"}:
+        return " or ".join(kinds.get(kind, kind) for kind in value.split(" | "))
+    return value.removesuffix(".0")
