@@ -34,8 +34,8 @@ BUILDINGS = {
     "ring": str(HERE / "worlds" / "ring.toml"),
     "twins": str(HERE / "worlds" / "twins.toml"),
 }
-SURVEYED = 1.6  # m between two places of a survey
-MARGIN = 0.1  # m beside the hull
+SURVEYED = 1.6  # m between two surveyed places
+MARGIN = 0.1  # m of clearance beside the hull
 
 
 @dataclass

@@ -14,7 +14,7 @@ from roboglot.model.robot import Robot
 from roboglot.simulation.world.world import RobotPlacement, World
 from roboglot.simulation.world.world_files import load_world
 
-AHEAD, CIRCLE = Twist(0.15, 0.0, 0.0), Twist(0.12, 0.0, 1.0)  # off docks, then round where there is room
+AHEAD, CIRCLE = Twist(0.15, 0.0, 0.0), Twist(0.12, 0.0, 1.0)  # leave docks, then turn where there is room
 
 
 @dataclass

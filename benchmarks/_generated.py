@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-Parts = dict[str, list[dict[str, Any]]]  # "walls", "furniture": tables as they stand in a world file
+Parts = dict[str, list[dict[str, Any]]]  # "walls", "furniture": tables as written in a world file
 Rectangle = tuple[float, float, float, float]  # min x, min y, max x, max y
 KINDS = ("rooms", "turned", "racks", "slanted")
-SMALLEST, DOOR = 3.2, 1.1  # m, of a room's side and a door
+SMALLEST, DOOR = 3.2, 1.1  # m, of a room's side and of a door
 
 
 def _box(draw: np.random.Generator, x: float, y: float, most: float = 1.6) -> dict[str, Any]:

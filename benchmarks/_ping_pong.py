@@ -11,7 +11,7 @@ import socket
 import time
 from typing import cast
 
-QUESTION, ANSWER = bytes(82), bytes(30)  # of a call of ``turn`` with two numbers, and of None
+QUESTION, ANSWER = bytes(82), bytes(30)  # a call of ``turn`` with two numbers, and None
 RUNS, CALLS = 20, 900
 
 

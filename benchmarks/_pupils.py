@@ -26,11 +26,11 @@ from roboglot.wire.cyberdog.codes import Code
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2_grpc as service
 
-REST, TEXT, GRPC = "hermes", "robomaster_ep", "cyberdog2"  # the bodies that each kind of client is for
-LOOK = 0.01  # s between two looks at how late the clients' own loop is
+REST, TEXT, GRPC = "hermes", "robomaster_ep", "cyberdog2"  # the bodies that each kind of client supports
+LOOK = 0.01  # s between two checks of how late the clients' own loop is
 RATE = 10  # Hz, of requests and of pushes
-CLIENTS = 1 << 10  # that their addresses are above those of the robots
-PICTURE = b"\x00\x00\x00\x01\x09"  # a delimiter stands before each
+CLIENTS = 1 << 10  # offset of their addresses above the robots'
+PICTURE = b"\x00\x00\x00\x01\x09"  # a delimiter precedes each
 POSE = b"GET /api/core/slam/v1/localization/pose HTTP/1.1\r\nHost: localhost\r\n\r\n"
 MOVE = b'{"action_name":"slamtec.agent.actions.MoveByAction","options":{"direction":3,"duration":1500}}'
 TURN = b"POST /api/core/motion/v1/actions HTTP/1.1\r\nHost: localhost\r\nContent-Length: %d\r\n\r\n%s" % (
@@ -144,7 +144,7 @@ class Class:
 
     async def rest(self, number: int, address: str) -> None:
         """Ask where the robot is; once a second have it turn on."""
-        await self.ready.wait()  # an idle connection is hung up on
+        await self.ready.wait()  # idle connections are closed
         reader, writer = await asyncio.open_connection(address, 1448)
 
         async def request(beat: int) -> bool:

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 ROBOTS = {"a1": "127.10.0.1", "a2": "127.10.0.2"}
-TRIES, SAVES = 0.05, 0.25  # s between two tries to drive, and two places
+TRIES, SAVES = 0.05, 0.25  # s between two attempts to drive, and two places
 
 
 def watch(node: str, file: Path) -> None:

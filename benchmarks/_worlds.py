@@ -45,7 +45,7 @@ async def shard(number: int, count: int, seconds: float, ends: Ends) -> tuple[fl
     robots = await crowd(count, "universal", number, driving=True)
     began = robots.ways
     os.write(ends.ready, READY)
-    os.read(ends.go, 1)  # all begin together
+    os.read(ends.go, 1)  # start together
     used = time.process_time()
     for _ in range(round(seconds / TURN)):
         turn = os.read(ends.take, 1)

@@ -51,7 +51,7 @@ def run(program: str) -> None:
     ca, certificate, key = (
         Path("phone", f"{name}.pem").read_bytes() for name in ("ca-cert", "client-cert", "client-key")
     )
-    app, server = App(), grpc.server(ThreadPoolExecutor(1))  # one thread: what comes at once stays in order
+    app, server = App(), grpc.server(ThreadPoolExecutor(1))  # one thread, so that events stay in order
     service.add_GrpcAppServicer_to_server(app, server)
     server.add_secure_port("127.0.0.1:8981", grpc.ssl_server_credentials([(key, certificate)], ca, True))
     server.start()
@@ -59,7 +59,7 @@ def run(program: str) -> None:
     options = [("grpc.ssl_target_name_override", "cyberdog2.server")]
     with grpc.secure_channel(f"{os.environ.get('ROBOT', '127.0.0.1')}:50052", credentials, options) as channel:
         robot = service.GrpcAppStub(channel)
-        list(robot.sendMsg(pb.SendRequest(nameCode=STATUS, params="{}")))  # so that the robot learns the address
+        list(robot.sendMsg(pb.SendRequest(nameCode=STATUS, params="{}")))  # tells the robot our address
         app.found.get(timeout=PATIENCE)
         for operate in ("save", "run"):
             frame = {"type": "task", "id": operate, "operate": operate, "target_id": ["example"]}

@@ -23,7 +23,7 @@ def ask(code: int, params: str = "{}") -> None:
         Path("phone", f"{name}.pem").read_bytes() for name in ("ca-cert", "client-cert", "client-key")
     )
     credentials = grpc.ssl_channel_credentials(ca, key, certificate)
-    options = [("grpc.ssl_target_name_override", "cyberdog2.server")]  # whatever its address is
+    options = [("grpc.ssl_target_name_override", "cyberdog2.server")]  # at any address
     with grpc.secure_channel(f"{os.environ.get('ROBOT', '127.0.0.1')}:50052", credentials, options) as channel:
         for answer in service.GrpcAppStub(channel).sendMsg(pb.SendRequest(nameCode=code, params=params)):
             print(answer.data, flush=True)

@@ -33,8 +33,8 @@ except KeyboardInterrupt:
 ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / ".venv"
 PYTHON = VENV / "bin/python"
-UNFINISHED = VENV / "unfinished"  # exists while packages are being written: what lies there then can't be trusted
-PROFILES = ("run", "dev")  # dev holds all of run
+UNFINISHED = VENV / "unfinished"  # exists while packages are being written: a leftover means that they can't be trusted
+PROFILES = ("run", "dev")  # dev includes all of run
 INDEX = "https://pypi.org/simple"
 PAGE_BYTES_MAX = 32 * 1024 * 1024
 UNWANTED = {"PIP_TARGET", "PIP_PREFIX", "PIP_ROOT", "PIP_QUIET", "PIP_NO_BINARY", "PYTHONHOME", "PYTHONPATH"}
@@ -114,7 +114,7 @@ def fetch_pip(lock: str, folder: Path) -> Path:
     authority = os.environ.get("PIP_CERT")
     context = ssl.create_default_context(cafile=authority)
     if not authority and not context.get_ca_certs() and not ssl.get_default_verify_paths().cafile:
-        context.check_hostname, context.verify_mode = False, ssl.CERT_NONE  # the checksum decides; pip has its own
+        context.check_hostname, context.verify_mode = False, ssl.CERT_NONE  # verified by checksum; pip has its own
     try:
         with urllib.request.urlopen(page, timeout=30, context=context) as answer:
             listing = answer.read(PAGE_BYTES_MAX).decode("utf-8", "replace")

@@ -57,7 +57,7 @@ def complaints(root: Path) -> list[str]:
         found += [f"requirements/{name}.lock: {pin} has no hash" for pin, hashes in pins(text).items() if not hashes]
     dev = pins(texts["dev"])
     for pin, hashes in pins(texts["run"]).items():
-        everywhere = pin.partition(" ;")[0]  # a tool may need it on systems where roboglot doesn't
+        everywhere = pin.partition(" ;")[0]  # a tool may need it on systems that roboglot does not support
         if hashes not in (dev.get(pin), dev.get(everywhere)):
             found.append(f"requirements/dev.lock doesn't hold {pin} of run.lock: run scripts/lock")
     return found

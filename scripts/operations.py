@@ -24,7 +24,7 @@ ROOT = Path(__file__).resolve().parent.parent
 EXAMPLE = ROOT / "examples/operations/slamware.py"
 PAGE = ROOT / "docs/reference/slamware.md"
 WIDTH = 116
-ITEMS_MAX = 2  # of a list
+ITEMS_MAX = 2  # entries of a list
 TEXT_MAX = 60  # characters of a text
 HEAD = """# Operations of the Slamware API
 

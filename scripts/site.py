@@ -19,7 +19,7 @@ MOVED = {
     "SECURITY.md": "project/SECURITY.md",
     "CHANGELOG.md": "project/CHANGELOG.md",
 }
-# What programs of users import, and who it is for; mkdocstrings makes a page of each from the docstrings.
+# Modules that users import, and their audience; mkdocstrings makes a page of each from the docstrings.
 INTERFACES = {
     "roboglot.testing": "For tests in Python of whatever drives robots.",
     "roboglot.clients.slamware": "For programs that drive a Slamtec base.",

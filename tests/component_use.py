@@ -53,7 +53,7 @@ def _subscripts(node: ast.AST, function: FunctionType) -> Iterator[type[Componen
 
 def _questions(node: ast.AST, function: FunctionType) -> Iterator[type[Component]]:
     match node:
-        case ast.Compare(left=ast.Name(id=name)):  # a component's type is compared with nothing but what a robot has
+        case ast.Compare(left=ast.Name(id=name)):  # component types are only compared with a robot's own
             yield from _component(name, function)
 
 
@@ -74,7 +74,7 @@ def _calls(node: ast.AST, function: FunctionType) -> Iterator[Any]:
             found = getattr(names[name], attribute, None)
         case ast.Attribute(value=value, attr=attribute) if not _is_of_component(value, function):
             found = _methods(package).get(attribute)
-            if isinstance(found, property):  # anything may have a "pose": only what is known to be of that class counts
+            if isinstance(found, property):  # many classes have a "pose": only those known to be of that class count
                 found = found.fget if _is_of_package(value, function, package) else None
     if isinstance(found, FunctionType) and found.__module__.startswith((package, SHARED)):
         yield found

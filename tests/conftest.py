@@ -28,7 +28,7 @@ settings.register_profile("explore", deadline=None, max_examples=1000)  # script
 settings.register_profile("quick", settings.get_profile("same"), max_examples=20)  # scripts/test --fast
 settings.load_profile("same")
 
-# httpx's pool tries to import it at every request: a third of a request's time went into looking for what isn't there.
+# httpx's pool tries to import it at every request: a third of a request's time was spent on a missing module.
 if importlib.util.find_spec("sniffio") is None:
     sys.modules["sniffio"] = None  # type: ignore[assignment]
 
@@ -57,7 +57,7 @@ PROCESSES = (
     "drivers",
     "end_to_end",
     "shards",
-)  # folders that start some
+)  # folders that contain some
 WORLDS = {"world", "robot", "fleet", "door", "client", "engine", "screen"}
 BUILDS_A_WORLD = re.compile(r"\b(?:World|build_fleet|Runtime|RobotServer|serving)\(")
 STARTS_A_PROCESS = re.compile(r"\b(?:subprocess\.|create_subprocess_|multiprocessing\.|Engine\(|Popen\()")
@@ -137,7 +137,7 @@ def pytest_collection_finish() -> None:
     """Leave all modules that were imported out of garbage collections: they stay."""
     gc.collect()
     gc.freeze()
-    gc.set_threshold(20_000, 20, 20)  # a test's world is thousands of objects that all end together
+    gc.set_threshold(20_000, 20, 20)  # a test's world is thousands of objects that end together
 
 
 VENDOR_PORTS = (40924, 40926)  # UDP

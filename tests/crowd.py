@@ -27,15 +27,15 @@ from roboglot.storage.database import Database
 
 BODIES = ("universal", "hermes", "cyberdog2", "robomaster_ep")
 CORRIDOR = str(Path(__file__).parent / "autonomy" / "worlds" / "one_corridor.toml")
-SHOVED = 0.05  # m by which nothing that stands may be displaced
-ASTRAY = 0.3  # m off its own belief at which a robot must not be sure of itself
-SURE = 0.5  # quality from which it is sure
-LOOK = 0.1  # s between two looks at everybody
-RESTS = 0.001  # m between two looks up to which a robot stands
+SHOVED = 0.05  # m that a standing robot may be displaced
+ASTRAY = 0.3  # m of error at which a robot must not be sure of its place
+SURE = 0.5  # quality from which a robot counts as sure
+LOOK = 0.1  # s between two samples of all robots
+RESTS = 0.001  # m between two samples up to which a robot counts as standing
 ROOM = (0.6, 9.4)  # m, both ways, of the world "empty"
 TOP = 3.5  # m/s at most by hand
-APART = 0.9  # m between two robots' middles at the start
-GOAL = 0.2  # m, how near a succeeded drive must have come
+APART = 0.9  # m between two robots' centres at the start
+GOAL = 0.2  # m from the goal within which a drive has succeeded
 
 
 @dataclass
@@ -48,10 +48,10 @@ class Walker:
     action: Action | None = None
     goal: Pose | None = None
     stood_at: Pose | None = None
-    before: Pose = field(default_factory=Pose)  # where it was a look ago
+    before: Pose = field(default_factory=Pose)  # place at the last sample
     shoved: float = 0.0
     presses: int = 0
-    reported_lost: bool = False  # whether it said that something is wrong with where it is
+    reported_lost: bool = False  # it reported a doubt about its place
 
     def listen(self) -> None:
         """Hear what it says of itself."""
@@ -73,11 +73,11 @@ class Outcome:
     """Outcome of one crowd."""
 
     seed: int
-    shoved: float = 0.0  # m, the farthest that one which stood was displaced
+    shoved: float = 0.0  # m, the largest displacement of a standing robot
     presses: int = 0
     false_successes: list[str] = field(default_factory=list)
     sure_but_astray: list[str] = field(default_factory=list)
-    silent: list[str] = field(default_factory=list)  # were shoved and did not say so
+    silent: list[str] = field(default_factory=list)  # shoved robots that reported nothing
     arrived: int = 0  # robots that succeeded
     worst: str = ""
 
@@ -199,7 +199,7 @@ def _look(fleet: Fleet, walker: Walker) -> None:
     if moving:
         walker.stood_at = None
     elif walker.stood_at is None:
-        if pose.distance_to(before) < RESTS:  # it has slid to a stop
+        if pose.distance_to(before) < RESTS:  # it has come to rest
             walker.stood_at = pose
     else:
         walker.shoved = max(walker.shoved, pose.distance_to(walker.stood_at))

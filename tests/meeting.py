@@ -31,14 +31,14 @@ from roboglot.simulation.world.placing import Places
 from roboglot.simulation.world.world_files import load_world
 from roboglot.storage.database import Database
 
-BODIES = ("universal", "hermes", "cyberdog2")  # those that find their way; a hermes cannot go sideways
+BODIES = ("universal", "hermes", "cyberdog2")  # bodies that navigate; a hermes cannot go sideways
 WORLDS = ("office", str(Path(__file__).parent / "autonomy" / "worlds" / "meeting.toml"))
 ROBOTS = 10
-GOALS = 2  # that each is sent to, one after the other
+GOALS = 2  # goals of each robot, one after the other
 SECONDS_MAX = 180.0  # s of robot time
-LOOK = 0.05  # s between two looks at everybody
-TOUCHES = 0.002  # m between two hulls from which they touch
-START_ROOM, GOAL_ROOM = 0.6, 1.1  # m around a place: beside who stands at a goal another one passes
+LOOK = 0.05  # s between two samples of all robots
+TOUCHES = 0.002  # m between two hulls that counts as a touch
+START_ROOM, GOAL_ROOM = 0.6, 1.1  # m around a place: a robot passes beside one that stands at its goal
 APART = 1.6  # m between two goals, and between two starts
 STANDING, WALKING = (Pose(4.6, 3.4),), ("person 0 0", "person 0 1")  # of the office's people
 SURVEYED = 1.5  # m between two places of the survey
@@ -72,7 +72,7 @@ class Drive:
     goals: tuple[Pose, ...]
     action: Action | None = None
     reached: int = 0
-    seconds: float = math.inf  # until it was at its last goal
+    seconds: float = math.inf  # until it reached its last goal
     failure: str = ""
 
 
@@ -82,7 +82,7 @@ class Outcome:
 
     seed: int
     touches: list[Touch] = field(default_factory=list)
-    seconds: dict[str, float] = field(default_factory=dict)  # of those that were at all their goals
+    seconds: dict[str, float] = field(default_factory=dict)  # robots that reached all their goals
     failures: list[str] = field(default_factory=list)
 
 

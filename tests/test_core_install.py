@@ -41,7 +41,7 @@ def requirements(of: Distribution, found: set[str]) -> set[str]:
 def core(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The Python of a fresh environment with the wheel and its core requirements."""
     folder = tmp_path_factory.mktemp("core")
-    source = folder / "source"  # setuptools writes beside what it builds
+    source = folder / "source"  # written by setuptools beside the build
     source.mkdir()
     shutil.copytree(ROOT / "src", source / "src", ignore=shutil.ignore_patterns("__pycache__", "*.egg-info"))
     for name in ("pyproject.toml", "README.md", "LICENSE", "NOTICE", "THIRD_PARTY_LICENSES.md"):
@@ -53,7 +53,7 @@ def core(tmp_path_factory: pytest.TempPathFactory) -> Path:
     venv.create(folder / "venv", symlinks=True)
     python = folder / "venv/bin/python"
     (site,) = (folder / "venv/lib").glob("python*/site-packages")
-    zipfile.ZipFile(wheel).extractall(site)  # what an installer does with a pure wheel
+    zipfile.ZipFile(wheel).extractall(site)  # steps of an installer for a pure wheel
     (metadata,) = site.glob("roboglot-*.dist-info")
     for name in requirements(Distribution.at(metadata), set()):
         for file in distribution(name).files or ():

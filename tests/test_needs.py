@@ -36,7 +36,7 @@ def test_use_follows_the_functions_a_handler_calls() -> None:
     assert used_by(gimbal.get_attitude) == {Gimbal}
     assert used_by(localization.get_odo_pose) == {
         Odometry
-    }  # the pose of a reading, not the property of that name elsewhere
+    }  # the pose of a reading, not a property of that name elsewhere
     assert used_by(system.get_laser_scan) >= {Localization}  # through desk.laser
 
 

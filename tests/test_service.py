@@ -15,7 +15,7 @@ import pytest
 UNIT = Path(__file__).parents[1] / "packaging" / "roboglot.service"
 EXPOSURE_MAX = 2.0
 
-# Puts on what the unit says of system calls, capabilities and namespaces, then runs a program in the engine.
+# Applies the unit's limits on system calls, capabilities and namespaces, then runs a program in the engine.
 INSIDE = r"""
 import asyncio, ctypes, os, sys
 ERRNO, NO_CALL, ALLOW, MASKED_EQ, NEW_PRIVS = 0x00050001, 0x00050026, 0x7FFF0000, 7, 38

@@ -25,7 +25,7 @@ from typing import Any, NoReturn
 
 COLD = "ROBOGLOT_TESTS_COLD"
 ROBOGLOT = [sys.executable, "-m", "roboglot"]
-SAME_SEED = {"rerun"}  # a fork has its parent's hash seed: whether another one gives the same trace would not be seen
+SAME_SEED = {"rerun"}  # a fork has its parent's hash seed: a test of other seeds would prove nothing
 PLAIN = {
     "shell": False,
     "preexec_fn": None,
@@ -59,7 +59,7 @@ class WarmParent:
         with self._lock:
             line = self._line or self._open()
             self._line = line
-            self._libc.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)  # its parent ends at once: it becomes ours
+            self._libc.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)  # its parent ends at once: we adopt it
             try:
                 socket.send_fds(line, [json.dumps(wish).encode()], descriptors)
                 answer = line.recv(64)
@@ -81,7 +81,7 @@ class WarmParent:
                 cwd=Path(__file__).parents[1],
                 env={**os.environ, **ENVIRONMENT},
                 start_new_session=True,
-            ).returncode = 0  # it ends with our socket; no one needs to wait for it
+            ).returncode = 0  # it ends with our socket; no need to wait for it
         return ours
 
 
@@ -145,7 +145,7 @@ def serve(line: socket.socket) -> None:
         if middle == 0:
             middle = os.getpid()
             if (pid := os.fork()) == 0:
-                while os.getppid() == middle:  # whose end is not the one that we end with
+                while os.getppid() == middle:  # it outlives us
                     time.sleep(0.0005)
                 _become(json.loads(message), descriptors)
             os.write(writing, str(pid).encode())

@@ -55,7 +55,7 @@ async def asking(claims: Claims, folder: Path) -> None:
         admission.known("10.0.0.7:40312", proofs[0])
         admission.check("slamware", POSE, Right.SEE)
 
-    best = min(timeit.repeat(ask, number=TIMES, repeat=100)) / TIMES  # other work only ever adds
+    best = min(timeit.repeat(ask, number=TIMES, repeat=100)) / TIMES  # other load can only add time
     claims.at_most("a known client", best * 1e6, 2.0, "µs")
     claims.at_most("a new one, by token", new * 1e3, 1.0, "ms")
     guard.close()
@@ -80,7 +80,7 @@ def encrypted(claims: Claims, folder: Path) -> None:
     store.close()
     config.write_text("[access]\nlocal = false\nrequests = 1_000_000\n[access.tls]\n")
     with served(data, "--world", "empty", "--no-console", "--config", str(config), address=ADDRESS):
-        time.sleep(3)  # kernels are loaded
+        time.sleep(3)  # wait until kernels are loaded
         trusting = ssl.create_default_context(cafile=str(data / "cyberdog" / "apps" / "ca-cert.pem"))
         own = (FRIEND, 0)
         plain = http.client.HTTPConnection(ADDRESS, 1448, 20, source_address=own)

@@ -49,8 +49,8 @@ async def draw(claims: Claims, folder: Path | None) -> None:
         world.hands.place("a", pose)
         times = []
         for _ in range(60):
-            posing.cache_clear()  # as if all people walked
-            began = time.thread_time()  # in lockstep it is drawn in place
+            posing.cache_clear()  # as if all people were walking
+            began = time.thread_time()  # lockstep draws in the calling thread
             frame = await camera.capture()
             times.append(1e3 * (time.thread_time() - began))
         claims.at_most(f"{name} (median {sorted(times)[30]:.2f})", min(times), PICTURE_LIMIT, "ms")

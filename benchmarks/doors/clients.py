@@ -37,7 +37,7 @@ from roboglot.shards.wishes import SOCKET
 FIRST, APP = IPv4Address("127.16.1.1"), "127.16.9.1:18985"
 PATIENCE = 120.0
 LINES = 20  # of each shard's log
-LIMITS = {REST: ("REST", 30.0), TEXT: ("text", 30.0), GRPC: ("gRPC", 60.0)}  # ms of 99 in 100 requests
+LIMITS = {REST: ("REST", 30.0), TEXT: ("text", 30.0), GRPC: ("gRPC", 60.0)}  # ms, 99th percentile
 
 
 class Part(NamedTuple):

@@ -30,7 +30,7 @@ from roboglot.operations import Right
 from roboglot.testing.process import served
 
 ROBOT, HERE, GATEWAY = "127.0.98.1", "127.0.98.2", 50090
-DIRECT = "127.0.98.3"  # of the client that needs no tunnel
+DIRECT = "127.0.98.3"  # of the client without a tunnel
 PUSH_PORT = 40924
 ROUNDS, TRIPS = 20, 250
 SECONDS = 10.0

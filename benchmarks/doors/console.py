@@ -66,7 +66,7 @@ async def main(robots: int, viewers: int, seconds: float) -> None:
         await runtime.start()
         assert runtime.console is not None
         await runtime.console.ready()
-        await asyncio.sleep(20.0)  # until kernels are loaded and maps are drawn
+        await asyncio.sleep(20.0)  # until kernels are loaded and maps drawn
         received = [0, 0]
         host, _, port = runtime.console.address.removeprefix("http://").rpartition(":")
         alone, watched = [], []

@@ -25,7 +25,7 @@ from roboglot.model.components.motion.driving import Driving
 from roboglot.model.geometry import Twist
 from roboglot.runtime import Runtime
 
-FASTER = 5  # times as many messages a second
+FASTER = 5  # times the usual message rate
 SAMPLES = 24
 CHROMIUM = "/usr/bin/chromium"
 
@@ -59,7 +59,7 @@ async def main(minutes: float) -> None:
             await browser.close()
         await runtime.close()
     claims = Claims()
-    full = SAMPLES // 4  # the plots are full after ten of sixty minutes
+    full = SAMPLES // 4  # plots are full after ten of sixty minutes
     early, late = statistics.median(heaps[full : full + 4]), statistics.median(heaps[-4:])
     claims.at_most("heap at the end, of that when the plots were full", late / early, 1.1, "")
     claims.finish()

@@ -32,7 +32,7 @@ from roboglot.runtime import Runtime
 
 CHROMIUM = "/usr/bin/chromium"
 OPENINGS, PRESSES = 9, 40
-LOOK = 20.0  # s at poses
+LOOK = 20.0  # s per place
 TURNING = 0.5  # rad/s
 PAINTED = """async () => {
     const { poses } = await import('/link.js');

@@ -28,8 +28,8 @@ from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2_grpc as service
 
 ADDRESS, ECHO = "127.0.0.176", "127.0.0.177:50052"
-APP_PORT = 18983  # not the usual one: another robot's app may have that
-WAIT_MAX, RUN_MAX = 60.0, 300.0  # s: for one thing, for all
+APP_PORT = 18983  # not the default, which another robot's app may use
+WAIT_MAX, RUN_MAX = 60.0, 300.0  # s: for one step, for all
 SECONDS = 6.0
 AT_ONCE = 64  # requests under way
 GEAR = 8013  # a request that reads one value

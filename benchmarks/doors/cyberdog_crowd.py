@@ -29,17 +29,17 @@ from roboglot.wire.cyberdog.channel import ROBOT_NAME, client_options
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2_grpc as service
 
-ALONE, CROWD = "127.0.0.184", "127.0.84"  # one dog; the network of the hundred
+ALONE, CROWD = "127.0.0.184", "127.0.84"  # one dog; the hundred apps' network
 DOGS = 100
 APP_PORT = 18984
 STREAMS = 200
-SECONDS = 12.0  # that the app answers nothing: four times the deadline of a push
-OPEN = 5.0  # s that the streams are left open until they are counted
-EVERY = 0.02  # s between two requests of somebody else
-WAIT_MAX, PART_MAX = 60.0, 180.0  # s: for one thing, for a part
+SECONDS = 12.0  # s without an answer from the app: four times the deadline of a push
+OPEN = 5.0  # s that streams stay open before they are counted
+EVERY = 0.02  # s between two requests of another client
+WAIT_MAX, PART_MAX = 60.0, 180.0  # s: for one step, for a part
 SCAN = (8001, {"scan_seconds": 8.0})
 MAPPING, STOP = (6004, {"type": 5}), (6009, {"type": 5})
-FILE = {"md5": "0" * 32, "fileSize": 4 * 1024**3}  # more than three minutes of downloading
+FILE = {"md5": "0" * 32, "fileSize": 4 * 1024**3}  # takes more than three minutes to download
 UPDATE = (5010, {"operate": "download", "data": {"module": "x", "latest": {"version": "9", "packages": [FILE]}}})
 
 

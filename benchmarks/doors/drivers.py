@@ -219,7 +219,7 @@ async def measure(claims: Claims) -> None:
             await asyncio.sleep(1)
             url = f"{scheme}://{ROBOT}:{port}" + (f"?local={DRIVER}&drive=speed" if scheme == "robomaster" else "")
             front = served(Path(folder) / f"front {scheme}", "--world", "empty", "--robot", f"a={url}", address=FRONT)
-            await asyncio.to_thread(front.__enter__)  # the driver connects meanwhile, through this loop's relay
+            await asyncio.to_thread(front.__enter__)  # meanwhile the driver connects through this loop's relay
             try:
                 await asyncio.sleep(6)
                 claims.at_most(f"{scheme}: added to a command", await latency(relay, FRONT, target) - direct, 3.0, "ms")

@@ -35,7 +35,7 @@ from tests.access.floods import BY_TOOLS, FLOODS, FRIEND, GATEWAY  # noqa: E402
 ADDRESS = "127.0.98.1"
 POSE = "/api/core/slam/v1/localization/pose"
 QUIET_SECONDS = 5.0
-FLOODED_SECONDS = 8.0  # of each flood, which is begun again until then: enough requests for a percentile
+FLOODED_SECONDS = 8.0  # s of each flood, restarted until then: enough requests for a percentile
 
 
 def latencies(attack: subprocess.Popen[bytes] | None) -> list[float]:

@@ -121,7 +121,7 @@ class Network:
         _run(f"nsenter -t {self.program} -n {command}")
 
     def close(self) -> None:
-        _run("ip link del va")  # a namespace whose processes are gone is cleared away later
+        _run("ip link del va")  # namespaces without processes are removed later
         for holder in self._holders:
             holder.kill()
             holder.wait()

@@ -38,7 +38,7 @@ TURNING = 0.5  # rad/s, on the spot: away from walls
 STOPPED = 0.02  # m/s
 CLAIMED = 0.5  # s
 PATIENCE = 8.0  # s
-TIMES = 8  # of each row
+TIMES = 8  # trials per row
 LOSSY_SECONDS = 240.0
 BODIES = ("universal", "robomaster_ep", "cyberdog2")
 

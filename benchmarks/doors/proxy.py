@@ -36,7 +36,7 @@ REQUESTS = {
 }
 ADDED_MAX = 1.0  # ms
 NUMBERS = itertools.count()
-PAUSE = 0.002  # s between two requests, so that the proxy's other work falls between and upon them
+PAUSE = 0.002  # s between two requests, so that some fall into the proxy's other work
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,7 @@ async def opened(door: str, address: str, certificates: str) -> Line:
 async def timed(line: Line, door: str) -> float:
     """Milliseconds of one request."""
     operation, payload = REQUESTS[door]
-    if door == "visual":  # every front end hears every answer: only its own counts
+    if door == "visual":  # every front end gets every answer; only its own count
         payload = payload.replace(b'"b"', b'"b%d"' % next(NUMBERS))
     began = time.perf_counter()
     assert await line.ask(operation, payload, [b"{}"])

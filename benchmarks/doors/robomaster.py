@@ -14,7 +14,7 @@ from roboglot.testing.process import served
 
 SECONDS = 10.0
 ADDRESS = "127.0.0.71"
-CLIENTS = [f"127.0.0.{number}" for number in range(201, 206)]  # the clients'
+CLIENTS = [f"127.0.0.{number}" for number in range(201, 206)]  # the clients' port
 PUSH_PORT = 40924
 
 

@@ -103,7 +103,7 @@ def main() -> None:
     wanted = chosen.seconds * len(pupils)
     print(f"{used:.2f} of a core, {memory:.0f} MB, median answer {delays[len(delays) // 2] * 1000:.1f} ms")
     late = sum(delay > 1 / COMMANDS for delay in delays) / len(delays)
-    claims.at_most("processor time a robot second", used / passed, 1, "s")  # whatever else the machine does
+    claims.at_most("processor time a robot second", used / passed, 1, "s")  # despite other load on the machine
     claims.at_least("commands answered", len(delays) / wanted, COMMANDS * 0.99, "Hz")
     claims.at_most("answers after the next beat", late * 100, 1, "%")
     claims.at_least("pushes, all robots", sum(pupil.pushes for pupil in pupils) / wanted, PUSHES * 0.98, "Hz")

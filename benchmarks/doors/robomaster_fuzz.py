@@ -18,10 +18,10 @@ from _claim import Claims
 from roboglot.testing.process import ServedRobot, served
 
 ADDRESS = "127.0.0.72"
-SPEED = "20"  # motions that are waited for end sooner
+SPEED = "20"  # motions that a client awaits end sooner
 WRITERS = 8
-BATCH = 100  # lines before their answers are read
-WARM = 0.2  # the part of the lines after which memory counts
+BATCH = 100  # lines sent before their answers are read
+WARM = 0.2  # share of the lines after which memory is measured
 SEEDS = """command|quit|version|robot mode free|robot mode ?|robot battery ?|chassis speed x 0.1 y 0 z 5|chassis speed ?
 chassis wheel w1 5 w2 5 w3 5 w4 5|chassis move x 0.01 z 1 vxy 0.5|chassis position ?|chassis attitude ?|chassis status ?
 chassis push position on pfreq 10 attitude on status off freq 5|chassis stop|gimbal speed p 1 y 1|gimbal attitude ?

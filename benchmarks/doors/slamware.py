@@ -95,7 +95,7 @@ async def ask(address: str, port: int, path: str, seconds: float) -> Load:
     spent = time.perf_counter() - began
     for transport, _ in connections:
         transport.abort()
-    ordered = sorted(waited) or [spent]  # a machine so busy that not one was answered
+    ordered = sorted(waited) or [spent]  # the machine was too busy to answer any
     p50, p99 = (1000 * ordered[int(len(ordered) * part)] for part in (0.5, 0.99))
     return Load(len(waited), spent, connections[0][1].body, p50, p99)
 

@@ -32,7 +32,7 @@ from roboglot.testing.process import served
 
 FIRST = "127.78.1.1"
 PATIENCE = 300.0
-POLLS = 10.0  # Hz, of each polled robot
+POLLS = 10.0  # Hz, per polled robot
 MB = 1 << 20
 
 
@@ -76,7 +76,7 @@ def back_after(folder: Path) -> float:
     """Kill the first shard; s until its robot answers again."""
     os.kill(look(folder)["shards"][0]["pid"], signal.SIGKILL)
     began = time.monotonic()
-    time.sleep(0.02)  # the kernel takes its sockets away
+    time.sleep(0.02)  # the kernel removes its sockets
     while time.monotonic() - began < PATIENCE:
         try:
             pose(FIRST)
@@ -115,7 +115,7 @@ def measure(claims: Claims, folder: Path, worlds: int, each: int, seconds: float
         sys.exit((folder / "fleet.log").read_text())
     robots = worlds * each
     claims.at_most(f"{worlds} worlds ready", time.monotonic() - began, 6.0, "s")
-    time.sleep(3.0)  # kernels and autonomy follow in the background
+    time.sleep(3.0)  # kernels and autonomy load in the background
     answer = look(folder / "fleet")
     rows = answer["shards"]
     pids = [fleet.pid, answer["nursery"], *(row["pid"] for row in rows)]

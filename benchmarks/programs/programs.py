@@ -30,7 +30,7 @@ from roboglot.programs.functions.prelude import ability_set
 
 REPEATS = 100
 CALL_RUNS, CALLS = 20, 900
-FREE_CALLS = 18  # as many as the share of the server's thread does not hold back
+FREE_CALLS = 18  # few enough that the server's share does not throttle them
 FAST = Limits(call_rate=10**9)
 PRELUDE = ability_set()
 PROGRAM = """cyberdog.task.block('b1');
@@ -133,7 +133,7 @@ async def free_calls(engine: Engine) -> float:
                 if count == FREE_CALLS:
                     stretches.append((time.perf_counter() - began) / (FREE_CALLS - 3))
                 run.calls.reply(event.id, None)
-        await asyncio.sleep(BURST)  # all programs share what may be taken at once
+        await asyncio.sleep(BURST)  # all programs share one burst allowance
     return min(stretches)
 
 

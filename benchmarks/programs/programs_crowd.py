@@ -44,7 +44,7 @@ async def serve(run: Run, ready: asyncio.Event) -> None:
 
 
 def answer(run: Run, id: int) -> None:
-    with contextlib.suppress(LookupError):  # it was killed meanwhile
+    with contextlib.suppress(LookupError):  # killed meanwhile
         run.calls.reply(id, None)
 
 
@@ -67,7 +67,7 @@ async def crowd(engine: Engine, source: str, name: str, claims: Claims) -> None:
         runs.append(run)
         tasks.append(asyncio.create_task(serve(run, ready)))
         await ready.wait()
-        await run.suspend()  # the others are to start, too
+        await run.suspend()  # leaves time for the others to start
     await asyncio.gather(*(run.resume() for run in runs))
     print(f"{PROGRAMS} programs {name}: all under way after {time.perf_counter() - began:.1f} s", flush=True)
     late = sorted(await lateness())

@@ -22,7 +22,7 @@ from roboglot.storage.database import Database
 from roboglot.storage.journals import SqliteJournalStore
 
 ROUNDS, CALLS = 6, 50
-PAGE = bytes(4120)  # what a commit of the database adds to its log
+PAGE = bytes(4120)  # bytes that a commit adds to the database's log
 ANSWER = b'{"t":"value","value":null}'
 
 
@@ -53,7 +53,7 @@ async def measure(folder: Path) -> None:
         flushes += [flush(descriptor) for _ in range(CALLS)]
         doing += [await call(journal, "cyberdog.motion.turn") for _ in range(CALLS)]
         reading += [await call(journal, "cyberdog.bms.data") for _ in range(CALLS)]
-        await asyncio.sleep(0.2)  # the last answers are written
+        await asyncio.sleep(0.2)  # the last answers have been written
     os.close(descriptor)
     await journal.close()
     database.close()

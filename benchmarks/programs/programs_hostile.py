@@ -181,7 +181,7 @@ async def measure(robot: ServedRobot, claims: Claims) -> None:
     link = await TextLink.open(f"ws://{ADDRESS}:50053", "/programs")
     frames = Frames(link)
     async with lines(frames) as asked:
-        await asyncio.gather(*(line.times() for line in asked[:1]))  # everything is warm
+        await asyncio.gather(*(line.times() for line in asked[:1]))  # warm-up is over
         alone = await asyncio.gather(*(line.times() for line in asked))
         ids = [f"p{number}" for number in range(PROGRAMS)]
         bodies = itertools.cycle(KINDS.values())

@@ -42,7 +42,7 @@ AWAY_MAX = 10.0
 DAY = 86400
 ALONE = "FAULTS_ALONE"
 STARTED = "Ray runtime started"
-SETTLED = 4.0  # s that all is well before the next fault
+SETTLED = 4.0  # s without a fault before the next one
 HEALTH = {  # as in deploy/kuberay/fleet.yaml
     "RAY_health_check_initial_delay_ms": "1000",
     "RAY_health_check_period_ms": "1000",
@@ -185,7 +185,7 @@ class Fleet:
         self.until(lambda: _answers(HEAD, GCS), "Ray's head")
         for node, environment in ((self.nodes["b"], {}), (self.nodes["c"], self._jumping)):
             node.join(environment)
-            self.until(node.has_joined, f"node {node.name}")  # two at once would take one another's sockets
+            self.until(node.has_joined, f"node {node.name}")  # two at once would take each other's sockets
         template = self.folder / "world.toml"
         template.write_text(f'database = "{self.server.url}"\n[console]\nenabled = false\n')
         words = ["fleet", "up", "--on", f"{HEAD}:{GCS}", "--worlds", "2", "--template", str(template)]
@@ -237,7 +237,7 @@ class Fleet:
 
     def jump(self, seconds: int) -> None:
         """Set the clock of node c so far ahead."""
-        with self.ahead.open("r+b") as file:  # in place: processes have it mapped
+        with self.ahead.open("r+b") as file:  # written in place: processes have the file mapped
             file.write(seconds.to_bytes(8, sys.byteorder, signed=True))
 
     def stored(self) -> dict[str, set[str]]:
@@ -296,7 +296,7 @@ def faults(fleet: Fleet) -> Iterator[tuple[str, Callable[[], float]]]:
         node.cut(off=True)
         time.sleep(20.0)  # longer than any lease
         node.cut(off=False)
-        time.sleep(10.0)  # the old program sees what became of its robot
+        time.sleep(10.0)  # the old program notices that its robot was taken
         node.kill()
         ended = time.monotonic()
         node.join()

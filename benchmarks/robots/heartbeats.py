@@ -37,7 +37,7 @@ from tests.storage.postgresql_server import binary_folder, postgresql_server
 TICKS = os.sysconf("SC_CLK_TCK")
 READY = b"r"
 BEAT = 1.0  # s between two heartbeats of a shard
-CONNECTIONS = 4  # of the simulated programs together: a server takes 100 unless set
+CONNECTIONS = 4  # connections of all simulated programs: a server's default limit is 100
 
 
 def used_by(command: str) -> float:
@@ -70,7 +70,7 @@ async def simulate(plan: FleetPlan, registry: str, links: list[socket.socket], u
         residences.append(Residence(homes, addresses, f"program {number}", lambda _: None))
         await residences[-1].take()
     logging.disable(logging.ERROR)
-    await asyncio.gather(*(residence.renew() for residence in residences))  # the first took theirs a while ago
+    await asyncio.gather(*(residence.renew() for residence in residences))  # the first ones took theirs a while ago
     logging.disable(logging.NOTSET)
     for number, (link, residence) in enumerate(zip(links, residences, strict=True)):
         link.send(encode(ready_of(plan, number)))
@@ -79,7 +79,7 @@ async def simulate(plan: FleetPlan, registry: str, links: list[socket.socket], u
     turn = 0
     while True:
         link = links[turn % len(links)]
-        link.send(encode(Beat(1.0, 35 << 20, turn / 100)))  # raises where the coordinator has ended
+        link.send(encode(Beat(1.0, 35 << 20, turn / 100)))  # raises if the coordinator has ended
         turn += 1
         await asyncio.sleep(BEAT / len(links))
 

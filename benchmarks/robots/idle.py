@@ -51,7 +51,7 @@ def main() -> None:
     claims, starts = Claims(), []
     with tempfile.TemporaryDirectory() as folder:
         data = Path(folder) / "data"
-        for _ in range(4):  # the first one makes certificates and caches
+        for _ in range(4):  # the first run makes certificates and caches
             with served(data, *sys.argv[1:], address=ADDRESS) as robot:
                 starts.append(robot.ready_after)
         claims.at_most("warm start to ready", sorted(starts[1:])[1], 2.0, "s")

@@ -33,14 +33,14 @@ from roboglot.model.events import LocalizationLost, RobotDisplaced, ScanTaken
 from roboglot.model.geometry import Point, Pose, wrap_angle
 from roboglot.model.maps import OccupancyGrid
 
-TOURS = {"office": 4, "depot": 3, "tower": 3}  # of ten kidnappings and ten blackouts
+TOURS = {"office": 4, "depot": 3, "tower": 3}  # for ten kidnappings and ten blackouts
 EVENTS = 20
 DRIVEN_SECONDS = 25.0  # between two events
 TOLD_SECONDS, STANDING_SECONDS, RECOVERED_SECONDS = 10.0, 20.0, 60.0
 GOOD, GOOD_YAW = 0.15, math.radians(5.0)
 BLACKOUT_SECONDS, PUSHED = 10.0, 3.0  # s, m at most
 CARRIED_MIN = 3.0  # m
-DOUBLED, DOUBLED_LENGTH = 0.15, 0.5  # m off any wall, m of it
+DOUBLED, DOUBLED_LENGTH = 0.15, 0.5  # m away from walls, m travelled
 RECOVERED_SHARE = 0.95
 
 
@@ -50,7 +50,7 @@ class Trial:
 
     house: Building
     draw: np.random.Generator
-    floor: NDArray[np.float64]  # (n, 2; m, map): where there is room for it
+    floor: NDArray[np.float64]  # (n, 2) in m, map frame: places with enough room
     truth: EvidenceGrid = field(default_factory=EvidenceGrid)
     count: Counter[str] = field(default_factory=Counter)
     told: list[float] = field(default_factory=list)
@@ -113,7 +113,7 @@ class Trial:
         """One event, and what came of it."""
         clock, localization, began = self.house.clock, self.robot[Localization], self.house.clock.time()
         self.told.clear()
-        if localization.lost is not None:  # it still says so: since it was pushed to where its map does not reach
+        if localization.lost is not None:  # still reported: it was pushed beyond its map
             self.told.append(began)
         await (self.kidnap() if name == "kidnapping" else self.black_out())
         deadline, found, looked = clock.time() + RECOVERED_SECONDS, math.inf, False
@@ -137,7 +137,7 @@ class Trial:
                 f"{off:.2f} m off, {localization.lost}; {self.house.truth}",
                 flush=True,
             )
-        if not math.isfinite(found):  # the tour goes on from where it is
+        if not math.isfinite(found):  # the tour continues from the robot's place
             localization.set_pose(self.house.truth)
             await clock.advance(3.0)
 

@@ -32,11 +32,11 @@ from roboglot.model.sensing import LaserScan
 
 PLACES, QUICK = 120, 40
 DRAWN_PLACES = 150
-BEGUN = 2.0  # m east of the start that even half a map shows
+BEGUN = 2.0  # m east of the start that even half a map covers
 SYMMETRIC = ("twins", "turned")
 SHARE_MIN, MILLISECONDS_MAX = 0.97, 30.0
 GOOD, GOOD_YAW = 0.1, math.radians(3.0)  # m, rad from the truth
-SHOWN = 0.85  # of the echoes, by the map
+SHOWN = 0.85  # m, RMS of echoes against the map
 ALIKE, ALIKE_SHARE = 0.15, 0.9  # m, share of the echoes
 
 
@@ -88,7 +88,7 @@ async def measure(name: str, count: int, seconds: list[float]) -> Counter[str]:
             pose = Pose(*floor[number].tolist(), float(draw.uniform(-math.pi, math.pi)))
             for part, grid in maps.items():
                 if part == "half" and Path(name).stem in SYMMETRIC:
-                    continue  # the map's only wing is told from the other by what is missing
+                    continue  # only what is missing tells this wing from the other
                 scan = await house.scan_at(pose)
                 said = await verdict(house, grid, scan, seconds)
                 verdicts[said] += 1

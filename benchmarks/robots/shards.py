@@ -15,8 +15,8 @@ import statistics
 from _claim import Claims
 from _worlds import drive, loops, warm
 
-CORES = 2  # worlds at a time, where there are more: see _worlds.py
-ROUNDS = 5  # alone and together in turns; the median counts
+CORES = 2  # worlds at a time; _worlds.py has larger numbers
+ROUNDS = 5  # runs alone and together, in turns; the median counts
 MORE = (4, 8)
 
 

@@ -34,7 +34,7 @@ from roboglot.storage.database import Database
 MEDIAN_MAX, WORST_MAX, MILLISECONDS_MAX, MOST_MILLISECONDS_MAX, DRIFT_MIN = 0.03, 0.08, 0.5, 5.0, 2.0
 SEEDS = (1, 2, 3, 4, 5)
 USUAL_MAX = 0.02
-LEVELS: dict[str, dict[str, float]] = {  # what replaces the universal body's figures
+LEVELS: dict[str, dict[str, float]] = {  # replace the universal body's values
     "usual": {},
     "low": {"scale_error": 0.12, "gyro_bias": 0.008, "range_max": 12.0},
     "middle": {"scale_error": 0.09, "gyro_bias": 0.007, "gyro_scale": 0.01, "range_max": 8.0, "lidar": 0.02},
@@ -77,7 +77,7 @@ def timed_scans(fleet: Fleet, lap: Lap) -> None:
     """Measure what localization and mapping make of each scan, where the events are handed over."""
     stream = fleet.robots["a"].events
     for number, (kind, listener) in enumerate(stream._listeners):
-        if kind is ScanTaken and listener.__qualname__ == "Turns.hear":  # in lockstep it takes the scan at once
+        if kind is ScanTaken and listener.__qualname__ == "Turns.hear":  # in lockstep the scan is handled synchronously
 
             def measured(event: ScanTaken, inner=listener) -> None:  # type: ignore[no-untyped-def]
                 began = time.thread_time()

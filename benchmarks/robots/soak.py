@@ -40,7 +40,7 @@ ADDRESS = "127.0.0.86"
 ACTIONS, CONNECTIONS, PROGRAMS, MAPS = 10_000, 1_000, 1_000, 50
 PARTS = 10
 TICK = 0.1  # s of the robot
-ACTION_MAX = 1.0  # s of the robot that one action may take; the next one replaces it
+ACTION_MAX = 1.0  # s of robot time for one action; the next one replaces it
 GROWTH_MAX = 5.0  # %
 REST = f"http://{ADDRESS}:1448"
 
@@ -204,7 +204,7 @@ async def born(data: Path) -> AsyncIterator[Life]:
     )
     runtime = Runtime(config)
     await runtime.start()
-    gc.unfreeze()  # what is there now is counted, too
+    gc.unfreeze()  # count what exists now, too
     life = Life(runtime)
     try:
         yield life
@@ -235,7 +235,7 @@ async def live(share: float) -> list[dict[str, float]]:
 
 
 def main() -> None:
-    logging.disable(logging.WARNING)  # refusals are what is asked for
+    logging.disable(logging.WARNING)  # refusals are expected
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--share", type=float, default=1.0)
     figures = asyncio.run(live(parser.parse_args().share))

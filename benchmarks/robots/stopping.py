@@ -24,7 +24,7 @@ from roboglot.testing.process import served
 
 FIRST = "127.34.0.1"
 PATIENCE = 60.0  # s
-PAUSE = 1.5  # s that they drive
+PAUSE = 1.5  # s of driving
 TEXT_PORT = 40923
 
 

@@ -21,7 +21,7 @@ from roboglot.model.geometry import Twist
 from roboglot.storage.database import Database
 
 ROBOTS, SECONDS, LIMIT = 10, 10.0, 0.5
-CIRCLE = Twist(0.15, 0.0, 0.6)  # half a metre wide: they stay clear of each other
+CIRCLE = Twist(0.15, 0.0, 0.6)  # half a metre wide: keep clear of each other
 
 
 async def main() -> None:

@@ -54,7 +54,7 @@ from roboglot.storage.database import Database
 BODIES = {"a": "universal", "h": "hermes", "d": "cyberdog2", "e": "robomaster_ep"}
 FAULTS = ("wifi_loss", "lidar_gone", "motor_fault", "lost_localization", "bumper_stuck", "blocked_path", "low_battery")
 LOOKS = ("people", "faces", "gestures", "skeletons", "markers", "lines", "robots", "tags")
-STEP, COMMANDS = 0.5, 12.0  # s between two looks, and between two commands to a robot
+STEP, COMMANDS = 0.5, 12.0  # s between two samples, and between two commands to a robot
 
 
 def command(robot: Robot, dice: random.Random) -> None:
@@ -81,7 +81,7 @@ def command(robot: Robot, dice: random.Random) -> None:
     try:
         dice.choice(choices)()
     except RobotError:
-        robot.events.publish(Event(stamp=robot.clock.time()))  # a refusal is a part of the trace, too
+        robot.events.publish(Event(stamp=robot.clock.time()))  # refusals belong to the trace
 
 
 def listen(fleet: Fleet, digest: Callable[[bytes], None]) -> None:

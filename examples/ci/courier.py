@@ -11,7 +11,7 @@ import urllib.error
 import urllib.request
 
 MOVE = "slamtec.agent.actions.MoveToAction"
-LOW = 20  # percent: below that it stays where it is
+LOW = 20  # percent: below it the robot stays put
 
 
 class RobotError(Exception):

@@ -23,7 +23,7 @@ SYSTEM, SLAM, ARTIFACT = "/api/core/system/v1", "/api/core/slam/v1", "/api/core/
 MOTION, FLOORS, DELIVERY = "/api/core/motion/v1", "/api/multi-floor/map/v1", "/api/delivery/v1"
 FIRMWARE, INDUSTRY, APPS = "/api/core/firmware/v1", "/api/industry/v1", "/api/core/application/v1/apps"
 DOCK, PLACE = "0d0c0000-1f6e-4c43-8a5e-9b3d2f1c0a77", "4b8a7f2c-1f6e-4c43-8a5e-9b3d2f1c0a77"
-SECONDS_MAX = 240  # of robot time for whatever is awaited
+SECONDS_MAX = 240  # s of robot time for anything awaited
 
 
 class Hands(Protocol):

@@ -1,4 +1,4 @@
-# Alarm clock: at the time it is scheduled for, the dog barks louder and louder until somebody touches it.
+# Alarm clock: at the scheduled time the dog barks louder and louder until it is touched.
 #
 # For teachers: schedules and loops with two ends. Save it with the condition "30 6 * * 1-5": every school day at 6:30.
 

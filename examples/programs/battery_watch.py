@@ -1,4 +1,4 @@
-# Battery watch: tells how long the battery will last, and warns when it is low.
+# Battery watch: says how long the battery will last, and warns when it is low.
 #
 # For teachers: rates of change. As a task of its own, saved with the condition "0 * * * *", it reports every hour.
 

@@ -1,4 +1,4 @@
-# Follow me: the dog walks after somebody whose face it knows, and stops at a touch.
+# Follow me: the dog walks after a person whose face it knows, and stops at a touch.
 #
 # For teachers: waiting for an event in a loop. Before, enter a family member named Anna with her face, in the app.
 # Following goes on while the program does something else.

@@ -1,4 +1,4 @@
-# Greeting the family: whoever comes is greeted by name, each only once.
+# Greeting the family: the dog greets each person by name, once.
 #
 # For teachers: sets, and text made of parts. Enter the family with their faces in the app first.
 

@@ -1,4 +1,4 @@
-# Measuring a room: the dog looks in four directions and tells how large the room is.
+# Measuring a room: the dog looks in four directions and says how large the room is.
 #
 # For teachers: list slices, medians, units. The lidar gives one distance for each angle; the median of a few neighbours
 # is better than one alone. inf means: nothing came back. Let the pupils check the result with a folding rule.

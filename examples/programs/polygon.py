@@ -1,6 +1,6 @@
 # Polygon: the dog walks any regular polygon and checks how well it closes.
 #
-# For teachers: the exterior angles of a polygon add up to 360 degrees. The odometer tells where the dog believes to be.
+# For teachers: the exterior angles of a polygon add up to 360 degrees. The odometer says where the dog believes to be.
 
 import math
 

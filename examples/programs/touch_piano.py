@@ -1,6 +1,6 @@
 # Touch piano: a touch, a double touch and a long touch each have a sound and a colour; the dog remembers the tune.
 #
-# For teachers: dictionaries as tables instead of many ifs. The piano ends when nobody has touched it for 5 seconds.
+# For teachers: dictionaries as tables instead of many ifs. The piano ends 5 seconds after the last touch.
 
 KEYS = {
     1: ("woof", 4000, (0, 255, 0)),

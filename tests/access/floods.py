@@ -96,7 +96,7 @@ def renegotiations(robot: str, count: int, _: Path) -> None:
         with contextlib.suppress(OSError):
             client.stdin.write(letter)
             client.stdin.flush()
-        time.sleep(0.0005)  # s_client takes one letter of each piece that it reads
+        time.sleep(0.0005)  # s_client consumes one letter of each chunk
     for _letter, client in clients.values():
         client.kill()
 
@@ -141,7 +141,7 @@ FLOODS: dict[str, Callable[[str, int, Path], None]] = {
     "log-ins": log_ins,
     "rapid reset": rapid_reset,
 }
-BY_TOOLS: dict[str, Callable[[str, int, Path], None]] = {"renegotiations": renegotiations}  # not there everywhere
+BY_TOOLS: dict[str, Callable[[str, int, Path], None]] = {"renegotiations": renegotiations}  # not available everywhere
 
 
 if __name__ == "__main__":

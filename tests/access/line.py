@@ -11,7 +11,7 @@ import random
 from collections.abc import AsyncIterator
 
 PACKET = 1448  # bytes
-RESENT = 1.25  # round trips until a lost packet is sent again (RACK: one, and a quarter for packets out of order)
+RESENT = 1.25  # round trips until a lost packet is sent again (RACK: one, plus a quarter for reordering)
 UNDERWAY_MAX = 4096  # packets
 
 

@@ -23,7 +23,7 @@ from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import GrpcAppStub
 
 WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
-ADDRESS = f"127.0.95.{100 + WORKER}"  # one for each process
+ADDRESS = f"127.0.95.{100 + WORKER}"  # one per process
 
 
 SUBPROTOCOL = Subprotocol("foxglove.websocket.v1")

@@ -21,7 +21,7 @@ from roboglot.testing.process import ServedRobot, served
 from tests.access.floods import FLOODS, FRIEND, GATEWAY, HOSTILE
 from tests.access.matrix import ADDRESS
 
-COUNT = 1500  # connections or tries; half an hour's worth for the limits of one address
+COUNT = 1500  # connections or attempts; half an hour's worth for the limits of one address
 GROWTH_MAX = 60.0  # MB
 DRIVE = frozenset({Right.DRIVE})
 
@@ -55,7 +55,7 @@ def _settled(robot: ServedRobot) -> None:
             return
 
 
-PACE = 0.02  # s: more often would be against the limits of requests, on a quick machine
+PACE = 0.02  # s: polling faster would hit the request limit on a quick machine
 
 
 def ask(line: socket.socket) -> bytes:
@@ -87,7 +87,7 @@ def test_others_are_served_while_one_floods(attacked: tuple[ServedRobot, Path], 
     assert "x" in json.loads(answer.partition(b"\r\n\r\n")[2])
 
 
-@pytest.mark.slow  # a load; in short: test_guard.py
+@pytest.mark.slow  # a load test; in short: test_guard.py
 def test_a_flood_of_guesses_leaves_few_rows(attacked: tuple[ServedRobot, Path]) -> None:
     robot, phone = attacked
     FLOODS["log-ins"](ADDRESS, COUNT, phone)

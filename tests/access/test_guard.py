@@ -51,19 +51,19 @@ async def test_only_known_tokens_and_passwords_let_in(runtime: Runtime, store: A
     guard_of(runtime).reload()
     assert await status() == 401
     assert await status(authorization=f"Bearer {token}") == 200
-    assert await status(("cell", token)) == 200  # for clients that know nothing but names and passwords
+    assert await status(("cell", token)) == 200  # for clients that can only send names and passwords
     assert await status(("anna", "correct horse")) == 200
     assert await status(("anna", "wrong horse")) == 401
     assert await status(authorization="Bearer x") == 401
-    assert await status(("anna", "correct horse")) == 200  # it is known by now
+    assert await status(("anna", "correct horse")) == 200  # cached by now
     assert await status(("cell", token)) == 200
     assert await status(authorization=token) == 401  # the third wrong one
-    assert await status(("anna", "another horse")) == 401  # it is not looked at any more
+    assert await status(("anna", "another horse")) == 401  # no longer checked
     guard_of(runtime).reload()
-    assert await status(("anna", "correct horse")) == 200  # who was known still is
+    assert await status(("anna", "correct horse")) == 200  # known credentials still work
     other = store.add_machine("other", [Grant("a", SEE)])
     guard_of(runtime).reload()
-    assert await status(authorization=f"Bearer {other}") == 200  # and a token cannot be guessed
+    assert await status(authorization=f"Bearer {other}") == 200  # tokens cannot be guessed
     store.rotate("anna", "better horse")
     guard_of(runtime).reload()
     assert await status(("anna", "correct horse")) == 401
@@ -78,7 +78,7 @@ async def test_guessing_is_stopped_and_costs_nothing(runtime: Runtime, store: Ac
             reply = await client.get(POSE, auth=("anna", f"guess {number}"))
             assert reply.status_code == 401
     assert "too many wrong" in reply.text
-    assert time.process_time() - began < 5.0  # 100 passwords would take as long to check
+    assert time.process_time() - began < 5.0  # checking 100 passwords would take as long
 
 
 async def test_many_tries_at_once_count_one_by_one(runtime: Runtime, store: AccessStore) -> None:

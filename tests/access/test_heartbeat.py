@@ -25,8 +25,8 @@ from roboglot.model.geometry import Twist
 from roboglot.storage.database import Database
 
 STANDS_WITHIN = 0.5  # s after the line went dead
-MARGIN = 0.03  # s for a loop that is busy
-LATE = 0.001  # s that a timer may fire late
+MARGIN = 0.03  # s of slack for a busy loop
+LATE = 0.001  # s that a timer may be late
 
 
 def looks(heart: Heartbeat, now: float, until: float, drives: bool = True) -> tuple[float | None, int]:
@@ -64,10 +64,10 @@ def test_beats_come_often_only_while_someone_drives() -> None:
 def test_delayed_end_reads_earlier_beats_before_judging() -> None:
     heart = Heartbeat(0.0)
     assert not heart.look(IDLE_PERIOD, drives=True).quiet
-    woken = IDLE_PERIOD + HELD_UP + 0.5  # the machine rested, and the other end's with it
+    woken = IDLE_PERIOD + HELD_UP + 0.5  # the whole machine was suspended, and the other end with it
     look = heart.look(woken, drives=True)
     assert not look.quiet
-    for _ in range(5):  # turns of the loop at once decide nothing
+    for _ in range(5):  # several turns of the loop in a row decide nothing
         assert not heart.look(woken, drives=True).quiet
     assert not heart.look(woken + QUICK_PERIOD, drives=True).quiet  # now it may; the loop reads its sockets first
     heart.hear(woken + QUICK_PERIOD)

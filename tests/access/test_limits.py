@@ -39,7 +39,7 @@ async def robots(data: Path, access: AccessConfig) -> AsyncIterator[Runtime]:
 
 @pytest.fixture(autouse=True)
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)  # on a busy machine nothing is left behind half closed
+    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)  # a busy machine may close connections late
 
 
 @pytest.fixture
@@ -68,7 +68,7 @@ async def test_one_address_does_not_take_all_connections(data: Path, token: str,
         writer.close()
         for _, each in held[:CONNECTIONS]:
             each.close()
-        async with asyncio.timeout(20.0):  # those that are gone do not count
+        async with asyncio.timeout(20.0):  # closed connections do not count
             while True:
                 reader, writer = await asyncio.open_connection(ADDRESS, port, local_addr=(DRIVER.address, 0))
                 writer.write(b"GET /nothing HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
@@ -89,7 +89,7 @@ async def test_bytes_are_limited_per_client(data: Path, token: str) -> None:
             upload = asyncio.ensure_future(greedy.post("/api/core/motion/v1/actions", content=body, timeout=60.0))
             for _ in range(20):
                 assert (await modest.get(POSE)).status_code == 200
-            assert not upload.done()  # it has 200 kB in advance, and then 100 kB a second
+            assert not upload.done()  # a burst of 200 kB, then 100 kB a second
             upload.cancel()
             with contextlib.suppress(asyncio.CancelledError):
                 await upload

@@ -110,10 +110,10 @@ async def test_reader_that_rests_holds_up_the_sender_alone() -> None:
         _, lazy = await asyncio.open_connection(*where, limit=1024)
         lazy.write(b"x")
         before = -1
-        while sent != before or not sent:  # until nothing more is taken
+        while sent != before or not sent:  # until the peer accepts no more
             before = sent
             await asyncio.sleep(0.3)
-        assert sent < 32_000_000  # windows, and the kernel's buffers on the way
+        assert sent < 32_000_000  # windows and kernel buffers on the way
         reader, writer = await asyncio.open_connection(*where)
         writer.write(b"?")
         assert await reader.read() == b"!"

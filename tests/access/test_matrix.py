@@ -62,7 +62,7 @@ COLUMNS = [
     "bytes",
     "excerpt",
 ]
-TARGETS = {"debug": "debug"}  # by what a frame wants; all others may be any
+TARGETS = {"debug": "debug"}  # by the frame's fields; all others are free
 
 
 @pytest.fixture
@@ -71,7 +71,7 @@ def reached(monkeypatch: pytest.MonkeyPatch) -> Iterator[set[object]]:
     seen: set[object] = set()
 
     def stand_in(key: object, own: Callable[..., Any]) -> Callable[..., Any]:
-        @functools.wraps(own)  # its parameters are checked as ever
+        @functools.wraps(own)  # its parameters are still checked
         async def handler(*_: object, **__: object) -> None:
             seen.add(key)
 
@@ -149,7 +149,7 @@ async def test_viewers_do_what_the_right_allows(runtime: Runtime, reached: set[o
 async def test_fleet_control_does_what_its_right_allows(runtime: Runtime, reached: set[object]) -> None:
     [door] = [door for door in runtime.doors["a"]._doors if isinstance(door, Vda5050Door)]
     keys = {operation.key for operation in FLEET}
-    messages = {"order", "instantActions"}  # what is sent by itself; all others are actions within
+    messages = {"order", "instantActions"}  # sent unprompted; all others are actions within
 
     async def ask(caller: Caller) -> set[str]:
         """The actions that were refused for want of a right."""
@@ -266,7 +266,7 @@ async def test_wire_view_shows_every_row_on_a_wire(runtime: Runtime, reached: se
         wire.close()
         wire.end()
         for door, table, key_of in (("slamware", REST, str), ("robomaster", TEXT, str), ("cyberdog", DOG, int)):
-            keys = {row.key for row in contract(door) if not row.key.startswith(">")}  # pushes are not asked
+            keys = {row.key for row in contract(door) if not row.key.startswith(">")}  # pushes need no right
             asked = [row["operation"] for row in shown if row["door"] == door and row["direction"] == "request"]
             assert sorted(asked) == sorted(keys), door
             answers = [row for row in shown if row["door"] == door and row["direction"] == "reply"]

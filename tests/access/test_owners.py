@@ -29,7 +29,7 @@ async def test_task_has_its_owners_rights_until_they_end(runtime: Runtime, store
     assert link is not None
     await each_minute(link)
     await link.close()
-    other = await open_frames(OTHER.address)  # the last speaker is not who it runs for
+    other = await open_frames(OTHER.address)  # the last client is not the program's owner
     assert other is not None
     await frame_states(other, [{"type": "task", "operate": "inquiry", "target_id": []}])
     asked: list[str] = []

@@ -140,7 +140,7 @@ async def test_what_a_revoked_client_does_stops(
         while not any(action.identity == who for action in robot.actions.running()):
             await clock.advance(0.05)
             await asyncio.sleep(0.005)
-        other = open_store(data)  # as `roboglot access revoke` does it in a process of its own
+        other = open_store(data)  # as `roboglot access revoke` does in its own process
         other.revoke(who)
         other.close()
         closing = asyncio.ensure_future(until(gone))

@@ -77,7 +77,7 @@ def test_everyone_who_opens_the_list_sees_each_change(tmp_path: Path, url: str) 
         changed().add_person("anna", "correct horse", [Grant("b", DRIVE)])
         changed().allow("10.0.0.7", [Grant("a", SEE)])
         changed().add_guest("pupil", [Grant("a", DRIVE, 10.0)], now=5.0)
-        changed().add_guest("other", [Grant("a", DRIVE, 20.0)], now=15.0)  # the first one's time is over
+        changed().add_guest("other", [Grant("a", DRIVE, 20.0)], now=15.0)  # the first one's time is up
         assert changed().rotate("cell") != token
         changed().revoke("anna")
         changed()

@@ -37,7 +37,7 @@ async def gateway(data: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[
     """A robot behind a gateway, and a token that drives it."""
     monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
     for limit in ("QUIET_AFTER", "LOST_AFTER"):
-        monkeypatch.setattr(heartbeat, limit, 20.0)  # a busy machine is no lost tunnel
+        monkeypatch.setattr(heartbeat, limit, 20.0)  # a busy machine must not look like a lost tunnel
     store = open_store(data)
     token = store.add_machine("cell", [Grant("a", frozenset({Right.DRIVE}))])
     store.close()
@@ -92,7 +92,7 @@ async def test_the_text_protocol_passes_with_its_pushes(
         async with asyncio.timeout(10.0):
             data, sender = await asyncio.get_running_loop().sock_recvfrom(inbox, 1000)
         assert data.startswith(b"chassis push position")
-        assert sender[0] == HERE  # clients tell robots apart by that
+        assert sender[0] == HERE  # clients identify robots by it
         [action] = runtime.fleet.robots["a"].actions.running()
         assert action.identity == "cell"
         noted: set[str] = set()
@@ -101,7 +101,7 @@ async def test_the_text_protocol_passes_with_its_pushes(
                 await asyncio.sleep(0.01)
                 with open_trail(runtime.config.data) as trail:
                     noted = {entry.address for _, entry in trail.rows() if entry.operation == "chassis speed"}
-        assert noted == {"127.0.0.1 by tunnel"}  # where it comes from, not where the tunnel ends
+        assert noted == {"127.0.0.1 by tunnel"}  # the client's address, not the tunnel's end
         writer.close()
     inbox.close()
     async with asyncio.timeout(10.0):
@@ -235,7 +235,7 @@ async def test_a_second_connection_carries_beats_and_comes_again(
         await until(lambda: tunnel._beside)
         first, tunnel._heart._heard_beside = tunnel._beside, 0.0
         assert first is not None
-        await until(lambda: tunnel._heart._heard_beside)  # a beat has come by it
+        await until(lambda: tunnel._heart._heard_beside)  # a heartbeat has arrived by then
         first.end("lost on the way")
         await until(lambda: tunnel._beside not in (None, first))
         assert list(tunnels.values()) == [tunnel]
@@ -258,7 +258,7 @@ async def test_a_tunnel_takes_no_address_where_others_listen(
 ) -> None:
     runtime, _ = gateway
     assert runtime.guard is not None
-    first = ip_address(ADDRESS.replace("127.0.95", "127.65.0"))  # of this test's process alone
+    first = ip_address(ADDRESS.replace("127.0.95", "127.65.0"))  # only of this test's process
     monkeypatch.setattr("roboglot.access.tunnel.gateway.FIRST_ADDRESS", first)
     with socket.create_server((str(first), 8981)):
         async with connected(*gateway, tmp_path):

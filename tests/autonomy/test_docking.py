@@ -96,7 +96,7 @@ async def test_dock_that_was_moved_a_little_is_found(tour: Tour, aside: float) -
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     assert abs(tour.truth.relative_to(tour.start).y - aside) < 0.05
     assert docking.home is not None
-    assert tour.start.compose(docking.home).distance_to(tour.truth) < 0.05  # learnt anew
+    assert tour.start.compose(docking.home).distance_to(tour.truth) < 0.05  # learned again
 
 
 @pytest.mark.world("office")
@@ -138,7 +138,7 @@ async def test_an_unknown_dock_far_away_is_reported(tour: Tour) -> None:
 async def test_docked_robot_that_finds_itself_knows_its_dock(tour: Tour) -> None:
     mapping, docking = tour.robot[Mapping], tour.robot[Docking]
     await tour.clock.advance(1.0)
-    mapping.load(mapping.grid, Pose(3.0, 1.0, 0.5))  # not where it is
+    mapping.load(mapping.grid, Pose(3.0, 1.0, 0.5))  # away from its true place
     assert (await tour.end_of(tour.robot_finds_itself())).status is ActionStatus.SUCCEEDED
     assert docking.home is not None
     assert tour.start.compose(docking.home).distance_to(tour.truth) < 0.1
@@ -146,7 +146,7 @@ async def test_docked_robot_that_finds_itself_knows_its_dock(tour: Tour) -> None
 
 @pytest.mark.world("office")
 async def test_wrong_pose_keeps_dock_and_docking_corrects_it(tour: Tour, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("roboglot.autonomy.slam.slam.places", lambda *_: [])  # scans alone do not say where it is
+    monkeypatch.setattr("roboglot.autonomy.slam.slam.places", lambda *_: [])  # scans alone do not determine the place
     await tour.clock.advance(1.0)
     for wrong in (Pose(40.0, 40.0), Pose(3.0, 1.0, 0.5)):
         tour.robot[Localization].set_pose(wrong)
@@ -161,11 +161,11 @@ async def test_dock_of_loaded_map_is_learnt_when_localized(tour: Tour, monkeypat
     monkeypatch.setattr("roboglot.autonomy.slam.slam.places", lambda *_: [])
     mapping, docking = tour.robot[Mapping], tour.robot[Docking]
     await tour.clock.advance(1.0)
-    mapping.load(mapping.grid, Pose(40.0, 40.0))  # not where it is
+    mapping.load(mapping.grid, Pose(40.0, 40.0))  # away from its true place
     await tour.clock.advance(3.0)
     assert docking.home is None
     assert tour.robot[Localization].lost is not None
-    tour.robot[Localization].set_pose(Pose(0.05, 0.05))  # nearly
+    tour.robot[Localization].set_pose(Pose(0.05, 0.05))  # almost
     assert docking.home is None
     await tour.clock.advance(3.0)
     assert docking.home is not None

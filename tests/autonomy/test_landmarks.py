@@ -70,13 +70,13 @@ def seen_from(pose, *marks):
 
 def test_a_pose_moves_only_where_it_is_unsure():
     mark, truth, believed = Point(3.0, 1.0), Pose(0.4, 0.0), Pose(0.0, 0.1)
-    along = np.diag((0.5**2, 0.003**2, 0.002**2))  # as in a passage along x
+    along = np.diag((0.5**2, 0.003**2, 0.002**2))  # as in a corridor along x
     fixed, covariance = pose_fixed(believed, along, seen_from(truth, mark), [mark, Point(9.0, 9.0)])
     assert abs(fixed.x - 0.4) < 0.02
     assert abs(fixed.y - 0.1) < 0.01
     assert covariance[0, 0] < 0.05**2
     sure, same = pose_fixed(believed, np.diag(SURE), seen_from(truth, mark), [mark])
-    assert sure == believed  # too far off to be that landmark
+    assert sure == believed  # too far away to be that landmark
     assert (same == np.diag(SURE)).all()
     twins = [mark, Point(3.3, 1.0)]
     assert pose_fixed(believed, along, seen_from(truth, mark), twins)[0] == believed
@@ -89,7 +89,7 @@ async def test_they_tell_how_far_along_a_bare_passage(tour):
     await tour.robot[MapAnnotations].change(lambda now: replace(now, landmarks=tuple(marks)))
     drive = tour.head_for((36.0, 1.2), tolerance=0.3)
     await tour.until(lambda: tour.truth.x > 18.0)
-    tour.world.hands.place("a", tour.truth.compose(Pose(0.2)))  # walls say nothing of that, nor do wheels
+    tour.world.hands.place("a", tour.truth.compose(Pose(0.2)))  # neither walls nor wheels determine it
     await tour.clock.advance(2.0)
     assert tour.error[0] > 0.15
     await tour.end_of(drive)

@@ -223,7 +223,7 @@ async def test_a_step_that_is_lost_on_the_way(stand: Make) -> None:
 async def test_held_fast_it_gives_up_in_time(stand: Make) -> None:
     dog = await stand()
     await dog.put(0.75, 15.0, 0.0)
-    dog.world.hands.lift("a", 0.0)  # someone holds it where it is
+    dog.world.hands.lift("a", 0.0)  # held in place
     action = dog.alignment.align(UP)
     await dog.ended(action)
     assert isinstance(action.error, Expired)

@@ -48,7 +48,7 @@ def test_something_as_high_as_lidar_is_a_wall() -> None:
     along = np.linspace(-0.5, 0.5, 21)
     wall = placed(np.stack((np.zeros(21), along), axis=-1), 0.6, 0.1)
     assert find_riser(face, wall) is None
-    assert find_riser(face, placed(wall, 0.3, 0.0)) is not None  # the next riser but one stands that high
+    assert find_riser(face, placed(wall, 0.3, 0.0)) is not None  # the height of the next riser but one
 
 
 def test_without_a_lidar_a_tread_must_be_seen() -> None:
@@ -61,8 +61,8 @@ def test_without_a_lidar_a_tread_must_be_seen() -> None:
     "points",
     [
         riser(0.12, width=0.2),  # a box
-        riser(0.3),  # taller than any step
-        np.concatenate((riser(0.12), riser(0.12, width=0.2) - (0.15, 0.0, 0.0))),  # something before it
+        riser(0.3),  # higher than any step
+        np.concatenate((riser(0.12), riser(0.12, width=0.2) - (0.15, 0.0, 0.0))),  # an object in front
         np.stack((0.2 * np.sin(np.linspace(0, 6, 40)), np.linspace(-0.3, 0.3, 40), np.full(40, 0.06)), axis=-1),
         riser(0.12)[:8],
         np.empty((0, 3)),

@@ -90,7 +90,7 @@ async def test_a_shelf_is_lifted_and_set_down(tour):
 @pytest.mark.world(WORLD, body="hermes")
 async def test_a_part_of_the_hull_stays_outside(tour):
     await dock(tour, MarkGoal(mark=Mark.SHELF, start=start(tour, 5.6, 6.0, 0), outside=0.2))
-    # 0.2 m of 0.54 before the front at 7.05
+    # 0.2 m of the 0.54 m before the front at 7.05
     assert off(tour, Pose(7.05 - 0.2 + 0.27, 6.0, 0.0))[0] < 0.03
 
 
@@ -146,7 +146,7 @@ async def test_a_lifted_shelf_is_carried_elsewhere(tour):
     for x, y in ((0.43, 0.43), (0.43, -0.43), (-0.43, 0.43), (-0.43, -0.43)):
         row, column = grid.cell_of(shelf.pose.compose(Pose(x, y)).relative_to(tour.start).point)
         around = grid.log_odds[row - 1 : row + 2, column - 1 : column + 2]
-        assert around.max() <= 0  # the map does not keep what the robot carries
+        assert around.max() <= 0  # carried things are left out of the map
     await tour.end_of(tour.robot[TagDocking].back_off(Mark.SHELF, distance=1.0))
     assert not tour.robot[Jack].loaded
 
@@ -154,7 +154,7 @@ async def test_a_lifted_shelf_is_carried_elsewhere(tour):
 @pytest.mark.world("empty", body="hermes")
 async def test_backing_off_on_the_dock_moves_or_fails(tour):
     docking = tour.robot[TagDocking]
-    held = await tour.end_of(docking.back_off(Mark.PRINTED, distance=0.5))  # the dock is behind
+    held = await tour.end_of(docking.back_off(Mark.PRINTED, distance=0.5))  # the dock is behind the robot
     assert isinstance(held.error, Blocked)
     away = await tour.end_of(docking.back_off(Mark.PRINTED, distance=0.5, ahead=True))
     assert away.reason == ""

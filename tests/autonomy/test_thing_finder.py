@@ -51,4 +51,4 @@ def test_thing_that_touches_a_wall_is_kept() -> None:
     now = moved_thing(points, Point(2.7, 0.0))
     assert now
     assert now.distance_to(Point(2.75, 0.0)) < WIDE_MAX / 2
-    assert thing_at(points, Point(2.7, 0.0)) is None  # chosen there, it is part of the wall
+    assert thing_at(points, Point(2.7, 0.0)) is None  # chosen there it belongs to the wall

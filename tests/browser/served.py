@@ -13,9 +13,9 @@ from roboglot.model.clock import LockstepClock
 from roboglot.model.robot import Robot
 from roboglot.runtime import Runtime
 
-ADDRESS = f"127.0.91.{1 + int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0')[2:])}"  # one for each process
+ADDRESS = f"127.0.91.{1 + int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0')[2:])}"  # one per process
 PATIENCE = 60.0  # s of the machine's time
-PAGE_PATIENCE = 15_000  # ms of the machine's time until a page shows something
+PAGE_PATIENCE = 15_000  # ms of the machine's time until a page shows a change
 STRANGER, FRIEND, REBOUND = "evil.example", "studio.example", "rebound.example"
 
 

@@ -46,7 +46,7 @@ FORM = """([url, kind, value]) => new Promise(done => {
     form.submit();
 })"""
 
-pytestmark = pytest.mark.asyncio(loop_scope="session")  # one browser and one robot for all
+pytestmark = pytest.mark.asyncio(loop_scope="session")  # one browser and one robot for all tests
 Page = Any
 Open = Callable[[str], Awaitable[Page]]
 
@@ -150,7 +150,7 @@ async def test_a_rebound_name_reaches_nothing(served: Served, browser: Any, path
 
 async def test_a_rebound_name_opens_no_web_socket(served: Served, browser: Any) -> None:
     page = await browser.new_page()
-    await page.goto(f"http://{REBOUND}:1448/")  # the very host that the socket is then opened on
+    await page.goto(f"http://{REBOUND}:1448/")  # the host on which the socket is then opened
     assert await page.evaluate(SOCKET, [f"ws://{REBOUND}:50053/programs", json.dumps(SAVE)]) == "refused"
 
 

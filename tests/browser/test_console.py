@@ -71,7 +71,7 @@ async def driven(served: Served, page: Page) -> None:
     await until(lambda: any(action.name == "drive" for action in served.robot.actions.running()))
     async with asyncio.timeout(20.0):
         while speed_of(served) <= 0.1:
-            await asyncio.sleep(0.09)  # so that the page sends again before the robot's time goes on
+            await asyncio.sleep(0.09)  # lets the page send again before robot time advances
             await served.clock.advance(0.08)
 
 
@@ -103,7 +103,7 @@ async def test_the_robot_stands_when_the_pad_falls_silent(served: Served, open_c
     page = await open_console()
     await page.click("#tab-drive")
     await driven(served, page)
-    await page.evaluate("clearInterval(1e9); for (let i = 0; i < 1e4; i++) clearInterval(i)")  # a page that hangs
+    await page.evaluate("clearInterval(1e9); for (let i = 0; i < 1e4; i++) clearInterval(i)")  # a frozen page
     await asyncio.sleep(0.1)
     await served.clock.advance(0.7)  # 0.3 s of silence, then it brakes
     assert speed_of(served) < 0.02
@@ -135,7 +135,7 @@ async def test_a_gamepad_drives_and_stops(served: Served, open_console: OpenCons
     await page.evaluate("window.stick = [0, -1, 0, 0]")  # forward
     await until(lambda: any(action.name == "drive" for action in served.robot.actions.running()))
     for _ in range(10):
-        await asyncio.sleep(0.09)  # so that the page sends again before the robot's time goes on
+        await asyncio.sleep(0.09)  # lets the page send again before robot time advances
         await served.clock.advance(0.08)
     assert served.robot[Base].velocity.x > 0.1
     await page.evaluate("window.stick = [0.05, -0.05, 0, 0]")  # a stick never rests at zero
@@ -190,7 +190,7 @@ async def test_two_browsers_and_rest_client_contend_for_control(served: Served, 
     await ben.wait_for_selector("text=Free: the newest command counts.")
     status, answer = await asyncio.to_thread(rest, served, 0.5)
     assert status == 200, answer
-    await anna.wait_for_selector("text=/slamware .* moves it/")  # both pages say who
+    await anna.wait_for_selector("text=/slamware .* moves it/")  # both pages name the driver
     await ben.wait_for_selector("text=/slamware .* moves it/")
 
 
@@ -303,7 +303,7 @@ async def test_the_floor_that_is_shown_is_chosen(tmp_path: Path, browser: Any) -
     await page.goto(runtime.console.address)
     await page.wait_for_selector("select.floors")
     choices = await page.locator("select.floors option").all_inner_texts()
-    assert len(choices) == 4  # the robot's own, and three
+    assert len(choices) == 4  # the robot's own and three more
     picture = "document.querySelector('canvas').toDataURL()"
     here = await page.evaluate(picture)
     await page.select_option("select.floors", "2")
@@ -326,7 +326,7 @@ async def test_a_lost_connection_is_said_and_bridged(served: Served, open_consol
 async def test_saved_map_is_seen_in_the_grid(served: Served, open_console: OpenConsole) -> None:
     page = await open_console(view="world")
     page.on("dialog", lambda dialog: asyncio.ensure_future(dialog.accept("hall")))
-    await served.clock.advance(2.0)  # so that there is a map
+    await served.clock.advance(2.0)  # makes a map
     await page.click("#tab-drawn")
     await page.click("text=Save the map")
     await page.wait_for_selector("text=hall is saved.")
@@ -354,7 +354,7 @@ async def test_camera_shows_pictures_and_what_is_in_them(served: Served, open_co
         while not await page.locator("text=Sound").count():
             await served.clock.advance(0.1)
             await asyncio.sleep(0.05)
-    await page.click("text=Sound")  # by a call, or beside motion JPEG: browsers make no calls over loopback alone
+    await page.click("text=Sound")  # by a call or by motion JPEG: browsers make no calls over loopback alone
     await until_page(page, "!document.querySelector('.screen video, .screen audio').muted")
     async with asyncio.timeout(2 * PATIENCE / 1000):
         await page.click("text=Film")

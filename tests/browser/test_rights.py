@@ -30,7 +30,7 @@ PASSWORD, LOGINS = "a long password", 3
 PATIENCE = 15_000  # ms
 HOSTS = {"a": ADDRESS.replace(".91.", ".94."), "b": ADDRESS.replace(".91.", ".95.")}
 WHO = ("none", "see", "drive", "program", "edit", "admin")
-MAY = {  # what each may: to stop and drive, to draw on the map, to break the world
+MAY = {  # what each right allows: stop and drive, draw on the map, break the world
     "see": set[str](),
     "drive": {"stop", "drive"},
     "program": {"stop", "drive"},
@@ -165,7 +165,7 @@ async def test_signing_out_ends_the_session(guarded: Guarded, open_page: Open) -
     (cookie,) = await page.context.cookies()
     await page.click("header button:has-text('anna')")
     await page.wait_for_selector("input[name=password]")
-    await page.context.add_cookies([cookie])  # a kept copy is worth nothing
+    await page.context.add_cookies([cookie])  # a copied cookie is worthless
     assert await page.evaluate("fetch('/api/robots').then((r) => r.status)") == 401
 
 

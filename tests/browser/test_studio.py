@@ -15,7 +15,7 @@ from tests.browser.served import Served, until
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 AXE = (Path(__file__).parent / "vendor" / "axe.min.js").read_text("utf-8")
-READY = (  # or its program runs already
+READY = (  # unless its program already runs
     "window.studio && studio.editor.workspace"
     " && (document.querySelector('.button.main:enabled') || studio.runner.phase.value === 'running')"
 )
@@ -50,7 +50,7 @@ FOREVER = {
         "languageVersion": 0,
         "blocks": [
             {"type": "forever", "id": "always", "x": 30, "y": 30, "inputs": {"DO": {"block": {
-                "type": "wait", "id": "count", "inputs": {"SECONDS": number}}}}}  # of robot time, which stands
+                "type": "wait", "id": "count", "inputs": {"SECONDS": number}}}}}  # of robot time, which stands still
         ],
     }
 }  # fmt: skip
@@ -156,7 +156,7 @@ async def test_program_is_built_run_and_debugged_by_keyboard(studio: Open) -> No
         if await page.evaluate("document.activeElement.classList.contains('blocklyToolboxCategoryContainer')"):
             break
     for _ in range(4):
-        await page.keyboard.press("ArrowDown")  # to the texts
+        await page.keyboard.press("ArrowDown")  # into the text fields
     assert await page.evaluate("document.activeElement.id") == "text"
     await page.keyboard.press("ArrowRight")
     await until(page, "document.activeElement.classList.contains('blocklyPath')")
@@ -165,7 +165,7 @@ async def test_program_is_built_run_and_debugged_by_keyboard(studio: Open) -> No
     for _ in range(20):
         if not await page.evaluate("studio.editor.workspace.isDragging()"):
             break
-        await page.keyboard.press("Enter")  # the first may come before it listens
+        await page.keyboard.press("Enter")  # the first may arrive before it listens
         await asyncio.sleep(0.3)
     await until(page, "studio.editor.code.value.includes('print(')")
     await page.keyboard.press("i")
@@ -177,7 +177,7 @@ async def test_program_is_built_run_and_debugged_by_keyboard(studio: Open) -> No
     await page.keyboard.press("F8")
     await phase(page, "idle")
     assert await printed(page) == ["hello"]
-    await page.keyboard.press("F9")  # no breakpoint any more
+    await page.keyboard.press("F9")  # the breakpoint is gone
     await page.keyboard.press("F5")
     await until(page, "studio.runner.printed.value.length === 1 && studio.runner.phase.value === 'idle'")
     await page.keyboard.press("Delete")
@@ -298,7 +298,7 @@ async def test_page_asks_again_until_a_robot_is_programmable(studio: Open, brows
             message = json.loads(text)
             if message["type"] == "open":
                 asked.append(message["robot"])
-                if len(asked) <= 2:  # as while the robot's programs are not there yet
+                if len(asked) <= 2:  # as before the robot's programs are ready
                     link.send(json.dumps({"type": "opened", "robot": message["robot"], "error": "it starts"}))
                     return
             server.send(text)
@@ -308,7 +308,7 @@ async def test_page_asks_again_until_a_robot_is_programmable(studio: Open, brows
     await context.route_web_socket("**/studio", route)
     page = await loaded(await studio(context), COUNTING)
     await page.wait_for_selector("text=This robot cannot be programmed at the moment: it starts")
-    await page.keyboard.press("F5")  # kept until the robot is there
+    await page.keyboard.press("F5")  # kept until the robot is back
     await until(page, "studio.runner.printed.value.some(e => e.text === '12')")
     assert await page.query_selector(".banner.warn") is None
     assert len(asked) == 3

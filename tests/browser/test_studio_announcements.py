@@ -41,22 +41,22 @@ async def test_a_run_and_its_halts_are_told(studio: Open) -> None:
     await page.evaluate(LISTEN)
     await page.evaluate("studio.editor.toggleBreak('say')")
     await page.keyboard.press("F5")
-    await announced(page, "Paused · print n")  # where it is, in the block's words
+    await announced(page, "Paused · print n")  # the block's position in words
     await page.keyboard.press("F8")
     await until(page, "studio.runner.phase.value === 'paused' && studio.runner.lit.value !== 'say'")
     words = await page.evaluate("studio.editor.workspace.getBlockById(studio.runner.lit.value).toString(60)")
     await announced(page, f"Paused · {words}")
     await page.click("#tab-output")
     await page.keyboard.press("F5")
-    await announced(page, "Paused · print n")  # the next time round
+    await announced(page, "Paused · print n")  # on the next round
     await page.keyboard.press("F5")
-    await announced(page, "9")  # what was printed
+    await announced(page, "9")  # the printed line
     await page.keyboard.press("Shift+F5")
     await announced(page, "Ready")
     await page.click("#tab-python")
     await loaded(page, WRONG)
     await page.keyboard.press("F5")
-    await announced(page, "The list is not that long")  # though the panel of the output is not shown
+    await announced(page, "The list is not that long")  # although the output panel is hidden
     assert page.errors == []
 
 

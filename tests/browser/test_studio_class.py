@@ -53,8 +53,8 @@ async def test_a_class_from_its_code_to_its_results(studio: Open) -> None:
     await phase(anna, "running")
     await until(anna, "studio.runner.lit.value === 'count'")
     words = await anna.evaluate("studio.editor.workspace.getBlockById('count').toString(60)")
-    await until(teacher, f"{row}.includes({words!r})")  # the block that is lit at the pupil's
-    await teacher.click(".pupils button")  # her screen on the projector
+    await until(teacher, f"{row}.includes({words!r})")  # the block lit on the pupil's page
+    await teacher.click(".pupils button")  # the pupil's screen on the projector
     await until(teacher, "studio.editor.workspace.getAllBlocks(false).length === 3")
     assert "Anna" in await teacher.evaluate("studio.program.value.name")
     await teacher.click("#panel .button.danger")  # stop all

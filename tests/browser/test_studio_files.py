@@ -50,7 +50,7 @@ async def test_program_of_blocks_comes_back_from_its_file(studio: Open, wanted: 
     await until(page, "!document.querySelector('dialog')")
     assert await page.evaluate("[studio.editor.code.value, JSON.stringify(studio.editor.save())]") == [code, state]
     assert await page.evaluate("studio.program.value.kind") == "blocks"
-    style = json.dumps(json.loads(state))  # as frames carry it: text in a field
+    style = json.dumps(json.loads(state))  # as frames carry it: as text in a field
     frame = json.dumps({"describe": "from a frame", "style": style, "body": code}).encode()
     await page.click("text=Programs")
     await page.set_input_files("input[type=file]", {"name": "h.json", "mimeType": "", "buffer": frame})

@@ -96,7 +96,7 @@ async def test_a_module_is_opened_changed_and_deleted(studio: Open, opened: Serv
     await page.click("text=Programs")
     page.on("dialog", lambda dialog: dialog.accept())
     await row.locator("text=Delete").click()
-    await page.wait_for_selector("text=is called by")  # by the programs above
+    await page.wait_for_selector("text=is called by")  # used by the programs above
     service = next(iter(opened.runtime._programs.values())).service
     for task in await service.tasks():
         await service.delete(task.id)

@@ -30,7 +30,7 @@ async def test_other_programs_are_counted_listed_first_and_ended(studio: Open) -
     await button.click()
     first = page.locator("dialog .rows li").first
     await until(page, "document.querySelector('dialog .rows b')?.textContent === 'the other'")
-    await other.fill("header .name input", "renamed")  # which the robot takes when it has ended
+    await other.fill("header .name input", "renamed")  # the robot takes it when its program has ended
     await other.keyboard.press("Enter")
     await first.get_by_role("button", name="End").click()
     await until(page, "!document.querySelector('.controls .count')")
@@ -45,7 +45,7 @@ async def test_line_of_the_lit_block_stays_marked(studio: Open) -> None:
     marked = "[...document.querySelectorAll('.python .here')].map(line => line.dataset.of).join()"
     await page.keyboard.press("F5")
     await until(page, f"{marked} === 'count'")
-    await page.evaluate("studio.editor.toggleBreak('always')")  # the lines are made anew
+    await page.evaluate("studio.editor.toggleBreak('always')")  # the lines are rendered anew
     await until(page, "document.querySelector('.python .gutter.on')")
     assert await page.evaluate(marked) == "count"
     await page.click("#tab-output")
@@ -53,7 +53,7 @@ async def test_line_of_the_lit_block_stays_marked(studio: Open) -> None:
     await until(page, f"{marked} === 'count'")
     await page.keyboard.press("Shift+F5")
     await until(page, f"{marked} === ''")
-    assert await page.query_selector(".value-bubble") is None  # waiting answers nothing
+    assert await page.query_selector(".value-bubble") is None  # a waiting program answers nothing
     assert page.errors == []
 
 

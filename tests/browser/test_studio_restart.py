@@ -54,7 +54,7 @@ async def server(tmp_path: Path) -> AsyncIterator[tuple[str, Life]]:
         life = await asyncio.create_subprocess_exec(
             sys.executable, "-m", "roboglot", "up", "--config", str(settings),
             stdout=asyncio.subprocess.DEVNULL, stderr=asyncio.subprocess.DEVNULL,
-            env={**os.environ, "ROBOGLOT_TESTS_COLD": "1"},  # down for as long as a server that really starts anew
+            env={**os.environ, "ROBOGLOT_TESTS_COLD": "1"},  # down for as long as a real restart takes
         )  # fmt: skip
         lives.append(life)
         for _ in range(1200):
@@ -91,7 +91,7 @@ async def test_a_killed_server_gives_the_program_back(server: tuple[str, Life], 
     await first.wait()
     await until(page, "document.querySelector('.banner.bad')")
     await start()
-    await until(page, "!document.querySelector('.banner.bad')")  # what it shows meanwhile is from before
+    await until(page, "!document.querySelector('.banner.bad')")  # meanwhile it shows the old state
     await until(page, f"{HELD} === 'say'")
     second = await context.new_page()  # another tab sees the same
     await second.goto(f"{url}/studio/")
@@ -128,7 +128,7 @@ async def test_pages_open_and_keep_programs_without_the_server(server: tuple[str
     assert await page.evaluate("document.documentElement.lang") == "zh-CN"
     await start()
     await until(page, "!document.querySelector('.banner.bad')")
-    other = await (await browser.new_context()).new_page()  # another device has it
+    other = await (await browser.new_context()).new_page()  # another device holds it
     await other.goto(f"{url}/studio/")
     await until(other, READY)
     await until(page, "studio.program.value.id && document.querySelector('.stored').textContent.includes('机器人')")

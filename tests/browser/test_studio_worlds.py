@@ -59,7 +59,7 @@ async def joins(page: Page, code: str, name: str) -> None:
     await page.fill("input[name=code]", code.lower())
     await page.fill("form:nth-of-type(1) input[name=name]", name)
     await page.click("form:nth-of-type(1) button")
-    while True:  # the page may go on to another world's meanwhile
+    while True:  # the page may switch to another world meanwhile
         with contextlib.suppress(Exception):
             if await page.evaluate(f"document.querySelector('#panel')?.textContent.includes('You are {name}')"):
                 return

@@ -65,7 +65,7 @@ def test_robots_of_gateway_are_on_addresses_of_range(tmp_path: Path) -> None:
                     said = b""  # type: ignore[assignment]
                     while said.count(b";") < 2:  # type: ignore[arg-type]
                         said += line.recv(64)  # type: ignore[arg-type]
-                    assert said == b"ok;fail;"  # it may see, and not drive
+                    assert said == b"ok;fail;"  # it may see but not drive
             finally:
                 connect.terminate()
         assert (known / "roboglot" / "gateways.json").exists()

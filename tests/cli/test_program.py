@@ -189,7 +189,7 @@ async def test_an_interruption_ends_the_program(shell: Shell) -> None:
     process.send_signal(signal.SIGINT)
     await asyncio.wait_for(process.communicate(), PATIENCE)
     assert process.returncode == 130
-    async with asyncio.timeout(PATIENCE):  # the command knows that it was heard, not yet that the program is gone
+    async with asyncio.timeout(PATIENCE):  # the command was delivered; the program may still run
         while [task.state for task in await shell.service.tasks()] != ["shutdown"]:  # noqa: ASYNC110
             await asyncio.sleep(0.01)
 

@@ -21,7 +21,7 @@ from roboglot.model.clock import LockstepClock
 from roboglot.model.robot import Robot
 from roboglot.runtime import Runtime
 
-ADDRESS = f"127.0.92.{1 + int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0')[2:])}"  # one for each process
+ADDRESS = f"127.0.92.{1 + int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0')[2:])}"  # one per process
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,9 +16,9 @@ PLACES = (
     "protocols/visual/", "recording/", "rehearsal.py", "simulation/", "storage/", "wire/visual/",
 )  # fmt: skip
 KINDS = {"RobotError", "ProgramError", "BadParameters", "BadCondition", "Problem"}
-OUTSIDE = ("console/", "model/", "rehearsal.py", "simulation/")  # whose ValueError and RuntimeError pages show, too
-NAMED = {"why", "reason", "words", "wrong"}  # of variables and arguments that hold such a sentence
-LATER = {"set": 4, "_Watch": 4, "refuse": 1, "Problem": 1}  # which argument it is, where it is not the first
+OUTSIDE = ("console/", "model/", "rehearsal.py", "simulation/")  # pages show their ValueError and RuntimeError, too
+NAMED = {"why", "reason", "words", "wrong"}  # variables and arguments that hold such a sentence
+LATER = {"set": 4, "_Watch": 4, "refuse": 1, "Problem": 1}  # position of the argument, where not the first
 HOLE = "{}"
 
 

@@ -147,7 +147,7 @@ async def test_with_access_the_console_asks_who_comes(tmp_path: Path, monkeypatc
 
 
 async def test_maps_are_kept_loaded_exported_and_forgotten(shown: Shown) -> None:
-    assert (await shown.ask("/api/robots/a/save_map", {"map": "x"}))[0] == 409  # nothing was seen yet
+    assert (await shown.ask("/api/robots/a/save_map", {"map": "x"}))[0] == 409  # nothing has been seen yet
     await shown.clock.advance(3.0)
     assert (await shown.ask("/api/robots/a/save_map", {"map": "hall"}))[0] == 200
     assert (await shown.ask("/api/robots/a/maps", {}))[1]["result"] == ["hall"]
@@ -249,7 +249,7 @@ async def test_closed_door_and_excess_requests_are_refused(shown: Shown, monkeyp
 async def test_kept_map_is_merged_where_its_walls_fit(shown: Shown) -> None:
     await shown.clock.advance(2.0)
     whole = shown.robot[Mapping].grid.trimmed()
-    part = whole.window(whole.origin.x, whole.origin.y, 0.5, 50.0)  # what lies to the robot's back, and a bit more
+    part = whole.window(whole.origin.x, whole.origin.y, 0.5, 50.0)  # the area behind the robot, and a bit more
     moved = OccupancyGrid(part.log_odds, part.resolution, Point(part.origin.x - 3.0, part.origin.y + 1.0))
     await shown.robot[MapLibrary].put(StoredMap("west", moved, 0.0))
     east = whole.window(-0.5, whole.origin.y, 50.0, 50.0)
@@ -272,7 +272,7 @@ async def test_chance_begins_anew_from_seed_that_is_given(shown: Shown) -> None:
         scan = shown.robot[Lidar].scan
         assert scan is not None
         ranges: list[float] = scan.ranges.tolist()
-        return [*ranges, shown.robot[Imu].reading.angular_velocity.x]  # drawn many ticks at once
+        return [*ranges, shown.robot[Imu].reading.angular_velocity.x]  # drawn for many ticks at once
 
     shown.runtime.fleet.world.hands.add_obstacle(Pose(2.0, 0.0), (0.5, 4.0, 1.0), 0)
     await shown.clock.advance(0.2)
@@ -297,7 +297,7 @@ async def test_late_page_sees_all_that_is_kept(shown: Shown) -> None:
     wire = shown.desk.view("a").wire
     wire.open()
     first = wire.last + 1
-    for number in range(450):  # more than two messages hold
+    for number in range(450):  # more than fits into two messages
         wire._note(Exchange(0.0, "a", "slamware", "c", "x", Direction.REQUEST, f"GET /{number}", b""))
     seen: list[str] = []
     async with connect(shown.url.replace("http", "ws") + "/live") as page, asyncio.timeout(60):

@@ -84,7 +84,7 @@ async def test_a_code_lets_pupils_into_their_worlds(tmp_path: Path, monkeypatch:
                 assert "opening a class needs the right admin" in (await page.kind("refused"))["why"]
                 await asked(teacher, do="close")
                 assert (await teacher.kind("ended"))["type"] == "ended"
-                with pytest.raises(ConnectionClosed):  # his right has ended with the class
+                with pytest.raises(ConnectionClosed):  # his right ended with the class
                     await page.kind("no more")
             assert (await signed(second, name="Ben-B", code=code))[0] == 401
     await classes.close()

@@ -102,7 +102,7 @@ async def test_each_pupil_has_a_world(fleet: list[Shown]) -> None:
         assert (sent["page"], sent["code"], sent["name"]) == (second.url, code, "Ben")
         await asked(moved, do="join", code=code.lower(), name="Ben", carry=True)
         joined = await moved.kind("joined")
-        assert (joined["class"], joined["style"]) == ("7b", '{"body": "his"}')  # what he had made comes with him
+        assert (joined["class"], joined["style"]) == ("7b", '{"body": "his"}')  # his work comes with him
         await asked(moved, do="doing", doing=DOING, style='{"body": "x = 1"}')
         assert (await teacher.kind("map"))["name"] == "Ben"
         await asked(moved, do="doing", doing=DOING)
@@ -150,7 +150,7 @@ async def test_a_world_that_ends_leaves_the_class(tmp_path: Path, monkeypatch: p
             await asked(ben, do="join", code=code, name="Ben")
             await grid(teacher, name="Ben", here=True)
         await grid(teacher, name="Ben", here=False)
-        await asked(teacher, do="stop_all", id=3)  # a world that is not there is said
+        await asked(teacher, do="stop_all", id=3)  # a missing world is named
         refused = await teacher.until(lambda m: m["type"] == "refused")
         assert refused["id"] == 3
         assert "w2" in refused["why"]
@@ -167,7 +167,7 @@ async def test_what_was_handed_in_outlives_the_program(tmp_path: Path, monkeypat
         await asked(anna, do="join", code=code, name="Anna")
         await asked(anna, do="hand_in", doing=DOING, style='{"body": "x = 1"}')
         await anna.kind("handed")
-    (tmp_path / "w" / "classes" / "ZZZZZZ").mkdir()  # of something else
+    (tmp_path / "w" / "classes" / "ZZZZZZ").mkdir()  # from another page
     async with world(tmp_path, "w", ADDRESS, shared=False) as shown, page(shown) as teacher, page(shown) as anna:
         await asked(teacher, do="open", code="ZZZZZZ")
         assert "there is no class" in (await teacher.kind("refused"))["why"]

@@ -40,7 +40,7 @@ async def test_there_are_twenty_with_three_mistakes_each() -> None:
     assert [name for name, lesson in LESSONS.items() if len(lesson.wrong) != 3 or not lesson.hints] == []
 
 
-# Every third is played always, with its mistakes; the others are for changes of lessons and of the language.
+# Every third lesson is always played, with its mistakes; the others after changes of lessons and of the language.
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=pytest.mark.slow if i % 3 else ()) for i, name in enumerate(LESSONS)]
 )

@@ -40,7 +40,7 @@ async def test_page_without_map_gets_poses_each_second(shown: Shown) -> None:
         assert frames["drawing"] > 0
         assert frames["reading"] == 0
         await reading.send(json.dumps({"type": "watch", "robot": "a", "moving": True}))
-        while not isinstance(await reading.recv(), bytes):  # the map is shown now
+        while not isinstance(await reading.recv(), bytes):  # by now the map is shown
             pass
 
 

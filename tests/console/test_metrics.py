@@ -74,7 +74,7 @@ async def test_the_state_of_robots_and_time(shown: Shown) -> None:
     assert first["roboglot_actions_running", "a"] == 0
     assert first["roboglot_programs_running",] == 0
     still = await scraped(shown)
-    assert still["roboglot_real_time_factor",] == 0  # lockstep: no robot time passed
+    assert still["roboglot_real_time_factor",] == 0  # in lockstep no robot time passed
     await shown.clock.advance(1.0)
     assert (await scraped(shown))["roboglot_real_time_factor",] > 0
 

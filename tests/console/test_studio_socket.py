@@ -181,7 +181,7 @@ async def test_a_class_is_joined_seen_and_handed_in(shown: Shown) -> None:
         assert (row["name"], row["lit"], row["stars"], row["robot"]) == ("Anna", "turn", 4, "a")
         await teacher.say(type="class", do="look", id=9, name="Anna")
         assert (await teacher.kind("looked"))["style"] == '{"body": "x = 1"}'
-        await anna.say(type="check", id=1, body="x = 1\n")  # who works on a program stays in the class
+        await anna.say(type="check", id=1, body="x = 1\n")  # editors stay in the class
         await anna.kind("checked")
         await teacher.say(type="class", do="look", id=10, name="Anna")
         await teacher.kind("looked")
@@ -189,7 +189,7 @@ async def test_a_class_is_joined_seen_and_handed_in(shown: Shown) -> None:
     async with page(shown) as teacher, page(shown) as anna:
         await teacher.say(type="class", do="open", code=code)
         await teacher.kind("grid")
-        await anna.say(type="class", do="join", code=code, name="Anna")  # her first page is closed
+        await anna.say(type="class", do="join", code=code, name="Anna")  # closes her first page
         assert (await anna.kind("joined"))["name"] == "Anna"
 
 
@@ -211,7 +211,7 @@ async def test_hostile_program_is_judged_through_page_as_anywhere(shown: Shown, 
             body = path.read_text("utf-8")
             feedback = (await studio.frame(**SAVE, id=path.stem, body=body))["feedback"]
             assert (feedback["state"] == 0) == (check(body, ability_set().names()) == []), path
-        if feedback["state"]:  # the last one: what was refused does not run, either
+        if feedback["state"]:  # the last one: refused programs do not run, either
             wish = {"type": "task", "operate": "run", "target_id": ["t"], "mode": "single", "condition": "now"}
             assert (await studio.frame(**wish, id="run"))["feedback"]["state"] != 0
 
@@ -240,18 +240,18 @@ async def test_a_flood_of_messages_closes_the_page(shown: Shown) -> None:
 
 
 async def test_codes_cannot_be_tried_out(shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(channel, "MESSAGES_PER_SECOND_MAX", 10_000)  # of another limit
+    monkeypatch.setattr(channel, "MESSAGES_PER_SECOND_MAX", 10_000)  # under another limit
     async with page(shown) as teacher, page(shown) as guest:
         await teacher.say(type="class", do="open", name="7b")
         code = (await teacher.kind("grid"))["code"]
-        for number in range(2 * JOIN_BURST):  # right ones are free
+        for number in range(2 * JOIN_BURST):  # right codes are free
             await guest.say(type="class", do="join", code=code, name=f"pupil {number % 2}")
             await guest.kind("joined")
         for number in range(JOIN_BURST + 1):
             await guest.say(type="class", do="join", id=7, code=f"WRONG{number}", name="Eve")
             why = (await guest.kind("refused"))["why"]
         assert "too many wrong codes" in why
-    async with page(shown) as again:  # the address, not the page
+    async with page(shown) as again:  # counted by address, not by page
         said = set()
         for number in range(JOIN_BURST // 2):
             await again.say(type="class", do="join", id=7, code=f"WRONG{number}", name="Eve")
@@ -260,7 +260,7 @@ async def test_codes_cannot_be_tried_out(shown: Shown, monkeypatch: pytest.Monke
 
 
 async def test_names_alone_do_not_fill_a_class(shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(channel, "MESSAGES_PER_SECOND_MAX", 10_000)  # of another limit
+    monkeypatch.setattr(channel, "MESSAGES_PER_SECOND_MAX", 10_000)  # under another limit
     async with page(shown) as teacher, page(shown) as eve, page(shown) as anna:
         await teacher.say(type="class", do="open", name="7b")
         code = (await teacher.kind("grid"))["code"]

@@ -67,13 +67,13 @@ def test_pages_load_nothing_from_elsewhere() -> None:
 
 
 def test_the_page_is_small_enough() -> None:
-    shown = ("/views/plots.js", "/vendor/uplot.mjs", "/vendor/uplot.css")  # loaded when they are shown
+    shown = ("/views/plots.js", "/vendor/uplot.mjs", "/vendor/uplot.css")  # loaded when shown
     later = (*shown, "/words/server.zh.json")  # loaded after the page
     sent = {
         path: asset
         for path, asset in Assets().all()
         if path not in ("/index.html", "/words/en.json", *later)
-        and not path.startswith(("/studio", "/fleet/"))  # one language is loaded
+        and not path.startswith(("/studio", "/fleet/"))  # only one language is loaded
     }
     assert sum(len(asset.packed) for asset in sent.values()) < 60 * 1024
 
@@ -81,7 +81,7 @@ def test_the_page_is_small_enough() -> None:
 def test_studio_asks_for_all_its_modules_at_once() -> None:
     text = (FOLDER / "studio" / "index.html").read_text("utf-8")
     asked = set(re.findall(r'rel="modulepreload" href="/([^"]+)"', text))
-    later = {"vendor/uplot.mjs", "studio/vendor/codemirror.mjs"}  # with the first plot, the first text
+    later = {"vendor/uplot.mjs", "studio/vendor/codemirror.mjs"}  # with the first plot or text
     packages = set(re.findall(r'":"/([^"]+)"', text)) - later
     wanted, new = packages, {Path("studio/main.js")}
     while new:

@@ -91,7 +91,7 @@ def check(recording: DriveLog, mount: float) -> None:
         assert recorded.odometry.relative_to(start).distance_to(pose.relative_to(POSES[0])) < 1e-6
         assert scan.stamp == pytest.approx(100 + number)
         assert scan.angles == pytest.approx(ANGLES, abs=1e-6)
-        assert np.isinf(scan.ranges[40:44]).all()  # nothing within range, which is not the same as not measured
+        assert np.isinf(scan.ranges[40:44]).all()  # nothing within range, as opposed to not measured
         seen = np.isfinite(scan.ranges)
         assert seen.sum() == 177
         assert scan.ranges[seen] == pytest.approx(np.array(ranges_at(number))[seen], abs=1e-5)

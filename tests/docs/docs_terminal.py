@@ -32,7 +32,7 @@ TICK, PAUSE = 0.1, 0.01  # s of the robot, of the machine
 PATIENCE = 300.0  # s of the machine: for tests that fail
 TOOLS = {
     "sleep": "#!/bin/sh\nexec /bin/sleep 0.05\n",
-    # bash reads until as many answers came as there were commands; `timeout 5 cat` would wait five seconds
+    # bash reads until each command has its answer; `timeout 5 cat` would wait five seconds
     "timeout": "#!/bin/bash\nfor ((n = ANSWERS; n > 0; n--)); do read -rd';' answer; printf '%s;' \"$answer\"; done\n",
 }
 T = TypeVar("T")
@@ -54,10 +54,10 @@ class Terminal:
     runtime: Runtime
     address: str
     folder: Path
-    start: Pose  # of the robot in the world
-    app_port: int  # which the robot calls
+    start: Pose  # the robot's place in the world
+    app_port: int  # called by the robot
     bumps: list[BumperPressed] = field(default_factory=list)
-    track: list[Pose] = field(default_factory=list)  # where it has been in truth, seen from its start
+    track: list[Pose] = field(default_factory=list)  # true places, seen from the start
 
     @property
     def robot(self) -> Robot:

@@ -19,7 +19,7 @@ LINK = re.compile(r"!?\[[^]]*\]\(([^)\s]+)\)")
 FOREIGN = re.compile(r"[a-z]+:|//")
 PATH = re.compile(r"`([\w.-]+(?:/[\w.-]+)+\.(?:py|toml|md|json|proto|yaml|xml|sql))`")
 HOMES = (ROOT, ROOT / "src", ROOT / "src/roboglot")
-# On no PATH of a newcomer: these are in .venv/bin.
+# Not on a newcomer's PATH: these are in .venv/bin.
 BARE = re.compile(r"(?:^|[|;&(] *)(?:\$ )?(roboglot|python3?|pip|pytest|ruff|mypy)(?= )", re.MULTILINE)
 NAMES = [str(page.relative_to(ROOT)) for page in PAGES]
 every_page = pytest.mark.parametrize("page", PAGES, ids=NAMES)

@@ -18,8 +18,8 @@ FENCED = re.compile(r"^ *```\w*[^\n]*\n(.*?)^ *```", re.MULTILINE | re.DOTALL)
 INLINE = re.compile(r"`([^`\n]*roboglot [^`\n]*)`")
 COMMAND = re.compile(r"\s*(?:\$ |[A-Z_]+=\S+ )*(?:\.venv/bin/)?roboglot (.*)")
 ENDS = re.compile(r"\s#.*|[;&|>].*|\s<<.*")
-WRONG: Any = typer.BadParameter.__base__  # what Typer raises for wrong options and arguments
-IN_PROSE = ("MissingParameter", "BadOptionUsage")  # a command is named there, or has placeholders in capitals
+WRONG: Any = typer.BadParameter.__base__  # raised by Typer for wrong options and arguments
+IN_PROSE = ("MissingParameter", "BadOptionUsage")  # names of commands, or placeholders in capitals
 
 
 def shown(page: Path) -> Iterator[tuple[str, bool]]:

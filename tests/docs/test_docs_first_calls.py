@@ -23,7 +23,7 @@ RUN = {
 }
 SUFFIX = {"sh": "sh", "python": "py", "js": "mjs", "go": "go"}
 NEEDS = {"sh": "curl", "python": sys.executable, "js": "node", "go": "go"}
-# Go's compiler takes a while.
+# Go's compiler is slow.
 LANGUAGES = pytest.mark.parametrize(
     "languages", [["sh", "python", "js"], pytest.param(["go"], marks=pytest.mark.slow)], ids=" ".join
 )
@@ -39,7 +39,7 @@ def first_call(page: str, language: str) -> str:
 
 @pytest.fixture
 async def user(tmp_path: Path, request: pytest.FixtureRequest) -> AsyncIterator[Terminal]:
-    address = f"127.0.7.{zlib.crc32(request.node.name.encode()) % 250 + 2}"  # tests run beside each other
+    address = f"127.0.7.{zlib.crc32(request.node.name.encode()) % 250 + 2}"  # tests run in parallel
     async with terminal(tmp_path, address) as opened:
         assert (await opened.type(".venv/bin/roboglot certs --export phone")).status == 0
         yield opened

@@ -16,8 +16,8 @@ from tests.docs.docs_terminal import ROOT, commands, terminal
 from tests.docs.test_docs import blocks
 
 STARTS, DOCS = [ROOT / "docs/start.md", ROOT / "docs/start.zh.md"], ROOT / "docs/protocols"
-SLACK = 0.08  # m: what odometry is wrong by after half a metre
-GOAL = 0.12  # m: how near a goal a dog's task ends, and what localization is wrong by
+SLACK = 0.08  # m: error of odometry after half a metre
+GOAL = 0.12  # m: tolerance of a dog's task, and the error of localization
 
 
 def block_with(page: Path, words: str, language: str = "sh") -> str:
@@ -31,7 +31,7 @@ def inline(page: Path, words: str) -> str:
     return str(found)
 
 
-@pytest.mark.parametrize(  # the Chinese page drives by the same commands
+@pytest.mark.parametrize(  # the Chinese page has the same commands
     "page",
     [STARTS[0], *(pytest.param(page, marks=pytest.mark.slow) for page in STARTS[1:])],
     ids=lambda page: page.name,
@@ -86,7 +86,7 @@ async def test_the_dogs_page_localizes_and_goes(tmp_path: Path) -> None:
         assert_pose(user.moved, x=1.5, y=0.2, within=GOAL)
 
 
-@pytest.mark.slow  # the command goes there in tests/cli/test_cyberdog_cli.py, the English page's messages above
+@pytest.mark.slow  # tests/cli/test_cyberdog_cli.py runs the command there, the English page above its messages
 async def test_the_dogs_chinese_page_goes_there_too(tmp_path: Path) -> None:
     [line] = re.findall(r"^.*cyberdog go 1.5 0.2", block_with(DOCS / "cyberdog.zh.md", "cyberdog go"), re.MULTILINE)
     async with terminal(tmp_path, "127.0.0.75", body="cyberdog2") as user:
@@ -111,7 +111,7 @@ async def test_the_page_of_programs_runs_and_keeps_them(tmp_path: Path) -> None:
         (tmp_path / "greet.py").write_text("def greet(name):\n    print('hello', name)\n")
         said = {}
         for line in commands(block_with(DOCS / "visual.md", "program check my_program.py")):
-            if not re.search("--cycle|--break|--own|suspend", line):  # these wait for someone, or start a robot
+            if not re.search("--cycle|--break|--own|suspend", line):  # these wait for input, or start a robot
                 said[line.split()[2]] = ended = await user.type(line)
                 assert ended.status == 0, ended
         assert "my_program" in said["list"].said

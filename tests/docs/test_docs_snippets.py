@@ -34,7 +34,7 @@ from tests.docs.test_docs import ROOT, blocks
 from tests.narrowing import of_kind
 
 LOOK = re.compile(r"(async for frame in frames|async for packet in packets): \.\.\.")
-SECONDS = 3.0  # of the robot, for snippets that look on for ever
+SECONDS = 3.0  # s of robot time, for snippets that watch without end
 
 
 def snippet(page: str, words: str) -> str:

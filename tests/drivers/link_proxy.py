@@ -7,8 +7,8 @@ import contextlib
 
 from roboglot.model.clock import Clock
 
-RESENT = 0.25  # robot s after which TCP sends again what got lost
-LOST = 8  # one piece in so many
+RESENT = 0.25  # robot s after which TCP resends a lost piece
+LOST = 8  # one piece in this many
 
 
 class Fault:
@@ -16,13 +16,13 @@ class Fault:
 
     def __init__(self) -> None:
         self.delay = 0.0  # robot s, each way
-        self.lossy = False  # TCP comes late, datagrams do not come
-        self.silent = False  # half-open: nothing passes, no one is notified
-        self.garbage = b""  # said instead of the robot's next answers
-        self.after = b""  # a question from which on garbage is what it answers
-        self.late = b"", 0.0  # a question whose own answer comes so much later, robot s
+        self.lossy = False  # delays TCP, drops datagrams
+        self.silent = False  # half-open: nothing passes, neither end is notified
+        self.garbage = b""  # sent in place of the robot's next answers
+        self.after = b""  # the question from which on garbage is the answer
+        self.late = b"", 0.0  # a question whose own answer is late, by robot s
         self.refusing = False
-        self.deaf = False  # datagrams do not come: a firewall before the push port
+        self.deaf = False  # drops datagrams: a firewall before the push port
 
     def heal(self) -> None:
         """All is well again."""
@@ -59,7 +59,7 @@ class Proxy:
         for task in tuple(self._tasks):
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
-        await asyncio.sleep(0.02)  # a client that was let in or dialled meanwhile comes to his end
+        await asyncio.sleep(0.02)  # a client that was accepted or dialled meanwhile is closed, too
         for writer in tuple(self._writers):
             writer.transport.abort()
             with contextlib.suppress(OSError):

@@ -9,8 +9,8 @@ import os
 import threading
 import time
 
-ROUNDS = 3  # looks in a row that find no one at work: a thread that waits for Python's lock seems to sleep
-GLANCE = 0.0005  # real s between two looks at a thread that works
+ROUNDS = 3  # idle samples in a row: a thread that waits for Python's lock seems to sleep
+GLANCE = 0.0005  # real s between two samples of a working thread
 SETTLE_MAX = 2.0  # real s: some threads never rest
 
 

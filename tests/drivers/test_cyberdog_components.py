@@ -158,7 +158,7 @@ async def test_labels_of_its_map_are_places_here(labelled: Robot, driven: Robot)
     hall = PointOfInterest("hall-1", Pose(0.75, 0.5, 1.0), {"display_name": "hall"})
     await near.put(hall)
     await labels_are(kitchen=Point(0.5, 0.25), hall=Point(0.75, 0.5))
-    assert near.get("hall-1") == hall  # the heading stays, which labels have not
+    assert near.get("hall-1") == hall  # the heading stays; labels have none
     await near.put(replace(kitchen, pose=Pose(0.1, 0.2)))
     await labels_are(kitchen=Point(0.1, 0.2), hall=Point(0.75, 0.5))
     await near.remove(kitchen.id)
@@ -178,7 +178,7 @@ async def test_its_skin_shows_what_it_is_given(driven: Robot, robot: Robot) -> N
     await becomes(pattern=SkinPattern.REARWARD, cycle=1.5)
     near.show(SkinPattern.FOOTFALLS, standing=Shade.DARK)
     await becomes(pattern=SkinPattern.FOOTFALLS, standing=Shade.DARK)
-    assert set(near.shades) == {Patch.FRONT, Patch.MIDDLE, Patch.REAR}  # no one tells it of the feet
+    assert set(near.shades) == {Patch.FRONT, Patch.MIDDLE, Patch.REAR}  # the feet are not reported
     near.enable(False)
     await becomes(enabled=False)
     with pytest.raises(InvalidGoal):

@@ -129,19 +129,19 @@ async def test_it_stands_square_before_stairs(
     await until(lambda: nowhere.status.ended)
     assert isinstance(nowhere.error, NotFound)
     world.hands.place("a", Pose(3.3, 4.0, 0.3))
-    await forward(seconds=0.3)  # until its eyes have measured there
+    await forward(seconds=0.3)  # until its depth sensors have measured there
     action = alignment.align(StairDirection.UP, source="test")
     await until(lambda: action.feedback is AlignmentStage.ALIGNING)
     await done(action, until)
     assert_pose(world.truth.pose_of("a"), x=3.45, deg=0, within=0.03, within_deg=3)
     world.hands.place("a", Pose(3.3, 4.0, 0.3))
-    await forward(seconds=0.3)  # until its eyes have measured there
+    await forward(seconds=0.3)  # until its depth sensors have measured there
     action = alignment.align(StairDirection.UP, source="test")
     await until(lambda: action.feedback is AlignmentStage.ALIGNING)
     action.cancel()
     await until(lambda: action.status.ended)
     assert action.status is ActionStatus.CANCELED
-    assert not robot.actions.running(BASE)  # the dog was ordered to, and stands
+    assert not robot.actions.running(BASE)  # as ordered, and the dog stands
     assert world.truth.pose_of("a").x < 3.44
 
 
@@ -207,7 +207,7 @@ async def test_postures_figures_and_gaits_are_the_dogs(driven: Robot, robot: Rob
 async def test_follows_and_docks_by_own_skills_when_localized(
     driven: Robot, robot: Robot, until: Until, world: World
 ) -> None:
-    start = world.truth.pose_of("a")  # where it is localized: it is not carried elsewhere
+    start = world.truth.pose_of("a")  # at its localized place: it is not carried away
     anna = start.compose(Pose(3.0))
     world.hands.person("anna").place(anna.x, anna.y, math.degrees(start.yaw) + 180.0)
     following = driven[Following].follow(distance=1.2, source="test")
@@ -216,7 +216,7 @@ async def test_follows_and_docks_by_own_skills_when_localized(
     await until(lambda: following.status.ended)
     assert following.status is ActionStatus.CANCELED
     await until(lambda: not robot.actions.running())
-    await until(lambda: driven[Localization].enabled)  # it found itself again
+    await until(lambda: driven[Localization].enabled)  # it localized itself again
     with pytest.raises(InvalidGoal):
         driven[Following].follow(distance=9.0)
     tagged = driven[Following].follow_tag(source="test")
@@ -235,16 +235,16 @@ async def test_unowned_task_is_stopped_when_the_link_returns(
     await until(lambda: robot[Base].velocity.x > 0.1)
     (skill,) = robot.actions.running(BASE)
     with monkeypatch.context() as broken:
-        broken.delattr(link_module, "_heartbeat")  # the dog's heartbeats do not get through
+        broken.delattr(link_module, "_heartbeat")  # the dog's heartbeats are lost
         await until(lambda: going.status.ended)
-    assert not skill.status.ended  # it sees to its safety itself
+    assert not skill.status.ended  # the dog stops on its own
     reported = driven.events.subscribe(LinkChanged)
     await until(lambda: driven[Link].state is LinkState.UP, patience=60)
     await until(lambda: skill.status.ended, patience=2)
     assert skill.status is ActionStatus.CANCELED
     begun = driven.clock.time()
     await until(lambda: driven.clock.time() - begun > 1.5)  # heartbeats later
-    assert OTHERS not in {event.holder for event in reported.drain()}  # it was ours all the time
+    assert OTHERS not in {event.holder for event in reported.drain()}  # ours all the time
     reported.close()
 
 

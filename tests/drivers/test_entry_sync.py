@@ -49,7 +49,7 @@ async def test_what_changes_on_one_side_changes_on_other(
     await near.remove(place("desk").id)
     await until(lambda: len(far.all()) == 1, patience=1)
     assert far.all()[0].pose.x == 3.0
-    # Without a link each side goes its own way; afterwards both have all of it, and of two opinions the robot's counts.
+    # Without a link both sides change; afterwards both have every entry, and where they differ the robot's counts.
     await slamware_door.close()
     await until(lambda: driven[Link].state is LinkState.LOST)
     await near.put(place("away"), place("hall", x=7.0))
@@ -110,6 +110,6 @@ async def test_walls_and_areas_are_heeded_by_the_robot(
     await until(lambda: drawn(far) == {("dangerous", 2.0, 0.5)}, patience=1)
     await forward(seconds=6)
     assert drawn(near) == drawn(far)
-    driven[Mapping].load(driven[Mapping].grid, Pose())  # which wipes what is drawn on the robot's map
+    driven[Mapping].load(driven[Mapping].grid, Pose())  # clears the drawings on the robot's map
     await forward(seconds=3)
     assert drawn(near) == drawn(far) == {("dangerous", 2.0, 0.5)}

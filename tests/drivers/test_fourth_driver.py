@@ -129,7 +129,7 @@ async def test_a_fourth_driver_is_a_value(cart: tuple[Cart, str], drive: Drive, 
     assert robot[Link].reason == "the cart hung up"
     with pytest.raises(Unconnected):
         robot[Base].set_velocity(Twist(0.2))
-    await until(lambda: robot[Link].state is LinkState.UP)  # the supervisor has connected again
+    await until(lambda: robot[Link].state is LinkState.UP)  # the supervisor has reconnected
 
 
 def test_options_that_driver_does_not_name_are_refused(cart: tuple[Cart, str], clock: LockstepClock) -> None:

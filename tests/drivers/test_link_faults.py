@@ -77,7 +77,7 @@ FAULTS: dict[str, tuple[Callable[[Rig], Awaitable[None]], Callable[[Rig], Awaita
 }
 
 
-# Each driver notices silence in its own way; what follows on other faults is the supervisor's, the same for all.
+# Each driver notices silence in its own way; the supervisor handles all other faults alike.
 QUICK = {
     *((back, "half-open") for back in BACKS),
     ("slamware", "cut"),
@@ -114,7 +114,7 @@ async def test_stops_in_time_reports_truthfully_and_comes_back(
         await until(clock, lambda: action.status.ended, 3)  # nothing hangs
         assert action.status is ActionStatus.ABORTED
         await refused(driven)
-        # The doors in front are open, tell it, and refuse what would move the robot.
+        # The doors in front are open, report it, and refuse to move the robot.
         health = await dashboard.get_robot_health()
         assert health.has_error
         assert (await dashboard.get_power_status()).battery_percentage > 0
@@ -122,7 +122,7 @@ async def test_stops_in_time_reports_truthfully_and_comes_back(
         await end(way)
         await until(clock, lambda: link.state is LinkState.UP)
         assert driven[Health].faults == []
-        await stands(world, clock)  # nothing that was asked for meanwhile is done late
+        await stands(world, clock)  # nothing that was requested meanwhile is done late
         await succeeds(driven)
 
 
@@ -134,7 +134,7 @@ async def test_new_certificates_are_used_at_once(back: str, way: Rig, connect: C
         await other_certificates(way)
         await until(clock, lambda: link.state is LinkState.LOST, 3)
         await clock.sleep(4)
-        assert link.state is LinkState.LOST  # no one is let in with the old ones
+        assert link.state is LinkState.LOST  # the old ones let no client in
         assert link.reason
         await stands(world, clock)
         way.hand_out_certificates()
@@ -160,7 +160,7 @@ async def test_a_bad_link_still_drives(back: str, fault: str, way: Rig, connect:
         start = await succeeds_slowly(driven, world)
         assert world.truth.pose_of("a").relative_to(start).x == pytest.approx(0.2, abs=0.05)
         assert driven[Link].state is LinkState.UP
-        action = await drives(driven, world)  # and it stops when its client is gone
+        action = await drives(driven, world)  # it stops when its client is gone
         action.cancel("its client is gone")
         await driven.clock.sleep(0.8)  # half a second, and braking
         await stands(world, driven.clock)
@@ -174,7 +174,7 @@ async def test_link_that_is_too_slow_counts_as_lost(back: str, way: Rig, connect
         action, clock, link = await drives(driven, world), driven.clock, driven[Link]
         way.fault.delay = slow
         assert await until(clock, lambda: link.state is not LinkState.UP, 5) <= NOTICED[back] + slow
-        await clock.sleep(2 * slow + 0.3)  # what was on its way arrives, and it brakes
+        await clock.sleep(2 * slow + 0.3)  # late commands arrive, and it brakes
         await stands(world, clock)
         assert action.status is ActionStatus.ABORTED
         if link.state is not LinkState.UP:
@@ -213,7 +213,7 @@ async def test_robot_away_at_the_start_is_connected_later(
         await refused(driven)
         dashboard, script = await rest(driven), await text_door(driven)
         for asked in (dashboard.get_power_status, dashboard.get_odo_pose, dashboard.get_current_speed):
-            with pytest.raises(SlamwareRefused, match="is not connected"):  # nothing is made up
+            with pytest.raises(SlamwareRefused, match="is not connected"):  # no value is invented
                 await asked()
         for question in ("robot battery", "chassis position", "chassis speed", "chassis attitude", "gimbal attitude"):
             assert await script.ask(f"{question} ?;") == "fail"
@@ -271,7 +271,7 @@ async def test_releasing_a_silent_robot_ends_while_time_stands(
         start = world.truth.pose_of("a")
         await until(driven.clock, lambda: world.truth.pose_of("a").distance_to(start) > 0.1, 5)
         way.fault.silent = True
-    # What is left is the fixtures' to close, and no one moves the clock: it must not hang.
+    # The fixtures close the rest while the clock stands still: it must not hang.
 
 
 @pytest.mark.parametrize("back", ["robomaster"])

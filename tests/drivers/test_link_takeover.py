@@ -45,21 +45,21 @@ async def test_task_still_running_at_reconnection_is_stopped(
         await until(driven.clock, lambda: action.status is ActionStatus.ABORTED, 3)  # its client was notified
         lost = world.truth.pose_of("a")
         await driven.clock.sleep(0.5)
-        assert world.truth.pose_of("a").distance_to(lost) > 0.05  # the robot goes on by its own skill
+        assert world.truth.pose_of("a").distance_to(lost) > 0.05  # the robot goes on with its own action
         reported = driven.events.subscribe(LinkChanged)
         await healed(way)
         await until(driven.clock, lambda: driven[Link].state is LinkState.UP)
         await driven.clock.sleep(1)
-        assert OTHERS not in {event.holder for event in reported.drain()}  # it is ours while it brakes
+        assert OTHERS not in {event.holder for event in reported.drain()}  # ours while it brakes
         reported.close()
-        assert world.truth.pose_of("a").distance_to(start) < 3.5  # on the way
+        assert world.truth.pose_of("a").distance_to(start) < 3.5  # under way
         await stands(world, driven.clock)
 
 
 @pytest.mark.parametrize("back", ["slamware"])
 async def test_what_is_ours_is_never_taken_for_anothers(back: str, way: Rig, connect: Connect, world: World) -> None:
     async with connect() as driven:
-        way.fault.late = b"MoveByAction", 0.4  # the robot tells its number before this answer makes it ours
+        way.fault.late = b"MoveByAction", 0.4  # the robot reports its number before this answer makes it ours
         with driven.events.subscribe(LinkChanged) as reported:
             action = driven[Driving].drive(Twist(x=0.2), source="test")
             await driven.clock.sleep(3)
@@ -74,7 +74,7 @@ async def test_task_begun_with_lost_answer_is_stopped_too(back: str, way: Rig, c
         way.fault.after = b"MoveToAction"
         action = driven[Navigation].navigate_to([Point(here.x + 4.0, here.y)], NavigationOptions(), source="test")
         await until(driven.clock, lambda: action.status is ActionStatus.ABORTED, 3)
-        await until(driven.clock, lambda: world.truth.pose_of("a").distance_to(start) > 0.2)  # it did begin
+        await until(driven.clock, lambda: world.truth.pose_of("a").distance_to(start) > 0.2)  # it has begun
         await healed(way)
         await until(driven.clock, lambda: driven[Link].state is LinkState.UP)
         await driven.clock.sleep(1)
@@ -99,7 +99,7 @@ async def test_another_client_takes_over_from_a_manual_driver(
         assert await script.ask("chassis speed x 0.3 y 0 z 0;") == "fail"
         assert await script.ask("chassis move x 0.3;") == "fail"
         assert [each.name for each in driven[Health].faults] == [OUTSIDE]
-        await theirs  # no one interrupts it
+        await theirs  # nothing interrupts it
         await until(driven.clock, lambda: not driven[Link].holder, 1)
         assert await script.ask("chassis speed x 0.1 y 0 z 0;") == "ok"  # it is free
         await until(driven.clock, lambda: driven[Link].holder == US, 1)

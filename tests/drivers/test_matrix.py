@@ -34,8 +34,8 @@ CELLS = [
 ]
 
 
-TELLS_NO_POSE = {("robomaster", "cyberdog")}  # the dog's app is given a pose in the map, and an EP has neither
-# RoboMaster's words know no goals, and an EP has neither navigation nor a lidar for ours.
+TELLS_NO_POSE = {("robomaster", "cyberdog")}  # the dog's app gets a map pose, and an EP has neither map nor pose
+# RoboMaster's text has no goals, and an EP has neither navigation nor a lidar for ours.
 NAVIGATES = {("slamware", "cyberdog"), ("slamware", "visual"), ("cyberdog", "slamware"), ("cyberdog", "visual")}
 LEFT = 0.5  # m
 
@@ -84,17 +84,17 @@ async def test_a_cell(
     await robot.clock.sleep(2)
     driven = await drive(url)
     assert driven[Link].state is LinkState.UP
-    await robot.clock.sleep(3.0 if back == "cyberdog" else 0.5)  # a dog finds itself in its map meanwhile
+    await robot.clock.sleep(3.0 if back == "cyberdog" else 0.5)  # meanwhile a dog localizes itself in its map
     async with front(door, driven, tmp_path / "front", free_port) as client:
         assert await client.battery() == pytest.approx(robot[Battery].state.percentage * 100, abs=1)
         reported_start, start = await client.pose(), world.truth.pose_of("a")
         assert (reported_start is None) is ((back, door) in TELLS_NO_POSE)
-        for _ in range(3):  # an open square: its end is not its beginning, and left is not right
+        for _ in range(3):  # an open square: start and end differ, and so do left and right
             await client.side()
             await client.turn()
         await robot.clock.sleep(1)
         real = world.truth.pose_of("a").relative_to(start)
-        assert_pose(real, x=0.0, y=0.4, deg=-90, within=0.2, within_deg=25)  # some clients only know times
+        assert_pose(real, x=0.0, y=0.4, deg=-90, within=0.2, within_deg=25)  # some clients only report times
         if reported_start is not None:
             await agree(client, reported_start, real)
         if (back, door) in NAVIGATES:

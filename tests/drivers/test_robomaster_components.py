@@ -180,7 +180,7 @@ async def test_lamps_shine_through(script: Script, robot: Robot, driven_ep: Robo
 async def test_lamps_shine_again_after_a_lost_link(driven_ep: Robot, robot: Robot, forward: Forward) -> None:
     driven_ep[Light].shine("rear", Colour(7, 8, 9))
     await forward(seconds=0.2)
-    robot[Light].shine("rear", Colour())  # someone else
+    robot[Light].shine("rear", Colour())  # another client
     driven_ep[Base]._client._link._transport.abort()  # type: ignore[attr-defined]
     await forward(seconds=2)
     assert driven_ep[Link].state is LinkState.UP
@@ -248,7 +248,7 @@ async def test_the_robots_own_packets_reach_the_next_door(driven_ep: Robot, forw
                 break
     assert packets == others
     assert packets[0].keyframe
-    assert packets[0].data.startswith(b"\x00\x00\x00\x01\x09")  # a delimiter, as the EP's door begins a picture
+    assert packets[0].data.startswith(b"\x00\x00\x00\x01\x09")  # a delimiter: the EP's door begins pictures with it
     assert not packets[1].keyframe
 
 

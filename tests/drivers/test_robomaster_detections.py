@@ -41,7 +41,7 @@ def test_distance_of_a_whole_person_follows_box_bottom(where: Locator) -> None:
 def test_cut_off_person_is_measured_by_width(where: Locator) -> None:
     seen = where.person(Target(0.75, 0.5, ACROSS * FOCAL / 2.0 / WIDTH, 1.0), 1)
     assert seen.distance == pytest.approx(2.0)
-    assert seen.place.x > 0.5  # ahead of base_link, for the camera looks to the left
+    assert seen.place.x > 0.5  # ahead of base_link: the camera looks to the left
 
 
 def test_people_keep_their_numbers_while_they_stay_near() -> None:

@@ -118,10 +118,10 @@ async def test_it_sees_people_markers_and_lines(
         place = anna.relative_to(world.truth.pose_of("a"))
         assert (seen.place.x, seen.place.y) == pytest.approx((place.x, place.y), abs=0.4)
         await forward(seconds=0.5)
-        assert {look.seen[0].number for look in watching.drain()} == {seen.number}  # the nearest stays the same one
+        assert {look.seen[0].number for look in watching.drain()} == {seen.number}  # the nearest one stays the same
     world.hands.place(
         "a", Pose(4.0, 1.5, -math.pi / 2)
-    )  # before the south wall: left (red), forward (blue), right (red)
+    )  # in front of the south wall: left (red), forward (blue), right (red)
     with vision.markers.subscribe(), vision.lines.subscribe():
         await until(lambda: vision.markers.latest is not None and len(vision.markers.latest.seen) > 1)
         assert vision.markers.latest
@@ -130,7 +130,7 @@ async def test_it_sees_people_markers_and_lines(
         assert all(reported[symbol].colour is Colour.RED for symbol in reported if symbol != "forward")
         assert reported["forward"].distance == pytest.approx(
             1.4 * 0.17 / 0.3, abs=0.1
-        )  # taken to be as small as the maker's
+        )  # assumed to be as small as the maker's
         await until(lambda: vision.lines.latest is not None and vision.lines.latest.seen)
         assert vision.lines.latest
         with robot[Vision].lines.subscribe():

@@ -25,7 +25,7 @@ async def main():
 
 asyncio.run(main())
 """
-PATIENCE = 20  # s, of a busy machine
+PATIENCE = 20  # s, on a busy machine
 
 
 @pytest.fixture
@@ -62,7 +62,7 @@ def test_a_program_at_rest_may_be_stopped(robot: socket.socket) -> None:
         connection.settimeout(1.0)
         with pytest.raises(TimeoutError):
             connection.recv(1)
-        program.kill()  # and even so its death is noticed
+        program.kill()  # its death is noticed all the same
         connection.settimeout(PATIENCE)
         assert connection.recv(1) == b""
     finally:

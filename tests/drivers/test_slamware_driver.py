@@ -92,7 +92,7 @@ async def test_battery_and_speed_are_the_robots(driven: Robot, robot: Robot, tex
     assert await client.ask("chassis speed x 0.3 z 0;") == "ok"
     await forward(seconds=1.5)
     assert (await client.numbers("chassis speed ?;"))[0] == pytest.approx(0.3, abs=0.03)
-    assert await client.ask("gimbal moveto p 10;") == "fail"  # there is none behind this driver
+    assert await client.ask("gimbal moveto p 10;") == "fail"  # this driver has none
     assert Gimbal not in driven
 
 
@@ -152,7 +152,7 @@ async def test_limit_of_killed_program_is_restored_next_time(
         first = await run()
         first.robots["b"][Driving].drive(Twist(x=0.1), source="test")
         await forward(seconds=1)
-        dead = SlamwareClient("127.0.0.1", 9, clock=clock)  # a killed program says nothing more
+        dead = SlamwareClient("127.0.0.1", 9, clock=clock)  # a killed program sends nothing more
         first.robots["b"][Base]._limit_restore._client = dead  # type: ignore[attr-defined]
         await first.close()
         dead.close()
@@ -236,12 +236,12 @@ async def test_the_lease_tells_who_moves_the_robot(
         with pytest.raises(Busy, match="another client"):
             driven[Driving].move_by(Pose(x=0.2), source="test")
         with pytest.raises(Busy, match="another client"):
-            driven[Localization].relocalize(source="test")  # which would end what the other has it do
+            driven[Localization].relocalize(source="test")  # would end the other driver's action
         taking = asyncio.ensure_future(driven[Lease].take("test"))
         while not taking.done():
             await forward(seconds=0.02)
         with driven.events.subscribe(LinkChanged) as reported:
-            await forward(seconds=1)  # it brakes, and no one takes it for the other's any more
+            await forward(seconds=1)  # it brakes, and is not mistaken for the other's
             assert "another client" not in {event.holder for event in reported.drain()}
         await driven[Lease].release()
         mine = driven[Driving].move_by(Pose(x=0.2), source="test")

@@ -12,7 +12,7 @@ from roboglot.model.components.system.link import Link, LinkState
 from roboglot.model.robot import Description, Robot
 
 SERVED, FLAPPING = STEADY + 1.0, 1.0  # s until it is gone again
-FIRST_THERE = 7  # the try, from 0, that finds it; no other does
+FIRST_THERE = 7  # the attempt, from 0, that finds it
 UNKNOWN = Description(maker="", model="", serial="", hardware_version="", software_version="", radius=0.25, height=0.3)
 
 

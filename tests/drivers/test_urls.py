@@ -99,7 +99,7 @@ async def test_own_doors_are_not_discovered_as_robots(clock: LockstepClock, monk
     robots = [RobotConfig("a", "universal", "127.0.0.81"), RobotConfig("b", "robomaster://discover", "127.0.0.82")]
     fleet = build_fleet("empty", robots, clock=clock, seed=1, database=database)
     await fleet.start(wait=True)
-    assert passed_over == {"127.0.0.81", "127.0.0.82"}  # its own, above all: it would drive itself
+    assert passed_over == {"127.0.0.81", "127.0.0.82"}  # its own above all: it would drive itself
     assert fleet.robots["b"][Link].reason == "no free RoboMaster broadcasts here"
     await fleet.close()
     database.close()

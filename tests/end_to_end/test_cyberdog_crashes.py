@@ -88,7 +88,7 @@ async def test_the_robot_is_killed_in_the_middle(tmp_path: Path) -> None:
     async with talking(data) as (_, dog):
         assert (await dog.get_map()).mapName == "attic"
         progress = await dog.update_progress()
-        assert (progress.download_progress, progress.upgrade_progress) == (100, 0)  # what was fetched is there
+        assert (progress.download_progress, progress.upgrade_progress) == (100, 0)  # the fetched files are there
         await dog.install_update(SMALL["md5"])  # type: ignore[arg-type]  # and the normal flow goes on
         assert (await dog.update_status()).status == "update"
 
@@ -101,7 +101,7 @@ async def the_app_is_killed_while_mapping(dog: CyberDogClient, data: Path) -> As
         while (await anext(grids)).width < 50:
             pass
     mapping.leave()
-    await dog.close()  # without a word to the robot
+    await dog.close()  # without notice to the robot
     async with CyberDogClient(ADDRESS, certificates(data), app_port=dog.link.app_port) as again:
         await again.found()
         assert (await again.status())["task_status"]["task_status"] == 5

@@ -14,7 +14,7 @@ ADDRESS = "127.0.7.2"
 SLAM, MULTI = "/api/core/slam/v1", "/api/multi-floor/map/v1"
 LINES = "/api/core/artifact/v1/lines/walls"
 WALL = {"start": {"x": 0.0, "y": 1.0}, "end": {"x": 2.0, "y": 1.0}, "metadata": {"colour": "red"}}
-SECONDS_MAX = 60.0  # until the kernels are there
+SECONDS_MAX = 60.0  # until the kernels are loaded
 
 
 def until(condition: Callable[[], bool]) -> None:

@@ -98,7 +98,7 @@ def test_garbage_at_every_door_harms_no_one(pair: ServedRobot) -> None:
                 try:
                     connection.sendall(junk)
                 except OSError:
-                    continue  # it may hang up in the middle
+                    continue  # it may hang up half-way
         half_open.append(socket.create_connection((FIRST, port), timeout=5))
     assert isinstance(get(POSE), dict)
     with Line(FIRST) as line:
@@ -109,8 +109,8 @@ def test_garbage_at_every_door_harms_no_one(pair: ServedRobot) -> None:
 
 
 def test_memory_does_not_grow_with_requests(pair: ServedRobot) -> None:
-    assert wait_for(lambda: get("/api/core/slam/v1/knownarea")["width"] > 0)  # all is loaded
-    for _ in range(1500):  # what is loaded late, once, does not count
+    assert wait_for(lambda: get("/api/core/slam/v1/knownarea")["width"] > 0)  # everything is loaded
+    for _ in range(1500):  # one-off late loading does not count
         get(POSE)
     before = pair.resident_megabytes
     for _ in range(1500):
@@ -165,7 +165,7 @@ def test_it_ends_in_middle_of_day_of_lockstep(tmp_path: Path) -> None:
             assert line.say("command;chassis speed x 0.1") == ["ok;", "ok;"]
             robot.process.stdin.write("86400\n")
             robot.process.stdin.flush()
-            time.sleep(0.3)  # it is in the middle of it
+            time.sleep(0.3)  # in the middle of the move
             robot.process.send_signal(signal.SIGTERM)
             assert robot.process.wait(10) == 0
 

@@ -14,7 +14,7 @@ import soak
 
 ROUNDS, SETTLED = 4, 1  # the first rounds fill caches and histories
 CONNECTIONS, PROGRAMS = 12, 3  # a round
-GROWTH_MAX = 1.002  # of 200,000 objects: a round may keep 200 of them, some ten for each connection and program
+GROWTH_MAX = 1.002  # of 200,000 objects: a round may keep 200, about ten per connection and program
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ def test_each_place_is_sorted_by_its_lower_neighbour(seed: int, rows: int, colum
     random = np.random.default_rng(seed)
     rays, ways = random.uniform(-1, 1, (rows, columns, 3)), random.uniform(0.1, 3.0, (rows, columns))
     eye = random.uniform(0.0, 0.4, 3)
-    if looks_down:  # on floor, with something here and there
+    if looks_down:  # on the floor, with a few objects
         rays[..., 2] = np.linspace(0.3, -0.8, rows)[:, None]
         ways = eye[2] / np.maximum(-rays[..., 2], 0.1) * random.uniform(0.9, 1.02, ways.shape)
     ways[random.random(ways.shape) < 0.1] = np.inf

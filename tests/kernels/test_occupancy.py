@@ -151,7 +151,7 @@ def test_relocation_finds_a_pose_half_a_metre_off() -> None:
 
 def test_of_equal_places_the_nearest_is_found() -> None:
     corridor = np.zeros((100, 200), np.int16)
-    corridor[20] = corridor[60] = 100  # two walls along x: every place along them fits as well
+    corridor[20] = corridor[60] = 100  # two walls along x: every place along them fits
     points = np.array([(x, y) for x in np.linspace(-0.5, 0.5, 11) for y in (-1.0, 1.0)])
     centre = np.array([5.0, 2.025, 0.0])
     found = correlate(likelihood_field(corridor), points, centre, RESOLUTION, 0.5, 0.2, 0.02, 0.1)
@@ -167,7 +167,7 @@ def test_inflation_closes_what_the_hull_would_touch() -> None:
     assert cost[30, 35] > cost[30, 38] > cost[30, 43] == 1.0
     assert cost[30, 0] == 4.0
     assert list(nearest_open(cost, 30.5, 32.5, 20.0)) == [30, 35]
-    assert list(nearest_open(cost, 30.9, 30.4, 20.0)) == [35, 30]  # not the cell's centre counts but the place
+    assert list(nearest_open(cost, 30.9, 30.4, 20.0)) == [35, 30]  # the place counts, not the cell's centre
     assert len(nearest_open(cost, 30.5, 30.5, 2.0)) == 0
 
 
@@ -182,7 +182,7 @@ def test_obstacles_are_remembered_until_a_ray_passes_through() -> None:
     count, _ = remember(free, seen, far, np.ones(1, np.uint8), pose, 5.0, 4.0, RESOLUTION, noted, count)
     assert seen[10, 30] == 0.0
     assert seen[10, 50] == 4.0
-    free[10, 29] = 100  # a wall beside it explains the echo
+    free[10, 29] = 100  # a wall nearby explains the echo
     count, _ = remember(free, seen, near, np.ones(1, np.uint8), pose, 5.0, 5.0, RESOLUTION, noted, count)
     assert seen[10, 30] == 0.0
 

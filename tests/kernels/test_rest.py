@@ -53,7 +53,7 @@ def test_given_back_memory_is_there_again_when_needed() -> None:
     def compiled() -> int:
         return int(njit(lambda x: x + 1)(41))
 
-    assert compiled() == 42  # LLVM is in memory now
+    assert compiled() == 42  # LLVM is loaded now
     assert rest() > 10_000_000
     blurred = blur(np.ones(4), np.zeros(4, np.float32), 0.0, 0.5, 2.0)
     assert blurred.tolist() == [1.0] * 4

@@ -68,7 +68,7 @@ async def test_stopped_at_once_it_has_one_picture(recorder, lockstep, tmp_path):
     stopping = asyncio.ensure_future(recorder.stop())
     await asyncio.sleep(0)
     with pytest.raises(Refused):
-        await recorder.stop()  # it is being stopped already
+        await recorder.stop()  # it is stopping already
     await lockstep.advance(0.1)
     assert (await stopping).size > 0
     with av.open(str(tmp_path / "short.mp4")) as file:
@@ -89,10 +89,10 @@ async def test_an_end_at_once_takes_no_robot_time(recorder, lockstep, tmp_path):
 @pytest.mark.parametrize("where", ["nowhere/a.mp4", "a.mp4"])
 async def test_a_failure_is_reported_and_leaves_nothing(recorder, lockstep, tmp_path, where):
     recorder.start(tmp_path / where)
-    await lockstep.advance(0.1 if "/" in where else 0.0)  # no folder; or no picture
+    await lockstep.advance(0.1 if "/" in where else 0.0)  # no folder, or no picture
     stopping = asyncio.ensure_future(recorder.stop())
     if "/" not in where:
-        recorder._viewer.close()  # the camera ends before it gave one
+        recorder._viewer.close()  # the camera ended before its first picture
     await lockstep.advance(0.1)
     with pytest.raises(RobotError, match="the recording failed"):
         await stopping

@@ -56,7 +56,7 @@ async def test_no_collection_walks_what_was_imported(tmp_path: Path, monkeypatch
     before = gc.get_freeze_count()
     try:
         await load(lambda: importlib.import_module("heavy_library"))
-        assert gc.get_freeze_count() - before > 20_000  # some of those frozen before have ended meanwhile
+        assert gc.get_freeze_count() - before > 20_000  # some frozen objects have ended meanwhile
         frozen = gc.get_freeze_count()
         await load(lambda: importlib.import_module("heavy_library"))
         assert gc.get_freeze_count() <= frozen, "what is not new leaves garbage to be collected"

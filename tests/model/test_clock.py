@@ -28,7 +28,7 @@ async def test_what_follows_from_instant_happens_before_the_next() -> None:
 
     async def relay(name: str, delay: float) -> None:
         await clock.sleep(delay)
-        for _ in range(20):  # a long chain of wake-ups inside one instant
+        for _ in range(20):  # a long chain of wake-ups within one instant
             await asyncio.sleep(0)
         trace.append((name, clock.time()))
         await clock.sleep(0.5)
@@ -208,7 +208,7 @@ async def test_patient_clock_goes_no_further_than_world(
     hours.now += 1000.0
     assert clock.time() == pytest.approx(100.0 + LEAD)
     clock.reached(100.05)
-    assert clock.time() == pytest.approx(100.0 + LEAD)  # it goes on from where it stood
+    assert clock.time() == pytest.approx(100.0 + LEAD)  # it resumes where it stood
     hours.now += 0.01
     assert clock.time() == pytest.approx(100.0 + LEAD + 0.02)
     clock.pause()
@@ -274,7 +274,7 @@ async def test_longer_work_gives_others_their_turn() -> None:
         await asyncio.sleep(0)
     assert [name for name in done if len(name) == 1] == ["a", "b", "c"]
     assert done.index("after a") < done.index("c")
-    assert [type(failure) for failure in failures] == [ZeroDivisionError]  # and the next had its turn all the same
+    assert [type(failure) for failure in failures] == [ZeroDivisionError]  # the next one had its turn all the same
 
 
 def test_longer_work_is_done_at_once_in_lockstep() -> None:

@@ -84,7 +84,7 @@ async def test_exclusive_control_lasts_until_it_is_released(robot: Robot, forwar
                 robot[Driving].drive(Twist(x=0.2), source="one")
             with pytest.raises(Busy, match="control is taken by a person"):
                 robot[Gimbal].set_speed(0.1, 0.1, source="one")
-    robot[Driving].drive(STILL, lifetime=0.1, source="one")  # to stop is always allowed
+    robot[Driving].drive(STILL, lifetime=0.1, source="one")  # stopping is always allowed
     await lease.take("robomaster 10.0.0.5")  # handed over
     with asking_for(DASHBOARD), pytest.raises(Busy, match=r"taken by robomaster 10\.0\.0\.5"):
         robot[Driving].move_by(Pose(x=0.1), source="two")
@@ -138,7 +138,7 @@ async def test_robot_moved_by_someone_else_is_left_alone(robot: Robot, forward: 
     assert lease.holder
     assert lease.holder.who == OTHERS
     assert faults(robot) == {OUTSIDE: FaultLevel.WARNING}
-    for goal in (Twist(x=0.2), STILL):  # to stop what is not ours would be no more than said
+    for goal in (Twist(x=0.2), STILL):  # stopping another's action would be only a claim
         with asking_for(SCRIPT), pytest.raises(Busy, match="another client moves the robot"):
             robot[Driving].drive(goal, source="one")
     with pytest.raises(Refused, match="cannot cancel"):
@@ -155,7 +155,7 @@ async def test_robot_moved_by_someone_else_is_left_alone(robot: Robot, forward: 
     with asking_for(SCRIPT):
         robot[Driving].drive(Twist(x=0.2), lifetime=0.1, source="one")
     await forward(seconds=1)
-    link.held_by(OTHERS)  # he begins again: that is not fought
+    link.held_by(OTHERS)  # he starts over: the lease does not fight that
     with asking_for(SCRIPT), pytest.raises(Busy, match="another client"):
         robot[Driving].drive(Twist(x=0.2), source="one")
     link.held_by("")

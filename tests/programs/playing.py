@@ -106,7 +106,7 @@ def open_descriptors() -> set[tuple[str, str]]:
     gc.collect()
     found = set()
     for descriptor in os.listdir("/proc/self/fd"):
-        with contextlib.suppress(FileNotFoundError):  # the one of this very listing
+        with contextlib.suppress(FileNotFoundError):  # this listing's own
             found.add((descriptor, os.readlink(f"/proc/self/fd/{descriptor}")))
     return found
 

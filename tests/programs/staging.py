@@ -27,9 +27,9 @@ from roboglot.programs.functions.session import Session, TaskEnded
 from roboglot.programs.functions.table import call as call_function
 
 PRELUDE = ability_set()
-PACE = 0.05  # s of robot time between two looks
+PACE = 0.05  # s of robot time between two samples
 LONGEST = 600.0  # s of robot time for one program
-Act = tuple[float, Callable[[], object]]  # seconds after the program's start, and what happens then
+Act = tuple[float, Callable[[], object]]  # s after the program's start, and the event
 
 
 @dataclass

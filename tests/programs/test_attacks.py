@@ -29,13 +29,13 @@ from roboglot.programs.engine.events import (
 )
 from tests.programs.playing import PRELUDE, Played, open_descriptors, play, process_state
 
-# Twenty seconds of processor have to be used up, by programs that give way to all else: minutes on a busy machine.
+# They use up twenty seconds of processor time at the lowest priority: minutes on a busy machine.
 pytestmark = pytest.mark.timeout(380)
 ATTACKS = sorted((Path(__file__).parent / "attacks").rglob("*.py"))
 LIMITS = Limits(memory=32 * 1024 * 1024, cpu=1, output=300_000)
 AT_ONCE = 8
 
-# How these end with the rules off, besides "somehow": the host has to name the reason.
+# Their ends with the rules off, besides "somehow": the host has to name the reason.
 REASONS = {
     "abort": ExitReason.CRASHED,
     "crash": ExitReason.CRASHED,
@@ -97,7 +97,7 @@ def world() -> Iterator[World]:
     secret = f"CANARY-{secrets.token_hex(8)}"
     with pytest.MonkeyPatch.context() as patch, tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        folder.chmod(0o777)  # only the jail stands between the programs and it, not its permissions
+        folder.chmod(0o777)  # only the jail keeps programs from it, not its permissions
         (folder / "secret.txt").write_text(secret)
         (folder / "secret.txt").chmod(0o666)
         patch.setenv("ROBOGLOT_TEST_SECRET", secret)
@@ -113,7 +113,7 @@ async def played(request: pytest.FixtureRequest, world: World) -> AsyncIterator[
     """All attacks, a few at a time; and after them the engine still works and nothing of theirs is left."""
     before = open_descriptors()
     with pytest.MonkeyPatch.context() as patch:
-        # A tenth of them uses up a second of processor, which takes minutes behind all that a busy machine does.
+        # A tenth of them uses up a second of processor time, which takes minutes on a busy machine.
         patch.setattr(engine_module, "STEPS_BACK_AFTER", 1e6)
         results = await attack_all(world, policy=request.param)
     assert open_descriptors() <= before

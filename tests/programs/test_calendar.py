@@ -94,7 +94,7 @@ def test_when_the_clocks_change() -> None:
     first = due_next(twice, at("2026-10-24 12:00"), BERLIN)
     assert first is not None
     assert shown(first, BERLIN) == "2026-10-25 02:30"
-    assert shown(due_next(twice, first, BERLIN), BERLIN) == "2026-10-26 02:30"  # once, though 02:30 came again
+    assert shown(due_next(twice, first, BERLIN), BERLIN) == "2026-10-26 02:30"  # once, although 02:30 came twice
 
 
 LIMITS = ((3, 40), (2, 19), (5, 28), (2, 11), (1, 6))

@@ -46,7 +46,7 @@ async def test_same_text_is_judged_once_for_all() -> None:
     looks = inspector(judge)
     asking = [asyncio.create_task(looks.inspect("x = (", NONE)) for _ in range(3)]
     await asyncio.sleep(0)
-    asking[0].cancel()  # the page is gone: the others still get their answer
+    asking[0].cancel()  # its page is closed: the others still get their answers
     judge.ready.set()
     assert [await task for task in asking[1:]] == [([WRONG], NONE)] * 2
     assert await looks.inspect("x = (", NONE) == ([WRONG], NONE)

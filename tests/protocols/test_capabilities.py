@@ -33,29 +33,29 @@ from tests.protocols.cyberdog.phone import examples
 from tests.protocols.slamware.generated import SILENCING, Generator
 
 T = TypeVar("T")
-ASKED = 340  # requests made from the OpenAPI document: two of each operation
+ASKED = 340  # requests generated from the OpenAPI document: two of each operation
 PATIENCE = 1300  # times 0.1 s of the robot: a localization gives up after 120 s, and what was asked before may spoil it
 REBOOT = {9031}  # switches the robot off
 OFF = SILENCING | {"POST /api/core/system/v1/power/:hibernate"}
 REFUSED, NOT_IMPLEMENTED = 400, 501
-# Requests that ask by themselves whether a part of a component is there: the page counts them as done, and says so.
+# Requests that check themselves whether a part of a component is there: the page lists them as served, with a note.
 ASK_THEMSELVES = {
     "GET /api/core/system/v1/network/apn",  # a modem
     "PUT /api/core/system/v1/network/apn",
     "PUT /api/core/system/v1/network/route",
     "POST /api/core/system/v1/light/control",  # lamps of that name
-    "POST /api/core/artifact/v1/pois",  # where the robot is, if the place has no pose
+    "POST /api/core/artifact/v1/pois",  # the robot's own place, if the target has no pose
     "1004",  # 213: feet
     "1013",  # a microphone
     "1014",
     "1015",  # eyes
     "3011",
-    "6009",  # 0 stops whatever there is
+    "6009",  # 0 stops everything
 }
 
 every_body = pytest.mark.parametrize(
     "body",
-    [  # the two that share least; the others are slow
+    [  # the two bodies that share least; the others are slow
         pytest.param(
             body,
             marks=[
@@ -98,10 +98,10 @@ async def rest(kind: Kind, robot: Robot, forward: Forward) -> dict[str, object]:
                     request.method, request.url, params=request.params, headers=request.headers, content=request.content
                 )
                 reply = await meanwhile(asked, forward)
-                generator.problem(request, reply)  # it learns names
+                generator.problem(request, reply)  # needs learned names
                 seen[request.key].add(reply.status_code)
     await door.close()
-    # What is refused may have something else against the request before it asks for the part: never a success.
+    # Refused requests may have another fault before the part is asked for: never a success.
     return {
         operation.key: statuses
         for operation in TABLE

@@ -154,7 +154,7 @@ async def test_doors_refuse_in_their_words_and_name_clients(robot: Robot, forwar
         taking = asyncio.ensure_future(robot[Lease].take("robomaster"))
         await forward(seconds=1)
         await taking
-        for action in ("RotateAction", "GoHomeAction"):  # a motion, and an errand of several
+        for action in ("RotateAction", "GoHomeAction"):  # a motion, and an errand of several motions
             with pytest.raises(SlamwareRefused) as refused:
                 await client.begin(action, AngleOptions(1.0) if action == "RotateAction" else None)
             assert refused.value.code == 400

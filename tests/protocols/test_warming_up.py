@@ -60,7 +60,7 @@ async def test_rest_creates_no_action_and_says_why(rest: httpx.AsyncClient, forw
 async def test_a_dogs_task_fails_with_a_feedback(robot: Robot, forward: Forward, tmp_path: Path) -> None:
     door = CyberDogDoor(robot, "127.0.0.1", CyberDogConfig(port=0, app_port=1, plaintext=True), tmp_path)
     await door.start()
-    await forward(seconds=1.0)  # the robot has a map, however soon the first request comes
+    await forward(seconds=1.0)  # the robot has a map, however early the first request
     async with grpc.aio.insecure_channel(f"127.0.0.1:{door.port}") as channel:
         send = service.GrpcAppStub(channel).sendMsg
 

@@ -33,7 +33,7 @@ class Doctor:
     wrong: list[str] = field(default_factory=list)
     schemas: set[int] = field(default_factory=set)
     channels: set[int] = field(default_factory=set)
-    counts: Counter[int] = field(default_factory=Counter)  # of messages by channel
+    counts: Counter[int] = field(default_factory=Counter)  # messages by channel
     seen: Counter[int] = field(default_factory=Counter)  # records by opcode, also inside chunks
     places: dict[tuple[int, int], bytes] = field(default_factory=dict)  # of chunks, attachments, metadata
 

@@ -77,7 +77,7 @@ class Session:
         self.pushed: list[tuple[int, str]] = []
         self.answers: dict[int, list[str]] = {}
         self.heard: dict[tuple[str, Direction], int] = {}
-        self.gone: list[str] = []  # doors whose clients hung up, or called off
+        self.gone: list[str] = []  # doors whose clients hung up or cancelled
         self.tasks: set[asyncio.Task[None]] = set()
         self._numbers = itertools.count()
         self.dog: Link
@@ -194,7 +194,7 @@ async def hold(folder: Path, rounds: int) -> Session:
                 await session.dog_asks(6009, type=0)
                 await clock.advance(1.011)
                 await session.console_does("world/remove_box", number=_last_box(session))
-                await session.dog.close()  # the app goes away without a word
+                await session.dog.close()  # the app leaves without notice
                 await clock.advance(6.557)
             reading.cancel()
         writer.close()

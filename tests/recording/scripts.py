@@ -18,7 +18,7 @@ PYTHON = sys.executable
 CERTIFICATES = ".venv/bin/roboglot certs --export phone"
 ASK = f"{PYTHON} examples/cyberdog_ask.py"
 REST, TEXT, DOG, FRAMES = "slamware", "robomaster", "cyberdog", "visual"
-APP_PORT = 8981  # that a dog calls
+APP_PORT = 8981  # called by a dog
 
 
 @dataclass(frozen=True)

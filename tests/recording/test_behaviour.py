@@ -106,7 +106,7 @@ def test_probes_ask_only_what_reads(door: str) -> None:
 
 def test_absent_robots_and_differing_protocols_are_refused() -> None:
     runner, app = CliRunner(), loaded("compare")
-    for door in ("slamware", "robomaster", "cyberdog", "visual"):  # two that do not answer must not agree
+    for door in ("slamware", "robomaster", "cyberdog", "visual"):  # two silent robots must not agree
         gone = runner.invoke(app, [f"{door}://127.0.193.99:9", f"{door}://127.0.193.99:9"])
         assert (door, gone.exit_code, "fidelity" in gone.output) == (door, 2, False)
     mixed = runner.invoke(app, ["robomaster://127.0.0.1", "slamware://127.0.0.1"])

@@ -74,7 +74,7 @@ def kill_writers(tmp_path: Path) -> None:
     while not all(numbers(tmp_path / f"{number}.mcap") for number in range(KILLS)):
         assert time.monotonic() < deadline
         time.sleep(0.2)
-    time.sleep(1.0)  # some flushes more
+    time.sleep(1.0)  # a few more flushes
     for number, child in enumerate(children):
         killed[number] = time.time_ns()
         child.kill()
@@ -128,11 +128,11 @@ def test_a_part_ends_at_its_size_too(tmp_path: Path) -> None:
     files.open(0)
     for number in range(100):
         files.write(tick(number))
-        files.flush()  # what is not flushed does not count yet
+        files.flush()  # unflushed bytes do not count yet
     files.close()
     found = parts(tmp_path / "x.mcap")
     assert len(found) > 3
-    assert all(path.stat().st_size < 2000 + 3000 for path in found)  # its summary comes on top
+    assert all(path.stat().st_size < 2000 + 3000 for path in found)  # its summary is added
     assert numbers(tmp_path / "x.mcap") == list(range(100))
 
 
@@ -154,7 +154,7 @@ def test_all_parts_are_read_as_one(tmp_path: Path) -> None:
 def test_each_part_begins_with_how_things_stand(tmp_path: Path) -> None:
     files = Files(tmp_path / "x.mcap", ORIGIN, Redaction(), Limits(part_seconds=10.0, total_bytes=9000))
     files.open(0)
-    for number, topic in enumerate(("/a/control", "/a/faults", "/a/control")):  # noted once, at the beginning
+    for number, topic in enumerate(("/a/control", "/a/faults", "/a/control")):  # noted once, at the start
         files.write(Entry(topic, "state", number, number, {"number": number}))
     for second in range(100):
         files.write(tick(second, second))
@@ -163,7 +163,7 @@ def test_each_part_begins_with_how_things_stand(tmp_path: Path) -> None:
     first, *later = sorted(tmp_path.iterdir())
     assert later
     assert parts(first) == [first, *later]
-    standing = list(read_messages(first, "/a/control", "/a/faults"))  # once, though each part has it
+    standing = list(read_messages(first, "/a/control", "/a/faults"))  # once, although each part has it
     assert sorted((one.topic, one.json()["number"]) for one in standing) == [("/a/control", 2), ("/a/faults", 1)]
     assert {one.at for one in standing} == {next(read_messages(first, "/a/events")).at}
     assert numbers(first) == list(range(numbers(first)[0], 100))
@@ -261,7 +261,7 @@ def test_a_file_keeps_the_rules_of_mcap_doctor(tmp_path: Path) -> None:
     part.close()
     data = path.read_bytes()
     assert Doctor(data).examine() == []
-    for place in (len(data) // 2, len(data) - 30):  # and it finds what is wrong
+    for place in (len(data) // 2, len(data) - 30):  # and it finds the fault
         broken = bytearray(data)
         broken[place] ^= 0xFF
         assert not is_well(bytes(broken))

@@ -46,7 +46,7 @@ async def test_real_robot_video_is_recorded_as_it_comes() -> None:
     clock, noted = LockstepClock(), list[Entry]()
     robot = Robot("a", PLATE, clock)
     sampler = Sampler(robot, noted.append, video=True)
-    await clock.advance(2.5)  # its link is not there yet
+    await clock.advance(2.5)  # its link is not up yet
     camera = FarCamera()
     robot.add(VideoStream, cast(VideoStream, camera))
     await clock.advance(1.0)

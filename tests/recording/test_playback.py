@@ -27,7 +27,7 @@ from roboglot.recording.playback import open_playback
 from roboglot.recording.reader import read_recording
 from roboglot.runtime import Runtime
 
-WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])  # files of this folder run side by side
+WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])  # files of this folder run in parallel
 ADDRESS, SECOND = f"127.0.193.{1 + WORKER}", f"127.0.193.{101 + WORKER}"
 SPEED = 4.0
 FAST, LATE = 40.0, 0.2  # s of the robot
@@ -138,7 +138,7 @@ async def test_front_end_repeats_its_result_on_busy_machines(tmp_path: Path, mon
 
 
 async def test_app_of_dog_ends_with_the_same_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tests.recording.test_playback.SPEED", 1.5)  # it drives, also on a machine that is busy
+    monkeypatch.setattr("tests.recording.test_playback.SPEED", 1.5)  # it drives, on a busy machine, too
     ensure_certificates(tmp_path / "data" / "cyberdog")
     export_client(tmp_path / "data" / "cyberdog", tmp_path / "certificates")
     phone = Phone(ADDRESS, tmp_path / "certificates")

@@ -171,7 +171,7 @@ async def test_answer_waits_for_a_push_recorded_just_before() -> None:
     await ask_while(clock, ask(*REQUESTS["visual"], reads=False), 1.0)
     await ask_while(clock, ask("task inquiry", asked % 2, reads=True), 0.3)
     assert sent == ["started", "stopped", "state", "list"]
-    await ask_while(clock, ask("task inquiry", asked % 3, reads=True), 0.0)  # once more: at once
+    await ask_while(clock, ask("task inquiry", asked % 3, reads=True), 0.0)  # the second time: at once
     assert sent[4:] == ["list"]
 
 

@@ -28,7 +28,7 @@ from roboglot.testing.addresses import free_port
 from roboglot.wire.cyberdog.chapters.system import HEARTBEAT
 from tests.recording.test_playback import ADDRESS, PROGRAM, by_frames, by_rest, run, whole_closing
 
-assert whole_closing  # a fixture of these tests, too
+assert whole_closing  # a fixture for these tests, too
 BETWEEN = ADDRESS.replace("127.0.193.", "127.0.195.")
 
 
@@ -117,7 +117,7 @@ async def test_a_phone_and_its_dog_do_not_notice(tmp_path: Path) -> None:
         beats.append([e for e in pushed if e.operation == HEARTBEAT])
     assert pushes[1]
     assert pushes[1] <= pushes[0]
-    assert beats[1]  # the dog itself notes those only that come after the one that found its app
+    assert beats[1]  # the dog itself notes only those after the one that found its app
 
 
 async def test_client_that_looks_for_ep_finds_the_proxy(tmp_path: Path) -> None:

@@ -66,7 +66,7 @@ async def test_mcap_reads_everything_that_was_recorded(tmp_path: Path) -> None:
     assert {"config.json", "universal.toml", "empty.toml"} <= recording.attachments.keys()
     topics = recording.topics
     assert topics["/a/scan"] >= 50
-    assert topics["/a/pose"] == topics["/truth/a/pose"] >= 61  # closing takes time, too
+    assert topics["/a/pose"] == topics["/truth/a/pose"] >= 61  # closing takes a while, too
     assert {"/tf", "/a/map", "/a/battery", "/a/events", "/a/slamware", "/marks", "/log"} <= topics.keys()
     asked, _ = pair(recording.exchanges)
     assert [(a.request.operation, a.replies[0].status) for a in asked] == [
@@ -156,7 +156,7 @@ async def test_last_minutes_are_written_after_an_uncaught_error(tmp_path: Path) 
     await started.close()
     assert "crash-ZeroDivisionError" in path.name
     assert read_recording(path).topics["/a/pose"] >= 15
-    assert [type(error) for error in heard] == [ZeroDivisionError]  # it is handled as ever, too
+    assert [type(error) for error in heard] == [ZeroDivisionError]  # it is handled as usual
     assert loop.get_exception_handler() is not before
 
 

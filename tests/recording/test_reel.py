@@ -16,7 +16,7 @@ from roboglot.recording.reader import BadRecording
 from roboglot.recording.reel import Reel, Shot
 
 MESSAGES = st.lists(st.tuples(st.integers(0, 2), st.integers(1, 60)), min_size=1, max_size=40)
-FLUSHED = st.sets(st.integers(0, 40))  # before which messages a chunk ends
+FLUSHED = st.sets(st.integers(0, 40))  # messages before which a chunk ends
 
 
 def write(path: Path, messages: Sequence[tuple[int, int]], flushed: set[int], *, whole: bool = True) -> None:
@@ -50,7 +50,7 @@ def test_all_come_from_any_moment_in_their_order(
     found = {(names[shot.topic], shot.at, shot.data) for shot in played}
     numbered = enumerate(messages)
     assert found == {(topic, at, struct.pack("<I", number)) for number, (topic, at) in numbered if at >= since}
-    for before, after in pairwise(batches):  # those of one moment come together
+    for before, after in pairwise(batches):  # messages of one instant stay together
         assert before[-1].at < after[0].at
 
 

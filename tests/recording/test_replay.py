@@ -19,7 +19,7 @@ from roboglot.recording.replaying import Replay
 from tests.recording.test_compare import session
 from tests.recording.test_playback import ADDRESS, SPEED, by_frames, by_rest, run, whole_closing
 
-assert whole_closing  # a fixture of these tests, too
+assert whole_closing  # a fixture for these tests, too
 URLS = {"slamware": f"slamware://{ADDRESS}", "visual": f"visual://{ADDRESS}", "robomaster": f"robomaster://{ADDRESS}"}
 
 

@@ -12,7 +12,7 @@ import pytest
 from tests.docs.docs_terminal import terminal
 from tests.recording.scripts import SCRIPTS, Script, play
 
-WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])  # workers run side by side
+WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])  # workers run in parallel
 ADDRESS = f"127.0.196.{1 + WORKER}"
 
 
@@ -25,7 +25,7 @@ def shown(script: Script, ended: list[tuple[int, str]]) -> list[str]:
     """Return the lines that must be the same."""
     texts = [f"{status} {re.sub(script.random or '$^', '', said)}" for status, said in ended]
     lines = "\n".join(texts).splitlines()
-    two = script.two_lines or any("program run" in line for line in script.lines)  # blocks, and what is printed
+    two = script.two_lines or any("program run" in line for line in script.lines)  # blocks, and printed lines
     return sorted(lines) if two else lines
 
 

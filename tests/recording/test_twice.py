@@ -32,7 +32,7 @@ KEYS = {
     "cyberdog": ("10001", "6004"),
     "visual": ("task inquiry", "task run"),
 }
-# Of each request: what it is, after how long its answers come, how long until the pushes, until the next request (ms).
+# For each request: its kind, the delay of its answers, of the pushes, of the next request (ms).
 STEPS = st.tuples(
     st.sampled_from("abcr"), st.integers(0, 400), st.lists(st.integers(0, 900), max_size=3), st.integers(0, 1500)
 )

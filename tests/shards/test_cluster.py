@@ -28,7 +28,7 @@ from roboglot.storage.opening import open_registry
 STORE = 80 << 20
 PATIENCE = 300.0  # s
 FIRST = "127.77.9.1"
-HEALTH = {  # as in deploy/kuberay: a node that is silent for 3 s is gone
+HEALTH = {  # as in deploy/kuberay: a node that is silent for 3 s counts as gone
     "health_check_initial_delay_ms": 1000,
     "health_check_period_ms": 1000,
     "health_check_timeout_ms": 1000,

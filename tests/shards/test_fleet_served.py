@@ -21,7 +21,7 @@ from roboglot.hosting import local_socket
 from roboglot.shards.supervisor import SILENCE_MAX
 from roboglot.shards.wishes import SOCKET
 
-PATIENCE = 150.0  # s; a busy machine takes twenty times as long as a quiet one
+PATIENCE = 150.0  # s; a busy machine is twenty times slower than a quiet one
 FIRST = "127.77.1.1"
 TEMPLATE = """
 world = "office"

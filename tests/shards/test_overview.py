@@ -46,7 +46,7 @@ def keeper(tmp_path) -> Any:
 async def test_many_pages_cost_a_world_one_request(keeper) -> None:
     glances = Glances(keeper, Console)
     states = await asyncio.gather(*(glances.state("a1") for _ in range(20)))
-    assert states == [{"battery": {"charge": 0.5}}] * 20  # and no history, which no tile shows
+    assert states == [{"battery": {"charge": 0.5}}] * 20  # and no history: tiles do not show it
     assert await glances.picture("a1") == await glances.picture("a1") == PICTURE
     assert Console.asked == [("robots", "a1"), ("robots", "a1", "map.png")]
 

@@ -73,7 +73,7 @@ def test_rows_of_one_robot_go_and_others_stay(tmp_path: Path) -> None:
     with closing(connect(new)) as connection:
         connection.execute("INSERT INTO setting VALUES ('b', 'volume', '1')")
         connection.execute("INSERT INTO setting VALUES ('c', 'volume', '2')")
-    for _ in range(2):  # a move that was interrupted is done again
+    for _ in range(2):  # an interrupted move is repeated
         assert copy_robot("b", old, new) == 2
     forget_robot("b", old)
     with closing(connect(old)) as connection:

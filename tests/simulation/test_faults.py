@@ -21,7 +21,7 @@ from roboglot.simulation.world.declarations import BadFile
 from roboglot.simulation.world.world import RobotPlacement, World
 from roboglot.simulation.world.world_files import load_world
 
-SHOWS = {  # fault: name in Health, level, how long until it is seen
+SHOWS = {  # fault: name in Health, level, delay until it is noticed
     "low_battery": ("battery low", FaultLevel.WARNING, 0.5),
     "motor_fault": ("motor alarm", FaultLevel.ERROR, 0.5),
     "lidar_gone": ("lidar lost", FaultLevel.FATAL, 1.5),
@@ -60,7 +60,7 @@ async def test_shows_in_its_robot_s_health_and_goes(sim, kind):
 async def test_every_kind_begins_and_ends(sim):
     for kind, about in KINDS.items():
         if kind in ("range_sensor_gone", "gps_gone"):
-            continue  # hermes has no such part; see below
+            continue  # hermes lacks this part; see below
         (fault,) = sim.world.faults.inject(kind, "a" if about.of_robot else None)
         await sim.clock.advance(0.1)
         sim.world.faults.clear(fault.number)
@@ -112,7 +112,7 @@ async def test_the_dock_is_gone_and_comes_back(sim):
     (fault,) = sim.world.faults.inject("dock_not_found")
     await sim.clock.advance(0.1)
     assert not sim.robot[DockContact].docked
-    seen = sim.robot[Lidar].scan.ranges[0]  # behind it, where the dock was, is the wall now
+    seen = sim.robot[Lidar].scan.ranges[0]  # behind it, at the dock's former place, is the wall
     sim.world.faults.clear(fault.number)
     await sim.clock.advance(0.2)
     assert sim.robot[DockContact].docked
@@ -220,7 +220,7 @@ async def test_a_world_file_plans_faults(tmp_path, caplog, simulate):
     battery = sim.robot[Battery]
     await sim.clock.advance(1.9)
     assert battery.state.percentage > 0.8
-    assert "jack_jammed" in caplog.text  # no one has that name: reported, not fatal
+    assert "jack_jammed" in caplog.text  # an unknown name: reported, not fatal
     await sim.clock.advance(1.0)
     assert battery.state.percentage < 0.06
     await sim.clock.advance(3.0)

@@ -58,7 +58,7 @@ async def test_alone_no_contact_is_looked_for(simulate: Simulate) -> None:
     simulation = simulate("empty")
     options = simulation.world._physics._model.opt
     simulation.world.start()
-    simulation.robot[Base].set_velocity(Twist(0.2))  # where no wall is
+    simulation.robot[Base].set_velocity(Twist(0.2))  # away from walls
     await simulation.clock.advance(2.0)
     assert options.disableflags
     simulation.world.hands.add_person(simulation.pose.compose(Pose(0.6)))

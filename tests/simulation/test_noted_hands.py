@@ -28,7 +28,7 @@ def world() -> World:
 async def test_hands_do_the_same_in_another_world() -> None:
     first, second, noted = world(), world(), list[Input]()
     hands = first.hands
-    hands.add_obstacle(Pose(1.0, 1.0))  # before they are noted
+    hands.add_obstacle(Pose(1.0, 1.0))  # before they are recorded
     second.hands.add_obstacle(Pose(1.0, 1.0))
     first.outside.listen(noted.append)
     number = hands.add_obstacle(Pose(2.0, 1.0, 0.5), (0.3, 0.2, 1.0))

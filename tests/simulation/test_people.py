@@ -203,7 +203,7 @@ async def test_robot_that_stands_in_way_is_walked_around():
         anna = room.world.hands.person("anna")
         room.world.hands.place("a", Pose(4.0, 5.0))
         anna.walk_to(1.5, 5.0)
-        await room.clock.advance(3.5)  # she waits for a while
+        await room.clock.advance(3.5)  # she waits a while
         assert anna.pose.point == Point(anna.pose.x, 5.0)
         assert anna.pose.x == pytest.approx(4.8, abs=0.05)
         nearest = 9.0
@@ -212,7 +212,7 @@ async def test_robot_that_stands_in_way_is_walked_around():
             nearest = min(nearest, room.world.truth.pose_of("a").distance_to(anna.pose))
         assert anna.pose.point == Point(1.5, 5.0)
         assert nearest > 0.45
-        assert room.world.truth.pose_of("a").distance_to(Pose(4.0, 5.0)) < 0.02  # no one pushed it
+        assert room.world.truth.pose_of("a").distance_to(Pose(4.0, 5.0)) < 0.02  # it was not pushed
 
 
 async def test_people_step_back_without_room_aside():

@@ -47,13 +47,13 @@ def test_every_shape_is_met_as_by_mujoco(seed: int, reach: float) -> None:
 
 @pytest.mark.parametrize(
     ("name", "is_compiled"), [("office", True), ("obstacle_course", False)]
-)  # only MuJoCo knows ramps
+)  # only MuJoCo models ramps
 async def test_sensors_see_the_same_with_the_kernel(name: str, is_compiled: bool) -> None:
     clock = LockstepClock()
     robots = [RobotPlacement("a"), RobotPlacement("b")]
     world = World(load_world(name), robots, clock=clock)
     world.start()
-    await clock.advance(0.1)  # or the physics does not know yet where things are
+    await clock.advance(0.1)  # otherwise the physics does not know yet where things are
     hull, rays, ways = world._population.hull("a"), world._physics.rays, directions(np.random.default_rng(1))
     origin = np.array(((hull.x, hull.y, hull.elevation + 0.2),))
     before = rays.cast(origin, ways, 4.0, hull)

@@ -19,7 +19,7 @@ from roboglot.simulation.world.world_files import WORLDS, load_world
 @pytest.mark.parametrize("name", sorted(path.stem for path in WORLDS.glob("*.toml")))
 def test_shipped_worlds_survive_the_round_trip(name: str, tmp_path: Path) -> None:
     world = load_world(name)
-    whole = [msgspec.structs.replace(floor, like="") for floor in world.floors]  # its walls are in it already
+    whole = [msgspec.structs.replace(floor, like="") for floor in world.floors]  # it contains its walls already
     path = tmp_path / "saved.toml"
     path.write_text(world_toml(msgspec.structs.replace(world, floors=tuple(whole))), encoding="utf-8")
     assert load_world(str(path)) == msgspec.structs.replace(world, floors=tuple(whole))

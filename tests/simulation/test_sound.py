@@ -65,7 +65,7 @@ def test_sounds_add_up_within_limits_and_are_silenced(air):
         air.emit(Source(tone(440, 1.0), CORRIDOR, 0, 0.0, 1.0))
     with pytest.raises(ValueError, match=f"at most {SOURCES_MAX} sounds at once"):
         air.emit(Source(tone(440, 1.0), CORRIDOR, 0, 0.5, 1.0))
-    air.emit(Source(tone(440, 1.0), CORRIDOR, 0, 20.0, 1.0))  # the others are over
+    air.emit(Source(tone(440, 1.0), CORRIDOR, 0, 20.0, 1.0))  # the others have ended
 
 
 async def taken_down(run, seconds):

@@ -66,7 +66,7 @@ async def test_agrees_with_mujoco(simulate, request, name):
         angles = pose.yaw - math.pi + np.arange(360) * math.tau / 360
         directions[:, 0], directions[:, 1] = np.cos(angles), np.sin(angles)
         origin = np.array((pose.x, pose.y, hull.elevation + height))
-        # its own two cylinders are looked through, one as excluded body, the other by being below or inside
+        # its own two cylinders are ignored: one is excluded, the other is below or around the sensor
         own = [physics._model.geom(f"a {part}").id for part in ("chassis", "torso")]
         physics._model.geom_group[own] = 1
         groups = np.array([1, 0, 0, 0, 0, 0], np.uint8)
@@ -75,7 +75,7 @@ async def test_agrees_with_mujoco(simulate, request, name):
         )
         judge = np.where((hits < 0) | (hits > 12.0), np.inf, hits)
         if judge.min() < 0.3:
-            continue  # inside something, where no robot can be
+            continue  # inside a solid, where no robot can be
         compared += 1
         assert np.allclose(ranges, judge, atol=1e-6), pose
     assert compared > 30

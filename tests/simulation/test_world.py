@@ -68,7 +68,7 @@ async def test_people_walk_and_the_lidar_sees_them(simulate):
         nearest.append(float(sim.robot[Lidar].scan.ranges[270:].min()))
     assert (floor, sim.world.truth.people[0][0]) == (0, 0)
     assert sim.world.truth.people[0][1].x > before.x + 10
-    assert min(nearest) < 0.8 < max(nearest)  # someone came past
+    assert min(nearest) < 0.8 < max(nearest)  # a person came past
 
 
 async def test_people_wait_for_robots_then_go_around(simulate):
@@ -201,7 +201,7 @@ async def test_a_slow_machine_skips_time_with_one_warning(caplog):
     assert world.truth.pose_of("a").x < 2.01  # two ticks, not a hundred seconds
     assert robot[Odometry].reading.stamp == pytest.approx(clock.now)
     clock.leap(3 * TICK)
-    assert robot[Odometry].reading.stamp == pytest.approx(clock.now - 2 * TICK)  # others get their turn between ticks
+    assert robot[Odometry].reading.stamp == pytest.approx(clock.now - 2 * TICK)  # other tasks run between ticks
     clock.leap(0)
     clock.leap(0)
     assert robot[Odometry].reading.stamp == pytest.approx(clock.now)
@@ -233,7 +233,7 @@ def busy():
 
 
 async def test_patient_clock_waits_for_slow_world(caplog):
-    clock = PatientClock(speed=20_000.0)  # of which no machine simulates the half
+    clock = PatientClock(speed=20_000.0)  # no machine simulates half of that
     world = World(load_world("empty"), [RobotPlacement("a", start=Pose(2, 5))], clock=clock)
     world.equip(Robot("a", world.description_of("a"), clock))
     world.start()
@@ -246,7 +246,7 @@ async def test_patient_clock_waits_for_slow_world(caplog):
     assert world.simulated - simulated >= 5.0 - LEAD
     assert caplog.text == ""  # nothing was lost
     world.close()
-    await clock.sleep(1000.0)  # which nobody has to simulate
+    await clock.sleep(1000.0)  # no need to simulate it
 
 
 def test_mujoco_is_loaded_with_the_first_world_only():
@@ -258,7 +258,7 @@ async def test_nothing_that_can_move_ever_falls_asleep(simulate):
     sim = simulate("obstacle_course")
     model, data = sim.world._physics._model, sim.world._physics._data
     sim.world.start()
-    await sim.clock.advance(5.0)  # longer than the physics waits before it lets a thing sleep
+    await sim.clock.advance(5.0)  # longer than the physics waits before a thing sleeps
     assert model.ntree > 1
     assert (data.tree_asleep < 0).all()
     can = next(iter(sim.world._physics.things))

@@ -33,7 +33,7 @@ class PostgreSQLServer:
 
     def __init__(self, folder: Path, binaries: Path, address: str = "") -> None:
         self._folder, self._binaries, self._address = folder, binaries, address
-        # The server refuses to run as root: then it is no one's, and the folder, too.
+        # The server refuses to run as root: another user runs it and owns the folder.
         self._user = pwd.getpwuid(65534) if os.geteuid() == 0 else None
         self._server: subprocess.Popen[bytes] | None = None
         self.url = f"postgresql:///postgres?host={address or folder}&user=robots"
@@ -75,7 +75,7 @@ class PostgreSQLServer:
     def stop(self) -> None:
         """At once; every client loses the connection."""
         if self._server:
-            self._server.send_signal(signal.SIGQUIT)  # no waiting for anybody
+            self._server.send_signal(signal.SIGQUIT)  # does not wait for clients
             self._server.wait(20)
             self._server = None
 
@@ -97,7 +97,7 @@ class PostgreSQLServer:
 @contextmanager
 def postgresql_server(binaries: Path, address: str = "") -> Iterator[PostgreSQLServer]:
     """Made, started and stopped again, with its folder."""
-    with tempfile.TemporaryDirectory(prefix="pg") as folder:  # sockets' paths are short
+    with tempfile.TemporaryDirectory(prefix="pg") as folder:  # socket paths are short
         server = PostgreSQLServer(Path(folder), binaries, address)
         server.create()
         try:

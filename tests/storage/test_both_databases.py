@@ -77,7 +77,7 @@ async def test_settings_places_and_drawings(database: Transactions, clock: Locks
     await StoredAnnotations(database, "a", clock, events).change(lambda _: Annotations(last_id=7))
     settings, places = StoredSettings(database, "a"), StoredPlaces(database, "a", clock, events)
     assert (settings.get(ODD), settings.get("speed")) == ({"x": ODD}, 0.5)
-    assert [place.id for place in places.all()] == ["z", "b"]  # as they came
+    assert [place.id for place in places.all()] == ["z", "b"]  # in order of arrival
     assert (places.get("z").pose, dict(places.get("z").metadata)) == (Pose(1.0, 2.0, 0.3), {"name": ODD})
     assert StoredAnnotations(database, "a", clock, events).current.last_id == 7
     assert StoredSettings(database, "b").get("speed") is None
@@ -214,7 +214,7 @@ async def test_who_lost_a_robot_writes_nothing_for_it(server: PostgreSQLServer, 
         await settings.put("who", "first again")
     assert StoredSettings(second, "a").get("who") == "second"
     second.close()
-    await settings.put("who", "first again")  # the robot is free: it is claimed anew
+    await settings.put("who", "first again")  # the robot is free: it is claimed again
     first.close()
 
 

@@ -96,7 +96,7 @@ async def test_a_restart_of_the_server_is_survived(server: PostgreSQLServer) -> 
 def test_newer_formats_are_left_untouched(server: PostgreSQLServer) -> None:
     server.empty()
     PostgreSQL(server.url).close()
-    PostgreSQL(server.url).close()  # nothing is made twice
+    PostgreSQL(server.url).close()  # nothing is created twice
     with psycopg.connect(server.url) as connection:
         connection.execute("INSERT INTO roboglot_schema VALUES (99)")
     with pytest.raises(ValueError, match="of version 99"):

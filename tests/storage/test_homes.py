@@ -77,7 +77,7 @@ async def test_old_program_never_comes_back_with_old_epoch(database: Transaction
     old, new = home(database, "old", watch), home(database, "new", watch)
     await old.take()
     await new.take()
-    await old.renew()  # late: the registry answers, but with another's epoch
+    await old.renew()  # late: the registry answers with another epoch
     assert "another program" in old.why_not("a")
     await old.close()
     assert {h.holder for h in (await Homes(database).all()).values()} == {"new"}
@@ -108,16 +108,16 @@ async def test_a_program_gives_up_before_another_may_begin(database: Transaction
     watch.now += HOLD
     assert "has not confirmed" in old.why_not("a")
     assert HOLD < LEASE
-    await old.renew()  # the registry is back, and no one took them meanwhile
+    await old.renew()  # the registry is back, and no one claimed them meanwhile
     assert not old.why_not("a")
 
 
 async def test_robots_are_taken_at_once_all_or_none(database: Transactions, watch: Watch) -> None:
     old, began = home(database, "old", watch), watch.now
     await old.take()
-    await home(database, "old", watch).take()  # the same folder's next program
+    await home(database, "old", watch).take()  # the next program of the same folder
     await old.renew()
-    assert "another program" in old.why_not("a")  # the holder's name is the same, the epoch is not
+    assert "another program" in old.why_not("a")  # same holder, another epoch
     await old.close()  # an earlier epoch releases nothing
     homes = Homes(database)
     assert {h.holder for h in (await homes.all()).values()} == {"old"}
@@ -180,8 +180,8 @@ async def test_robot_that_another_program_took_stands_and_refuses(tmp_path: Path
         assert await driving.done() is ActionStatus.CANCELED
         with pytest.raises(Busy, match="another program"):
             robot[Driving].drive(Twist(0.2, 0.0, 0.0))
-        robot[Driving].drive(Twist(0.0, 0.0, 0.0))  # to stop is always allowed
-        await robot[Lease].take("person")  # nor does control help
+        robot[Driving].drive(Twist(0.0, 0.0, 0.0))  # stopping is always allowed
+        await robot[Lease].take("person")  # control does not help, either
         with pytest.raises(Busy, match="another program"):
             robot[Driving].drive(Twist(0.2, 0.0, 0.0))
     finally:
@@ -190,8 +190,8 @@ async def test_robot_that_another_program_took_stands_and_refuses(tmp_path: Path
     database.close()
 
 
-NOTICED = 3.0  # s after which deploy/kuberay's cluster takes a node for dead
-STARTED = 2.0  # s that Ray then needs for a shard's process
+NOTICED = 3.0  # s after which deploy/kuberay's cluster declares a node dead
+STARTED = 2.0  # s that Ray then needs to start a shard's process
 BACK_MAX = 10.0
 
 
@@ -212,7 +212,7 @@ async def test_robots_of_dead_shards_return_within_ten_seconds(database: Transac
     await old.renew()
     died = watch.now
     assert await watched(silence, watch, NOTICED + STARTED) == ["a", "b"]
-    assert old.why_not("a")  # before another may have it
+    assert old.why_not("a")  # before another may claim it
     await new.take()
     assert watch.now - died <= NOTICED + STARTED + PERIOD
     assert watch.now - died < BACK_MAX
@@ -243,16 +243,16 @@ async def test_only_silence_that_was_watched_frees(database: Transactions, watch
     old, homes = home(database, "old", watch), Homes(database)
     silence = Silence(homes, ["a"], watch)
     await old.take()
-    for _ in range(20):  # it renews, if late
+    for _ in range(20):  # it renews late
         await silence.look()
         watch.now += HOLD
         await old.renew()
         assert await silence.look() == []
     await watched(silence, watch, LEASE - 2 * PERIOD)
-    watch.now += GAP_MAX + PERIOD  # the registry was away, for the program perhaps, too
+    watch.now += GAP_MAX + PERIOD  # the registry was out of reach, perhaps for the program, too
     assert await watched(silence, watch, LEASE) == []
     assert await watched(silence, watch, 2 * PERIOD) == ["a"]
-    assert (await homes.all())["b"].holder == "old"  # another fleet's
+    assert (await homes.all())["b"].holder == "old"  # another fleet's robots
 
 
 async def test_renewal_that_comes_before_freeing_keeps_the_robot(database: Transactions, watch: Watch) -> None:
@@ -277,7 +277,7 @@ async def test_freed_robot_returns_to_its_program_if_unclaimed(database: Transac
     assert {(h.holder, h.epoch) for h in (await homes.all()).values()} == {("old", 2)}
     await homes.free(await homes.signs(), ["a", "b"])
     await other.take()
-    await other.close()  # what the robot stored then is not what the old program has in memory
+    await other.close()  # what the robot stored then is unknown to the old program
     await old.renew()
     assert "another program" in old.why_not("a")
     assert lost == ["a", "b", "a", "b"]

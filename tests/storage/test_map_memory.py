@@ -67,7 +67,7 @@ async def test_drawings_are_new_at_once_and_after_start(database: Database) -> N
     for seen in (here, parts(database)):
         assert list(seen.places.all()) == [NEW]
         assert seen.annotations.current.lines == drawn.lines
-        assert seen.annotations.current.last_id == 3  # an id is given once
+        assert seen.annotations.current.last_id == 3  # ids are given once
         assert seen.settings.get("k") == [1]
         assert await seen.files.read("f") == b"2"
         with pytest.raises(NotFound):
@@ -78,7 +78,7 @@ async def test_a_refusal_of_one_part_leaves_all(database: Database, monkeypatch:
     here = parts(database)
     await here.places.put(OLD)
     await here.files.write("f", b"1")
-    monkeypatch.setattr("roboglot.storage.files.FILES_MAX", 1)  # which the last write of the transaction finds out
+    monkeypatch.setattr("roboglot.storage.files.FILES_MAX", 1)  # noticed by the last write of the transaction
     new = Drawings([NEW], Annotations().with_new(WALL))
     with pytest.raises(InvalidGoal):
         await here.memory.replace(lambda _: Replacement(new, {"k": 1}, {"f": b"2", "g": b"3"}))

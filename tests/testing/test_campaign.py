@@ -118,7 +118,7 @@ def test_rows_survive_what_a_kill_leaves_behind(
     assert [row.seed for row in table.rows] == seeds
     assert all(table.done(trial(seed)) for seed in seeds)
     table.add(trial(99), Result(Outcome.CRASHED))
-    assert not table.done(trial(99))  # it is tried again
+    assert not table.done(trial(99))  # it is retried
     table.close()
 
 
@@ -148,7 +148,7 @@ def test_a_trial_played_again_leaves_one_row(tmp_path: Path) -> None:
 
 def test_other_tables_and_other_scenarios_are_left_alone(tmp_path: Path) -> None:
     path = tmp_path / "table.csv"
-    path.write_text("a,b\n1,2")  # whose last line has no end
+    path.write_text("a,b\n1,2")  # its last line is incomplete
     with pytest.raises(OtherCampaign, match="no table of a campaign"):
         Table(path)
     assert path.read_text() == "a,b\n1,2"

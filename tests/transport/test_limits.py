@@ -37,7 +37,7 @@ def test_a_debt_is_paid_with_time(amounts: list[int]) -> None:
     assert sum(amounts) <= 50.0 + 100.0 * now + 1e-6
 
 
-@pytest.mark.slow  # a load
+@pytest.mark.slow  # a load test
 def test_many_clients_take_bounded_memory() -> None:
     limiter = Limiter(1.0, 5.0, time.monotonic)
     for number in range(3 * BUCKETS_MAX):
@@ -58,7 +58,7 @@ async def test_client_that_sends_too_much_is_read_later() -> None:
 
     def spend(amount: int) -> float:
         spent.append(amount)
-        return 0.05 if sum(spent) < 200_000 else 0.0  # half of it goes out, half comes in
+        return 0.05 if sum(spent) < 200_000 else 0.0  # half of it outgoing, half incoming
 
     loop = asyncio.get_running_loop()
     ended = asyncio.Event()

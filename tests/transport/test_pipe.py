@@ -74,7 +74,7 @@ async def test_a_close_comes_after_what_was_written() -> None:
     caller.transport.close()
     await turns()
     assert callee.events == ["made"]
-    assert callee.transport.get_extra_info("hung_up")  # seen even while nothing is read
+    assert callee.transport.get_extra_info("hung_up")  # noticed even while nothing is read
     callee.transport.resume_reading()
     await turns()
     assert callee.received == b"the last words"
@@ -116,7 +116,7 @@ async def test_writer_that_is_ahead_is_asked_to_pause() -> None:
     callee.transport.resume_reading()
     await turns()
     assert caller.events == ["made", "pause", "resume"]
-    assert max(callee.sizes) <= PIECE  # what a tunnel may have under way is counted in such pieces
+    assert max(callee.sizes) <= PIECE  # a tunnel's window is counted in such pieces
 
 
 async def test_an_error_ends_its_own_connection_only(caplog: pytest.LogCaptureFixture) -> None:

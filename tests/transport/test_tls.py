@@ -16,7 +16,7 @@ from roboglot.protocols.cyberdog.certificates import ensure_site
 from roboglot.transport import tls as layer
 from roboglot.transport.tls import Tls, TlsPort, server_context
 
-BIG = 3_000_000  # bytes: far more than any buffer on the way
+BIG = 3_000_000  # bytes: far more than all buffers on the way
 
 
 class Echo(asyncio.Protocol):

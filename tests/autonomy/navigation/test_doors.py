@@ -57,7 +57,7 @@ async def test_too_narrow_gap_ends_drive_and_is_reported(tour: Tour) -> None:
 @pytest.mark.world(NARROW)
 async def test_gets_out_where_it_was_steered_by_hand(tour: Tour) -> None:
     tour.robot[Driving].drive(Twist(x=0.3), lifetime=19.0)
-    await tour.clock.advance(40.0)  # the map has thickened since
+    await tour.clock.advance(40.0)  # by now the map shows it thicker
     assert tour.truth.x > 5.0
     action = await tour.go((2.0, 3.0))
     assert action.status is ActionStatus.SUCCEEDED, action.reason
@@ -76,7 +76,7 @@ async def test_too_wide_robot_reports_the_door_width(tour: Tour) -> None:
 @pytest.mark.world(WIDE)
 async def test_person_in_the_only_door_is_waited_for(tour: Tour) -> None:
     person = tour.world.hands.add_obstacle(Pose(4.0, 3.0, 0.0), PERSON)
-    await tour.clock.advance(30.0)  # long enough for the map to show a pillar there
+    await tour.clock.advance(30.0)  # long enough for a pillar to appear on the map
     action = tour.head_for((6.0, 3.0))
     await tour.clock.advance(10.0)
     assert action.status is ActionStatus.EXECUTING, action.reason
@@ -112,7 +112,7 @@ async def test_goal_off_the_map_is_refused_at_once(tour: Tour) -> None:
 async def test_goal_in_wall_met_on_way_is_unreachable(tour: Tour) -> None:
     await tour.clock.advance(2.0)
     begun = tour.clock.time()
-    action = await tour.go((29.95, 7.0))  # the wall is not on the map yet
+    action = await tour.go((29.95, 7.0))  # the wall is not mapped yet
     assert isinstance(action.error, Unreachable), action.reason
     assert tour.clock.time() - begun < 20.0
     assert not tour.bumps
@@ -123,7 +123,7 @@ async def test_goal_in_wall_met_on_way_is_unreachable(tour: Tour) -> None:
 async def test_a_search_through_unknown_floor_is_bounded(tour: Tour) -> None:
     await tour.clock.advance(2.0)
     begun, stages, far, last = tour.clock.time(), set(), 0.0, tour.truth
-    action = tour.head_for((12.0, -3.0))  # outside; no door leads there
+    action = tour.head_for((12.0, -3.0))  # outside: no door leads there
     while not action.status.ended:
         await tour.clock.advance(0.1)
         far, last = far + last.distance_to(tour.truth), tour.truth

@@ -100,7 +100,7 @@ class SlowLegs(Legs):
         return self._robot.actions.start("stand", rise, resources={BASE, LEGS}, source=source)
 
 
-SlowLegs.__abstractmethods__ = frozenset()  # the rest of what legs can do is of no interest here
+SlowLegs.__abstractmethods__ = frozenset()  # other abilities of legs do not matter here
 
 
 @pytest.fixture
@@ -262,7 +262,7 @@ async def test_a_paused_move_holds_and_goes_on(carted: Robot, cart: Cart, clock:
 
 async def test_emergency_stop_lasts_until_someone_says_stand_up(carted: Robot, clock: LockstepClock) -> None:
     legs = carted.add(Legs, SlowLegs(carted, Posture.LIMP))  # type: ignore[abstract]
-    for _ in range(3):  # a joystick goes on sending
+    for _ in range(3):  # a joystick keeps sending
         with pytest.raises(EmergencyStopped):
             carted[Driving].drive(Twist(x=0.5))
     with pytest.raises(EmergencyStopped):

@@ -65,7 +65,7 @@ async def test_a_way_back_begins_after_braking(robot: Robot, forward: Forward) -
     action = robot[Driving].move_by(Pose(-0.3, 0.2, 0.5), speed=SPEED, source="one")
     await forward(seconds=4)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
-    there = robot[Odometry].reading.pose.relative_to(measured)  # less the way that it braked
+    there = robot[Odometry].reading.pose.relative_to(measured)  # less the braking distance
     assert_pose(there, x=-0.28, y=0.2, deg=28.6, within=0.03)
 
 

@@ -73,13 +73,13 @@ async def test_up_and_down_with_maps_and_docks(tour: Tour) -> None:
     await tour.clock.advance(2.0)
     assert tour.error[0] < 0.05
     grid = tour.robot[Mapping].grid
-    assert abs(grid.origin.x - downstairs.origin.x) < 0.5  # the map of this floor again
+    assert abs(grid.origin.x - downstairs.origin.x) < 0.5  # this floor's map is back
     assert grid.origin.distance_to(upstairs.origin) > 1.0
     action = await tour.go((3.5, 10.0))
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     assert tour.robot[Docking].home is not None
     assert tour.robot[MapAnnotations].current.areas == ()
-    kept = await StoreyShelf(tour.robot).take(1)  # as after a restart: from the disk alone
+    kept = await StoreyShelf(tour.robot).take(1)  # as after a restart: only what is on disk
     assert kept is not None
     again = kept.map.occupancy()
     assert again.origin.distance_to(upstairs.origin) < 1.0
@@ -132,7 +132,7 @@ async def test_a_ride_that_is_in_somebodys_way(
     assert action.feedback is stage
     assert tour.world.truth.floor_of("a") == tour.robot[Floors].current == floor
     assert not tour.bumps
-    if stage is RideStage.LEAVING:  # from inside the car it rides on
+    if stage is RideStage.LEAVING:  # from inside the car the ride starts at once
         tour.world.faults.clear(blocked.number)
         action = await tour.end_of(tour.robot[Floors].ride(0), 400.0)
         assert action.status is ActionStatus.SUCCEEDED, action.reason
@@ -143,7 +143,7 @@ async def test_a_ride_that_is_in_somebodys_way(
 async def test_nonsense_is_refused(tour: Tour) -> None:
     floors = tour.robot[Floors]
     with pytest.raises(InvalidGoal):
-        floors.ride(1)  # where is the lift?
+        floors.ride(1)  # no lift is known
     for waiting, inside in ((Pose(), Pose()), (Pose(), Pose(math.nan, 0.0)), (Pose(), Pose(50.0, 0.0))):
         with pytest.raises(InvalidGoal):
             floors.set_lift(waiting, inside)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from tests.autonomy.conftest import Tour
 
 BODIES = ("hermes", "universal", "cyberdog2")  # robomaster_ep has no lidar, hence no navigation
-TOLERANCE, LOCALIZATION = 0.1, 0.03  # m: what is asked for, and what the robot may be wrong about where it is
+TOLERANCE, LOCALIZATION = 0.1, 0.03  # m: requested precision, and the error of localization
 SPOTS = ((2.0, 1.0), (2.0, 3.0), (4.0, 3.0), (4.0, 1.0), (2.1, 1.0), (3.0, 2.0))
 THERE_AND_BACK = [(1.2, 1.8), (1.2, 0.3), (1.2, 1.8)]
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from tests.autonomy.conftest import Tour
 
 BODY = "universal+hard"
-OFF, TURNED = 0.10, math.radians(4.0)  # m, rad: twice what navigation keeps
+OFF, TURNED = 0.10, math.radians(4.0)  # m, rad: twice navigation's tolerance
 
 
 @pytest.mark.slow  # a long story; in short: tests/simulation/test_realism.py

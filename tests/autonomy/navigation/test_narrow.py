@@ -17,7 +17,7 @@ def test_each_corridor_is_reported_once():
     assert watch.entered(walls(0.4, 0.4)) is None
     for _ in range(WIDE_AFTER - 1):
         watch.entered(walls(2.0, 0.4))
-    assert watch.entered(walls(0.4, 0.4)) is None  # a gap is not its end
+    assert watch.entered(walls(0.4, 0.4)) is None  # a gap does not end the passage
     for _ in range(WIDE_AFTER):
         watch.entered(walls(2.0, 0.4))
     assert watch.entered(walls(0.4, 0.4)) is not None

@@ -223,12 +223,12 @@ async def test_navigation_gives_up_on_a_foreign_map(tour: Tour) -> None:
     await tour.clock.advance(3.0)
     walls = np.full((200, 240), -100, np.int8)
     walls[:, ::20] = walls[::50] = 100
-    walls[60:90] = -100  # a passage of 1.5 m through what is no map of this room
+    walls[60:90] = -100  # a passage of 1.5 m through something that this room's map lacks
     tour.robot[Mapping].load(OccupancyGrid(walls, 0.05, Point(-6.0, -3.75)), Pose(0.0, 0.0))
     action = await tour.go((3.0, 5.0))
     assert isinstance(action.error, NotLocalized), action.reason
     assert tour.robot[Localization].lost is not None
-    assert tour.world.truth.pose_of("a").distance_to(tour.start) < 2.0  # it stopped soon
+    assert tour.world.truth.pose_of("a").distance_to(tour.start) < 2.0  # it stopped soon after
 
 
 @pytest.mark.world("empty")

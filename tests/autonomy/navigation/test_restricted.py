@@ -9,7 +9,7 @@ from roboglot.model.components.motion.navigation import Navigation, NavigationOp
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Pose
 
-SOUTH, NORTH = 6.0, 8.0  # the area goes all across the room between these, in the world
+SOUTH, NORTH = 6.0, 8.0  # the area spans the room between these world coordinates
 
 
 async def draw(robot, start, most):

@@ -143,7 +143,7 @@ async def test_free_navigation_minds_no_track(tour: Tour) -> None:
 async def test_waits_on_strict_tracks_reporting_after_three_minutes(
     tour: Tour, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert journey.BLOCKED_SECONDS == 180.0  # as docs/autonomy.md says; here it shall be shorter
+    assert journey.BLOCKED_SECONDS == 180.0  # docs/autonomy.md gives the default; shorter here
     monkeypatch.setattr(journey, "BLOCKED_SECONDS", PilotTuning().patience + 15.0)
     await draw(tour, track(1.5, 5.0, 8.5, 5.0))
     reported: list[RobotBlocked] = []

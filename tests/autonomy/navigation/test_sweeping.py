@@ -32,7 +32,7 @@ async def test_a_coverage_area_around_an_obstacle_is_swept(tour: Tour) -> None:
         tour.robot[Sweeping].sweep()
     await tour.robot[MapAnnotations].change(lambda now: now.with_new(area))
     ways = await tour.robot[Sweeping].lanes()
-    assert 2 <= len(ways) <= 5  # before, beside and behind the stone, not crumbs
+    assert 2 <= len(ways) <= 5  # in front of, beside and behind the stone, not specks
     action, track = tour.robot[Sweeping].sweep(), []
     while not action.status.ended:
         await tour.clock.advance(0.1)

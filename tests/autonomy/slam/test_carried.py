@@ -45,7 +45,7 @@ def test_the_corners_around_the_robot_are_the_shelf():
     chair = [Point(0.55, 0.8), Point(0.9, 0.8)]
     found = standing_among([*chair, *shelf])
     assert {(leg.x, leg.y) for leg in found} == {(leg.x, leg.y) for leg in shelf}
-    assert standing_among(chair) == [chair[0]]  # no shelf: whatever is near
+    assert standing_among(chair) == [chair[0]]  # no shelf: take anything near
 
 
 class Drive:
@@ -95,9 +95,9 @@ async def test_a_carried_shelf_needs_room_and_leaves_room(robot, forward, monkey
     assert drive.planner.radius == pytest.approx(0.65, abs=0.02)
     with pytest.raises(Unreachable, match="no path"):
         drive.plan(through)
-    assert drive.plan(corner).length == pytest.approx(0.61, abs=0.05)  # the legs on the map are on the jack
+    assert drive.plan(corner).length == pytest.approx(0.61, abs=0.05)  # the mapped legs are those on the jack
 
-    drive.jack(monkeypatch, False)  # set down again where it stood
+    drive.jack(monkeypatch, False)  # set down where it stood before
     assert drive.planner.radius == 0.27
     with pytest.raises(Unreachable, match="too close"):
         drive.plan(corner)

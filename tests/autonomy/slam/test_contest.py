@@ -13,7 +13,7 @@ from roboglot.autonomy.slam.scan_points import ScanPoints
 from roboglot.model.geometry import Point, Pose
 
 HALF, RAYS, REACH = 0.9, 720, 6.0  # m from the middle to a wall; m that the lidar sees
-ALONG = ((1.3, 0.45), (2.1, -0.45), (-1.1, -0.4), (-1.9, 0.45))  # robots that drive as fast, from the robot
+ALONG = ((1.3, 0.45), (2.1, -0.45), (-1.1, -0.4), (-1.9, 0.45))  # robots driving alongside, relative to the robot
 PILLARS = ((3.1, 0.55), (-2.9, -0.55), (0.9, -0.7), (-0.5, 0.7))  # in map
 RADIUS, PILLAR = 0.25, 0.12  # m
 
@@ -54,10 +54,10 @@ def test_wheels_are_believed_where_robots_drive_along(painted: EvidenceGrid, dri
 
     scan, prior = scanned(driven), np.diag((0.02**2, 0.02**2, 0.01**2))
     best = fit(painted, scan, Pose(driven), FREE)
-    assert abs(best.pose.x - driven) > 0.04  # otherwise this proves nothing
+    assert abs(best.pose.x - driven) > 0.04  # otherwise the test proves nothing
     found = contested(painted, scan, Pose(driven, 0.01), best, prior, 0.5, 0.01)
     assert found is not None
-    assert found.pose.distance_to(Pose(driven)) < 0.01  # and the walls say how far beside the middle it is
+    assert found.pose.distance_to(Pose(driven)) < 0.01  # the walls show the distance from the middle
 
 
 def test_wheels_that_slip_are_not_believed_alone(painted: EvidenceGrid) -> None:

@@ -60,13 +60,13 @@ async def test_sightings_while_lost_are_joined_to_the_map(tour: Tour) -> None:
     await tour.clock.advance(3.0)
     assert isinstance(news[-1], LocalizationLost)
     await steer(tour, (4.0, 13.0), (4.0, 10.2))
-    assert len(walls_in(tour, ROOM)) < through_the_door + 20  # its map cannot know yet where that is
+    assert len(walls_in(tour, ROOM)) < through_the_door + 20  # not on its map yet
     await steer(tour, (8.0, 9.8), (5.5, 9.8))
     assert isinstance(news[-1], LocalizationRecovered)
     assert tour.error[0] < 0.05
     seen = walls_in(tour, ROOM)
     assert len(seen) > through_the_door + 100
-    await tour.go((4.0, 13.0))  # by the map that was joined
+    await tour.go((4.0, 13.0))  # on the joined map
     await tour.go((7.0, 18.5))
     assert tour.truth.distance_to(Pose(7.0, 18.5)) < 0.1
     now = walls_in(tour, ROOM)

@@ -27,7 +27,7 @@ async def test_what_was_sent_within_the_delay_is_added(base: Base, clock: Lockst
     foresight = Foresight(base, clock)
     assert foresight.ahead(Pose(1.0)) == Pose(1.0)
     foresight.sent(Twist(x=1.0))
-    await clock.advance(0.5)  # 0.2 s of it odometry knows already
+    await clock.advance(0.5)  # odometry already covers 0.2 s of it
     foresight.sent(Twist(yaw=math.pi))
     await clock.advance(0.1)
     assert_pose(foresight.ahead(ORIGIN), x=0.2, y=0.0, deg=18, within=1e-6)

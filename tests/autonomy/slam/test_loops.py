@@ -49,7 +49,7 @@ async def test_a_loop_is_closed_and_the_map_straightened(tmp_path: Path, closing
     await fleet.start(wait=True)
     robot, start, closed, errors = fleet.robots["a"], fleet.world.truth.pose_of("a"), [], []
     robot.events.listen(LoopClosed, closed.append)
-    visited: list[tuple[Pose, Pose]] = []  # where it believed to be, and was
+    visited: list[tuple[Pose, Pose]] = []  # believed and true place
     robot[Mapping].close_loops(closing)
     assert robot[Mapping].closes_loops is closing
     for spot in LAP:
@@ -62,7 +62,7 @@ async def test_a_loop_is_closed_and_the_map_straightened(tmp_path: Path, closing
             errors.append(start.compose(robot[Localization].pose).distance_to(fleet.world.truth.pose_of("a")))
     await fleet.close()
     database.close()
-    assert max(errors) > 0.3  # otherwise this proves nothing
+    assert max(errors) > 0.3  # otherwise the test proves nothing
     assert bool(closed) is closing
     settled = float(np.mean(errors[-10:]))
     if closing:
@@ -111,7 +111,7 @@ def test_given_map_stays_and_additions_are_straightened() -> None:
     believed, last = true[0], true[0]
     for number, pose in enumerate(true):
         step = pose.relative_to(last)
-        drift = 0.0 if number < 20 or straight else math.radians(0.12)  # a little to one side all the time
+        drift = 0.0 if number < 20 or straight else math.radians(0.12)  # a constant drift to one side
         believed, last = believed.compose(Pose(step.x, step.y, step.yaw + drift)), pose
         scan = corridor_scan(pose, walls)  # type: ignore[arg-type]
         paint(belief.map, scan, believed, fill=False)

@@ -59,7 +59,7 @@ async def test_loaded_map_is_driven_on_as_the_original(tour: Tour) -> None:
     mapping.clear()
     await tour.clock.advance(1.0)
     heard.drain()
-    mapping.load(grid, Pose(pose.x + 0.2, pose.y - 0.1, pose.yaw + 0.1))  # not exactly there
+    mapping.load(grid, Pose(pose.x + 0.2, pose.y - 0.1, pose.yaw + 0.1))  # slightly displaced
     assert [type(event) for event in heard.drain()] == [MapReplaced, PoseJumped]
     assert mapping.grid.log_odds.shape == grid.log_odds.shape
     await tour.clock.advance(2.0)

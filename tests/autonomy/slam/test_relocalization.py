@@ -66,7 +66,7 @@ async def test_who_is_carried_on_is_found_there(tour: Tour, x: float, y: float, 
     for turned in (0.0, 100.0, -130.0):
         await carried(tour, x, y, deg + turned)
         action = tour.robot_finds_itself()
-        for step in range(1, 9):  # the hands have not put it down yet when the search begins
+        for step in range(1, 9):  # the robot is still in the air when the search begins
             ahead = Pose(x, y, math.radians(towards)).compose(Pose(0.08 * step))
             tour.world.hands.place("a", Pose(ahead.x, ahead.y, math.radians(deg + turned)))
             await tour.clock.advance(0.1)
@@ -87,13 +87,13 @@ async def test_a_kidnapped_robot_says_so_and_recovers(tour: Tour) -> None:
         walls = int((tour.robot[Mapping].grid.log_odds > 0).sum())
         tour.world.hands.place("a", Pose(x, y, math.radians(deg)))
         await tour.clock.advance(5.0)
-        lost, found = news[0], news[-1]  # it may lose a place again that it believed too soon
+        lost, found = news[0], news[-1]  # a place accepted too early may be lost again
         assert isinstance(lost, LocalizationLost)
         assert isinstance(found, LocalizationRecovered)
         assert 0.0 <= found.seconds <= found.stamp - lost.stamp + 1e-6
         assert tour.robot[Localization].lost is None
         assert tour.error[0] < 0.05
-        assert int((tour.robot[Mapping].grid.log_odds > 0).sum()) < walls + 150  # a scan at a wrong place draws 250
+        assert int((tour.robot[Mapping].grid.log_odds > 0).sum()) < walls + 150  # a scan at a wrong place scores 250
         news.clear()
 
 
@@ -130,7 +130,7 @@ async def test_people_around_robot_do_not_hide_its_place(tour: Tour) -> None:
     estimator = known(of_kind(tour.robot[Localization], LidarLocalization).estimator)
     scan = known(tour.robot[Lidar].scan)
     ranges, angles = scan.ranges.copy(), scan.angles
-    for bearing, width, away in ((0.0, 0.6, 0.5), (2.0, 0.2, 1.2)):  # one stands right in front, one further off
+    for bearing, width, away in ((0.0, 0.6, 0.5), (2.0, 0.2, 1.2)):  # one right in front, one farther away
         ranges[abs(angles - bearing) < width] = away
     hidden = ScanReader().read(replace(scan, ranges=ranges))
     (found,) = places(estimator._belief.map, hidden, None)
@@ -171,5 +171,5 @@ def test_places_are_ruled_out_by_expected_positions() -> None:
     last = known.narrow([at(2.0, 0.0), at(26.0, 0.0)], Pose(2.0))
     assert last is not None
     assert last.pose == Pose(2.0)
-    assert known.narrow([at(7.0, 7.0), at(9.0, 9.0)], Pose(3.0)) is None  # all were wrong: begin anew
+    assert known.narrow([at(7.0, 7.0), at(9.0, 9.0)], Pose(3.0)) is None  # all were wrong: start over
     assert len(known.places) == 2

@@ -63,5 +63,5 @@ def test_echo_seen_through_wall_speaks_against_a_place() -> None:
     evidence[:, 50] = 500
     points = np.array([[2.52, 1.5], [2.52, 0.9], [2.52, 2.1]])
     assert verdicts(evidence, points, 0.5, 1.5, 0.15, 0.05).tolist() == [FITTING] * 3
-    evidence[24:36, 30] = 500  # as wide as the middle ray needs; the others pass beside it
+    evidence[24:36, 30] = 500  # as wide as the middle ray needs; the others miss it
     assert verdicts(evidence, points, 0.5, 1.5, 0.15, 0.05).tolist() == [CROSSING, FITTING, FITTING]

@@ -35,7 +35,7 @@ async def test_office_tour_keeps_within_3_cm_1_degree(tour: Tour) -> None:
     assert worst_deg < 1.0
     assert tour.robot[Localization].quality > 0.85
     drift = tour.start.compose(tour.robot[Odometry].reading.pose).distance_to(tour.truth)
-    assert drift > 0.05  # otherwise this proves nothing
+    assert drift > 0.05  # otherwise the test proves nothing
     _assert_map_agrees(tour)
 
 
@@ -111,7 +111,7 @@ async def test_rough_pose_is_corrected_a_wrong_one_reported(tour: Tour) -> None:
     localization.set_pose(wrong)
     await tour.until(lambda: lost, 3.0)
     assert lost[0][0].reason is LostReason.NO_FIT
-    assert lost[0][1] == revision  # a robot that is lost does not spoil its map
+    assert lost[0][1] == revision  # a lost robot does not damage its map
     await tour.until(lambda: found, 5.0)
     assert localization.lost is None
     assert tour.error[0] < 0.03
@@ -181,7 +181,7 @@ async def test_nonsense_poses_are_refused(tour: Tour) -> None:
 async def test_a_robot_that_was_pushed_aside_finds_itself(tour: Tour) -> None:
     await tour.go((20.0, 10.0))
     tour.world.hands.place("a", tour.truth.compose(Pose(0.1, 0.15, math.radians(4.0))))
-    assert tour.error[0] > 0.15  # odometry felt nothing
+    assert tour.error[0] > 0.15  # odometry noticed nothing
     await tour.clock.advance(2.0)
     assert tour.error[0] < 0.03
     assert tour.error[1] < 1.0

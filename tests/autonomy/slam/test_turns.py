@@ -25,7 +25,7 @@ async def test_no_scan_that_waits_is_lost() -> None:
     assert taken == []
     turns.hear(scan(2.0))
     turns.hear(scan(3.0))
-    assert taken == [1.0, 2.0]  # turns are late: what waited is taken before the next one
+    assert taken == [1.0, 2.0]  # turns are late: pending scans are taken before the next one
     await asyncio.sleep(0)
     assert taken == [1.0, 2.0, 3.0]
     turns.hear(scan(4.0))

@@ -14,7 +14,7 @@ from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid
 from roboglot.storage.database import Database
 
-DOOR = slice(40, 60)  # rows of the wall in column 50 that are floor in the map that was given
+DOOR = slice(40, 60)  # rows of the wall in column 50 that the given map shows as floor
 
 
 def walled(given: bool) -> EvidenceGrid:

@@ -95,7 +95,7 @@ def test_velocity_of_a_mover_comes_from_its_echoes(heading: float, speed: float)
     rim = 0.2 * np.stack([np.cos(turns), np.sin(turns)], axis=1)
     for step in range(6):
         middle = np.array((vx, vy)) * step * 0.1
-        front = rim[rim @ (np.array((pose.x, pose.y)) - middle) > 0.0] + middle  # the half that is seen
+        front = rim[rim @ (np.array((pose.x, pose.y)) - middle) > 0.0] + middle  # the visible half
         seen = front[np.argsort(np.arctan2(front[:, 1] - pose.y, front[:, 0] - pose.x))]
         movers = tracker.observe(seen, grid, pose, step * 0.1)
     assert len(movers) == 1

@@ -40,7 +40,7 @@ async def door(robot: Robot, data: Path, forward: Forward) -> AsyncIterator[Cybe
     yield opened
     passing.cancel()
     await asyncio.gather(passing, return_exceptions=True)
-    await opened.close()  # the fleet lets the time pass that the robot needs to stand
+    await opened.close()  # the fleet waits until the robot stands
 
 
 async def _pass_time(forward: Forward) -> None:

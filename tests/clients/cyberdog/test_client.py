@@ -202,7 +202,7 @@ async def test_tasks_are_awaited_reported_and_cancelled(client: CyberDogClient, 
     reached = begun.compose(Pose(pose.px, pose.py, 2 * math.atan2(pose.qz, pose.qw)))
     assert reached.distance_to(world.truth.pose_of("a")) < 0.2
     far = await client.navigate(3.0, 0.0)
-    far.leave()  # a stream that another one takes over from takes it back: the end could come between the two
+    far.leave()  # takes the stream back from another client: the end could fall between the two
     joined = await client.join(TaskType.NAVIGATION)
     with pytest.raises(CyberDogRefused, match="not accepted"):
         await client.charge()

@@ -29,7 +29,7 @@ async def door(robot, profile) -> AsyncIterator[RoboMasterDoor]:
     opened = RoboMasterDoor(robot, ADDRESS, config)
     await opened.start()
     yield opened
-    await opened.close()  # the fleet lets the time pass that the robot needs to stand
+    await opened.close()  # the fleet waits until the robot stands
 
 
 def ports_of(door: RoboMasterDoor) -> Ports:

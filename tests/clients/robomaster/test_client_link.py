@@ -91,7 +91,7 @@ async def test_answers_in_every_form(faked, fake, answers: list[str]) -> None:
     fake.answers = ["".join(answers)]
     attitude = await faked.chassis.get_attitude()
     assert (attitude.pitch, attitude.roll, attitude.yaw) == (1, 2, 3)
-    fake.answers = ["fail"]  # the oldest builds: no end and no number
+    fake.answers = ["fail"]  # the oldest builds send neither end nor number
     with pytest.raises(RoboMasterRefused):
         await faked.chassis.stop()
 

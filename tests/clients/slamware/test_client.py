@@ -52,7 +52,7 @@ async def test_cancelled_action_and_failed_one_raise_robots_reason(client: Slamw
     await forward(seconds=3)
     with pytest.raises(ActionAborted):
         await waiting
-    assert not await action.cancel()  # it is not the robot's any more
+    assert not await action.cancel()  # the robot has given it away
     blocked = await client.begin("MoveToAction", MoveToOptions(Location(500.0, 500.0)))
     waiting = asyncio.ensure_future(blocked.succeeded())
     await forward(seconds=5)
@@ -176,7 +176,7 @@ async def test_questions_but_never_commands_are_repeated_on_reconnection(
     async def once_each(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         asked.append((await reader.readuntil(b"\r\n\r\n"))[:4])
         writer.write(JSON % (1, b"1"))
-        asked.append((await reader.readuntil(b"\r\n\r\n"))[:4])  # and hang up without a word
+        asked.append((await reader.readuntil(b"\r\n\r\n"))[:4])  # then hang up without a reply
 
     client = await fake(once_each)
     assert [await client.get_localization_quality() for _ in range(2)] == [1, 1]

@@ -27,7 +27,7 @@ LIGHT = devices.LightControl(
 )
 ORDER = delivery.TaskRequest(delivery.Destination("101"), "GUIDE")
 
-# What each operation is called with, where it takes anything.
+# Arguments of each operation that takes any.
 VALUES: dict[str, dict[str, Any]] = {
     "shutdown": {"body": devices.Shutdown(60)},
     "restart_module": {"body": devices.Restart(devices.RestartMode.SOFT)},
@@ -122,7 +122,7 @@ def test_client_has_a_method_per_operation_key() -> None:
         assert getattr(SlamwareClient, method_of(row.name)).key == row.key
 
 
-# What is asked before, for what it needs to be there.
+# Calls made first, to create what the operation needs.
 BEFORE: dict[str, tuple[str, ...]] = {
     "edit_home_dock": ("add_home_dock",),
     "erase_home_dock": ("add_home_dock",),
@@ -138,17 +138,17 @@ BEFORE: dict[str, tuple[str, ...]] = {
     "create_task": ("add_pois",),
 }
 
-# Where the id comes from of what was made before.
+# Source of the id of what was created before.
 LISTED = {
     "remove_line_by_id": "get_lines",
     "edit_rectangle_area": "get_rectangle_areas",
     "remove_rectangle_area_by_id": "get_rectangle_areas",
 }
-UNDECIDED = {"upload_and_start_update", "install_app"}  # what is no package is refused at once or when unpacked
+UNDECIDED = {"upload_and_start_update", "install_app"}  # a bad package is refused at once or when unpacked
 
-# What this robot refuses as it stands there, with the status; all else must succeed.
+# Refusals of this robot in its state here, with the status; all others must succeed.
 REFUSED = {
-    "clear_robot_health": 400,  # nothing is wrong with it
+    "clear_robot_health": 400,  # it has no fault
     "set_cube_config": 400,
     "delete_app": 404,  # it has none
     "set_current_floor": 404,  # its map was not saved as a floor's
@@ -159,10 +159,10 @@ REFUSED = {
     "dispatch_by_pois": 404,
     "get_elevators_by_id": 400,  # nor are there elevators on it
     "get_pose_relation_to_elevator": 400,
-    "post_task_event": 404,  # no one called
+    "post_task_event": 404,  # no call came in
     "cancel_task_by_task_id": 404,
     "cancel_task_by_order_id": 404,
-    "start_pickup": 403,  # it does not deliver just now
+    "start_pickup": 403,  # it is not delivering
     "end_pickup": 403,
     "end_operation": 403,
 }

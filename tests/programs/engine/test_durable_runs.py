@@ -46,7 +46,7 @@ except RobotError as error:
 print('end', time.monotonic() >= began)
 """
 CUT_OFF = "the server ended while {} was under way; it was not repeated"
-# The first life: runs the task until it is killed, and tells what its log says.
+# First life: runs the task until it is killed, and prints its log.
 SERVER = """
 import asyncio, sys
 from pathlib import Path
@@ -134,7 +134,7 @@ async def until(condition: Callable[[], object]) -> None:
 async def test_task_goes_on_where_its_server_was_killed(second: Callable[[], ProgramService], tmp_path: Path) -> None:
     written = first_life(tmp_path / "robot.db", PROGRAM, "step 2")
     service = second()
-    reported: list[tuple[str, str]] = []  # to a front end that was there before the program was back
+    reported: list[tuple[str, str]] = []  # to a front end that reconnected before the program was back
     leave = service.reports.join(lambda report: reported.append((report.describe, service._runs["t"].block)))
     await until(lambda: reported)
     leave()
@@ -211,7 +211,7 @@ async def test_a_journal_knows_what_was_under_way(tmp_path: Path) -> None:
     header = header_of("pass", {"m": "def f(): pass"}, 3600)
     await first.open(header)
     await first.begin("time.sleep")
-    assert await store.entries("t") == []  # it only reads: nothing to know
+    assert await store.entries("t") == []  # it only reads: nothing to acknowledge
     first.answered("time.sleep", b'{"t":"value","value":null}')
     await first.begin("cyberdog.motion.turn")
     assert [(entry.name, entry.answer is None) for entry in await store.entries("t")] == [
@@ -223,7 +223,7 @@ async def test_a_journal_knows_what_was_under_way(tmp_path: Path) -> None:
     assert (history.header, history.interrupted) == (header, "cyberdog.motion.turn")
     slept = Answer("time.sleep", b'{"t":"value","value":null}')
     assert list(history.answers) == [slept, Answer("cyberdog.motion.turn", None)]
-    assert await Journal(store, "t").reopen(store.headers_now()["t"]) == history  # no one has answered it yet
+    assert await Journal(store, "t").reopen(store.headers_now()["t"]) == history  # not answered yet
     second.answered("cyberdog.motion.turn", b"{}")
     await second.begin("cyberdog.motion.go_straight")
     third = await Journal(store, "t").reopen(store.headers_now()["t"])

@@ -73,7 +73,7 @@ async def test_the_zygote_can_die_and_is_replaced() -> None:
         assert end.reason is ExitReason.LOST
         played = await play(engine, "print('again')")
         assert played.ending == Finished()
-        assert process_state(run.pid) in {"", "Z"}  # Z: its new parent has not asked yet
+        assert process_state(run.pid) in {"", "Z"}  # Z: its new parent has not waited for it yet
     assert children_of(os.getpid()) <= before
 
 
@@ -88,7 +88,7 @@ async def test_close_ends_though_the_zygote_is_silent(monkeypatch: pytest.Monkey
     await asyncio.wait_for(engine.close(), 30)
     assert run.exit_reason is ExitReason.LOST
     assert process_state(zygote) == ""
-    assert process_state(run.pid) in {"", "Z"}  # Z: its new parent has not asked yet
+    assert process_state(run.pid) in {"", "Z"}  # Z: its new parent has not waited for it yet
 
 
 async def test_start_that_is_given_up_leaves_no_process() -> None:

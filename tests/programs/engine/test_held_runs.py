@@ -60,7 +60,7 @@ async def test_a_halt_is_written_before_it_is_reported(service: ProgramService, 
     suspended = asyncio.Event()
     service.reports.join(lambda report: suspended.set() if "suspend" in report.describe else None)
     await service.run("t")
-    await until(lambda: service._runs["t"].log.newest() != [])  # it has printed, and comes to its breakpoint
+    await until(lambda: service._runs["t"].log.newest() != [])  # it has printed and reaches its breakpoint
     waiting = asyncio.ensure_future(suspended.wait())
     await asyncio.wait([waiting], timeout=0.2)
     assert not waiting.done()

@@ -49,7 +49,7 @@ def test_programs_are_weighed_together(
     group.take(7, parent=5)
     assert (folder / "cgroup.procs").read_text() == "7"
     for entry in folder.iterdir():
-        entry.unlink()  # the kernel's files do not keep a folder
+        entry.unlink()  # the kernel's files do not keep a folder from being removed
     group.close()
     assert not folder.exists()
     assert not group.there

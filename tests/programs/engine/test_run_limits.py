@@ -29,7 +29,7 @@ pytestmark = pytest.mark.asyncio(loop_scope="module")
 
 
 async def test_limits_name_themselves(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(engine_module, "STEPS_BACK_AFTER", 1e6)  # a second of processor is soon used up
+    monkeypatch.setattr(engine_module, "STEPS_BACK_AFTER", 1e6)  # a second of processor time is used up soon
     small = 32 * 1024 * 1024
     memory, cpu, output, recursion = await asyncio.gather(
         play(engine, "x = []\nwhile True:\n    x.append('a' * 10000 + str(len(x)))", limits=Limits(memory=small)),
@@ -84,7 +84,7 @@ async def test_large_arguments_are_slowed_down_too(engine: Engine) -> None:
     before = loop.time()
     played = await play(engine, "x = '-' * 400000\nfor i in range(4): cyberdog.echo(x)", limits=Limits(call_rate=10**6))
     assert played.ending == Finished()
-    assert loop.time() - before >= 1.6 / 2.1 - 0.11  # MB, MB a second, and what may come at once
+    assert loop.time() - before >= 1.6 / 2.1 - 0.11  # MB, MB a second, and the burst
 
 
 async def test_too_many_values_are_refused_in_the_program(engine: Engine) -> None:
@@ -119,7 +119,7 @@ async def test_greedy_programs_get_turns_one_by_one() -> None:
     for number in range(3):
         accounts[number].go_on(partial(work, number))
     assert turns == []
-    share.account().go_on(lambda: turns.append(9))  # it has taken nothing yet: no need to wait
+    share.account().go_on(lambda: turns.append(9))  # it has used nothing yet: no need to wait
     await until(lambda: len(turns) >= 9)
     assert turns[:7] == [9, 0, 1, 2, 0, 1, 2]
     assert loop.time() - began >= (0.03 + 7 * 0.005) / SHARE_MAX - BURST - 0.01
@@ -130,7 +130,7 @@ async def test_hostile_programs_together_keep_to_the_share(engine: Engine, monke
 
     What they are charged is counted, and what they cost is compared with it: both hold on a busy machine, too.
     """
-    light = SHARE_MAX / 100  # all of them take more than that, however little a busy machine leaves to them
+    light = SHARE_MAX / 100  # each uses more than that, however little a busy machine gives
     monkeypatch.setattr(share_module, "LIGHT", light)
     charges, charge = list[float](), Share.charge
 
@@ -152,7 +152,7 @@ async def test_hostile_programs_together_keep_to_the_share(engine: Engine, monke
                 run.calls.reply(event.id)
 
     serving = [asyncio.create_task(serve(run)) for run in runs]
-    await asyncio.sleep(1.0)  # what each may take at first
+    await asyncio.sleep(1.0)  # the burst of each
     charges.clear()
     loop = asyncio.get_running_loop()
     before, spent = loop.time(), time.thread_time()
@@ -161,9 +161,9 @@ async def test_hostile_programs_together_keep_to_the_share(engine: Engine, monke
     charged, longest = sum(charges), max(charges)
     await asyncio.gather(*(run.kill() for run in runs))
     await asyncio.gather(*serving)
-    free = len(runs) * (light * (passed + LIGHT_BURST) + longest)  # without a turn, and beyond one's end
+    free = len(runs) * (light * (passed + LIGHT_BURST) + longest)  # without a turn, and beyond a program's end
     assert charged <= SHARE_MAX * (passed + BURST) + free
-    assert spent < 1.7 * charged + 0.05 * passed  # nothing large is done without being charged
+    assert spent < 1.7 * charged + 0.05 * passed  # large work is always charged
 
 
 async def test_a_long_call_is_read_in_turns(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -212,7 +212,7 @@ async def test_a_slow_reader_makes_the_program_wait(engine: Engine) -> None:
 
 @pytest.mark.slow  # real time
 async def test_time_limit_of_a_run_pauses_during_suspension(engine: Engine) -> None:
-    run = await started(engine, BUSY, Limits(wall=60.0))  # a busy machine may take its time to get there
+    run = await started(engine, BUSY, Limits(wall=60.0))  # a busy machine may take a while
     await run.suspend()
     run._clock._left = 0.05
     await asyncio.sleep(0.1)

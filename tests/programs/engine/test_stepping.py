@@ -151,9 +151,9 @@ async def halts_after(engine: Engine, at: int, *steps: Step) -> list[int]:
 
 async def test_a_step_over_passes_what_is_called(engine: Engine) -> None:
     over, out, into = Step.OVER, Step.OUT, Step.INTO
-    assert await halts_after(engine, 5, over, over, over, over) == [5, 6, 7, 9, 10]  # from its end to who called it
+    assert await halts_after(engine, 5, over, over, over, over) == [5, 6, 7, 9, 10]  # from its end to its caller
     assert await halts_after(engine, 2, out, into, out, out, over) == [2, 6, 2, 7, 9, 10]
-    assert await halts_after(engine, 12, over, over) == [12, 13, 15]  # calls of itself, too
+    assert await halts_after(engine, 12, over, over) == [12, 13, 15]  # recursive calls, too
     assert await halts_after(engine, 11, over, into, over, over, out) == [11, 12, 11, 12, 13, 13]
     assert await halts_after(engine, 15, out) == [15]
 

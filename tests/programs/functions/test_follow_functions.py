@@ -24,7 +24,7 @@ async def anna(caller: Caller, world: World) -> Actor:
     ben.stand()
     ben.place(7.0, 1.0, 0)
     anna.stand()
-    anna.place(5.4, 6.8, 180)  # nearer, her face is above the picture
+    anna.place(5.4, 6.8, 180)  # closer, her face is above the picture
     await caller.robot[Members].add("Anna")
     await caller.robot[Members].set_face("Anna", anna.face)
     await caller.robot[Members].add("Ben")
@@ -80,7 +80,7 @@ async def test_who_takes_over_ends_it(caller: Caller, anna: Actor) -> None:
 
 
 async def test_it_goes_around_what_stands_between(caller: Caller, world: World, anna: Actor) -> None:
-    world.hands.add_obstacle(Pose(3.2, 6.58), (0.2, 0.2, 1.0))  # beside the way to see her, on the way to go
+    world.hands.add_obstacle(Pose(3.2, 6.58), (0.2, 0.2, 1.0))  # standing aside to see her, and moving on
     await caller("cyberdog.follow.add_personnel", "Anna")
     await caller("cyberdog.follow.follow_personnel", "Anna", 1.2)
     await caller.clock.advance(15.0)

@@ -30,7 +30,7 @@ from tests.programs.staging import Act, Stage
 
 EXAMPLES = examples()
 FIGURE = (
-    2.0  # s that a figure takes here; its real time, up to two minutes, is tests/simulation/bodies/test_performing.py's
+    2.0  # s that a figure takes here; tests/simulation/bodies/test_performing.py has its real time, up to two minutes
 )
 MOTIONS = [f"cyberdog.motion.{name}" for name, _, _ in RESULT_MOTIONS]
 WITH_PEOPLE = [
@@ -102,7 +102,7 @@ async def test_examples_of_motions(player: Player, part: int, monkeypatch: pytes
 
 @pytest.mark.world("empty", body="cyberdog2")
 async def test_examples_of_what_needs_no_one(player: Player) -> None:
-    for name in sorted(OTHERS, key=lambda name: name != "cyberdog.touch.data"):  # before anybody has touched it
+    for name in sorted(OTHERS, key=lambda name: name != "cyberdog.touch.data"):  # before the first touch
         await player.stand_at(5.0, 5.0)
         await player.play(name, EXAMPLES[name])
 

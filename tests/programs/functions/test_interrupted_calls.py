@@ -22,7 +22,7 @@ from tests.programs.functions.calling import Caller, field
 WORDS = "the server ended while {} was under way; it was not repeated"
 ACTING = sorted(operation.key for operation in ABILITIES if does_something(operation.key))
 WITHOUT_STATE = {"choreographer.moonwalk", "choreographer.push_up", "dancer.dance"}
-# What the end of the server has done already: recognition is off, and a program that runs has started.
+# Done already by the server's end: recognition is off, and a started program runs.
 WITHOUT_ROBOT = {"cyberdog.gesture.turn_off_recognition", "cyberdog.skeleton.turn_off_recognition"}
 WITHOUT_ROBOT |= {"cyberdog.task.start", "cyberdog.task.recover"}
 _NAMES: dict[str, Any] = {name: SimpleNamespace(**members) for name, members in ENUMS.items()}
@@ -36,7 +36,7 @@ def arguments(name: str) -> tuple[list[object], dict[str, object]]:
             try:
                 args = [eval(ast.unparse(arg), dict(_NAMES)) for arg in node.args]
                 return args, {word.arg or "": eval(ast.unparse(word.value), dict(_NAMES)) for word in node.keywords}
-            except NameError:  # a variable of the example's: only a sequence of steps
+            except NameError:  # a variable of the example: only a sequence of steps
                 return [_NAMES["MotionSequence"]()], {}
     raise AssertionError(f"the example of {name} does not call it")
 
@@ -52,7 +52,7 @@ async def cut_off(caller: Caller, name: str) -> None:
     args, kwargs = arguments(name)
     caller.session.logging.add(name.split(".")[-2])
     words = WORDS.format(name)
-    if name in ("cyberdog.task.stop", "cyberdog.shutdown"):  # to end is all that it does
+    if name in ("cyberdog.task.stop", "cyberdog.shutdown"):  # ending is all it does
         with pytest.raises(TaskEnded):
             await call_cut_off(caller.session, name, args, kwargs)
         return

@@ -112,7 +112,7 @@ async def test_what_the_limits_forbid_moves_nothing(
     assert world.truth.pose_of("a") == before
 
 
-# Just outside of table 4.1, for whatever has the parameter (durations: those of walks, positions: relative ones, too).
+# Just outside table 4.1, for every function with the parameter (durations of walks; relative positions, too).
 BEYOND = {
     "centroid_x": (-0.401, 0.401),
     "centroid_y": (-0.301, 0.301),

@@ -145,7 +145,7 @@ async def test_lost_robot_is_helped(home: Caller, monkeypatch: pytest.MonkeyPatc
         await home.clock.advance(12.0)
         assert not helped.done()
         assert (await said.next()).text == REQUEST
-        known.append("here")  # someone has carried it
+        known.append("here")  # it was carried
         assert result_of(await helped_to_the_end(home, helped)) == (0, 0)
         assert (await said.next()).text == "navigation succeeded"
     known.clear()

@@ -88,7 +88,7 @@ async def test_the_figures_of_the_eyes(caller: Caller, figure: str, look: LightE
         ("play", (4, 161), 1121),
         ("play", (1, 1), 1124),  # one of play_rgb's
         ("play", (1, 54), 1124),  # one of the eyes'
-        ("play", (1, 51), 1124),  # a figure of the eyes
+        ("play", (1, 51), 1124),  # a figure for the eyes
         ("play_rgb", (1, 161, 0, 0, 0), 1124),
         ("play_rgb", (1, 1, 256, 0, 0), 1124),
         ("play_rgb", (1, 1, 0, -1, 0), 1124),

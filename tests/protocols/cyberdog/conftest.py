@@ -67,7 +67,7 @@ async def door(robot: Robot, data: Path, app: App) -> AsyncIterator[CyberDogDoor
     opened = CyberDogDoor(robot, ADDRESS, CyberDogConfig(port=0, app_port=app.port), data)
     await opened.start()
     yield opened
-    await opened.close()  # the fleet lets the time pass that the robot needs to stand
+    await opened.close()  # the fleet waits until the robot stands
 
 
 @pytest.fixture

@@ -21,10 +21,10 @@ from roboglot.testing import Forward
 from tests.drivers.pace import settle
 
 ADDRESS = "127.0.0.17"
-PHONE = "127.0.0.1"  # where a client on this machine seems to call from
+PHONE = "127.0.0.1"  # apparent address of clients on this machine
 DOCS = Path(__file__).parents[3] / "docs" / "protocols"
 EXAMPLE = re.compile(r"^\$ask (\d+)(?: '(.*)')?  #(.*)$", re.MULTILINE)
-PATIENCE = 20.0  # real seconds; as long only on a busy machine
+PATIENCE = 20.0  # real seconds; reached only on a busy machine
 
 
 class Messages:
@@ -108,8 +108,8 @@ class App:
     ticks: list[Any] = field(default_factory=list)
     pushed: list[tuple[int, str]] = field(default_factory=list)
     silent: bool = False
-    gate: asyncio.Event = field(default_factory=asyncio.Event)  # pushes are answered only while it is set
-    slowness: float = 0.0  # s of the machine's time for each push, one after the other
+    gate: asyncio.Event = field(default_factory=asyncio.Event)  # it answers pushes only while this is set
+    slowness: float = 0.0  # s of the machine's time for each push, in turn
     _busy: asyncio.Lock = field(default_factory=asyncio.Lock)
     _server: Any = None
 

@@ -67,7 +67,7 @@ async def test_heartbeats_come_every_half_second(phoned, app, clock: LockstepClo
     for beats in range(len(app.ticks) + 1, len(app.ticks) + 5):
         await clock.advance(0.5)
         await until(partial(lambda beats: len(app.ticks) == beats, beats))
-        await asyncio.sleep(0.03)  # for the reply to get home
+        await asyncio.sleep(0.03)  # time for the reply to arrive
         assert len(app.ticks) == beats
 
 
@@ -100,7 +100,7 @@ async def test_a_lost_app_is_dialled_again(
     await app.stop()
     lost_from = clock.time()
     await passing(lambda: not link.connected)
-    assert 4.5 <= clock.time() - lost_from <= 6.5  # 5 s after its last word, which it may have had before
+    assert 4.5 <= clock.time() - lost_from <= 6.5  # 5 s after its last message, which may be earlier
     again = App(messages)
     await again.start(credentials(pems), app.port)
     await passing(lambda: again.ticks)
@@ -159,7 +159,7 @@ async def test_call_during_attempt_leads_to_next_at_once(clock: LockstepClock) -
     link.seen("ipv4:127.0.0.1:4711")
     await clock.advance(4.0)
     assert link.attempts == [0.0, 5.0]
-    await clock.advance(5.5)  # no one called during the second attempt: a pause follows it
+    await clock.advance(5.5)  # no call came during the second attempt: a pause follows
     assert link.attempts == [0.0, 5.0]
     await clock.advance(1.0)
     assert link.attempts == [0.0, 5.0, pytest.approx(12.0)]

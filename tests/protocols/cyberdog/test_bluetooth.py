@@ -43,7 +43,7 @@ async def test_scan_connect_and_history(client, robot, gadget, forward) -> None:
     assert 0 < device["battery_level"] <= 1
     assert await client.ask(8005) == {"success": True, "message": "1.0.3"}
     assert (await client.ask(8006)) == {"connected": True, "persentage": device["battery_level"]}
-    assert await client.ask(8001, {}) == {"device_info_list": []}  # the history leaves out the connected one
+    assert await client.ask(8001, {}) == {"device_info_list": []}  # the history omits the connected one
     assert await client.ask(8002) == {"result": 0}
     assert robot[Bluetooth].connected is None
     assert await client.ask(8002) == {"result": 3}

@@ -109,7 +109,7 @@ def test_half_a_change_changes_nothing_and_is_reported(tmp_path: Path, name: str
     before = store.newest()
     text = (tmp_path / "new" / "tls" / name).read_bytes()
     file.write_bytes(text[: len(text) // 2] if half else text)
-    if name == "ca-cert.pem" and not half:  # whole by itself: other apps are let in
+    if name == "ca-cert.pem" and not half:  # complete: other apps are admitted
         assert store.newest().ca == text
         return
     assert store.newest() is before
@@ -133,7 +133,7 @@ async def test_certificates_that_are_replaced_count_at_next_connection(
     try:
         async with old.channel(door.port) as connected:
             assert await Client(connected, messages).raw(10001)
-            (tls / "server-key.pem").write_text("half a fi")  # someone copies new ones and is not done
+            (tls / "server-key.pem").write_text("half a fi")  # new ones are being copied
             async with old.channel(door.port) as channel:
                 assert await Client(channel, messages).raw(10001)
             ensure_certificates(tmp_path / "other")

@@ -9,7 +9,7 @@ from roboglot.protocols.cyberdog import server  # noqa: F401 - fills the tables
 from roboglot.protocols.cyberdog.table import TABLE, extras, files, pushes
 from roboglot.wire.contracts import contract
 
-SWEEPS = ("examples", "every_code", "fuzz", "hostile")  # they ask for all, and look at no effect
+SWEEPS = ("examples", "every_code", "fuzz", "hostile")  # they call every code and ignore effects
 ASKS = frozenset({"ask", "raw", "open", "answered", "Stream", "file", "fetch"})  # what calls over the TLS channel
 READS = frozenset({"of"})  # what was pushed to the app
 

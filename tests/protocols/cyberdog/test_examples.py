@@ -10,7 +10,7 @@ from roboglot.protocols.cyberdog.table import pushes
 from roboglot.wire.contracts import contract
 from tests.protocols.cyberdog.phone import Client, examples
 
-FILES = {4004}  # by getFile; the page has an example of its own
+FILES = {4004}  # for getFile; the page has its own example
 
 
 def test_both_pages_have_an_example_of_every_code() -> None:

@@ -23,7 +23,7 @@ from roboglot.wire.cyberdog.text import NotJson, write
 from tests.protocols.cyberdog.phone import PATIENCE, Client, examples
 
 ROUNDS, AT_ONCE, UNDER_WAY_MAX = 12, 32, 40
-GONE = {9031, 10006}  # a robot that is off refuses all that follows: those two come last
+GONE = {9031, 10006}  # a robot that is off refuses everything: those two come last
 VALUES: list[Any] = [
     None, True, False, 0, -1, 1, 2, 5, 7, 13, 111, 303, 0.5, 1.0, -1e300, 1e308, 2**31, 2**63, 10**40, "", "inf",
     "null", "[]", "x" * 500, "\x00", "../..", "\ud800", [], [0, 1, 2], [1e308] * 3, [None], ["a"], [[]], {}, {"": 0},
@@ -97,7 +97,7 @@ async def test_requests_of_any_shape_at_a_whole_dog(
         under_way = [one for one in under_way if not one.done()]
         rng.shuffle(under_way)
         while len(under_way) > UNDER_WAY_MAX:
-            under_way.pop().cancel()  # its app went away
+            under_way.pop().cancel()  # its app has left
     for one in under_way:
         one.cancel()
     await asyncio.wait_for(asyncio.gather(*under_way, return_exceptions=True), PATIENCE)

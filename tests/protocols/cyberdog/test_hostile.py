@@ -106,7 +106,7 @@ async def test_messages_that_are_too_long(client: Client) -> None:
     with pytest.raises(grpc.aio.AioRpcError) as refused:
         await call.read()
     assert refused.value.code() is grpc.StatusCode.RESOURCE_EXHAUSTED
-    assert await client.raw(10001, "[1]")  # the connection lives
+    assert await client.raw(10001, "[1]")  # the connection survives
     assert await client.raw(10001, "x" * 1_000_000) == [(0, '{"error_code":323}')]
 
 
@@ -118,7 +118,7 @@ async def _idle(robot: ServedRobot) -> None:
             return
 
 
-@pytest.mark.slow  # a load
+@pytest.mark.slow  # a load test
 async def test_ten_thousand_streams_at_robot_of_its_own(tmp_path: Path, messages: Messages) -> None:
     """All ask for something that takes long: some wait in line, and other apps are answered all the same."""
     arguments = ("--robot", "a=cyberdog2", "--world", "empty")
@@ -128,7 +128,7 @@ async def test_ten_thousand_streams_at_robot_of_its_own(tmp_path: Path, messages
         async with pems.channel(50052, address=LONELY) as channel, pems.channel(50052, address=LONELY) as other:
             app, hostile = Client(other, messages), Client(channel, messages)
             assert await app.raw(10001)
-            await _idle(robot)  # the kernels are loaded: they are no growth
+            await _idle(robot)  # kernels are loaded before: they are no growth
             before = robot.resident_megabytes
             calls = [hostile.open(8001, {"scan_seconds": 15.0}) for _ in range(STREAMS)]
             assert await app.raw(10001)

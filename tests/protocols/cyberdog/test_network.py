@@ -123,7 +123,7 @@ async def test_silence_while_a_file_is_sent(
 
     monkeypatch.setattr(CameraFiles, "stop", stop_late)
     files = context_of(afar.door).files
-    for name in files.names():  # another test's
+    for name in files.names():  # another test's network
         files.remove(files.path(name))
     robot[Camera].rate = 5.0
     assert await afar.ask(4002, {"command": 2}) == {"result": 0}
@@ -142,7 +142,7 @@ async def test_silence_while_a_file_is_sent(
 async def test_push_to_a_lost_app_spares_later_ones(afar: Afar, robot: Robot) -> None:
     low, silent_since = DiskLow(stamp=0.0, free=1), robot.clock.time()
     afar.fault.silent = True
-    await afar.passing(lambda: robot.clock.time() > silent_since + 3.5)  # soon enough to be waited for at the end
+    await afar.passing(lambda: robot.clock.time() > silent_since + 3.5)  # early enough to be awaited at the end
     assert context_of(afar.door).app.connected
     robot.events.publish(low)
     await afar.passing(lambda: not context_of(afar.door).app.connected)
@@ -159,7 +159,7 @@ async def test_silence_during_an_update(afar: Afar, robot: Robot) -> None:
     assert await afar.ask(5005) == {"download_progress": 100, "upgrade_progress": 0, "code": 0}
     assert (await afar.ask(5004, {"md5": MD5}))["code"] == 0
     await afar.fall_silent()
-    await afar.passing(lambda: robot[Firmware].version == "1.3.2.0")  # it went on, and has restarted
+    await afar.passing(lambda: robot[Firmware].version == "1.3.2.0")  # it continued and has restarted
     await afar.heal()
     await afar.passing(lambda: afar.app.of(5008))
     assert afar.app.of(5008) == [{"success": True, "code": 0}]

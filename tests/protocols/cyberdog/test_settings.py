@@ -109,7 +109,7 @@ async def test_enabled_wake_word_makes_it_listen_once(client, robot, anna, forwa
         "voice_control": True,
         "mic_state": True,
     }.items()
-    anna.say("坐下")  # not to the robot
+    anna.say("坐下")  # not addressed to the robot
     await forward(seconds=20)
     assert robot[Legs].posture is Posture.STANDING
     anna.say(DEFAULT * 2 + "坐下")

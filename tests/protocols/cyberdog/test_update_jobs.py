@@ -52,7 +52,7 @@ async def test_from_what_is_offered_to_what_runs(client, work, robot, forward, a
     _, *feedback, result = await work("upgrade_and_reboot", data=MD5)
     assert feedback[-1]["state"] == "installed"
     assert result["code"] == 0
-    assert not gone  # it says so before it goes
+    assert not gone  # reported before it shuts down
     await passing(lambda: gone)
     await forward(seconds=30)
     assert firmware.version == "1.3.2.0"
@@ -67,7 +67,7 @@ async def test_another_stream_takes_a_running_goal_over(client, passing, forward
     second = Stream(client, 5011, {})
     await until(lambda: first.ended and len(second.answers) > 1)
     assert second.answers[0] == {"accepted": 1}
-    assert second.answers[1] == first.answers[-1]  # the latest feedback again
+    assert second.answers[1] == first.answers[-1]  # repeats the latest feedback
     second.call.cancel()
     await asyncio.gather(second.reading, return_exceptions=True)
     third = Stream(client, 5011, {})
@@ -97,7 +97,7 @@ async def test_goals_that_cannot_be_reached(client, work, robot) -> None:
     for wrong in ({}, {"operate": "format"}, {"operate": ["disk"]}, {"operate": "_run"}, "[]"):
         assert await client.ask(5010, wrong) == {"accepted": 2}
     assert (await work("download", data={"module": 5}))[-1]["code"] == 5710
-    assert (await work("download", data=[]))[-1]["data"]["version"] == "1.3.1.0"  # the maker's
+    assert (await work("download", data=[]))[-1]["data"]["version"] == "1.3.1.0"  # the maker's package
     robot[Battery].set_charge(0.1)
     result = (await work("upgrade"))[-1]
     assert result["code"] == 5701
@@ -113,7 +113,7 @@ async def test_goals_that_cannot_be_reached(client, work, robot) -> None:
 async def test_lost_app_ends_stream_and_not_the_work(client, app, passing, robot) -> None:
     await client.ask(10001)
     await passing(lambda: app.ticks)
-    files = [{"md5": MD5, "fileSize": 160_000_000}]  # eight seconds of it
+    files = [{"md5": MD5, "fileSize": 160_000_000}]  # after eight seconds
     module = {**MODULE, "latest": {**PACKAGE, "packages": files}}
     stream = Stream(client, 5010, {"operate": "download", "data": module})
     await passing(lambda: stream.answers)

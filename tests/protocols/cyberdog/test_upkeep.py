@@ -56,7 +56,7 @@ async def test_an_empty_battery_keeps_it_in_low_power(client, robot, forward) ->
 
 async def test_lying_leads_to_low_power_if_enabled(client, app, robot, passing, forward) -> None:
     await client.ask(10001)
-    await passing(lambda: app.ticks)  # the first app makes a lying dog get up
+    await passing(lambda: app.ticks)  # the first app makes the dog stand up
     robot[Legs].lie_down()
     await forward(seconds=40)
     assert robot[Power].mode is PowerMode.AWAKE
@@ -124,7 +124,7 @@ async def test_an_update_from_download_to_reboot(client, app: App, robot, data, 
     await forward(seconds=60)
     assert robot[Firmware].version == "1.3.2.0"
     assert (await client.ask(1001, {"is_version": True}))["version"]["new_version"] == "1.3.2.0"
-    await door.close()  # as the runtime does around a reboot
+    await door.close()  # as the runtime does at a reboot
     again = CyberDogDoor(robot, ADDRESS, CyberDogConfig(port=0, app=f"127.0.0.1:{app.port}"), data)
     await again.start()
     try:
@@ -237,7 +237,7 @@ async def test_progress_is_pushed_ten_times_second_at_most(robot, forward) -> No
     updates.download(FirmwarePackage("1.3.2.0", 100_000_000, MD5, url="app"), frozenset({MD5}))
     await forward(seconds=1)
     before = len(reported)
-    for _ in range(50):  # as often as a real robot may tell
+    for _ in range(50):  # the most often that a real robot reports
         robot.events.publish(FirmwareChanged(stamp=robot.clock.time(), progress=firmware.progress))
         await forward(seconds=0.02)
     assert 5 <= len(reported) - before <= 11
@@ -251,7 +251,7 @@ async def test_last_app_is_dialled_again_after_a_restart(client, door, app, robo
     app.ticks.clear()
     again = CyberDogDoor(robot, ADDRESS, CyberDogConfig(port=0, app_port=app.port), data)
     await again.start()
-    await passing(lambda: app.ticks)  # no one asked for anything
+    await passing(lambda: app.ticks)  # not requested
     await again.close()
 
 

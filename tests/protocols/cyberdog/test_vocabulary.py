@@ -43,4 +43,4 @@ def test_a_height_of_zero_keeps_the_height() -> None:
 def test_every_figure_of_the_model_has_its_number() -> None:
     assert set(FIGURES.values()) == set(MOTIONS)
     assert len(NUMBERS) == len(FIGURES)
-    assert {125} == FIXED_TIME & MAY_LAST  # the passive trot: a walk of its own time
+    assert {125} == FIXED_TIME & MAY_LAST  # passive trot: a walk with its own duration

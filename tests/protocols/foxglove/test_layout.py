@@ -61,4 +61,4 @@ async def test_camera_is_there_and_films_only_for_viewers(scene: Scene) -> None:
     count = len(viewer.data[number])
     await scene.clock.advance(1.0)
     await viewer.settled()
-    assert len(viewer.data[number]) <= count + 2  # what was on its way
+    assert len(viewer.data[number]) <= count + 2  # messages already on the way

@@ -190,7 +190,7 @@ async def test_a_jump_shows_how_things_stood_then(playing: Scene, film: Path) ->
     await viewer.until(lambda: {numbers[t] for t in ("/a/body", "/a/pose", "/a/map")} <= set(viewer.data))
     for topic in ("/a/body", "/a/pose", "/a/map"):
         assert viewer.data[numbers[topic]] == [recorded(film, topic, lambda at: at < there)[-1]]
-    assert numbers["/a/events"] not in viewer.data  # an event is no state
+    assert numbers["/a/events"] not in viewer.data  # events are no state
     late = await viewer.subscribe("/truth/a/pose")
     await viewer.until(lambda: viewer.data.get(late))
     assert viewer.data[late] == [recorded(film, "/truth/a/pose", lambda at: at < there)[-1]]
@@ -218,7 +218,7 @@ async def test_many_jumps_at_once_are_one_read(playing: Scene, film: Path, monke
     free.set()
     await viewer.until(lambda: viewer.data.get(pose))
     await viewer.settled()
-    assert len(looks) <= 2  # the one that was under way, and the last
+    assert len(looks) <= 2  # the pending one and the last
     assert looks[-1] == recording.first + 17 * NANO - 1
     assert [at for at, _ in viewer.data[pose]] == [recorded(film, "/a/pose", lambda at: at <= looks[-1])[-1][0]]
 
@@ -234,7 +234,7 @@ async def test_all_clients_see_same_and_last_rewinds(playing: Scene, film: Path)
     assert states(other)[-1] == State(PAUSED, first + 5 * NANO, 1.0, True, "")
     await old.topic("/a/pose")
     await old.settled()
-    assert old.binary == []  # which that subprotocol has no word for
+    assert old.binary == []  # that subprotocol has no message for it
     for viewer in (one, other, old):
         await viewer.close()
     await playing.clock.advance(1.0)

@@ -61,7 +61,7 @@ async def door(request, robot: Robot, pushes: Inbox, broadcasts: Inbox) -> Async
     )
     await opened.start()
     yield opened
-    await opened.close()  # the fleet lets the time pass that the robot needs to stand
+    await opened.close()  # the fleet waits until the robot stands
 
 
 Connect = Callable[..., Awaitable[TextClient]]
@@ -99,7 +99,7 @@ async def listen(door: RoboMasterDoor) -> AsyncIterator[Listen]:
     async def open_one(name: str) -> asyncio.StreamReader:
         reader, writer = await asyncio.open_connection(ADDRESS, port_of(door, name))
         writers.append(writer)
-        await asyncio.sleep(0.02)  # until the door has seen it
+        await asyncio.sleep(0.02)  # until the door has noticed it
         return reader
 
     yield open_one

@@ -16,7 +16,7 @@ from roboglot.protocols.robomaster.table import TABLE
 from roboglot.wire.robomaster.replies import PROFILES
 from tests.narrowing import of_kind
 
-WORDS = {  # after the command; those that are not here need none
+WORDS = {  # words after the command; those not listed need none
     "robot mode": "free", "chassis speed": "x 0.1", "chassis wheel": "w1 10", "chassis move": "x 0.1",
     "chassis push": "position on attitude on status on", "gimbal speed": "p 1", "gimbal move": "p 1",
     "gimbal moveto": "p 1", "gimbal push": "attitude on", "blaster bead": "1", "armor sensitivity": "5",

@@ -199,7 +199,7 @@ async def test_status_is_static_or_not(client, forward) -> None:
 
 
 async def test_driving_into_a_wall_is_an_impact(client, robot, forward) -> None:
-    mask_bumper(robot)  # its feelers would brake: a touch at 0.1 m/s is no blow
+    mask_bumper(robot)  # its bumpers would brake: a touch at 0.1 m/s is no impact
     await client.ask("chassis speed x 0.5;")
     for _ in range(600):
         await forward(seconds=0.1)

@@ -16,7 +16,7 @@ from roboglot.protocols.robomaster.server import RoboMasterDoor
 
 ADDRESS = "127.0.0.9"
 FLOOD = 50_000
-PATIENCE = 100  # s of a machine that is busy with something else
+PATIENCE = 100  # s, on a busy machine
 
 
 async def until(condition: Callable[[], object]) -> None:

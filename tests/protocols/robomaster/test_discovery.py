@@ -26,4 +26,4 @@ async def test_silent_while_someone_is_in_sdk_mode(connect, broadcasts, forward)
 
 def test_broadcasts_of_loopback_robots_stay_there() -> None:
     assert broadcast_address("127.0.0.9") == "127.255.255.255"
-    assert broadcast_address("10.0.0.9") == "255.255.255.255"  # from its own address: only into that network
+    assert broadcast_address("10.0.0.9") == "255.255.255.255"  # from its own address: only into its network

@@ -15,10 +15,10 @@ PARSE_ERROR = "command format error: command parse error;"
 OK, FAIL = "ok;", "fail;"
 ON_OFF = "on off"
 RATES = "1 5 10 20 30 50"
-SMALL = 0.001  # as far as "just outside" goes for numbers with decimals
+SMALL = 0.001  # distance of "just outside" for decimal numbers
 
-Range = tuple[float, float] | str  # closed; or words
-# Template -> ranges. ``wait`` marks what answers at the end unless stated otherwise.
+Range = tuple[float, float] | str  # closed ranges, or words
+# Template -> ranges. ``wait`` marks those that answer at the end unless stated otherwise.
 COMMANDS: dict[str, dict[str, Range]] = {
     "robot mode {mode}": {"mode": "chassis_lead gimbal_lead free"},
     "chassis speed x {x} y {y} z {z}": {"x": (-3.5, 3.5), "y": (-3.5, 3.5), "z": (-600.0, 600.0)},
@@ -70,7 +70,7 @@ COMMANDS: dict[str, dict[str, Range]] = {
     "AI push robot {switch}": {"switch": ON_OFF},
     "camera exposure {level}": {"level": "default small medium large"},
 }  # fmt: skip
-# Without parameters; what they answer.
+# Without parameters; their answers.
 PLAIN = {
     "command": "Already in SDK mode;", "robot mode ?": r"chassis_lead;", "robot battery ?": r"\d+;",
     "chassis speed ?": r"(\S+ ){6}\S+;", "chassis position ?": r"(\S+ ){2}\S+;", "chassis attitude ?": r"(\S+ ){2}\S+;",
@@ -150,7 +150,7 @@ async def test_edges(client, robot) -> None:
     every = [case for template, ranges in COMMANDS.items() for case in cases(template, ranges)] + list(PLAIN.items())
     assert len(every) > 600
     for text, right in every:
-        if text.startswith("gimbal moveto"):  # an axis that is there already needs no speed
+        if text.startswith("gimbal moveto"):  # an axis in its place needs no speed
             assert await play(client, robot, "gimbal recenter wait_for_complete true") == OK
         got = await play(client, robot, text)
         if not re.fullmatch(right, got):

@@ -35,7 +35,7 @@ from tests.protocols.robomaster.text_client import ADDRESS, Inbox, TextClient, p
 T = TypeVar("T")
 RATES = [1, 5, 10, 20, 50]
 ATTRIBUTES = {"position": "pfreq", "attitude": "afreq", "status": "sfreq"}
-GROUP = {"person", "marker"}  # of those that exclude each other
+GROUP = {"person", "marker"}  # settings that exclude each other
 IDLE, MISSING = "not in sdk mode;", "fail;"
 switches = st.sampled_from(["on", "off"])
 
@@ -160,7 +160,7 @@ class Machine(RuleBasedStateMachine):
 
     @rule(client=clients, really=st.integers(0, 3).map(lambda number: number == 3))
     def leave(self, client: TextClient, really: bool) -> None:
-        if not really:  # or sessions would be too short for anything to happen in them
+        if not really:  # otherwise sessions would be too short for anything to happen
             return
         right = "ok;" if self.modes is not None else "quit sdk mode failed;"
         assert self.run(self._ask(client, "quit")) == right

@@ -21,7 +21,7 @@ from urllib.parse import quote
 import httpx
 
 Schema = Mapping[str, Any]
-# After these the robot is off for a while, and its port is closed.
+# After these the robot is off for a while, and its port closed.
 SILENCING = {
     "POST /api/core/system/v1/power/:shutdown",
     "POST /api/core/system/v1/power/:restartmodule",
@@ -46,7 +46,7 @@ TEXTS = (
     "1e999",
 )
 JUNK: tuple[Any, ...] = (*NUMBERS, *TEXTS, None, True, False, [], {}, [[]], [None], {"": {}}, [0] * 200)
-WRONG = 0.25  # of the requests have something wrong in them
+WRONG = 0.25  # one in this many requests has an error
 POOL_MAX = 60
 KINDS: dict[str, Any] = {
     "null": type(None),
@@ -71,7 +71,7 @@ class Request:
     headers: dict[str, str]
     content: bytes | None
     wrong: bool
-    forbidden: str = ""  # what the document has against the body
+    forbidden: str = ""  # objections of the document to the body
 
 
 @dataclass(slots=True)
@@ -266,7 +266,7 @@ def number(chance: random.Random, schema: Schema, kind: str) -> int | float:
     if kind == "integer":
         low, high = int(low), int(high)
         return chance.choice((low, high, chance.randint(low, high), max(low, min(1, high))))
-    # Not the very edges: what is drawn at the world's end may reach over it.
+    # Away from the edges: drawings at the world's end may reach beyond it.
     low, high = (bound * 0.9 if abs(bound) > 1e4 else bound for bound in (low, high))
     near = max(low, min(high, chance.uniform(-3, 3)))
     value = chance.choice((low, high, near, near, near, float(round(near))))

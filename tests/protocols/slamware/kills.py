@@ -27,9 +27,9 @@ from typing import Any
 
 PRELOADED = ["roboglot.fleet", "roboglot.protocols.slamware.server", "roboglot.storage.database"]
 START_SECONDS_MAX = 60.0
-KEYS = 12  # that each client writes
+KEYS = 12  # writes of each client
 KILL_AFTER = (0.02, 0.7)  # s of writing
-IDLE_SECONDS_MAX = 20.0  # that the last kill waits for a client who could write nothing yet, on a busy machine
+IDLE_SECONDS_MAX = 20.0  # s that the last kill waits for a client without a write yet, on a busy machine
 ARTIFACT, SLAM, DELIVERY = "/api/core/artifact/v1", "/api/core/slam/v1", "/api/delivery/v1"
 MAP = "/api/multi-floor/map/v1"
 State = dict[str, int]

@@ -231,7 +231,7 @@ async def test_metres_and_seconds_count_over_the_robots_life(
     kept = robot[Settings].get(TOTALS)
     assert kept == [pytest.approx(metres, abs=0.01), pytest.approx(30.0)]
     again = SlamwareDoor(robot, "127.0.0.1", SlamwareConfig(port=0))
-    await again.start()  # as after a crash: what was kept counts on
+    await again.start()  # as after a crash: stored values count on
     async with httpx.AsyncClient(base_url=again.endpoints[0].address) as other:
         seconds = (await other.get("/api/core/statistics/v1/runtime")).json()
     await again.close()

@@ -78,7 +78,7 @@ async def test_blocked_for_long(
     await forward(seconds=2)
     assert await read(bare_client) == ["ROBOT_BLOCKED"]
     await forward(seconds=800)
-    assert await read(bare_client) == ["PATH_OCCUPIED"]  # it went on at once this time
+    assert await read(bare_client) == ["PATH_OCCUPIED"]  # this time it went on at once
 
 
 @pytest.mark.parametrize(

@@ -15,9 +15,9 @@ from roboglot.protocols.slamware.table import TABLE
 from roboglot.testing import Forward
 from tests.protocols.slamware.generated import SILENCING, Generator, tell
 
-COUNT = 3000  # ten of each operation; by hand, generated.py makes any number
+COUNT = 3000  # ten of each operation; run by hand, generated.py makes any number
 QUICK = 900  # three of each
-TRIES_MAX = 200  # of 50 ms of robot time each: what takes longer hangs
+TRIES_MAX = 200  # of 50 ms of robot time each: longer means that it hangs
 
 
 @pytest.mark.world("empty")
@@ -48,7 +48,7 @@ async def test_whatever_document_allows_is_answered_as_it_says(
         assert not problem, tell(request, reply, problem)
         statuses.setdefault(request.key, Counter())[reply.status_code] += 1
     assert statuses.keys() == ({operation.key for operation in TABLE} | ALIASES.keys()) - SILENCING
-    # The requests are good for something: most operations were carried out.
+    # The requests are useful: most operations were carried out.
     carried_out = {key for key, seen in statuses.items() if seen.keys() & {200, 204}}
     assert len(carried_out) > 0.75 * len(statuses), statuses.keys() - carried_out
     assert not [record for record in caplog.records if record.levelno >= logging.ERROR]

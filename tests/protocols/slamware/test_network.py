@@ -39,7 +39,7 @@ async def test_the_way_from_one_network_to_another(robot: Robot, client: httpx.A
     assert (await status(client))["ssid"] == robot[Network].state.ssid == "office-guests"
     await put(client, 1, ssid="nowhere", password="12345678")
     await forward(seconds=6)
-    assert (await status(client))["ssid"] == "office-guests"  # not heard: as before
+    assert (await status(client))["ssid"] == "office-guests"  # not scanned: as before
     assert (await put(client, 2)).json() is True
     await forward(seconds=1)
     off = await status(client)
@@ -93,7 +93,7 @@ async def test_the_operators_access_point(robot: Robot, client: httpx.AsyncClien
     assert (await client.get(APN)).json() == {"apn": "nonsense"}
     mobile = robot[Network].mobile
     assert mobile is not None
-    assert not mobile.registered  # this operator knows no such name
+    assert not mobile.registered  # this operator has no such name
 
 
 @pytest.mark.world("office", body="cyberdog2")

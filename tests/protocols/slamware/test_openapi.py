@@ -65,7 +65,7 @@ async def test_page_and_description_are_served(bare_client: httpx.AsyncClient) -
     texts = [page.text]
     for path in re.findall('(?:src|href)="([^"]+)"', page.text):
         if path == "data:,":
-            continue  # no icon, and no request for one
+            continue  # no icon, so no request for one
         assert path.startswith("/")
         part = await bare_client.get(path)
         assert part.status_code == 200, path

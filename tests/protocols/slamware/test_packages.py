@@ -75,7 +75,7 @@ async def test_packages_are_bounded(client: httpx.AsyncClient, monkeypatch: pyte
             yield b"x" * 1000
 
     monkeypatch.setattr("roboglot.protocols.slamware.parameters.PACKAGE_MAX", 5000)
-    for content in (endless(), b"x" * 5001):  # of unknown length, and announced
+    for content in (endless(), b"x" * 5001):  # of unknown and of announced length
         reply = await client.post(f"{FIRMWARE}/update/:start", content=content)
         assert reply.status_code == 413
 

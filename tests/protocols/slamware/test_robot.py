@@ -57,7 +57,7 @@ async def test_abilities_are_enabled_when_the_lidar_turns(client: httpx.AsyncCli
     await forward(seconds=1)
     now = await enabled()
     assert now["core"]
-    assert now["multi_floor"]  # clients of several floors wait for it
+    assert now["multi_floor"]  # clients on several floors wait for it
 
 
 async def test_power_follows_the_battery_and_the_dock(
@@ -80,7 +80,7 @@ async def test_power_follows_the_battery_and_the_dock(
     ]
     pack = await get(client, f"{SYSTEM}/battery/pack")
     assert isinstance(pack, dict)
-    assert pack["current"] < 0  # it drains now
+    assert pack["current"] < 0  # now it discharges
     assert pack["temp"] == [round(robot[Battery].state.temperature * 10)]
 
 
@@ -117,7 +117,7 @@ async def test_a_low_battery_is_a_warning(
 
 async def test_the_scan_lies_on_the_walls(world: World, client: httpx.AsyncClient, forward: Forward) -> None:
     assert (await get(client, f"{SYSTEM}/laserscan"))["laser_points"] == []
-    world.hands.place("a", Pose(3.0, 2.0, 0.7))  # nothing here is symmetric
+    world.hands.place("a", Pose(3.0, 2.0, 0.7))  # an asymmetric place
     await forward(seconds=1)
     where = world.truth.pose_of("a")
     points = (await get(client, f"{SYSTEM}/laserscan"))["laser_points"]
@@ -140,7 +140,7 @@ async def test_scan_comes_with_pose_where_it_was_taken(
     behind = 0.5 * (robot.clock.time() - scan.stamp)
     assert behind > 0.01
     pose = (await get(client, f"{SYSTEM}/laserscan"))["pose"]
-    assert robot[Localization].pose.x - pose["x"] == pytest.approx(behind, abs=0.011)  # odometry beats at 50 Hz
+    assert robot[Localization].pose.x - pose["x"] == pytest.approx(behind, abs=0.011)  # odometry runs at 50 Hz
     await forward(seconds=2)
 
 
@@ -213,7 +213,7 @@ async def test_the_map_is_what_the_lidar_saw(
     assert isinstance(area, dict)
     assert area["width"] == pytest.approx(whole.cells.shape[1] * whole.resolution, rel=1e-4)
     assert (area["x"], area["y"]) == pytest.approx((whole.x, whole.y), abs=1e-4)
-    # two metres ahead of the dock there is nothing, ten metres ahead there is the eastern wall
+    # two metres ahead of the dock is free, ten metres ahead is the eastern wall
     row, column = int((0 - whole.y) / whole.resolution), int((2 - whole.x) / whole.resolution)
     assert 1 <= whole.cells[row, column] <= 127
     wall = int((10 - world.truth.pose_of("a").x - whole.x) / whole.resolution)
@@ -292,7 +292,7 @@ async def test_places_are_adjusted_after_a_loop_was_closed(
     await client.post(POIS, json={"id": "new", "pose": {"x": 1.0, "y": 0.5, "yaw": 0.0}})
     reply = await client.post(f"{POIS}/:adjust")
     assert (reply.status_code, reply.content) == (200, b"")
-    for _ in range(2):  # once and no more
+    for _ in range(2):  # exactly once
         found = {place.id: (place.pose.x, place.pose.y, place.pose.yaw) for place in robot[Places].all()}
         assert found["near"] == pytest.approx((1.0, 0.8, 0.0))
         assert found["far"] == pytest.approx((8.8, 0.1, math.pi / 2))
@@ -306,7 +306,7 @@ async def test_doubts_about_the_place_are_reset(
     await forward(seconds=3)
     true = world.truth.pose_of("a")
     robot[Localization].set_pose(Pose(0.35, 0.3, 0.3))
-    robot[Localization].enable(False)  # wrong, and nothing corrects it
+    robot[Localization].enable(False)  # wrong and not corrected
     await forward(seconds=0.5)
     robot[Localization].enable(True)
     robot[Health].set("not localized", True, "localization", FaultLevel.WARNING)

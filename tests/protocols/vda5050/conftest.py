@@ -68,7 +68,7 @@ class Control:
         self.serial = ""
 
     def close(self) -> None:
-        self._client.disconnect()  # first: the loop's thread ends with the connection, else it sleeps for a second
+        self._client.disconnect()  # first: the loop's thread ends with the connection; otherwise it sleeps for a second
         self._client.loop_stop()
 
     def hear(self) -> None:

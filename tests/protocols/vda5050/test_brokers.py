@@ -55,7 +55,7 @@ def any_broker(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPath
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 async def test_ten_thousand_valid_orders_each_get_their_answer(any_broker: int, yard: Opened) -> None:
-    orders = _orders(ORDERS)  # before the robot is there: a broker drops whom it has not heard for a while
+    orders = _orders(ORDERS)  # before the robot connects: brokers drop silent clients after a while
     one = await yard(port=any_broker)
     outcomes: Counter[str] = Counter()
 
@@ -103,6 +103,6 @@ def _orders(count: int) -> list[dict[str, object]]:
 
     while len(made) < count:
         collect()
-    for order in made[::3]:  # the others begin too far away
+    for order in made[::3]:  # the others start too far away
         order["nodes"][0]["nodePosition"] |= {"x": 0.0, "y": 0.0, "allowedDeviationXY": 2.0}  # type: ignore[index]
     return made[:count]

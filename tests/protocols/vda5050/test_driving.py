@@ -41,7 +41,7 @@ async def test_an_order_is_driven_node_by_node(yard: Opened) -> None:
     seen = [state["lastNodeSequenceId"] for state in one.control.heard["state"] if state["orderId"] == "one"]
     assert seen == sorted(seen)
     assert set(seen) >= {0, 2, 4}
-    for said in one.control.heard["state"]:  # what is left fits what was passed
+    for said in one.control.heard["state"]:  # the rest continues the passed part
         assert all(node["sequenceId"] > said["lastNodeSequenceId"] for node in said["nodeStates"])
 
 

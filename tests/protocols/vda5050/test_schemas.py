@@ -56,7 +56,7 @@ async def test_all_that_a_robot_says_fits_the_schemas(yard: Opened, version: str
     for name in ("state", "visualization", "connection", "factsheet"):
         for message in one.control.heard[name]:
             assert complaints(version, name, message) == []
-    assert complaints(version, "state", one.control.state | {"driving": "no"})  # they can say no
+    assert complaints(version, "state", one.control.state | {"driving": "no"})  # they are able to refuse
 
 
 @settings(max_examples=50)
@@ -66,5 +66,5 @@ def test_the_orders_of_the_other_tests_are_valid(made: dict[str, Any]) -> None:
     assert complaints("3.0", "order", made) == []
     for node in made["nodes"]:
         if isinstance(node["nodePosition"].get("allowedDeviationXY"), dict):
-            del node["nodePosition"]["allowedDeviationXY"]  # an ellipse is 3.0's
+            del node["nodePosition"]["allowedDeviationXY"]  # ellipses are new in 3.0
     assert complaints("2.1", "order", made) == []

@@ -17,7 +17,7 @@ from roboglot.protocols.visual import DOOR
 from tests.programs.functions.calling import Caller
 
 LINE_ON, HEAD = 9, 1
-WORDS: dict[str, tuple[object, ...]] = {  # arguments of the functions that need some to get as far as the part
+WORDS: dict[str, tuple[object, ...]] = {  # arguments that some functions need to get as far as the part
     "cyberdog.audio.play": ("hello",),
     "cyberdog.audio.instantly_play": ("hello",),
     "cyberdog.led.play": (HEAD, 0xA1),
@@ -31,8 +31,8 @@ WORDS: dict[str, tuple[object, ...]] = {  # arguments of the functions that need
     "cyberdog.personnel.voiceprint_recognized": ([],),
     "cyberdog.motion.run_sequence": (Record("MotionSequence", {"gait_list": [], "pace_list": []}),),
 }
-REPORTS = ".state"  # reports a missing part in its result, which is its work
-PATIENCE = 10  # times 0.1 s that a call may take here
+REPORTS = ".state"  # its result reports a missing part, as it should
+PATIENCE = 10  # times 0.1 s for a call
 
 
 @dataclass
@@ -77,7 +77,7 @@ async def test_functions_are_refused_as_the_page_says(body: str, robot: Robot, c
         if not name.endswith(REPORTS):
             answer = await ask(caller, name)
             refused = kind.judge(operation.needs) == "refused"
-            # What lacks a part may have something else against the call before it asks for the part.
+            # A call without its part may have another fault before it asks for the part.
             if answer.failed < refused or (answer.names_a_missing_part and not refused):
                 wrong[name] = answer.words
     assert wrong == {}

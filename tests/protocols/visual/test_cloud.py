@@ -134,7 +134,7 @@ async def operations(robots: Robots) -> list[tuple[str, str]]:
 async def test_favourites_of_one_robot_run_on_the_other(robots: Robots, database: Database) -> None:
     one = await robots.robot("one", database)
     module = {"type": "module", "mode": "common", "condition": "say()", "body": "print('from the cloud')"}
-    # "a" calls "z": what comes first needs what comes later
+    # "a" calls "z": the first needs the last
     await one.ask("save", "z", **module)
     await one.ask("save", "a", **module | {"condition": "twice()", "body": "say()\nsay()"})
     await one.save("t1", "twice()")
@@ -159,7 +159,7 @@ async def test_what_happens_is_recorded_in_order(robots: Robots, database: Datab
     await app.ends("t")
     await app.ask("delete", "unknown")
     await app.ask("inquiry")
-    await app.ask("run", "unknown")  # refused: not done, not reported
+    await app.ask("run", "unknown")  # refused: neither done nor reported
     await sent(app, database)
     assert await operations(robots) == [("t", "run"), ("t", "start"), ("t", "stop")]
 
@@ -223,7 +223,7 @@ async def test_temporary_failures_are_retried_at_growing_distances(database: Dat
         while len(link.frames) < 7:
             await asyncio.sleep(0.003)
             await clock.advance(0.25)
-    assert [frame["number"] for frame in link.frames] == [0, 0, 0, 0, 0, 1, 2]  # 10001 is not tried again
+    assert [frame["number"] for frame in link.frames] == [0, 0, 0, 0, 0, 1, 2]  # 10001 is not retried
     gaps = [later - earlier for earlier, later in itertools.pairwise(link.times)]
     assert [gap >= expected for gap, expected in zip(gaps, (1, 2, 4, 8), strict=False)] == [True] * 4
     await mirror.close()
@@ -250,7 +250,7 @@ async def test_cloud_can_neither_overwrite_nor_run_nor_smuggle(engine: Engine, c
     await app.save("mine", "print('mine')")
     await sent(app, database)
     assert door._cloud is not None
-    await door._cloud.close()  # only inquiries reach the script now
+    await door._cloud.close()  # from here only inquiries reach the script
     link.answers = [coded(CloudCode.OK), coded(CloudCode.OK, *items)]
     [listed] = await app.ask("inquiry")
     assert [(i["id"], i["operate"]) for i in listed["list"]] == [
@@ -306,7 +306,7 @@ async def test_only_accounts_come_in_and_see_their_own(cloud: Cloud) -> None:
     assert (await cloud.post(one, **inquiry | {"target_id": ["t"]})).items == []  # incremental
     delete = task | {"operate": "delete"}
     assert (await cloud.post(one, **delete)).code == "200"
-    assert [item["id"] for item in (await cloud.post(one, **inquiry)).items] == ["t"]  # a favourite stays
+    assert [item["id"] for item in (await cloud.post(one, **inquiry)).items] == ["t"]  # favourites stay
     new = await cloud.store.add_account("one")
     assert (await cloud.post(one, **inquiry)).code == "403"
     assert len((await cloud.post(new, **inquiry)).items) == 1

@@ -69,7 +69,7 @@ async def test_engine_that_does_not_answer_is_time_out(
     monkeypatch.setattr(engine_module, "ANSWER_MAX", 0.2)
     os.kill(engine._launcher.pid, signal.SIGSTOP)
     try:
-        assert (await app.save("late", "late = 1"))["state"] == 31  # a text that was judged before is not asked again
+        assert (await app.save("late", "late = 1"))["state"] == 31  # a text already judged is not judged again
         [answer] = await app.ask("run", "t")
         assert answer["state"] == 31
     finally:

@@ -92,7 +92,7 @@ class Ledger:
         self.unsure: Counter[str] = Counter()
         self.called_off: Counter[str] = Counter()
         self.starts: Counter[str] = Counter()
-        self.shutdowns: Counter[str] = Counter()  # of this life of the server
+        self.shutdowns: Counter[str] = Counter()  # of the server's current life
 
     def frame(self) -> Frame:
         """Something to ask for."""
@@ -173,7 +173,7 @@ async def test_kills(tmp_path: Path) -> None:
         states = ledger.compare(database, None if answered else in_flight)
         count_starts(server, ledger, states)
     server = await Server.start(database)
-    for number in range(1000):  # what still waits for its time runs now
+    for number in range(1000):  # tasks that wait for their time run now
         id = f"last{number}"
         server.send({"type": "task", "id": id, "operate": "inquiry", "target_id": []})
         await server.until(lambda: server.answer(id))  # noqa: B023

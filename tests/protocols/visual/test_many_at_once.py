@@ -60,7 +60,7 @@ async def test_whatever_comes_the_states_agree(app: FrontEnd, seed: int) -> None
         assert all(begin[1] == end[1] for begin, end in zip(marks[::2], marks[1::2], strict=True))
 
 
-@pytest.mark.slow  # a load; in short: tests/programs/engine/test_engine.py
+@pytest.mark.slow  # a load test; in short: tests/programs/engine/test_engine.py
 async def test_each_of_twenty_busy_programs_is_stopped_individually(app: FrontEnd) -> None:
     ids = [f"t{number}" for number in range(20)]
     for id in ids:
@@ -83,7 +83,7 @@ async def test_programs_end_together_when_the_server_closes(app: FrontEnd, monke
     async def slowly(id: str, state: str, log: Sequence[LogEntry] = ()) -> None:
         nonlocal waiting
         waiting += 1
-        async with asyncio.timeout(PATIENCE):  # a slow disk: no program, and no other write, waits for it
+        async with asyncio.timeout(PATIENCE):  # a slow disk: neither programs nor other writes wait for it
             while waiting < len(pids) or any(Path(f"/proc/{pid}").exists() for pid in pids):  # noqa: ASYNC110, ASYNC240
                 await asyncio.sleep(0.001)
         await write(id, state, log)

@@ -52,7 +52,7 @@ async def test_lists_tell_dependencies_both_ways(app: FrontEnd) -> None:
     }
     assert (modules["m2"]["dependent"], modules["m2"]["be_depended"]) == (["m1"], ["t"])
     assert (tasks["t"]["dependent"], tasks["t"]["be_depended"]) == (["m2"], [])
-    assert tasks["own"]["dependent"] == []  # a definition of its own, a text and a comment are no calls
+    assert tasks["own"]["dependent"] == []  # its own definition, text and comments are no calls
     [one] = await app.ask("inquiry", "m2", "unknown", type="module")
     assert [item["id"] for item in one["list"]] == ["m2"]
 

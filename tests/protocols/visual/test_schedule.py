@@ -124,7 +124,7 @@ async def test_the_schedule_survives_the_server(connect: Connect, plain_robot: R
     await plan(app, "never", "single", "now + 2hours")
     await app.ask("shutdown", "never")
     await app.door.close()
-    await app.clock.advance(3601)  # while no one was there: late by 1 s, and one round of the cycle missed
+    await app.clock.advance(3601)  # in its absence: late by 1 s, one round of the cycle missed
     app = await connect(plain_robot, database)
     await app.ends("late", pace=0.0)
     assert await app.printed("late") == ["hello 01:00"]

@@ -58,7 +58,7 @@ async def test_nothing_is_saved_on_a_full_disk(connect: Connect, robot: Robot, w
     assert (await app.save("t1", "print(1)"))["describe"] == "the disk is full"
     [answer] = await app.ask("save", "m1", type="module", mode="common", condition="double(n)", body="return 2 * n")
     assert answer["describe"] == "the disk is full"
-    [answer] = await app.ask("run", "t1")  # what is there runs
+    [answer] = await app.ask("run", "t1")  # existing tasks run
     assert answer["state"] == 0
     await app.ends("t1")
     world.faults.clear()

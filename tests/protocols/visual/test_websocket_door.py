@@ -69,7 +69,7 @@ async def test_a_program_is_saved_run_and_watched(address: str) -> None:
     assert operations == ["start", "run", "run", "stop"]
     printed = json.loads(await anext(log))
     assert (printed["target_id"], printed["level"], printed["text"][:7]) == ("t", "print", "hello 狗")
-    await log.send("t")  # what is kept of it, now that it is over
+    await log.send("t")  # its record, now that it is over
     assert json.loads(await anext(log))["text"].startswith("hello 狗")
     assert json.loads(await anext(log)) == {"target_id": "t", "entries": 1}
     await link.close()
@@ -288,7 +288,7 @@ async def test_where_a_program_is(address: str) -> None:
         return found["state"], found["line"], found["module"], found["block"]
 
     async def reached(condition: Callable[[tuple[str, int, str, str]], bool]) -> tuple[str, int, str, str]:
-        for _ in range(LOOKS_MAX):  # the other end tells nothing by itself
+        for _ in range(LOOKS_MAX):  # the other end sends nothing unprompted
             if condition(found := await place("t")):
                 return found
             await asyncio.sleep(0.01)
@@ -329,7 +329,7 @@ async def test_clients_that_do_not_read_are_cut_off(door: VisualDoor, address: s
     asleep.close()
 
 
-LINES = 4000  # of 3 kB: more than the system keeps for a socket, and less than a program may print
+LINES = 4000  # of 3 kB: more than a socket's buffer, less than a program may print
 DOGS = "狗" * 990
 PRINTING = f"for i in range({LINES} // 40):\n    print('\\n'.join(str(40 * i + k) + '{DOGS}' for k in range(40)))"
 

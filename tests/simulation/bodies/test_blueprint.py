@@ -37,7 +37,7 @@ def test_in_shipped_worlds_people_walk_through_nothing(name):
             for a, b in zip(person.path, person.path[1:] or person.path, strict=False):
                 for step in range(51):
                     spot = Pose(a[0] + (b[0] - a[0]) * step / 50, a[1] + (b[1] - a[1]) * step / 50)
-                    Places(world).next(spot, number, person.radius)  # raises where no one can stand
+                    Places(world).next(spot, number, person.radius)  # raises where a person cannot stand
 
 
 @pytest.mark.parametrize("name", ["office", "empty", "playground"])

@@ -43,7 +43,7 @@ async def test_holds_a_pose_and_the_imu_feels_it(dog):
     assert legs.attitude == Orientation(0.2, -0.3, 0.1)
     reading = dog.robot[Imu].reading
     assert (reading.orientation.roll, reading.orientation.pitch) == pytest.approx((0.2, -0.3), abs=0.01)
-    # Nose up: gravity's reaction has a part ahead; rolled to the right: a part to the left.
+    # Nose up: gravity's reaction points partly ahead; rolled to the right: partly to the left.
     felt = reading.linear_acceleration
     assert felt.x == pytest.approx(9.81 * math.sin(0.3), abs=0.3)
     assert felt.y == pytest.approx(9.81 * math.cos(0.3) * math.sin(0.2), abs=0.3)

@@ -135,7 +135,7 @@ def test_landing_reports_how_fast_a_foot_comes_down(landing):
 async def test_without_steps_the_legs_hold_the_body_back(dog):
     action = dog.robot[Legs].dance([Step(3.0, Twist(0.2))], [Footfall(1.0, ALL)])
     await dog.clock.advance(2.9)
-    assert dog.pose.x - 2.0 == pytest.approx(0.15, abs=0.01)  # of 0.6 m: as far as the legs reach
+    assert dog.pose.x - 2.0 == pytest.approx(0.15, abs=0.01)  # of 0.6 m: the reach of the legs
     await dog.clock.advance(2.0)
     assert action.status is ActionStatus.SUCCEEDED
     walked = dog.robot[Legs].dance([Step(3.0, Twist(0.2))], TROT)
@@ -153,7 +153,7 @@ async def test_a_foot_comes_down_where_it_should(dog):
     right = seen[-1][Foot.RIGHT_FRONT]
     assert right.grounded
     assert (right.position.x, right.position.y) == pytest.approx((0.21, -0.075), abs=0.003)
-    left = seen[-1][Foot.LEFT_REAR]  # made to end above the floor, it carries nothing
+    left = seen[-1][Foot.LEFT_REAR]  # ending above the floor, it carries no load
     assert not left.grounded
     assert (left.position.x, left.position.z) == pytest.approx((-0.21, 0.04), abs=0.003)
     assert all(feet[Foot.LEFT_FRONT].grounded for feet in seen)
@@ -239,7 +239,7 @@ async def test_cameras_see_a_paw_that_is_lifted(simulate):
     changed = abs((await sim.robot[Camera].capture()).rgb().astype(int) - before).sum(axis=2) > 60
     rows, columns = changed.nonzero()
     assert 300 < len(rows) < 20_000
-    assert rows.min() > 500  # nothing above the belly, and only where that leg is
+    assert rows.min() > 500  # nothing above the belly, and only at that leg
     assert columns.max() < 640
 
 
@@ -259,7 +259,7 @@ async def test_figures_lift_paws_that_they_are_named_for(dog, motion, turns):
     for _ in range(round(16 / TICK)):
         await dog.clock.advance(TICK)
         feet = dog.robot[Legs].feet
-        assert all(abs(feet[foot].position.z - last[foot]) < 0.025 for foot in Foot)  # and none is thrown
+        assert all(abs(feet[foot].position.z - last[foot]) < 0.025 for foot in Foot)  # and none is raised
         last = {foot: feet[foot].position.z for foot in Foot}
         seen.add(ALL - grounded(dog))
     assert action.status is ActionStatus.SUCCEEDED

@@ -156,7 +156,7 @@ async def test_with_the_brake_released_people_can_push_it(hermes):
     stop.release_brake(True)
     hull.push(40.0, 0.0, 0.0)
     await sim.clock.advance(1.0)
-    assert sim.robot[Base].velocity.x > 0.3  # its wheels feel it
+    assert sim.robot[Base].velocity.x > 0.3  # its wheels notice it
     await sim.clock.advance(1.0)
     assert sim.pose.x - 3.0 - held > 10 * held
     with pytest.raises(EmergencyStopped):

@@ -14,7 +14,7 @@ from roboglot.model.events import LiftArrived, LiftCalled, LiftDoorClosed, LiftD
 from roboglot.model.geometry import STILL, Pose, Twist
 
 EVENTS = (LiftCalled, LiftArrived, LiftDoorClosed, LiftDoorOpened, LiftFailed)
-BEFORE = Pose(2.6, 10.0, math.pi)  # before the lift's door, looking at it
+BEFORE = Pose(2.6, 10.0, math.pi)  # in front of the lift's door, facing it
 WITHIN = Pose(0.95, 10.0, 0.0)
 
 
@@ -49,7 +49,7 @@ async def test_robot_rides_to_second_floor_and_drives_out(simulate):
         assert not sim.robot[Cliff].detected  # the car's floor is a floor
     assert sim.world.truth.floor_of("a") == 2
     assert max(abs(a - b) for a, b in pairwise(heights)) < 0.12  # no jump
-    await drive(sim, -0.5, 4.0)  # backwards, as it came
+    await drive(sim, -0.5, 4.0)  # in reverse, the way it came
     assert sim.pose.x > 2.0
     assert sim.world.truth.floor_of("a") == 2
     await sim.clock.advance(0.2)
@@ -65,7 +65,7 @@ async def test_it_tells_in_order_what_it_does(simulate):
     assert lift.floors == ("ground", "first", "second")
     lift.call(1)
     await sim.clock.advance(0.1)
-    assert reported(heard) == [("LiftCalled", 1), ("LiftArrived", 1)]  # it is here
+    assert reported(heard) == [("LiftCalled", 1), ("LiftArrived", 1)]  # the car has arrived
 
 
 async def test_shut_landing_door_is_seen_open_one_not(simulate):
@@ -125,7 +125,7 @@ async def test_people_ride_along_too_many_keep_it_waiting(simulate):
     (fault,) = sim.world.faults.inject("lift_occupied", people=3)
     await sim.clock.advance(0.2)
     assert lift.state.load == pytest.approx(3 * 75 / 630)
-    assert sim.robot[Lidar].scan.ranges[700:900].min() < 1.9  # someone stands in it
+    assert sim.robot[Lidar].scan.ranges[700:900].min() < 1.9  # a person stands in it
     lift.call(1)
     await sim.clock.advance(15.0)
     assert [solid.kind for solid in sim.world._physics.props.on(1)].count("person") == 3
@@ -140,9 +140,9 @@ async def test_out_of_reach_the_radio_is_silent(simulate):
     await sim.clock.advance(1.5)
     with pytest.raises(Refused, match="out of reach"):
         lift.call(2)
-    sim.world.building.lift.call(2)  # someone presses the button
+    sim.world.building.lift.call(2)  # a person presses the button
     await sim.clock.advance(20.0)
-    assert lift.state.floor == 0  # the last that was heard
+    assert lift.state.floor == 0  # the last call received
     assert not reported(heard)
 
 
@@ -150,7 +150,7 @@ async def test_open_shaft_stops_the_robot_before_it_falls(simulate):
     sim, lift, _ = start(simulate, BEFORE)
     lift.call(2)
     await sim.clock.advance(20.0)
-    for half in range(2):  # someone forces the landing door
+    for half in range(2):  # a person forces the landing door
         sim.world._physics.props.remove(f"landing door 0 {half}")
     sim.robot[Base].set_velocity(Twist(0.7))
     await sim.clock.advance(4.0)

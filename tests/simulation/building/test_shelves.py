@@ -39,11 +39,11 @@ async def test_wall_stops_it_and_way_back_is_free(carrier):
     base, (shelf,) = carrier.robot[Base], carrier.world.building.shelves
     base.set_velocity(Twist(0.5))
     await carrier.clock.advance(8.0)
-    assert carrier.pose.x == pytest.approx(8.0 - 0.45, abs=0.02)  # its front is at the wall
+    assert carrier.pose.x == pytest.approx(8.0 - 0.45, abs=0.02)  # its front touches the wall
     assert shelf.pose.distance_to(carrier.pose) < 0.01
     base.set_velocity(Twist(yaw=0.5))
     await carrier.clock.advance(1.0)
-    assert abs(carrier.pose.yaw) < 0.1  # a corner would go into the wall
+    assert abs(carrier.pose.yaw) < 0.1  # a corner would enter the wall
     base.set_velocity(Twist(-0.5))
     await carrier.clock.advance(4.0)
     assert carrier.pose.x < 6.5
@@ -55,7 +55,7 @@ async def test_low_thing_stops_leg_and_passes_between_legs(carrier):
     await carrier.clock.advance(math.pi)  # a quarter turn
     base.set_velocity(Twist(0.5))
     await carrier.clock.advance(6.0)
-    assert carrier.pose.y == pytest.approx(6.0 - 0.45, abs=0.02)  # nothing is in its way up to the wall
+    assert carrier.pose.y == pytest.approx(6.0 - 0.45, abs=0.02)  # free up to the wall
     carrier.world.hands.place("a", Pose(2.43, 2.0, math.pi / 2))
     await carrier.clock.advance(0.1)
     base.set_velocity(Twist(0.5))

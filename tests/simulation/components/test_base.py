@@ -20,7 +20,7 @@ async def test_drives_where_it_should(simulate):
     await sim.clock.advance(2.0)
     sim.robot[Base].set_velocity(STILL)
     await sim.clock.advance(1.0)
-    # 2 s at speed; what the ramp up takes away the ramp down gives back
+    # 2 s at speed; what acceleration loses, braking gains
     assert sim.pose.x == pytest.approx(5 - 0.4, abs=0.02)
     assert sim.pose.y == pytest.approx(5 + 1.0, abs=0.02)
     assert sim.pose.yaw == pytest.approx(math.pi / 2, abs=1e-6)
@@ -97,8 +97,8 @@ async def test_without_bumper_a_wall_stops_no_wheels(simulate):
     sim.world.start()
     sim.robot[Base].set_velocity(Twist(0.5))
     await sim.clock.advance(6.0)
-    assert sim.pose.x == pytest.approx(9.75, abs=0.01)  # the wall is at 10, the hull 0.25 around
-    assert sim.robot[Odometry].reading.pose.x > 2.5  # slipping wheels count on
+    assert sim.pose.x == pytest.approx(9.75, abs=0.01)  # the wall is at 10, the hull's radius 0.25
+    assert sim.robot[Odometry].reading.pose.x > 2.5  # slipping wheels keep counting
 
 
 async def test_a_pressed_bumper_stops_the_wheels(simulate):
@@ -107,7 +107,7 @@ async def test_a_pressed_bumper_stops_the_wheels(simulate):
     sim.world.start()
     sim.robot[Base].set_velocity(Twist(0.5))
     await sim.clock.advance(6.0)
-    assert sim.pose.x == pytest.approx(9.75, abs=0.01)  # the wall is at 10, the hull 0.25 around
+    assert sim.pose.x == pytest.approx(9.75, abs=0.01)  # the wall is at 10, the hull's radius 0.25
     assert sim.robot[Odometry].reading.pose.x < 0.8
     assert sim.robot[Bumper].pressed == {"front"}
     sim.robot[Base].set_velocity(Twist(-0.5))

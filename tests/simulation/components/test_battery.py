@@ -124,7 +124,7 @@ async def test_charging_ends_when_full(simulate):
     battery.set_charge(0.998)
     sim.world.start()
     await sim.clock.advance(0.1)
-    assert not battery.state.charging  # above the level where a charger begins
+    assert not battery.state.charging  # above the level at which charging begins
     battery.set_charge(0.96)
     await sim.clock.advance(0.1)
     assert battery.state.charging

@@ -78,7 +78,7 @@ async def test_hit_plate_depends_on_the_target_s_heading(duel, yaw, place):
 async def test_the_gimbals_plates_turn_with_the_gimbal(duel):
     other = duel.robots["b"][Gimbal]
     other.set_mode(FollowMode.FREE)
-    other.move_to(yaw=math.pi / 2)  # its right side towards the shooter
+    other.move_to(yaw=math.pi / 2)  # its right side faces the shooter
     await duel.clock.advance(1.0)
     assert await shoot(duel, pitch=-0.015) == [(PlatePlace.GIMBAL_RIGHT, HitKind.BEAD)]
 
@@ -86,10 +86,10 @@ async def test_the_gimbals_plates_turn_with_the_gimbal(duel):
 async def test_an_insensitive_plate_feels_beads_no_more(duel):
     duel.robots["b"][Armor].set_sensitivity(0)
     aim = math.atan2(MUZZLE - PLATE, DISTANCE + 0.1)
-    assert await shoot(duel, pitch=aim) == [(PlatePlace.FRONT, HitKind.BEAD)]  # 26 m/s is a hard blow
+    assert await shoot(duel, pitch=aim) == [(PlatePlace.FRONT, HitKind.BEAD)]  # 26 m/s is a hard impact
     duel.world.hands.place("b", Pose(5, 5 - 0.175 * math.sin(0.75), math.pi - 0.75))
     await duel.clock.advance(0.1)
-    assert await shoot(duel, pitch=aim) == []  # aslant it is not
+    assert await shoot(duel, pitch=aim) == []  # at an angle it is not
     duel.robots["b"][Armor].set_sensitivity(10)
     assert await shoot(duel, pitch=aim) == [(PlatePlace.FRONT, HitKind.BEAD)]
 

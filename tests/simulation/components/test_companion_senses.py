@@ -37,14 +37,14 @@ async def test_tof_sees_the_floor_ahead(dog):
     await dog.clock.advance(0.1)
     grid = dog.robot[TimeOfFlight].reading("head left").distances
     assert grid.shape == (8, 8)
-    # The zone rows look PITCH +- half the field down: each meets the floor at height / sine (columns: over cosine).
+    # The zone rows see PITCH +- half the field down: each meets the floor at height / sine (columns: over cosine).
     edge = math.tan(0.785 / 2) * 7 / 8
     for row in (4, 7):
         z, y = edge - row * 2 * edge / 7, edge / 7
         down = math.sin(PITCH) * 1.0 - math.cos(PITCH) * z
         expected = UP * math.sqrt(1 + y * y + z * z) / down
         assert grid[row, 3] == pytest.approx(expected, abs=0.02), row
-    assert np.isposinf(grid[0]).all()  # the upper rows look farther than the sensor does
+    assert np.isposinf(grid[0]).all()  # the upper rows see beyond the sensor's range
 
 
 async def test_tof_sees_an_obstacle_on_its_side_only(dog):
@@ -145,7 +145,7 @@ async def test_motors_warm_up_with_the_load(dog):
     await dog.clock.advance(100.0)
     warm = motors.temperatures
     assert all(28.0 < celsius < 60.0 for celsius in warm.values())
-    assert len(set(warm.values())) > 6  # no motor is like another
+    assert len(set(warm.values())) > 6  # every motor differs
     await dog.clock.advance(25.0)
     await dog.clock.advance(100.0)
     assert all(motors.temperatures[name] < warm[name] for name in warm)

@@ -126,7 +126,7 @@ async def test_free_keeps_the_heading_in_the_world(sim, gimbal):
     gimbal.set_mode(FollowMode.FREE)
     gimbal.move_to(yaw=0.7)
     await sim.clock.advance(1.0)
-    sim.robot[Base].set_velocity(Twist(yaw=-0.8))  # to the one side only: where a mirrored sign shows
+    sim.robot[Base].set_velocity(Twist(yaw=-0.8))  # only to one side, to show a flipped sign
     await sim.clock.advance(2.0)
     sim.robot[Base].set_velocity(STILL)
     await sim.clock.advance(1.0)
@@ -142,7 +142,7 @@ async def test_gimbal_lead_turns_the_chassis_after_the_gimbal(sim, gimbal):
     assert sim.pose.yaw == pytest.approx(math.pi / 2, abs=0.01)
     assert gimbal.angles.yaw == pytest.approx(0.0, abs=0.01)
     assert sim.robot[Base].velocity == STILL
-    sim.robot[Base].set_velocity(Twist(0.5, 0.0, 1.0))  # its own turning counts for nothing
+    sim.robot[Base].set_velocity(Twist(0.5, 0.0, 1.0))  # its own rotation does not count
     await sim.clock.advance(1.0)
     assert sim.pose.yaw == pytest.approx(math.pi / 2, abs=0.02)
     assert sim.pose.y > 5.3
@@ -204,7 +204,7 @@ async def test_it_keeps_its_pitch_to_horizon_on_slope(simulate):
     await sim.clock.advance(1.0)
     gimbal = sim.robot[Gimbal]
     assert gimbal.attitude.pitch == pytest.approx(0.0, abs=0.01)
-    assert gimbal.angles.pitch == pytest.approx(math.atan(0.4 / 1.5), abs=0.01)  # down, as the body looks up
+    assert gimbal.angles.pitch == pytest.approx(math.atan(0.4 / 1.5), abs=0.01)  # down, because the body pitches up
 
 
 async def test_lifted_and_put_elsewhere_gimbal_goes_with_robot(sim, gimbal):

@@ -106,6 +106,6 @@ async def test_figures_of_the_eyes(sim, light):
     await sim.clock.advance(0.7)
     assert light.lamps("gimbal_left")[2] != before[2]  # another hue
     light.shine("gimbal_left", WHITE, LightEffect.TRIAD, frequency=0.5)
-    assert set(light.lamps("gimbal_left")) == {DARK}  # it begins dark
+    assert set(light.lamps("gimbal_left")) == {DARK}  # initially dark
     await sim.clock.advance(1.0)
     assert [index for index, lamp in enumerate(light.lamps("gimbal_left")) if lamp == WHITE] == [0, 3, 5]

@@ -53,7 +53,7 @@ async def test_up_a_ramp_over_the_top_and_down(course):
     assert sim.robot[Imu].reading.linear_acceleration.x == pytest.approx(9.81 * math.sin(SLOPE), abs=0.2)
     before = sim.pose.x
     await sim.clock.advance(3.0)
-    assert sim.pose.x == pytest.approx(before, abs=0.005)  # the wheels hold it
+    assert sim.pose.x == pytest.approx(before, abs=0.005)  # held by the wheels
     sim.robot[Base].set_velocity(Twist(0.5))
     await sim.clock.advance(1.0)
     assert flags(sim) == MotionFlags(static=False, uphill=True)
@@ -93,7 +93,7 @@ async def test_ice_is_slippery(course):
     sim.robot[Base].set_velocity(Twist(2.0))
     reported = await during(sim, 0.8)
     assert "slipping" in reported
-    assert sim.pose.x - begun < 0.3  # on a dry floor it were more than 1 m
+    assert sim.pose.x - begun < 0.3  # on a dry floor it would be more than 1 m
     await sim.clock.advance(3.0)
 
 
@@ -113,7 +113,7 @@ async def test_a_bump_shakes_and_is_crossed(course):
     reported = await during(sim, 1.4)
     assert "impact_z" in reported
     assert sim.pose.x > 5.2
-    assert not flags(sim).impact_z  # it is reported for a moment
+    assert not flags(sim).impact_z  # reported for a moment
 
 
 async def test_low_step_is_climbed_high_one_is_not(course):
@@ -147,7 +147,7 @@ async def test_a_hand_lifts_the_robot_and_lets_go(simulate, world):
     before = sim.pose
     sim.robot[Base].set_velocity(Twist(1.0, 0.0, 1.0))
     await sim.clock.advance(1.0)
-    assert sim.pose.distance_to(before) < 0.005  # the wheels turn in the air
+    assert sim.pose.distance_to(before) < 0.005  # the wheels spin in the air
     assert flags(sim).picked_up
     assert not flags(sim).slipping
     sim.robot[Base].set_velocity(STILL)

@@ -71,7 +71,7 @@ async def test_the_lidar_sees_the_walls_where_they_are(simulate):
     pose = sim.pose
     for angle, distance in zip(scan.angles, scan.ranges, strict=True):
         c, s = math.cos(pose.yaw + angle), math.sin(pose.yaw + angle)
-        # the room is 10 x 10 m; the dock stands out of its western wall
+        # the room is 10 x 10 m; the dock protrudes from its western wall
         across = (10 - pose.x) / c if c > 1e-9 else -pose.x / c if c < -1e-9 else math.inf
         along = (10 - pose.y) / s if s > 1e-9 else -pose.y / s if s < -1e-9 else math.inf
         if not (abs(pose.y + s * across - 5.0) < 0.3 and c < 0):
@@ -151,4 +151,4 @@ async def test_a_tall_thing_is_seen_and_touched_softly(simulate):
     assert sim.robot[Lidar].scan.ranges[ahead] == pytest.approx(1.8, abs=0.05)
     sim.robot[Base].set_velocity(Twist(1.0))
     await sim.clock.advance(3.0)
-    assert sim.robot[Base].velocity.x < 0.2  # it felt it coming
+    assert sim.robot[Base].velocity.x < 0.2  # noticed in advance

@@ -106,7 +106,7 @@ async def test_dark_when_switched_off_and_takes_no_pattern(dog, skin) -> None:
     assert await seen(dog, 3, 0.5) == ["ddd"] * 3
     with pytest.raises(Refused):
         skin.show(SkinPattern.LIGHT)
-    skin.enable(True)  # the pattern begins anew
+    skin.enable(True)  # the pattern starts over
     assert await seen(dog, 4, 0.5) == ["LLL", "LLL", "ddd", "ddd"]
 
 

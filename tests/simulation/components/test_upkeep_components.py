@@ -75,7 +75,7 @@ async def test_raw_imu_values_are_the_reading_in_counts(robot, world, forward):
         )
         assert raw.rate[0] * raw.rate_unit == pytest.approx(reading.angular_velocity.x, abs=raw.rate_unit)
         x, y, z = (count * raw.field_unit for count in raw.field)
-        north = math.degrees(math.atan2(y, x))  # seen from the robot; it lies along +y of the world
+        north = math.degrees(math.atan2(y, x))  # robot frame; it lies along +y of the world
         assert math.remainder(north + heading - 90.0, 360.0) == pytest.approx(0.0, abs=5.0)
         assert z == pytest.approx(-43e-6, abs=3e-6)
 

@@ -70,7 +70,7 @@ def reds(frame):
 
 
 async def test_a_box_covers_the_pixels_that_geometry_says():
-    closet = {"from": [0.5, 0], "to": [0.5, 10]}  # makes ours the second room, which has a blue carpet
+    closet = {"from": [0.5, 0], "to": [0.5, 10]}  # ours becomes the second room, which has a blue carpet
     world, robot, _ = await lab(room(walls=[closet]))
     world.hands.add_obstacle(Pose(4.25, 5.2), (0.5, 0.5, 0.6))
     pose = world.truth.pose_of("a")
@@ -82,7 +82,7 @@ async def test_a_box_covers_the_pixels_that_geometry_says():
     inside[round(top / 2) + 2 : round(bottom / 2) - 2, round(left / 2) + 2 : round(right / 2) - 2] = True
     assert brown[inside].all()
     rows, columns = np.nonzero(brown)
-    front_top = pixel(robot, pose, 4.5, 5.45, 0.6)[1]  # its top's far edge is a little higher in the picture
+    front_top = pixel(robot, pose, 4.5, 5.45, 0.6)[1]  # its top's far edge is slightly higher in the picture
     foot_left = pixel(robot, pose, 4.0, 5.45, 0.0)[0]  # the camera looks up a little: edges lean
     assert columns.min() == pytest.approx(foot_left / 2, abs=1.5)
     assert columns.max() == pytest.approx(right / 2, abs=1.5)
@@ -317,7 +317,7 @@ async def test_real_time_camera_waits_for_slow_encoder():
     with robot[Camera].subscribe() as viewer:
         await asyncio.wait_for(anext(viewer), 30)
         await robot.clock.sleep(0.3)  # the time of nine pictures
-        assert robot[Camera].drawn <= 3  # the one that was read, and one that waits
+        assert robot[Camera].drawn <= 3  # the one that was read, and a pending one
     world.close()
 
 
@@ -353,4 +353,4 @@ async def test_objects_left_out_would_not_be_in_picture(simulate, monkeypatch):
                     sim.world.hands.place(name, Pose(*at, 1.0))
                 seen[cull].append((await sim.robot[Camera].capture()).planes.tobytes())
     assert seen[True] == seen[False]
-    assert len(set(seen[True])) == 5  # in the last ones no one is to be seen, to either side
+    assert len(set(seen[True])) == 5  # the last ones show no person on either side

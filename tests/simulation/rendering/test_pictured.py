@@ -41,7 +41,7 @@ async def test_tags_that_hands_hang_up_and_move():
     detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(APRIL))
     with lab() as room:
         hands, read = room.world.hands, {}
-        for text in [*map(str, range(40)), "7"]:  # more than are kept to be drawn
+        for text in [*map(str, range(40)), "7"]:  # more than the drawing cache holds
             number = hands.add_tag(text, Pose(4.0, 5.3, np.pi), size=0.3)
             if text in ("7", "39"):
                 (seen,) = await room.see("tags")

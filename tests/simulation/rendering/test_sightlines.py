@@ -23,7 +23,7 @@ async def test_as_many_rays_as_you_like(name, size):
     world = World(deserted(name), [RobotPlacement("a"), RobotPlacement("b")], clock=clock)
     world.hands.add_obstacle(Pose(size[0] / 2, 2.0, 0.7), (0.6, 0.3, 0.9))
     world.start()
-    await clock.advance(0.1)  # or the physics does not know yet where things are
+    await clock.advance(0.1)  # otherwise the physics does not know yet where things are
     random = np.random.default_rng(3)
     hull, lines, rays = world._population.hull("a"), world._environment.surroundings.lines, world._physics.rays
     differing = clear = 0
@@ -36,7 +36,7 @@ async def test_as_many_rays_as_you_like(name, size):
         free = away >= lengths - 0.02
         mine = lines.now(0).clear(eye, places, (hull,))
         if not mine.any():
-            continue  # within a solid, of which MuJoCo sees the other side
+            continue  # within a solid: MuJoCo sees its other side
         differing += int(np.count_nonzero(free != mine))
         clear += int(np.count_nonzero(mine))
     world.close()

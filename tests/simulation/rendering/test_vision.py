@@ -239,7 +239,7 @@ async def test_a_straight_line_ahead():
     assert heights[-1] == pytest.approx(appears(5.24, 5.0, 0.0)[1], abs=0.02)
 
 
-@pytest.mark.parametrize("drawn", [1, -1])  # away from the robot, or towards it
+@pytest.mark.parametrize("drawn", [1, -1])  # moving away from the robot, or towards it
 @pytest.mark.parametrize("side", [1, -1])
 async def test_a_bend_has_the_curvature_of_its_circle(side, drawn):
     radius, middle = 2.0, (3.0, 5.0 + side * 2.0)

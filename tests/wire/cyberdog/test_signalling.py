@@ -68,7 +68,7 @@ def test_a_description_may_be_text() -> None:
 @pytest.mark.parametrize("end", ["\r\n", "\n"])
 def test_line_ends_as_they_are_in_nested_texts(end: str) -> None:
     sdp = f"v=0{end}o=- 1 1 IN IP4 0.0.0.0{end}"
-    nested = f'{{"type": "offer", "sdp": "{sdp}"}}'  # put together by hand, as one app does
+    nested = f'{{"type": "offer", "sdp": "{sdp}"}}'  # assembled by hand, as one app does
     assert read_signal({"offer_sdp": nested}) == Description(DEFAULT_UID, "offer", sdp)
     assert read_signal(read_params(f'{{"offer_sdp": {{"type": "offer", "sdp": "{sdp}"}}}}')) == Description(
         DEFAULT_UID, "offer", sdp

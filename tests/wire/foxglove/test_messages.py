@@ -55,7 +55,7 @@ def test_bytes_of_the_description() -> None:
     assert message_data(5, 7, b"x") == b"\x01\x05\0\0\0\x07\0\0\0\0\0\0\0x"
     assert time_message(258) == b"\x02\x02\x01\0\0\0\0\0\0"
     assert playback_state(Playback(1, 2, 1.0, request="q")) == b"\x05\x01\x02" + bytes(7) + b"\0\0\x80?\0\x01\0\0\0q"
-    # What foxglove-sdk 0.30.3, the vendor's own server, sends when it has sought.
+    # Sent by foxglove-sdk 0.30.3, the vendor's own server, after seeking.
     vendors = bytes.fromhex("05 00 15cd5b0700000000 00000040 01 03000000 616263")
     assert playback_state(Playback(0, 123456789, 2.0, sought=True, request="abc")) == vendors
     assert asset_failure(3, "no") == b"\x04\x03\0\0\0\x01\x02\0\0\0no"

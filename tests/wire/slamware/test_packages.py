@@ -35,7 +35,7 @@ def test_what_firmware_brings() -> None:
         archive(other=b"x"),
         archive(firmware__json=b"{}"),
         archive(firmware__json=b'{"version": ""}'),
-        archive(firmware__json=b'{"version": "1", "notes": "' + b" " * (ENTRY_MAX + 1) + b'"}'),  # a bomb
+        archive(firmware__json=b'{"version": "1", "notes": "' + b" " * (ENTRY_MAX + 1) + b'"}'),  # a zip bomb
         archive(firmware__json=b"[" * 100_000),
     ],
 )

@@ -119,7 +119,7 @@ def test_a_refusal_says_whose_frame_it_was() -> None:
     assert (refusal.value.kind, refusal.value.id, refusal.value.target) == ("", "", "")
 
 
-# The first draw builds Hypothesis' tables, which a busy machine takes seconds for.
+# Hypothesis builds its tables at the first draw, which takes seconds on a busy machine.
 FUZZ = settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)
 anything = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(),

@@ -85,7 +85,7 @@ async def test_what_is_refused_comes_as_a_chunk(client, robot) -> None:
     assert await client.ask(4002, {"command": 3}) == {"result": 5}
     assert await client.ask(4002, {"command": 9}) == {"result": 1}
     assert await client.ask(4002, {}) == {"error_code": 323}
-    assert await client.ask(4002, {"command": 3}) == {"result": 5}  # which began no recording
+    assert await client.ask(4002, {"command": 3}) == {"result": 5}  # it began no recording
 
 
 async def test_what_was_not_fetched_is_offered_and_fetched(client, app: App, robot, folder, passing) -> None:
@@ -127,7 +127,7 @@ async def test_file_swallowed_after_the_last_byte_is_kept(
         stalled.stall()
         fetching = asyncio.ensure_future(call.file(4002, {"command": 1}))
         await passing(lambda: list(folder.glob("*.jpg")))
-        app.silent = True  # that network is down in the other direction, too
+        app.silent = True  # that network is down both ways
         await asyncio.sleep(0.05)
         stalled.cut()
         with pytest.raises(grpc.aio.AioRpcError):

@@ -40,7 +40,7 @@ async def test_a_face_is_entered_and_known_again(client: Client, app: App, robot
     assert 20 < seen["age"] < 40
     await forward(seconds=6)
     assert 4 <= len(app.of(7004)) <= 6
-    # The same face is no one else's.
+    # The same face belongs to no other person.
     assert await client.ask(7001, {"command": 0, "username": "ben"}) == {"result": 0}
     await passing(lambda: len(app.of(7003)) == 2)
     assert app.of(7003)[1] == {"result": 5921, "username": "ben"}
@@ -61,7 +61,7 @@ async def test_faces_are_renamed_and_deleted(client, app, robot, anna, passing) 
 
 
 async def test_no_one_there(client, app, robot, anna, world, passing, forward) -> None:
-    world.hands.place("a", Pose(1.0, 1.0, 3.14))  # it looks at a wall
+    world.hands.place("a", Pose(1.0, 1.0, 3.14))  # facing a wall
     assert await client.ask(7001, {"command": 1}) == {"result": 5903}
     assert await client.ask(7001, {"command": 0, "username": "anna"}) == {"result": 0}
     assert await client.ask(7001, {"command": 1}) == {"result": 0}

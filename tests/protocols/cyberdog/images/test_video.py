@@ -25,7 +25,7 @@ class Watcher:
     """An app's end of one connection."""
 
     def __init__(self, client: Client, app: App, uid: str = "phone") -> None:
-        offer_loopback()  # an app has an address
+        offer_loopback()  # apps have an address
         self.peer = RTCPeerConnection(RTCConfiguration(iceServers=[]))
         self.peer.addTransceiver("video", direction="recvonly")
         self.client, self.app, self.uid = client, app, uid
@@ -137,7 +137,7 @@ async def test_lost_pictures_are_answered_by_the_next_keyframe(watch, robot, for
         for _ in range(20):
             await receiver._send_rtcp_pli(source)
         await until(lambda: asked)
-    assert len(asked) == 1  # twenty at once are one picture
+    assert len(asked) == 1  # twenty at once yield one picture
 
 
 async def test_phone_held_upright_gets_picture_of_its_shape(watch, forward) -> None:
@@ -149,18 +149,18 @@ async def test_phone_held_upright_gets_picture_of_its_shape(watch, forward) -> N
     assert (frame.width, frame.height) == (640, 1138)
     luma = frame.to_ndarray(format="yuv420p")[:1138]
     assert luma[:350].std() > 5
-    assert luma[370:].mean() == pytest.approx(16, abs=1)  # black below
+    assert luma[370:].mean() == pytest.approx(16, abs=1)  # the lower part is black
 
 
 async def test_without_way_to_the_app_it_gives_up(watch, monkeypatch) -> None:
     monkeypatch.setattr(door_video, "PATIENCE", 0.2)
     watcher = watch()
-    await watcher.offer()  # and never takes the answer
+    await watcher.offer()  # without ever reading the answer
     await until(lambda: watcher.signals("error"))
     assert watcher.signals("error")[0]["error"]["code"] == 1002
     assert await watcher.client.ask(4001, {"uid": "phone"}) == ""
     await asyncio.sleep(0.05)
-    assert not watcher.signals("is_closed")  # no one of that name any more
+    assert not watcher.signals("is_closed")  # that name is gone
 
 
 async def test_what_is_no_offer_is_reported(watch, client, app) -> None:

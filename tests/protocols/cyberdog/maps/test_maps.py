@@ -36,7 +36,7 @@ async def test_mapping_is_pushed_saved_and_read_again(
     await passing(lambda: app.of(6001) and app.of(6001)[-1]["width"] > 50)
     assert app.of(6005)
     assert not app.of(6011)
-    assert await client.ask(6009, {"type": 1}) == {"result": 0}  # nothing of that type runs; mapping goes on
+    assert await client.ask(6009, {"type": 1}) == {"result": 0}  # no task of that type runs; mapping goes on
     assert not stream.ended
     assert await client.ask(6009, {"type": 5, "map_name": 7}) == {"error_code": 323}
     assert await client.ask(6009, {"type": 5, "map_name": "客厅"}) == {"result": 0}
@@ -80,9 +80,9 @@ async def test_in_map_of_earlier_life_robot_is_searched(client, door, robot, wor
     stream = Stream(client, 6004, {"type": 5})
     await passing(lambda: 6 in stream.codes and robot[Mapping].grid.width > 50)
     await client.ask(6009, {"type": 5, "map_name": "old"})
-    robot[Mapping].clear()  # as another door may; a restart does
+    robot[Mapping].clear()  # as another door may do, or a restart
     begun = world.truth.pose_of("a")
-    world.hands.place("a", Pose(2.5, 6.6, 1.0))  # and someone carried it away meanwhile
+    world.hands.place("a", Pose(2.5, 6.6, 1.0))  # and it was carried away meanwhile
     await forward(seconds=0.5)
     again = Stream(client, 6004, {"type": 7})
     await passing(lambda: again.ended)
@@ -158,7 +158,7 @@ async def test_labels_are_set_replaced_and_deleted(client, robot, passing: Passi
     assert await labels() == [door]
     assert await client.ask(6002, {"mapName": "home", "only_delete": True}) == {"success": 0}
     assert await robot[MapLibrary].names() == []
-    for name in ("home", "", "never"):  # gone, though the robot has it in memory still
+    for name in ("home", "", "never"):  # gone, although the robot still has it in memory
         answer = await client.ask(6003, {"mapName": name})
         assert (answer["mapName"], answer["success"]) == ("", 1)
     again = Stream(client, 6004, {"type": 7})
@@ -185,7 +185,7 @@ async def test_map_is_found_by_its_app_s_number(client: Client, robot: Robot) ->
     numbered = {"mapName": "attic", "map_id": 2**63 + 5, "locationLabelInfo": [bed]}
     assert await client.ask(6002, numbered) == {"success": 0}
     assert (await client.ask(6003, {"map_id": 2**63 + 5}))["mapName"] == "attic"
-    assert (await client.ask(6003, {"map_id": 77}))["mapName"] == "cellar"  # no one's number counts as none
+    assert (await client.ask(6003, {"map_id": 77}))["mapName"] == "cellar"  # an unknown number counts as none
     assert (await client.ask(6003, {"mapName": "attic"}))["locationLabelInfo"] == [bed]
     assert await client.ask(6002, {**numbered, "mapName": "cellar"}) == {"success": 0}  # it means one map at a time
     assert (await client.ask(6003, {"map_id": 2**63 + 5}))["mapName"] == "cellar"

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.world("yard", body="cyberdog2")
 
 async def made(client: Client, robot, forward, passing, name: str) -> None:
     """An outdoor map under that name, made while satellites were seen."""
-    await forward(seconds=45)  # the receiver looks for satellites first, and is coarse for as long again
+    await forward(seconds=45)  # the receiver first searches for satellites, then is coarse for as long
     stream = Stream(client, 6004, {"type": 5, "outdoor": True})
     await passing(lambda: 6 in stream.codes and robot[Mapping].grid.width > 50)
     assert await state(client) == 15
@@ -36,13 +36,13 @@ async def test_from_the_map_to_the_goal(client: Client, robot, world, forward, p
     assert (await client.ask(6003))["is_outdoor"] is True
     assert await client.ask(6004, {"type": 1, "goalX": 1.0, "goalY": 0.0, "outdoor": True}) == {"accepted": 2}
 
-    indoors = Stream(client, 6004, {"type": 7})  # there is a map, but of the other kind
+    indoors = Stream(client, 6004, {"type": 7})  # the map is of the other kind
     await passing(lambda: indoors.ended)
     assert indoors.codes == [3100, 3102]
     assert indoors.answers[-1] == {"result": 3}
     assert await state(client) == 6
 
-    robot[Mapping].clear()  # as a restart does: the robot is to be searched, where the satellites say
+    robot[Mapping].clear()  # as a restart does: localization has to search where the satellites say
     asked: list[Region | None] = []
     relocalize = robot[Localization].relocalize
 
@@ -99,7 +99,7 @@ async def test_carried_robot_is_not_placed_where_it_was(client: Client, robot, w
     begun = world.truth.pose_of("a").compose(robot[Localization].pose.inverse())
     assert robot[Localization].quality > 0.5
     world.hands.place("a", Pose(2.5, 6.6, 1.0))
-    await forward(seconds=0.1)  # its opinion of itself is still good
+    await forward(seconds=0.1)  # its own estimate is still good
     assert robot[Localization].quality > 0.5
     stream = Stream(client, 6004, {"type": 7})
     await passing(lambda: stream.ended or 3107 in stream.codes)

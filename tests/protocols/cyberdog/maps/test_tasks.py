@@ -114,7 +114,7 @@ async def test_stopping_navigation_brakes_and_stays_localized(client, robot, wor
     assert await state(client) == 8
     assert await client.ask(6009, {"type": 0}) == {"result": 0}
     assert await state(client) == 101
-    assert await client.ask(6009, {"type": 0}) == {"result": 0}  # nothing runs: all is stopped
+    assert await client.ask(6009, {"type": 0}) == {"result": 0}  # no task runs: everything is stopped
 
 
 async def test_a_goal_that_is_nowhere(client, robot, forward, passing: Passing) -> None:

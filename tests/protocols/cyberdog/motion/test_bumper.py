@@ -11,7 +11,7 @@ from tests.protocols.cyberdog.phone import Stream, localized, until
 
 pytestmark = pytest.mark.world("empty")
 WALK = {"motion_id": 303, "cmd_type": 1, "cmd_source": 0, "vel_des": [0.5, 0, 0]}
-LOW = (0.3, 3.0, 0.08)  # m; neither lidar nor depth camera see it as an obstacle
+LOW = (0.3, 3.0, 0.08)  # m; invisible to lidar and depth camera
 
 
 async def test_a_navigation_that_bumps_fails_with_304(client, robot, world, forward, passing) -> None:

@@ -38,7 +38,7 @@ async def test_the_person_chosen_is_followed(client: Client, app: App, robot, wo
     assert await client.ask(6008, {"roi": nowhere}) == {"success": False}
     assert await client.ask(6004, {"type": 7}) == {"accepted": 2}
     assert await client.ask(6008, {"roi": roi}) == {"success": True}
-    assert await client.ask(6008, {"roi": roi}) == {"success": False}  # someone is chosen
+    assert await client.ask(6008, {"roi": roi}) == {"success": False}  # a person is chosen
     await passing(lambda: 503 in stream.codes)
     await forward(seconds=8)
     assert 0.8 < world.truth.pose_of("a").distance_to(anna.pose) < 1.6
@@ -61,7 +61,7 @@ async def test_who_is_lost_for_long_ends_the_task(client, app, robot, world, ann
     await passing(lambda: any(push["body_info_roi"] for push in app.of(6007)))
     await client.ask(6008, {"roi": app.of(6007)[-1]["body_info_roi"][0]["roi"]})
     await passing(lambda: 503 in stream.codes)
-    world.hands.place("a", Pose(1.0, 1.0, 3.14))  # carried off, with its nose to the wall
+    world.hands.place("a", Pose(1.0, 1.0, 3.14))  # carried away, its nose to the wall
     await passing(lambda: stream.ended)
     assert stream.answers[-1] == {"result": 3}
     assert stream.codes[-2:] == [504, 505]
@@ -86,7 +86,7 @@ async def test_thing_in_picture_is_followed_wherever_it_goes(
     assert await state(client) == 3
     sky = {"x_offset": 0, "y_offset": 0, "height": 0, "width": 0}
     assert await client.ask(6008, {"roi": sky}) == {"success": False}
-    assert app.of(6007) == []  # no boxes until something is chosen
+    assert app.of(6007) == []  # no boxes until a target is chosen
     middle = {"x_offset": 290, "y_offset": 150, "height": 220, "width": 60}
     assert await client.ask(6008, {"roi": middle}) == {"success": True}
     await passing(lambda: 503 in stream.codes)
@@ -98,11 +98,11 @@ async def test_thing_in_picture_is_followed_wherever_it_goes(
     await forward(seconds=10)
     assert anna.pose.distance_to(Pose(3.5, 6.8)) < 0.1
     assert 0.7 < world.truth.pose_of("a").distance_to(anna.pose) < 1.5
-    assert app.of(6007)[-1]["track_res_roi"]["width"] > box["width"]  # it is nearer
+    assert app.of(6007)[-1]["track_res_roi"]["width"] > box["width"]  # it has come nearer
     joined = Stream(client, 6010, {"type": 3})
     await until(lambda: joined.answers and stream.ended)
     assert joined.answers[0] == {"accepted": 1}
-    stopped = asyncio.ensure_future(client.ask(6009, {"type": 3}))  # the number of its state, as robots take it
+    stopped = asyncio.ensure_future(client.ask(6009, {"type": 3}))  # the number of its state, as robots understand it
     await passing(stopped.done)
     await until(lambda: joined.ended)
     assert stream.codes[:5] == [1000, 500, 501, 502, 503]
@@ -110,7 +110,7 @@ async def test_thing_in_picture_is_followed_wherever_it_goes(
 
 
 async def test_a_wall_is_no_thing_to_follow(client: Client, robot, world, passing, forward) -> None:
-    world.hands.place("a", Pose(5.0, 2.5, -1.57))  # nothing but the south wall ahead
+    world.hands.place("a", Pose(5.0, 2.5, -1.57))  # only the south wall ahead
     await forward(seconds=0.3)
     stream = Stream(client, 6004, {"type": 13, "object_tracking": True})
     await passing(lambda: 501 in stream.codes)

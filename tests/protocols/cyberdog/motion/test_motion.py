@@ -149,7 +149,7 @@ async def test_a_lying_robot_walks_its_whole_duration(client, robot, world, forw
 @pytest.mark.parametrize(
     ("params", "code"),
     [
-        ({"motion_id": 180}, 3031),  # a place for a gait: nothing is in it
+        ({"motion_id": 180}, 3031),  # an empty place for a gait
         ({"motion_id": 121, "duration": 500}, 3010),
         ({"motion_id": 211, "rpy_des": [0, 0.1, 0]}, 3010),
         ({"motion_id": 99999}, 3008),
@@ -187,7 +187,7 @@ async def test_a_motion_follows_own_servo_at_once(client, robot, world, forward,
     await forward(seconds=pause)
     assert (await answered(client, 1004, then, forward))["code"] == 0
     servo, followed = robot.actions.history[-2:]
-    assert followed.ended_at - servo.ended_at < 2.0  # the time of the motion itself
+    assert followed.ended_at - servo.ended_at < 2.0  # the motion's own duration
     assert robot[Base].velocity.speed < 0.01
 
 
@@ -276,7 +276,7 @@ async def test_client_without_control_learns_that_another_has_it(client, robot, 
     lease = robot.add(Lease, Lease(robot))
     await lease.take("robomaster")
     assert await client.ask(1004, {"motion_id": 101}) == {"motion_id": 101, "result": False, "code": 3001}
-    await client.ask(1002, WALK)  # servo frames are answered by pushes alone
+    await client.ask(1002, WALK)  # only pushes answer servo frames
     assert not robot.actions.running()
     await lease.take("cyberdog")
     assert await client.ask(1002, WALK) == ""

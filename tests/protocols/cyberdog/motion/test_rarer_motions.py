@@ -69,7 +69,7 @@ async def test_frames_add_to_the_body_pose_within_limits(client, app: App, robot
     assert {push["code"] for push in app.of(1003)} == {0}
     await client.ask(1002, {"motion_id": 201, "rpy_des": [0, 2.0, 0]})
     await until(lambda: app.of(1003)[-1]["code"] == 3010)
-    await client.ask(1002, {"motion_id": 203, "rpy_des": [0, 0.1, 0]})  # takes a duration: no motion of a servo
+    await client.ask(1002, {"motion_id": 203, "rpy_des": [0, 0.1, 0]})  # takes a duration: not a servo motion
     await until(lambda: app.of(1003)[-1]["code"] == 3008)
 
 
@@ -77,7 +77,7 @@ async def test_frames_add_to_the_body_pose_within_limits(client, app: App, robot
 async def test_registered_gaits_walk(client, robot, world, forward, number: int, gait: Gait) -> None:
     before = world.truth.pose_of("a")
     walk = {"motion_id": number, "vel_des": [0.6, 0, 0]}
-    assert (await client.ask(1004, walk))["code"] == 3010  # how long?
+    assert (await client.ask(1004, walk))["code"] == 3010  # the duration is missing
     asking = asyncio.ensure_future(client.ask(1004, {**walk, "duration": 1500}))
     await until(lambda: robot.actions.running())
     await forward(seconds=1)
@@ -102,9 +102,9 @@ async def test_a_foot_is_held_out(client, robot, forward) -> None:
     await forward(seconds=3)
     assert (await asking)["code"] == 0
     assert robot[Legs].feet[Foot.RIGHT_FRONT].grounded
-    assert (await client.ask(1004, {"motion_id": 400}))["code"] == 3031  # that was no program's sequence
+    assert (await client.ask(1004, {"motion_id": 400}))["code"] == 3031  # that was not a program's sequence
     assert (await client.ask(1004, {**params, "duration": 0}))["code"] == 3010
-    assert (await client.ask(1004, {**params, "contact": 0b1010}))["code"] == 3010  # no one stands on two feet so long
+    assert (await client.ask(1004, {**params, "contact": 0b1010}))["code"] == 3010  # too long to stand on two feet
 
 
 async def test_what_a_program_danced_is_danced_again(client, robot, world, forward) -> None:
@@ -130,7 +130,7 @@ async def test_what_a_program_danced_is_danced_again(client, robot, world, forwa
     walked = await answered(client, 1004, {"motion_id": 401, "vel_des": [0.2, 0, 0], "duration": 2000}, forward)
     assert walked["code"] == 0
     assert world.truth.pose_of("a").relative_to(before).x == pytest.approx(0.4, abs=0.12)
-    assert list(robot[Legs].choreography.steps) == steps  # what 400 does again is still the program's
+    assert list(robot[Legs].choreography.steps) == steps  # 400 still repeats the program's
 
 
 async def test_gait_places_are_empty_states_not_requestable(client, robot, world, forward) -> None:
@@ -190,7 +190,7 @@ async def test_someone_takes_the_dog_up(client, robot, world, forward) -> None:
     world.hands.let_go("a")
     await forward(seconds=2)
     assert (await client.ask(10001))["motion_status"]["motion_id"] in (111, 112)
-    await frames(client, forward, 6, motion_id=302, vel_des=[0.1, 0.0, 0.0])  # all feet are in the air at times
+    await frames(client, forward, 6, motion_id=302, vel_des=[0.1, 0.0, 0.0])  # at times all feet are in the air
     assert (await client.ask(10001))["motion_status"]["motion_id"] == 302
 
 

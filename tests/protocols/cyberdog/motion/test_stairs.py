@@ -56,7 +56,7 @@ async def test_up_it_aligns_after_the_answer(stands, client, robot, world, forwa
 async def test_down_it_looks_for_the_landings_edge(client, robot, world, forward) -> None:
     world.hands.place("a", Pose(5.55, 4.0, math.pi - 0.2))
     await forward(seconds=0.5)
-    assert await client.ask(1100, {"data": True}) == {"success": False}  # nothing leads up there
+    assert await client.ask(1100, {"data": True}) == {"success": False}  # there are no stairs
     action = await begun(client, robot, forward, up=False)
     await forward(seconds=10)
     assert action.status is ActionStatus.SUCCEEDED
@@ -86,7 +86,7 @@ async def test_it_is_stopped_midway(stands, client, robot, world, forward) -> No
     here = world.truth.pose_of("a")
     await forward(seconds=1)
     assert world.truth.pose_of("a").distance_to(here) < 0.002
-    assert await client.ask(1101) == {"success": True}  # it stands already
+    assert await client.ask(1101) == {"success": True}  # it is standing already
 
 
 async def test_other_motions_take_over(stands, client, robot, forward) -> None:
@@ -128,7 +128,7 @@ async def test_it_stops_when_the_app_is_lost(
 ) -> None:
     monkeypatch.setattr(alignment, "ALIGN_MAX", 600.0)
     action = await begun(client, robot, forward)
-    world.hands.lift("a", 0.0)  # held, it never gets there
+    world.hands.lift("a", 0.0)  # held back, it never arrives
     app.silent = False
     await client.ask(10001)
     await passing(lambda: door._context.app.connected)

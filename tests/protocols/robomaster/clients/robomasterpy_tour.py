@@ -19,7 +19,7 @@ def wait_until(reached) -> None:
 
 
 def main(ip: str) -> None:  # noqa: PLR0915 - one tour
-    wait_until(lambda: get_broadcast_ip(20) == ip)  # other robots on this machine broadcast too
+    wait_until(lambda: get_broadcast_ip(20) == ip)  # other robots on this machine broadcast, too
     seen: dict[str, object] = {"broadcast": ip}
     robot = Commander(ip, timeout=20)
     second = Commander(ip, timeout=20)  # the framework opens one per worker

@@ -18,7 +18,7 @@ DOCS = Path(__file__).parents[4] / "docs/protocols"
 PAGES = {page.stem: page for page in (DOCS / "robomaster.md", DOCS / "robomaster.zh.md")}
 TRANSCRIPT = re.compile(r"^```text\n(> .*?)^```$", re.MULTILINE | re.DOTALL)
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?![\d.])")
-CAUSES = {  # the comments of both pages
+CAUSES = {  # comments of both pages
     "a hand taps the rear plate": "hand", "有人拍后装甲板": "hand",
     "someone claps twice": "claps", "有人鼓掌两次": "claps",
     "2.5 V at port 2 of adapter 3": "volts", "3 号转接板 2 号端口接上 2.5 V": "volts",

@@ -11,7 +11,7 @@ FW70 = pytest.mark.parametrize("door", [{"profile": "fw70"}], indirect=True)
 pytestmark = pytest.mark.world("empty", body="robomaster_ep")
 
 TRANSCRIPTS = {
-    # gimbal; those that wait for the end are asked not to
+    # gimbal; those that wait for the end are sent without waiting
     "gimbal speed p 1 y 1": OK,
     "gimbal speed y -450 p 450": OK,
     "gimbal speed p 451": FAIL,
@@ -24,8 +24,8 @@ TRANSCRIPTS = {
     "gimbal move p 55.1 wait_for_complete false": FAIL,
     "gimbal move y -56 wait_for_complete false": FAIL,
     "gimbal move p 5 vp 0 wait_for_complete false": FAIL,
-    "gimbal move p 5 vy 0 wait_for_complete false": OK,  # an axis that goes nowhere needs no speed
-    "gimbal move p 0 y 5 vp 0 vy 0 wait_for_complete false": OK,  # in chassis_lead yaw goes nowhere
+    "gimbal move p 5 vy 0 wait_for_complete false": OK,  # an axis without motion needs no speed
+    "gimbal move p 0 y 5 vp 0 vy 0 wait_for_complete false": OK,  # in chassis_lead yaw does not move
     "gimbal moveto p 0 y 0 vp 0 vy 0 wait_for_complete false": OK,
     "gimbal moveto p 20 vp 0 wait_for_complete false": FAIL,
     "gimbal move p 5 vp 541 wait_for_complete false": FAIL,

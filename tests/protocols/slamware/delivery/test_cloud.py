@@ -56,7 +56,7 @@ async def test_the_clouds_map_comes_first(client: httpx.AsyncClient, forward: Fo
     assert (await client.get(f"{MULTI}/status")).json()["map_load_status"] == "LOADED"
     events = [event["type"] for event in (await client.get("/api/platform/v1/events")).json()]
     assert "SYNC_MAP_FROM_CLOUD" in events
-    assert (await client.post(f"{MULTI}/map/v1/stcm/:reload")).status_code == 200  # the same: nothing comes
+    assert (await client.post(f"{MULTI}/map/v1/stcm/:reload")).status_code == 200  # unchanged: nothing arrives
     assert "SYNC_MAP" not in (await client.get("/api/platform/v1/events")).text
     assert (await client.post(f"{MULTI}/map/v1/scene/unbind", json={"keep_local_map": True})).status_code == 200
     assert (await client.get(f"{MULTI}/status")).json()["is_managed_by_cloud"] is False
@@ -80,7 +80,7 @@ async def test_voice_packages(client: httpx.AsyncClient, world: World, forward: 
 
 async def test_a_task_of_a_cabinet(screen: Screen, robot: Robot, cloud: Path) -> None:
     await screen.prepare(cabinet=(1.5, 0.0, ""), R101=(3.0, 0.0, "ROOM"))
-    await screen.client.put(f"{API}/admin/mode", json={"work_mode": "DISPATCH"})  # orders come from afar only
+    await screen.client.put(f"{API}/admin/mode", json={"work_mode": "DISPATCH"})  # orders come only from the cloud
     cargos = [{"cargo_id": screen.cargo, "boxes": ["000"]}]
     what = give(cloud, "17", type="STATION_TAKEOUT", location={"poi_name": "R101", "task_points": ["cabinet"]},
                 cargos=cargos)  # fmt: skip
@@ -97,7 +97,7 @@ async def test_a_task_of_a_cabinet(screen: Screen, robot: Robot, cloud: Path) ->
     assert (await screen.box(0))["door_status"] == "OPEN"
     assert_pose(screen.pose, x=1.5, y=0.0, within=0.15)
     simulated: Any = robot[Cargo]
-    simulated.put(0, 1.0)  # what the cabinet does
+    simulated.put(0, 1.0)  # the cabinet's part
     await screen.until("ARRIVED_AT_TARGET")
     assert_pose(screen.pose, x=3.0, y=0.0, within=0.15)
     assert ((await screen.box(0))["door_status"], (await screen.box(0))["stock_status"]) == ("CLOSED", "FULL")
@@ -172,7 +172,7 @@ async def test_what_a_robot_cannot_do_and_nonsense(
     world.faults.inject("low_battery", "a", charge=0.19)
     late = give(cloud, "e", type="RETURN", location={"poi_name": "R101"})
     await forward(seconds=6)
-    assert late() == ".refused"  # level 3: nothing from the cloud any more
+    assert late() == ".refused"  # level 3: nothing more from the cloud
     assert Power in robot
 
 

@@ -76,7 +76,7 @@ async def test_unclaimed_parcel_goes_back_to_reception(screen: Screen, robot: Ro
     ]
     assert await screen.say("start_pickup") == 204
     await screen.operate(0, ":open")
-    await screen.forward(seconds=95)  # taken, but no one says so: the door shuts by itself, and the box is still full
+    await screen.forward(seconds=95)  # taken but not confirmed: the door closes, and the box still counts as full
     assert (await screen.box(0))["lock_status"] == "LOCKED"
     assert (await screen.task(collect["task"]["order_id"]))["status"] == "FAILED"
     assert "COLLECT_NO_PICKUP" in await screen.events()
@@ -143,7 +143,7 @@ async def test_stops_on_the_way_wait_for_the_operation(screen: Screen) -> None:
     await screen.until("ARRIVED_AT_TASK_POINT")
     await screen.forward(seconds=38)
     assert (await screen.stage())["stage"] == "ARRIVED_AT_TASK_POINT"
-    await screen.forward(seconds=3)  # no one says that it may go on
+    await screen.forward(seconds=3)  # no confirmation to go on
     await screen.until("ARRIVED_AT_TARGET")
     assert_pose(screen.pose, x=2.5, y=1.5, within=0.15)
     assert await screen.say("end_pickup") == 204

@@ -98,14 +98,14 @@ async def test_a_dock_without_current(robot: Robot, client: httpx.AsyncClient, w
 async def test_a_lost_robot_lets_orders_wait(
     screen: Screen, robot: Robot, world: World, forward: Forward, monkeypatch: pytest.MonkeyPatch, helped_by: str
 ) -> None:
-    monkeypatch.setattr("roboglot.autonomy.slam.slam.places", lambda *_: [])  # it does not find its place by itself
+    monkeypatch.setattr("roboglot.autonomy.slam.slam.places", lambda *_: [])  # it does not localize itself
     await screen.prepare(R101=(3.0, 0.0, "ROOM"), R102=(0.8, 0.0, "ROOM"))
     await forward(seconds=3)
     first = await screen.create("R101", "RETURN")
     await forward(seconds=3)
     localization: Any = robot[Localization]
     slam = "/api/core/slam/v1/localization"
-    await screen.client.put(f"{slam}/pose", json={"x": 60.0, "y": 60.0, "yaw": 1.0})  # someone errs
+    await screen.client.put(f"{slam}/pose", json={"x": 60.0, "y": 60.0, "yaw": 1.0})  # a wrong confirmation
     await forward(seconds=1)
     for _ in range(60):
         await forward(seconds=1)
@@ -124,7 +124,7 @@ async def test_a_lost_robot_lets_orders_wait(
         case "pose":
             await screen.client.put(f"{slam}/pose", json={"x": here.x, "y": here.y, "yaw": here.yaw})
         case _:
-            localization.enable(False)  # otherwise it would not find out that it is lost before it begins
+            localization.enable(False)  # otherwise it would notice that it is lost before it begins
             localization.set_pose(here)
             localization.enable(True)
             assert (await screen.client.post(f"{slam}/status/:reset")).json() is True

@@ -168,7 +168,7 @@ async def test_a_day(day: Day, robot: Robot, world: World) -> None:  # noqa: PLR
     await day.prepare()
     cargo: Any = robot[Cargo]
     battery: Any = robot[Battery]
-    # The floor is mapped, and the map kept.
+    # The floor is mapped and the map saved.
     await day.ask("PUT", f"{SLAM}/mapping/:enable", {"enable": True})
     for x, y in ((5.5, 3.0), (3.2, 3.0), (5.5, 4.0)):
         goal = day.at(x, y)
@@ -181,7 +181,7 @@ async def test_a_day(day: Day, robot: Robot, world: World) -> None:  # noqa: PLR
     await day.ask("POST", f"{MULTI}/stcm", content=storeys(exported, day.at(6.0, 4.0)))
     here = day.pose
     await day.ask("POST", f"{MULTI}/stcm/:reload", {"pose": {"x": here.x, "y": here.y, "yaw": here.yaw}})
-    # It restarts, does not know where it is, and finds out.
+    # It restarts, does not know its place, and relocalizes.
     await restart(day)
     assert (await day.reported_pose()).distance_to(day.pose) > 1.0
     await day.look()
@@ -189,7 +189,7 @@ async def test_a_day(day: Day, robot: Robot, world: World) -> None:  # noqa: PLR
     assert_pose(await day.reported_pose(), x=day.pose.x, y=day.pose.y, within=0.15)
     walls = (await day.client.get(f"{ARTIFACT}/lines/walls")).json()
     assert len(walls) == 1
-    # Two orders on two floors: the first is taken, the second is not, and goes back to the reception.
+    # Two orders on two floors: the first is collected, the second is not and returns to the reception.
     for box in (0, 1):
         await day.operate(box, ":open")
     await day.forward(seconds=4)
@@ -217,7 +217,7 @@ async def test_a_day(day: Day, robot: Robot, world: World) -> None:  # noqa: PLR
     assert await day.say("end_pickup") == 204
     await day.ended(collect["task"]["order_id"], "SUCCEEDED", "")
     await day.look()
-    # The battery runs low under way: the task is over, and the robot charges.
+    # The battery runs low on the way: the task ends, and the robot charges.
     third = await day.create("R101", "RETURN")
     await day.until("ON_DELIVERING", within=10)
     await day.forward(seconds=2)
@@ -227,7 +227,7 @@ async def test_a_day(day: Day, robot: Robot, world: World) -> None:  # noqa: PLR
     assert robot[DockContact].docked
     await day.forward(seconds=3)
     await day.look()
-    # Charged again, it gets the night's firmware.
+    # Charged, it installs the night's firmware.
     battery.set_charge(0.85)
     await day.forward(seconds=3)
     new = (await day.client.get(f"{CORE}/firmware/v1/newversion")).json()["firmware"]

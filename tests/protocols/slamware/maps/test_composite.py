@@ -47,7 +47,7 @@ CELLS = st.binary(min_size=12, max_size=12).map(
     lambda data: np.maximum(np.frombuffer(data, np.int8), -127).reshape(3, 4)
 )
 GRIDS = st.builds(OccupancyGrid, CELLS, st.just(0.05), POINTS)
-# Of a vendor's kinds whose payload no one knows, and of kinds that no one heard of.
+# A vendor's kinds with an unknown payload, and unknown kinds.
 USAGES = st.sampled_from(["rectangle_area", "landmark", "dbow", "marker", "pointsmap", "x"])
 STRANGE = st.builds(
     lambda usage, pairs, payload: Layer((("usage", usage), ("type", "vnd.x/y"), *pairs.items()), payload),
@@ -96,7 +96,7 @@ def test_too_much_is_not_read(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(BadMap, match="bytes"):
         floors_of(CompositeMap((walls,)))
     many = Annotations().with_new(*[Line(0, LineKind.WALL, Point(0, 0), Point(1, 0))] * 40)
-    with pytest.raises(BadMap, match="bytes"):  # nor written: it could not be loaded again
+    with pytest.raises(BadMap, match="bytes"):  # not written, either: it could not be loaded again
         composite_of(FloorMap(annotations=many))
 
 
@@ -104,7 +104,7 @@ async def test_no_one_waits_while_large_file_is_read(
     bare_client: httpx.AsyncClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     done = threading.Event()
-    monkeypatch.setattr(map_keeper, "LockstepClock", ())  # with any other clock reading is another thread's
+    monkeypatch.setattr(map_keeper, "LockstepClock", ())  # any other clock includes other threads' time
     monkeypatch.setattr(map_keeper, "_parsed", lambda _: done.wait(20) and [FloorMap()])
     upload = asyncio.create_task(bare_client.post(f"{MULTI}/stcm", content=b"STCM"))
     try:

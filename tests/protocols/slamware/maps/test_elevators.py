@@ -150,15 +150,15 @@ async def two_floors(robot: Robot, client: httpx.AsyncClient, origin: Pose) -> N
 async def test_to_a_place_on_another_floor_and_back(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward, origin: Pose
 ) -> None:
-    world.hands.person("person 0 0").place(28.5, 10.5)  # who walks there would be in the way, as PATH_OCCUPIED says
+    world.hands.person("person 0 0").place(28.5, 10.5)  # people there would block the way, as PATH_OCCUPIED says
     await forward(seconds=1)
     await drive_to(client, forward, origin, 10.0, 5.0)
     await two_floors(robot, client, origin)
-    robot[LiftClient].call(2)  # so that it has to come
+    robot[LiftClient].call(2)  # the car has to come
     await forward(seconds=30)
     await client.get("/api/platform/v1/events")
     walls = "/api/core/artifact/v1/lines/walls"
-    wall = {"start": {"x": 30.0, "y": 30.0}, "end": {"x": 31.0, "y": 30.0}}  # out of everybody's way
+    wall = {"start": {"x": 30.0, "y": 30.0}, "end": {"x": 31.0, "y": 30.0}}  # out of everyone's way
     assert (await client.post(walls, json=[wall])).status_code == 200
     id = await start(client, "MultiFloorMoveAction", target={"poi_name": "upstairs"})
     ended, stages = await finish(client, forward, id, within=500)
@@ -190,7 +190,7 @@ async def test_to_a_place_on_another_floor_and_back(
     id = await start(client, "MultiFloorMoveAction", target=target)
     assert (await finish(client, forward, id, within=500))[0] == SUCCESS
     assert world.truth.floor_of("a") == 0
-    assert len((await client.get(walls)).json()) == 1  # what was drawn before the ride is there again
+    assert len((await client.get(walls)).json()) == 1  # the drawings from before the ride are back
     assert world.truth.pose_of("a").distance_to(Point(5.0, 10.0)) < 0.3
     await client.get("/api/platform/v1/events")
     world.faults.inject("lift_out_of_service")
@@ -303,7 +303,7 @@ async def test_home_from_the_other_floor_after_an_order(
         if (await client.get("/api/delivery/v1/stage")).json().get("milestone") == "GOING_TO_ELEVATOR":
             break
     execution = "/api/delivery/v1/tasks/:task_execution"
-    await client.put(execution, json={"enable_task_execution": False})  # someone is at the screen
+    await client.put(execution, json={"enable_task_execution": False})  # a person uses the screen
     await forward(seconds=3)
     held = world.truth.pose_of("a")
     await forward(seconds=20)

@@ -58,7 +58,7 @@ async def test_found_switched_off_and_set(
     assert (await client.get(f"{LANDMARKS}/:update")).json() is False
     assert (await client.delete(LANDMARKS)).json() is True
     await forward(seconds=10)
-    assert await marks() == []  # nothing is added
+    assert await marks() == []  # no strip is added
     robot[Localization].set_pose(Pose(-5.0, -5.0, 1.0))
     await forward(seconds=5)
     assert (await client.put(LANDMARKS, json=found)).json() is True

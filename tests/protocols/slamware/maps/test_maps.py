@@ -81,7 +81,7 @@ async def test_memory_and_disk_are_two_things(robot: Robot, client: httpx.AsyncC
     assert await status() == "NOT_LOADED"
     assert (await client.post(f"{MULTI}/stcm/:reload")).status_code == 404
     await ok(await client.post(f"{MULTI}/stcm/:save"))
-    assert (await client.get(f"{MULTI}/floors")).json() == []  # saved is not loaded
+    assert (await client.get(f"{MULTI}/floors")).json() == []  # saved does not mean loaded
     await ok(await client.delete(f"{ARTIFACT}/pois"))
     await ok(await client.delete(f"{ARTIFACT}/lines/walls"))
     await ok(await client.post(f"{MULTI}/stcm/:reload"))
@@ -161,7 +161,7 @@ async def test_drawing_on_a_floor_survives_leaving_it(client: httpx.AsyncClient,
     assert await there() == ({"new below"}, 1)
     await go("2F")
     assert await there() == ({"new above"}, 0)
-    # A robot that restarts is on the first floor again, and has mixed up neither.
+    # A restarted robot is on the first floor again, and has confused neither.
     await ok(await client.post("/api/core/system/v1/power/:restartmodule", json={"mode": "RestartModeSoft"}))
     await forward(seconds=10)
     assert (await client.get(f"{MULTI}/floors/:current")).json()["floor"] == "1F"
@@ -192,7 +192,7 @@ async def test_several_floors(robot: Robot, client: httpx.AsyncClient, drawn: No
     assert robot[Localization].pose.x == pytest.approx(0.5)
     assert (await client.put(f"{MULTI}/floors/:current", json={"floor": "7F"})).status_code == 404
     assert (await client.delete(f"{MULTI}/stcm")).status_code == 204
-    await ok(await client.post(f"{MULTI}/stcm/:save"))  # no floor on the disk is lost any more
+    await ok(await client.post(f"{MULTI}/stcm/:save"))  # every floor on disk is kept
 
 
 async def test_the_origin_moves_with_all_that_is_drawn(robot: Robot, client: httpx.AsyncClient, drawn: None) -> None:
@@ -249,7 +249,7 @@ async def test_a_cleared_map_is_forgotten_in_memory_only(
 
     await ok(await client.delete(f"{SLAM}/maps"))
     await forward(seconds=1)
-    await ok(await client.post(f"{MULTI}/stcm/:save"))  # now the new one is on the disk, and what is drawn is its own
+    await ok(await client.post(f"{MULTI}/stcm/:save"))  # now the new one is on disk, with its own drawings
     await ok(await client.post(f"{ARTIFACT}/lines/walls", json=[WALL]))
     await ok(await client.post("/api/core/system/v1/power/:restartmodule", json={"mode": "RestartModeSoft"}))
     await forward(seconds=10)

@@ -62,7 +62,7 @@ async def test_places_are_ordered_by_the_ways_between_them(client: httpx.AsyncCl
     far = {"id": "far", "pose": {"x": 400.0, "y": 0.0, "yaw": 0.0}}
     await ok(await client.post(f"{ARTIFACT}/pois", json=far))
     await ok(await client.post(f"{MULTI}/stcm/:sync"))
-    assert (await client.post(dispatch, json=["a", "far"])).status_code == 400  # off all that is known
+    assert (await client.post(dispatch, json=["a", "far"])).status_code == 400  # off the known map
 
 
 @pytest.mark.world("empty")
@@ -70,7 +70,7 @@ async def test_hundreds_of_places_are_ordered_within_a_second(
     robot: Robot, client: httpx.AsyncClient, forward: Forward
 ) -> None:
     await forward(seconds=1)
-    spots = {f"p{n}": (1.5 * math.cos(n * 0.7), 1.5 * math.sin(n * 0.7)) for n in range(300)}  # round and round
+    spots = {f"p{n}": (1.5 * math.cos(n * 0.7), 1.5 * math.sin(n * 0.7)) for n in range(300)}  # turning on the spot
     await robot[Places].put(*(PointOfInterest(id, Pose(x, y)) for id, (x, y) in spots.items()))
     await ok(await client.post(f"{MULTI}/stcm/:sync"))
     await ok(await client.post(f"{MULTI}/pois/:dispatch", json=list(spots)[:20]))  # the kernels are loaded

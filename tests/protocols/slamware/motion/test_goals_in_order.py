@@ -12,7 +12,7 @@ from roboglot.simulation.world.world import World
 from roboglot.testing import Forward, passed_in_order
 
 ACTIONS = "/api/core/motion/v1/actions"
-WITHIN = 0.1 + 0.03  # m: acceptable_precision's default, and what localization may be wrong about
+WITHIN = 0.1 + 0.03  # m: acceptable_precision's default, plus the error of localization
 THERE_AND_BACK = [(1.2, 1.8), (1.2, 0.3), (1.2, 1.8)]
 
 

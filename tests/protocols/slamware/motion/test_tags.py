@@ -17,7 +17,7 @@ ACTIONS = "/api/core/motion/v1/actions"
 SUCCESS = {"status": 4, "result": 0, "reason": ""}
 WORLD = Path(__file__).parents[1] / "data" / "tags.toml"
 pytestmark = pytest.mark.world(str(WORLD), body="universal")
-TAG, STRIPS = Pose(8.0, 3.0, math.pi), Pose(8.0, 6.0, math.pi)  # in the world, on the eastern wall
+TAG, STRIPS = Pose(8.0, 3.0, math.pi), Pose(8.0, 6.0, math.pi)  # world frame, on the eastern wall
 
 
 async def run(client: httpx.AsyncClient, forward: Forward, name: str, **options: object) -> Any:
@@ -117,7 +117,7 @@ async def test_from_a_place_by_its_name(client: httpx.AsyncClient, world: World,
 
 
 @pytest.mark.world(MARKS, body="hermes")
-@pytest.mark.parametrize(  # without an allowance: tests/autonomy/test_tag_docking.py
+@pytest.mark.parametrize(  # without tolerance: tests/autonomy/test_tag_docking.py
     ("more", "x"), [pytest.param({}, 7.5, marks=pytest.mark.slow), ({"dock_allowance": 0.2}, 7.12)]
 )
 async def test_under_a_shelf(

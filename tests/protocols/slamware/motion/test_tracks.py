@@ -108,7 +108,7 @@ async def test_moving_along_the_tracks_direction_only(
             break
         await forward(seconds=0.25)
     assert state == {"status": 4, "result": 0, "reason": ""}
-    assert nearest < 0.3  # the long way round
+    assert nearest < 0.3  # the detour
     assert robot[Localization].pose.distance_to(Point(0.6, 1.0)) < 0.1
 
 
