@@ -1,24 +1,27 @@
 """The tools by the protocol's own client: over standard input, over streamable HTTP, and in one process."""
 
+from __future__ import annotations
+
 import asyncio
 import contextlib
 import json
 import sys
 from collections.abc import AsyncIterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
-from mcp import Client, StdioServerParameters
-from mcp.types import ImageContent, TextContent
 
 from roboglot.agents.console import ConsoleClient
-from roboglot.agents.server import make_server
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.geometry import Pose
 from roboglot.testing.addresses import free_port
 from tests.console.conftest import Shown
 from tests.narrowing import of_kind
 
+if TYPE_CHECKING:
+    from mcp import Client
+
+# mcp is imported where it is used: it takes every worker of the suite a second otherwise.
 TOOLS = {"robots", "where_am_i", "look", "map_picture", "go_to", "drive", "stop", "run_program", "rehearse"}
 PNG, JPEG = "iVBORw0KGgo", "/9j/"
 
@@ -43,6 +46,8 @@ async def passing(shown: Shown) -> AsyncIterator[None]:
 
 async def call(client: Client, tool: str, **values: Any) -> Any:
     """The tool's answer as plain values."""
+    from mcp.types import TextContent
+
     answer = await client.call_tool(tool, values)
     assert not answer.is_error, answer.content
     if answer.structured_content is not None:
@@ -58,10 +63,20 @@ async def refusal(client: Client, tool: str, **values: Any) -> str:
 
 def tools(shown: Shown) -> Client:
     """The protocol's own client of the tools over this console."""
-    return Client(make_server(ConsoleClient(shown.url)))
+    return tools_of(shown.url)
+
+
+def tools_of(console: str) -> Client:
+    from mcp import Client
+
+    from roboglot.agents.server import make_server
+
+    return Client(make_server(ConsoleClient(console)))
 
 
 async def test_over_standard_input(shown: Shown) -> None:
+    from mcp import Client, StdioServerParameters
+
     command = StdioServerParameters(command=sys.executable, args=["-m", "roboglot", "mcp", "--console", shown.url])
     async with Client(command) as client:
         assert {tool.name for tool in (await client.list_tools()).tools} >= TOOLS
@@ -69,6 +84,8 @@ async def test_over_standard_input(shown: Shown) -> None:
 
 
 async def test_over_streamable_http(shown: Shown) -> None:
+    from mcp import Client
+
     port = free_port()
     arguments = ("-m", "roboglot", "mcp", "--console", shown.url, "--http", str(port))
     process = await asyncio.create_subprocess_exec(sys.executable, *arguments, stderr=asyncio.subprocess.PIPE)
@@ -111,6 +128,8 @@ async def test_stop_ends_what_moves(shown: Shown) -> None:
 
 
 async def test_map_and_camera_are_pictures(shown: Shown) -> None:
+    from mcp.types import ImageContent
+
     async with tools(shown) as client, passing(shown):
         for tool, start in (("map_picture", PNG), ("look", JPEG)):
             (picture,) = (await client.call_tool(tool, {})).content
@@ -138,7 +157,7 @@ async def test_a_fault_and_its_end(shown: Shown) -> None:
 async def test_refusals_say_why(shown: Shown) -> None:
     async with tools(shown) as client:
         assert "no robot 'b'" in await refusal(client, "where_am_i", robot="b")
-        async with Client(make_server(ConsoleClient("http://127.0.0.1:1"))) as lost:
+        async with tools_of("http://127.0.0.1:1") as lost:
             assert "start it with `roboglot up`" in await refusal(lost, "robots")
 
 

@@ -122,9 +122,9 @@ async def test_an_axis_without_weight_keeps_what_it_had(caller: Caller, world: W
     assert_pose(world.truth.pose_of("a").relative_to(before), x=0.0, y=0.2, deg=0, within=0.03)
 
 
-@pytest.mark.parametrize(
-    ("made", "words"),
-    [
+def refused() -> list[tuple[Record, str]]:
+    """Sequences that make no sense, and words of the answer to each."""
+    return [
         (sequence(name="2 hops"), "name"),
         (sequence(), "has paces"),
         (sequence({"landing_gain": 1.6}), "landing_gain"),
@@ -147,14 +147,16 @@ async def test_an_axis_without_weight_keeps_what_it_had(caller: Caller, world: W
         (sequence({"left_hindfoot__w": -0.01}), "are lifted"),
         (sequence({"weight__linear__x": -1.0}), "weight"),
         (Record("MotionSequence", {"name": "a", "gait_list": [], "pace_list": [1]}), "list of MotionSequencePace"),
-    ],
-)
-async def test_what_makes_no_sense_moves_nothing(caller: Caller, made: Record, words: str) -> None:
-    result = await caller("cyberdog.motion.run_sequence", made)
-    assert field(result, "state.code") == 1
-    assert (field(result, "response.result"), field(result, "response.code")) == (False, 3010)
-    assert words in field(result, "response.describe")
-    assert not caller.robot.actions.history
+    ]
+
+
+async def test_what_makes_no_sense_moves_nothing(caller: Caller) -> None:
+    for made, words in refused():
+        result = await caller("cyberdog.motion.run_sequence", made)
+        assert field(result, "state.code") == 1, words
+        assert (field(result, "response.result"), field(result, "response.code")) == (False, 3010), words
+        assert words in field(result, "response.describe")
+        assert not caller.robot.actions.history, words
 
 
 async def test_only_a_sequence_is_one(caller: Caller) -> None:

@@ -65,6 +65,7 @@ async def app(messages: Messages, pems: Pems) -> AsyncIterator[App]:
 async def door(robot: Robot, data: Path, app: App) -> AsyncIterator[CyberDogDoor]:
     """It learns the app's address from the first request."""
     opened = CyberDogDoor(robot, ADDRESS, CyberDogConfig(port=0, app_port=app.port), data)
+    app.robot = opened
     await opened.start()
     yield opened
     await opened.close()  # the fleet waits until the robot stands

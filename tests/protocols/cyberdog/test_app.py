@@ -24,6 +24,7 @@ from roboglot.protocols.cyberdog.table import push, pushes
 from roboglot.simulation.world.world import World
 from roboglot.wire.cyberdog.proto.cyberdog_app_pb2 import Ticks
 from roboglot.wire.visual.relay import FrontEnd
+from tests.drivers.pace import settle
 from tests.protocols.cyberdog.phone import ADDRESS, App, Client, Messages, Pems, context_of, until
 
 Passing = Callable[[Callable[[], object]], Awaitable[None]]
@@ -38,6 +39,7 @@ def robot(walker: tuple[World, Robot]) -> Robot:
 async def phoned(door: CyberDogDoor, app: App, robot: Robot, data: Path) -> AsyncIterator[CyberDogDoor]:
     """A door whose app is configured, and that no one calls."""
     opened = CyberDogDoor(robot, ADDRESS, CyberDogConfig(port=0, app=f"127.0.0.1:{app.port}"), data)
+    app.robot = opened
     await opened.start()
     yield opened
     await opened.close()
@@ -48,7 +50,7 @@ def credentials(pems: Pems) -> grpc.ServerCredentials:
 
 
 async def test_a_heartbeat_tells_the_robot_s_states(phoned, app, robot, passing: Passing) -> None:
-    await passing(lambda: app.ticks)
+    await passing(lambda: app.connected)
     ticks = app.ticks[0]
     assert ticks.ip == ADDRESS
     assert ticks.sn == robot.description.serial
@@ -63,17 +65,17 @@ async def test_a_heartbeat_tells_the_robot_s_states(phoned, app, robot, passing:
 
 async def test_heartbeats_come_every_half_second(phoned, app, clock: LockstepClock, passing: Passing) -> None:
     await passing(lambda: phoned._context.app.connected)
-    await asyncio.sleep(0.05)
+    await settle()
     for beats in range(len(app.ticks) + 1, len(app.ticks) + 5):
         await clock.advance(0.5)
         await until(partial(lambda beats: len(app.ticks) == beats, beats))
-        await asyncio.sleep(0.03)  # time for the reply to arrive
+        await settle()  # until the reply has arrived
         assert len(app.ticks) == beats
 
 
 async def test_without_an_address_no_one_is_dialled(door, app, forward) -> None:
     await forward(seconds=3)
-    await asyncio.sleep(0.02)
+    await settle()
     assert not app.ticks
 
 
@@ -81,7 +83,7 @@ async def test_lying_dog_gets_up_for_its_first_app(door, client, app, robot, for
     robot[Legs].lie_down()
     await forward(seconds=5)
     await client.ask(10001)
-    await passing(lambda: app.ticks)
+    await passing(lambda: app.connected)
     await passing(lambda: robot[Legs].posture is Posture.STANDING)
     robot[Legs].lie_down()
     await client.ask(55001)
@@ -129,7 +131,7 @@ async def test_an_app_with_a_strange_certificate_gets_nothing(
     await door.start()
     for _ in range(20):
         await forward(seconds=0.1)
-        await asyncio.sleep(0.005)
+        await settle()
     assert not stranger.ticks
     await door.close()
     await stranger.stop()
@@ -173,7 +175,7 @@ async def test_disconnect_forgets_the_app_until_it_calls_again(door, client, app
     await passing(lambda: not door._context.app.connected)
     seen = len(app.ticks)
     await forward(seconds=3)
-    await asyncio.sleep(0.02)
+    await settle()
     assert len(app.ticks) == seen
     await client.ask(10001)
     await passing(lambda: len(app.ticks) > seen)

@@ -64,7 +64,7 @@ async def test_what_is_not_there_cannot_be_connected(client, robot, gadget, forw
 
 async def test_lost_and_found_and_its_update(client, app: App, robot, gadget, passing, forward) -> None:
     await client.ask(10001)
-    await passing(lambda: app.ticks)
+    await passing(lambda: app.connected)
     await connect(client, forward)
     await passing(lambda: app.of(8008))
     assert app.of(8008) == [{"data": "1.0.3 1.1.0"}]
@@ -84,7 +84,7 @@ async def test_lost_and_found_and_its_update(client, app: App, robot, gadget, pa
 
 async def test_a_device_lost_during_its_update(client, app, robot, gadget, passing, forward) -> None:
     await client.ask(10001)
-    await passing(lambda: app.ticks)
+    await passing(lambda: app.connected)
     await connect(client, forward)
     await client.ask(8009)
     await forward(seconds=5)
@@ -97,7 +97,7 @@ async def test_a_device_lost_during_its_update(client, app, robot, gadget, passi
 
 async def test_the_remote_control_s_gear(client, app, robot, gadget, passing, forward) -> None:
     await client.ask(10001)
-    await passing(lambda: app.ticks)
+    await passing(lambda: app.connected)
     await connect(client, forward)
     assert await client.ask(8013) == {"data": 0}
     assert await client.ask(8011, {"data": 1}) == ""

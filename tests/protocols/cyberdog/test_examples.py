@@ -8,6 +8,7 @@ import pytest
 
 from roboglot.protocols.cyberdog.table import pushes
 from roboglot.wire.contracts import contract
+from tests.drivers.pace import settle
 from tests.protocols.cyberdog.phone import Client, examples
 
 FILES = {4004}  # for getFile; the page has its own example
@@ -25,7 +26,7 @@ async def test_every_example_is_answered_as_it_says(client: Client, robot, forwa
     async def pass_time() -> None:
         while True:
             await forward(seconds=0.05)
-            await asyncio.sleep(0.005)
+            await settle()
 
     passing = asyncio.ensure_future(pass_time())
     try:

@@ -8,6 +8,7 @@ import pytest
 from roboglot.model.clock import LockstepClock
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
+from tests.drivers.pace import settle
 
 # kind: robot time until it is reported, the self check's code, the state, the code of walking
 WORDS = {
@@ -25,7 +26,7 @@ async def asked(client, clock: LockstepClock, code: int, **params: Any) -> Any:
     answer = asyncio.ensure_future(client.ask(code, params))
     while not answer.done():
         await clock.advance(0.05)
-        await asyncio.sleep(0.001)
+        await settle()
     return await answer
 
 

@@ -132,7 +132,7 @@ async def test_a_closed_microphone_hears_nothing(client, robot, anna, forward) -
 
 async def test_a_voiceprint_is_learned_from_who_speaks(client, app: App, robot, anna, passing, forward) -> None:
     await client.ask(1020, {"member": "anna"})
-    await passing(lambda: app.ticks)
+    await passing(lambda: app.connected)
     assert await client.ask(3011, {"nick_name": "anna", "voiceprint_id": "v1"}) == {}
     assert (await client.ask(1021, {"account": "anna"}))["accounts"][0]["voice_state"] == 2
     anna.say("good morning, robot")
@@ -144,7 +144,7 @@ async def test_a_voiceprint_is_learned_from_who_speaks(client, app: App, robot, 
 
 async def test_training_is_cancellable_expires_and_needs_a_member(client, app, robot, passing, forward, world) -> None:
     await client.ask(10001)
-    await passing(lambda: app.ticks)
+    await passing(lambda: app.connected)
     await client.ask(3011, {"nick_name": "unknown", "voiceprint_id": "v2"})
     await until(lambda: app.of(3013))
     assert app.of(3013) == [{"code": 5010, "voiceprint_id": "v2"}]
@@ -167,7 +167,7 @@ async def test_voice_board_is_activated_by_token_that_holds(client, app, robot, 
     assert await client.ask(3002, token) == {"result": True}
     assert (await client.ask(1001, {"is_audio_state": True, "uid": "77"}))["audio_state"] is True
     assert (await client.ask(1001, {"is_audio_state": True, "uid": "78"}))["audio_state"] is False
-    await passing(lambda: app.ticks and app.ticks[-1].audio)
+    await passing(lambda: app.connected and app.ticks[-1].audio)
     await forward(seconds=61)
     assert (await client.ask(1001, {"is_audio_state": True, "uid": "77"}))["audio_state"] is False
 

@@ -112,7 +112,7 @@ async def test_goals_that_cannot_be_reached(client, work, robot) -> None:
 
 async def test_lost_app_ends_stream_and_not_the_work(client, app, passing, robot) -> None:
     await client.ask(10001)
-    await passing(lambda: app.ticks)
+    await passing(lambda: app.connected)
     files = [{"md5": MD5, "fileSize": 160_000_000}]  # after eight seconds
     module = {**MODULE, "latest": {**PACKAGE, "packages": files}}
     stream = Stream(client, 5010, {"operate": "download", "data": module})

@@ -56,7 +56,7 @@ async def test_an_empty_battery_keeps_it_in_low_power(client, robot, forward) ->
 
 async def test_lying_leads_to_low_power_if_enabled(client, app, robot, passing, forward) -> None:
     await client.ask(10001)
-    await passing(lambda: app.ticks)  # the first app makes the dog stand up
+    await passing(lambda: app.connected)  # the first app makes the dog stand up
     robot[Legs].lie_down()
     await forward(seconds=40)
     assert robot[Power].mode is PowerMode.AWAKE
@@ -99,7 +99,7 @@ async def test_it_switches_off_after_the_answer(client, robot, forward) -> None:
 
 async def test_an_update_from_download_to_reboot(client, app: App, robot, data, passing, forward, door) -> None:
     assert await client.ask(5001) == {"status": "idle", "code": 0}
-    await passing(lambda: app.ticks)
+    await passing(lambda: app.connected)
     assert await client.ask(5006) == {"time": -2}
     assert (await client.ask(5004, {"md5": MD5}))["code"] == 5703  # nothing was downloaded
     assert await client.ask(5003, {"modules": [MODULE]}) == {"response": True, "code": 0}
@@ -160,7 +160,7 @@ async def test_fetched_and_installed_update_survives_a_crash(client, robot, forw
 
 async def test_an_update_that_cannot_be(client, app, robot, passing, forward) -> None:
     await client.ask(10001)
-    await passing(lambda: app.ticks)
+    await passing(lambda: app.connected)
     assert await client.ask(5003, {"modules": [{"module": "x"}]}) == {"error_code": 323}
     broken = {**MODULE, "latest": {**MODULE["latest"], "packages": [{**FILE, "md5": "short"}]}}  # type: ignore[dict-item]
     assert await client.ask(5003, {"modules": [broken]}) == {"response": False, "code": 5710}
@@ -172,7 +172,7 @@ async def test_an_update_that_cannot_be(client, app, robot, passing, forward) ->
 
 async def test_a_low_battery_installs_nothing(client, app, robot, passing, forward) -> None:
     await client.ask(5003, {"modules": [MODULE]})
-    await passing(lambda: app.ticks)
+    await passing(lambda: app.connected)
     await forward(seconds=6)
     robot[Battery].set_charge(0.1)
     assert (await client.ask(5004, {"md5": MD5}))["code"] == 0
@@ -246,7 +246,7 @@ async def test_progress_is_pushed_ten_times_second_at_most(robot, forward) -> No
 
 async def test_last_app_is_dialled_again_after_a_restart(client, door, app, robot, data, passing) -> None:
     await client.ask(10001)
-    await passing(lambda: app.ticks and robot[Settings].get("cyberdog.app"))
+    await passing(lambda: app.connected and robot[Settings].get("cyberdog.app"))
     await door.close()
     app.ticks.clear()
     again = CyberDogDoor(robot, ADDRESS, CyberDogConfig(port=0, app_port=app.port), data)
@@ -257,6 +257,6 @@ async def test_last_app_is_dialled_again_after_a_restart(client, door, app, robo
 
 async def test_forgotten_app_is_not_dialled_after_a_restart(client, app, robot, passing) -> None:
     await client.ask(10001)
-    await passing(lambda: app.ticks and robot[Settings].get("cyberdog.app"))
+    await passing(lambda: app.connected and robot[Settings].get("cyberdog.app"))
     await client.ask(55001)
     await until(lambda: not robot[Settings].get("cyberdog.app"))

@@ -7,6 +7,7 @@ import pytest
 from roboglot.model.clock import LockstepClock
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
+from tests.drivers.pace import settle
 
 REFUSED = {"emergency_stop", "brake_released"}
 
@@ -15,7 +16,7 @@ async def reply_to(client, clock: LockstepClock, text: str) -> str:
     reply = asyncio.ensure_future(client.ask(text))
     while not reply.done():
         await clock.advance(0.05)
-        await asyncio.sleep(0.001)
+        await settle()
     return await reply
 
 

@@ -4,17 +4,18 @@ import asyncio
 
 from roboglot.model.clock import LockstepClock
 from roboglot.simulation.world.world import World
+from tests.drivers.pace import settle
 
 
 async def test_replies_come_late(client, world: World, clock: LockstepClock) -> None:
     world.faults.inject("slow_answers", "a", seconds=3.0)
     reply = asyncio.ensure_future(client.ask("version;"))
     for _ in range(29):
-        await asyncio.sleep(0.003)
+        await settle()
         await clock.advance(0.1)
     assert not reply.done()
     for _ in range(200):
-        await asyncio.sleep(0.003)
+        await settle()
         await clock.advance(0.1)
         if reply.done():
             break

@@ -119,7 +119,7 @@ async def test_file_swallowed_after_the_last_byte_is_kept(
     """The client's window takes a small file whole: the robot has sent it, and nothing has arrived."""
     monkeypatch.setattr(camera_files, "jpeg", lambda frame: jpeg(frame, 5))
     await client.ask(10001)
-    await passing(lambda: app.ticks)
+    await passing(lambda: app.connected)
     stalled = Stalling(ADDRESS, door.port)
     async with stalled.open() as port, pems.channel(port, address="127.0.0.1") as channel:
         call = Client(channel, messages)
@@ -187,7 +187,7 @@ class Stalling:
 async def test_lost_app_ends_the_recording_and_keeps_it(client, app, robot, folder, passing, forward) -> None:
     robot[Camera].rate = 5.0  # six seconds of film in a sixth of the pictures
     await client.ask(4002, {"command": 2})
-    await passing(lambda: app.ticks)
+    await passing(lambda: app.connected)
     await forward(seconds=1)
     app.silent = True
     await passing(lambda: not robot[Recorder].recording)
@@ -202,7 +202,7 @@ async def test_files_count_on_disk_and_survive_a_restart(client, app, robot, fol
     await client.ask(4002, {"command": 1})
     (path,) = folder.iterdir()
     assert robot[Disk].uses[f"camera {path.name}"] == path.stat().st_size
-    await passing(lambda: app.ticks)
+    await passing(lambda: app.connected)
     robot[Disk].release(f"camera {path.name}")
     assert CameraFiles(robot, folder).names() == [path.name]
     assert f"camera {path.name}" in robot[Disk].uses
@@ -210,7 +210,7 @@ async def test_files_count_on_disk_and_survive_a_restart(client, app, robot, fol
 
 async def test_full_disk_is_reported_and_takes_no_picture(client, app, robot, folder, passing) -> None:
     await client.ask(10001)
-    await passing(lambda: app.ticks)
+    await passing(lambda: app.connected)
     robot[Disk].take("rubbish", robot[Disk].free - 400_000_000)
     await passing(lambda: app.of(4005))
     assert app.of(4005) == [{"remain_size": 400_000_000}]

@@ -17,7 +17,7 @@ async def anna(world, robot, client, app, passing):
     person = world.hands.person("anna")
     world.hands.place("a", Pose(person.pose.x - 3.0, person.pose.y, 0.0))
     await client.ask(10001)
-    await passing(lambda: app.ticks)
+    await passing(lambda: app.connected)
     return person
 
 

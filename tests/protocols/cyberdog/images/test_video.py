@@ -16,6 +16,7 @@ from roboglot.media.video import VideoStream
 from roboglot.protocols.cyberdog.chapters.camera import transmission as door_video
 from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.wire.ice import offer_loopback
+from tests.drivers.pace import settle
 from tests.protocols.cyberdog.phone import PATIENCE, App, Client, until
 
 pytestmark = pytest.mark.world("playground", body="cyberdog2")
@@ -159,7 +160,7 @@ async def test_without_way_to_the_app_it_gives_up(watch, monkeypatch) -> None:
     await until(lambda: watcher.signals("error"))
     assert watcher.signals("error")[0]["error"]["code"] == 1002
     assert await watcher.client.ask(4001, {"uid": "phone"}) == ""
-    await asyncio.sleep(0.05)
+    await settle()
     assert not watcher.signals("is_closed")  # that name is gone
 
 
@@ -181,7 +182,7 @@ async def test_what_is_no_offer_is_reported(watch, client, app) -> None:
         {"c_sdp": []},
     ):
         assert await client.ask(4001, nonsense) == ""
-    await asyncio.sleep(0.05)
+    await settle()
     assert app.of(4001) == []
 
 

@@ -28,7 +28,7 @@ async def test_mapping_is_pushed_saved_and_read_again(
 ) -> None:
     await forward(seconds=1)
     await client.ask(10001)
-    await passing(lambda: app.ticks)
+    await passing(lambda: app.connected)
     stream = Stream(client, 6004, {"type": 5})
     await passing(lambda: 6 in stream.codes)
     assert await state(client) == 5

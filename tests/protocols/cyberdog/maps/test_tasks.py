@@ -57,7 +57,7 @@ async def test_navigation_arrives_and_the_app_sees_the_way(
 ) -> None:
     await forward(seconds=1)
     await client.ask(10001)
-    await passing(lambda: app.ticks)
+    await passing(lambda: app.connected)
     await localized(client, passing)
     stream = Stream(client, 6004, {"type": 1, "goalX": 2, "goalY": 1, "theta": 1.5})
     await passing(lambda: stream.ended)
@@ -81,7 +81,7 @@ async def test_navigation_arrives_and_the_app_sees_the_way(
 async def test_laser_points_lie_on_walls_of_the_map(client, app, robot, forward, passing: Passing) -> None:
     await forward(seconds=1)
     await client.ask(10001)
-    await passing(lambda: app.ticks)
+    await passing(lambda: app.connected)
     await localized(client, passing)
     await passing(lambda: app.of(6011) and app.of(6001))
     grid = app.of(6001)[-1]
@@ -181,7 +181,7 @@ async def test_task_can_be_rejoined_and_stream_taken_over(client, robot, forward
 
 async def test_losing_app_ends_stream_but_not_the_task(client, app, robot, passing: Passing) -> None:
     await client.ask(10001)
-    await passing(lambda: app.ticks)
+    await passing(lambda: app.connected)
     stream = Stream(client, 6004, {"type": 5})
     await passing(lambda: 6 in stream.codes)
     app.silent = True

@@ -28,7 +28,7 @@ async def test_a_navigation_that_bumps_fails_with_304(client, robot, world, forw
 async def test_servo_frames_into_a_wall_are_refused(client, app, robot, world, forward, passing) -> None:
     world.hands.place("a", Pose(9.5, 5.0, 0.0))
     await client.ask(10001)
-    await passing(lambda: app.ticks)
+    await passing(lambda: app.connected)
     for _ in range(20):
         await client.ask(1002, WALK)
         await forward(seconds=0.1)

@@ -133,7 +133,7 @@ async def test_servo_frames_choose_gait_pose_and_the_lift(client, robot, forward
 
 async def test_getting_up_for_a_servo_is_reported(client, app: App, robot, passing, forward) -> None:
     await client.ask(10001)
-    await passing(lambda: app.ticks)
+    await passing(lambda: app.connected)
     for _ in range(3):
         await client.ask(1002, {"motion_id": 303, "vel_des": [0, 0, 0.1]})
         await forward(seconds=0.1)

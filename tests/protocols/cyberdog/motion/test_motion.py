@@ -102,7 +102,7 @@ async def test_every_frame_is_reported(
     client: Client, app: App, passing: Callable[..., Awaitable[None]], world: World
 ) -> None:
     await client.ask(10001)
-    await passing(lambda: app.ticks)
+    await passing(lambda: app.connected)
     await client.ask(1002, {**WALK, "cmd_id": 7})
     await until(lambda: app.of(1003))
     assert app.of(1003) == [
@@ -194,7 +194,7 @@ async def test_a_motion_follows_own_servo_at_once(client, robot, world, forward,
 async def test_frames_that_come_during_a_motion_are_refused(client, app, robot, world, forward, passing) -> None:
     await client.ask(1002, WALK)
     lying = asyncio.ensure_future(client.ask(1004, {"motion_id": 101}))
-    await passing(lambda: app.ticks and robot[Legs].posture is Posture.CHANGING)
+    await passing(lambda: app.connected and robot[Legs].posture is Posture.CHANGING)
     await client.ask(1002, WALK)
     await until(lambda: app.of(1003) and app.of(1003)[-1]["code"] == 3011)
     await forward(seconds=5)

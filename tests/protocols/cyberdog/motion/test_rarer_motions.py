@@ -54,7 +54,7 @@ async def test_frames_hold_the_body_at_a_pose(client, robot, world, forward) -> 
 
 async def test_frames_add_to_the_body_pose_within_limits(client, app: App, robot, forward, passing) -> None:
     await client.ask(10001)
-    await passing(lambda: app.ticks)
+    await passing(lambda: app.connected)
     rolled = []
     for _ in range(3):
         await client.ask(1002, {"motion_id": 202, "rpy_des": [0.05, 0, 0]})
