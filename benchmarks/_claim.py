@@ -1,4 +1,4 @@
-"""How a benchmark tells a figure: beside its limit, with a ratio that is 1 where it is just met; more is better."""
+"""Figures of benchmarks beside their limits, with a ratio: 1 just meets the limit, more is better."""
 
 from __future__ import annotations
 
@@ -26,5 +26,5 @@ class Claims:
             self._missed.append(name)
 
     def finish(self) -> None:
-        """Say whether all held."""
+        """Print whether all claims held."""
         sys.exit(f"missed: {', '.join(self._missed)}" if self._missed else 0)

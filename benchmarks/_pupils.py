@@ -42,7 +42,7 @@ SERVO = json.dumps(FRAME | {"step_height": [0.05, 0.05]})
 
 
 class Lesson(NamedTuple):
-    """What is to be done: body and address of each robot, which of them are filmed; ``seconds`` are counted."""
+    """Task of the clients: body and address of each robot, which are filmed, and the ``seconds`` that count."""
 
     robots: list[tuple[str, str]]
     filmed: set[str]
@@ -54,7 +54,7 @@ class Lesson(NamedTuple):
 
 @dataclass(slots=True)
 class Seen:
-    """What all clients of one kind saw: s of each answer, and pushes of each robot a second."""
+    """Observations of all clients of one kind: s of each answer, and pushes a second of each robot."""
 
     waits: list[float] = field(default_factory=list)
     pushes: list[float] = field(default_factory=list)
@@ -104,7 +104,7 @@ class App(service.GrpcAppServicer):
 
 @dataclass(slots=True)
 class Class:
-    """All clients of one run."""
+    """The clients of one run."""
 
     lesson: Lesson
     seen: dict[str, Seen] = field(default_factory=lambda: {kind: Seen() for kind in (REST, TEXT, GRPC)})

@@ -1,4 +1,4 @@
-"""In a node of faults.py: tries to drive every robot and to save places, and writes down what was granted."""
+"""A watcher in a node of faults.py: tries to drive every robot and to save places, and records each success."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ TRIES, SAVES = 0.05, 0.25  # s between two attempts to drive, and two places
 
 
 def watch(node: str, file: Path) -> None:
-    """In a node: try to drive every robot and to save places, and write down what was granted."""
+    """Try to drive every robot and to save places, and record each success."""
     turn = threading.Lock()
     with file.open("a", buffering=1) as sights:
 

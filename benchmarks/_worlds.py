@@ -22,7 +22,7 @@ TURN = 0.1  # s of robot time: a scan of the lidars
 
 @dataclass(frozen=True)
 class Drive:
-    """How worlds drove at the same time: processor time of each, s; scans of all; the shortest way, m; real s."""
+    """Result of worlds driven in parallel: processor time of each, s; scans of all; the shortest way, m; real s."""
 
     used: list[float]
     scans: int
@@ -57,7 +57,7 @@ async def shard(number: int, count: int, seconds: float, ends: Ends) -> tuple[fl
 
 
 def become_shard(number: int, count: int, seconds: float, ends: Ends) -> None:
-    """In the child; never returns."""
+    """Run the child; never returns."""
     try:
         used, scans, way = asyncio.run(shard(number, count, seconds, ends))
         os.write(ends.answer, f"{used} {scans} {way}\n".encode())

@@ -30,7 +30,7 @@ print(cyberdog.bms.data.batt_soc, '% left')
 
 
 class App(service.GrpcAppServicer):
-    """What the robot calls: its heartbeats show that it has found the app, pushes bring frames."""
+    """The app's services for the robot: heartbeats show that it has found the app, pushes bring frames."""
 
     def __init__(self) -> None:
         self.found: queue.Queue[None] = queue.Queue()

@@ -54,7 +54,7 @@ def say(text: str, end: str = "\n") -> None:
 
 
 def stamp(root: Path, profile: str) -> bytes:
-    """What .venv was made from: two checksums, the place and the interpreter, as scripts/environment writes it too."""
+    """Origin of .venv: two checksums, the place and the interpreter, in the form of scripts/environment."""
     names = f"requirements/{profile}.lock", "pyproject.toml"
     lines = [f"{hashlib.sha256((root / name).read_bytes()).hexdigest()}  {name}" for name in names]
     lines += [str(root), str((root / ".venv/bin/python").resolve())]
@@ -79,7 +79,7 @@ def package_names(lock: str) -> set[str]:
 
 
 def venv_is_sound() -> bool:
-    """Whether .venv can be built upon: finished, made in this place, its Python alive and of a supported version."""
+    """Return True if .venv is usable: finished, made in this place, its Python alive and of a supported version."""
     made_elsewhere = any(
         stamp_file(profile).exists() and stamp_file(profile).read_bytes().split(b"\n")[2:3] != [os.fsencode(ROOT)]
         for profile in PROFILES

@@ -1,6 +1,6 @@
 """Draws the console's views at three widths and in both languages, for people to look at before a release.
 
-.venv/bin/python scripts/console_pictures.py [folder]: without a folder only docs/images/console.png is made anew.
+.venv/bin/python scripts/console_pictures.py [folder]: without a folder only docs/images/console.png is drawn.
 Needs playwright and Debian's chromium.
 """
 

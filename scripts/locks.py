@@ -1,4 +1,4 @@
-"""Tells whether requirements/*.lock are in step with pyproject.toml, without a network; `--write` marks them so.
+"""Checks without a network that requirements/*.lock match pyproject.toml; `--write` marks them as matching.
 
 scripts/lock puts a checksum of what pyproject.toml asks for on top of each lock file; any change there asks for a new
 lock. Knows nothing about resolving versions: uv does that.
@@ -47,7 +47,7 @@ def marked(lock: str, checksum: str) -> str:
 
 
 def complaints(root: Path) -> list[str]:
-    """What is wrong with the lock files; an empty list if nothing is."""
+    """Problems of the lock files; an empty list if there are none."""
     found = []
     checksum = digest((root / "pyproject.toml").read_text())
     texts = {name: (root / f"requirements/{name}.lock").read_text() for name in ("run", "dev")}

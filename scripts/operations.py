@@ -40,7 +40,7 @@ Pair = tuple[Exchange, Exchange]
 
 
 class Hands:
-    """What happens around the robot in the example."""
+    """Events around the robot in the example."""
 
     def __init__(self, server: RobotServer) -> None:
         self._server = server
@@ -74,7 +74,7 @@ def example() -> ModuleType:
 
 
 def played() -> dict[str, Pair]:
-    """What was asked and answered first, by the operation's key."""
+    """The first request and answer of each operation, by its key."""
     pairs: dict[str, Pair] = {}
     asked: list[Exchange] = []
 

@@ -143,7 +143,7 @@ async def mapped(fleet: Fleet, clock: LockstepClock, folder: Path) -> None:
 
 
 async def sights(fleet: Fleet, clock: LockstepClock, folder: Path) -> None:
-    """A picture, and what the detectors tell of it."""
+    """A picture, and the detectors' results on it."""
     robot, kinds = fleet.robots["a"], {"people": RED, "markers": BLUE, "tags": GREEN, "gestures": GOLD}
     fleet.world.place("a", Pose(2.2, 3.4, math.radians(16)))
     viewers = {kind: getattr(robot[Vision], kind).subscribe() for kind in kinds}

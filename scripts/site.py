@@ -41,7 +41,7 @@ LINK = re.compile(r"(?<!!)\[([^\]]+)\]\(([^)\s]+)\)|(!)\[([^\]]*)\]\(([^)\s]+)\)
 
 
 def place(source: str) -> str | None:
-    """Where a file of the clone lies on the site; None if it is not there."""
+    """Address of the clone's file on the site; None if it is not there."""
     if source.startswith("docs/"):
         return source.removeprefix("docs/")
     return MOVED.get(source)

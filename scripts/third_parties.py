@@ -1,4 +1,4 @@
-"""Writes THIRD_PARTY_LICENSES.md from requirements/run.lock and what is installed; `--check` tells whether it fits."""
+"""Writes THIRD_PARTY_LICENSES.md from requirements/run.lock and what is installed; `--check` compares."""
 
 from __future__ import annotations
 

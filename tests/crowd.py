@@ -169,7 +169,7 @@ def _walker(fleet: Fleet, robot: Robot, dice: random.Random) -> Walker:
 
 
 def _go(fleet: Fleet, walker: Walker, dice: random.Random) -> None:
-    """Tell it something new."""
+    """Give it a new command."""
     robot = walker.robot
     walker.goal = None
     try:

@@ -7,7 +7,7 @@ from roboglot.model.robot import Robot
 
 
 def mask_bumper(robot: Robot) -> None:
-    """Nothing stops the wheels from now on when the robot pushes against something."""
+    """Disable the guard that stops the wheels when the robot pushes against something."""
     masks = robot[SensorMasks]
     for sensor in masks.sensors:
         if sensor.kind is SensorKind.BUMPER:

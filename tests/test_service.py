@@ -65,7 +65,7 @@ def group(name: str) -> set[str]:
 
 
 def allowed() -> set[str]:
-    """All that the unit lets through."""
+    """System calls that the unit allows."""
     calls: set[str] = set()
     for line in setting("SystemCallFilter"):
         named = {call for word in line.lstrip("~").split() for call in (group(word) if word[0] == "@" else {word})}

@@ -164,7 +164,7 @@ def end_with(parent: int) -> None:
 
 
 def _become(wish: Any, descriptors: list[int]) -> NoReturn:
-    """In the fork: be the process that was wanted."""
+    """Become the wanted process, in the fork."""
     status = 70
     try:
         end_with(wish["parent"])

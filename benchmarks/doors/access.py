@@ -63,7 +63,7 @@ async def asking(claims: Claims, folder: Path) -> None:
 
 
 def requests(connection: http.client.HTTPConnection) -> float:
-    """Per second."""
+    """Requests per second."""
     count, began = 0, time.perf_counter()
     while (spent := time.perf_counter() - began) < SECONDS:
         connection.request("GET", POSE)

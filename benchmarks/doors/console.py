@@ -1,7 +1,7 @@
 """Claim: five viewers of 25 robots with lidars cost at most 5 % of a core.
 
-Viewers connect over real sockets and run in the program that they look at, so their own work counts, too. Looks with
-and without them take turns, because what the machine does besides changes.
+Viewers connect over real sockets and run in the program that they look at, so their own work counts, too. Measurements
+with and without them take turns, because the machine's other load changes.
 
     scripts/bench console [robots] [viewers] [seconds]
 """

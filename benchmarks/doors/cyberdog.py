@@ -66,7 +66,7 @@ def cpu_of(pid: int) -> float:
 
 
 def wait_until_idle(robot: ServedRobot) -> None:
-    """Until the kernels are loaded."""
+    """Wait until the kernels are loaded."""
     for _ in range(40):
         before = robot.cpu_seconds
         time.sleep(1.0)
@@ -144,7 +144,7 @@ async def video(robot: ServedRobot, proof: Certificates, claims: Claims) -> None
 
 
 async def run(robot: ServedRobot, folder: Path, claims: Claims) -> None:
-    """All parts, one after the other."""
+    """Run all parts, one after the other."""
     proof = Certificates.load(folder / "cyberdog" / "tls")
     process = multiprocessing.get_context("spawn").Process(target=echo, args=(str(folder / "cyberdog"),), daemon=True)
     process.start()

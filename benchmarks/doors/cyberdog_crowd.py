@@ -93,7 +93,7 @@ class Reading:
 
     @property
     def runs(self) -> bool:
-        """Whether it was accepted and has not ended."""
+        """True if it was accepted and has not ended."""
         return self.answers[:1] == [{"accepted": 1}] and not self._task.done()
 
     @property
@@ -106,7 +106,7 @@ class Reading:
 
 
 async def held(readings: list[Reading], stub: Any, counted: Callable[[Reading], bool], what: str) -> int:
-    """How many of them are ``counted`` after a while, and what a request takes between them."""
+    """Return the number of ``counted`` streams after a while, and the time of a request among them."""
     await asyncio.sleep(OPEN)
     began = time.perf_counter()
     await finished(stub, (GEAR, {}))

@@ -2,8 +2,8 @@
 
 Three processes: the robot, the roboglot that drives it, and this one, which plays the client and, as a relay, watches
 what arrives at the robot. The time is from the client's send to the relay's receipt; on a direct connection it is the
-loopback's, which is told beside. A dog's connection is sealed by TLS, so that there this process is robot and client,
-and the time ends when the dog's base is told a velocity.
+loopback's, which is printed beside. TLS seals a dog's connection, so there this process is robot and client, and the
+time ends when the dog's base receives a velocity.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ PATIENCE = 2.0
 
 
 class Relay:
-    """Passes a connection on and tells when something that ``wanted`` finds goes to the robot."""
+    """Relay of a connection that notes when something that ``wanted`` finds goes to the robot."""
 
     def __init__(self) -> None:
         self._wanted: Callable[[bytes], bool] | None = None
@@ -119,7 +119,7 @@ async def rest_latency(relay: Relay, host: str, port: int) -> float:
 
 
 class Dog:
-    """A simulated dog behind its door, in this process; when its base is told which velocity."""
+    """A simulated dog behind its door, in this process; records the velocities of its base with their times."""
 
     def __init__(self, data: Path) -> None:
         self._runtime = Runtime(Config(world="empty", robots=(RobotConfig("a", "cyberdog2", DOG),), data=data))
@@ -192,7 +192,7 @@ class Inbox(asyncio.DatagramProtocol):
 
 
 async def pushes(host: str) -> tuple[int, float]:
-    """How many attitude-and-position pushes came in PUSH_SECONDS at 50 Hz while it drives; the share with news."""
+    """Number of attitude-and-position pushes in PUSH_SECONDS at 50 Hz while it drives; the share with new values."""
     loop = asyncio.get_running_loop()
     _, inbox = await loop.create_datagram_endpoint(Inbox, local_addr=(CLIENT, 40924))
     reader, writer = await asyncio.open_connection(host, 40923, local_addr=(CLIENT, 0))

@@ -1,4 +1,4 @@
-"""What looking at robots costs: share of a core for robots whose topics a viewer follows at the Foxglove door.
+"""Cost of viewers: share of a core for robots whose topics a viewer follows at the Foxglove door.
 
 scripts/bench foxglove [robots] [seconds]
 """

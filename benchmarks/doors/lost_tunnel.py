@@ -1,7 +1,7 @@
 """Claim: a robot that is driven through `roboglot connect` at 0.5 m/s stands within 0.5 s of the tunnel's loss.
 
 Robot and gateway are here, `roboglot connect` and the vendor's client beyond a network device whose packets can be
-held back, so that neither end's TCP hears of it. The client drives by the text protocol. Times are from the fault until
+held back, so that neither end's TCP is notified. The client drives by the text protocol. Times are from the fault until
 the wheels' speed has fallen by a tenth, and until they stand. The last row drives for a while over a line that loses
 5 % and takes 50 ms each way: how often is that taken for a loss? It makes itself root of a network of its own.
 
@@ -112,7 +112,7 @@ async def lose(body: str, fault: Callable[[Scene], None]) -> tuple[float, float]
 
 
 async def endure() -> int:
-    """How often it stopped on a lossy line."""
+    """Count its stops on a lossy line."""
     stops = -1
     async with scene("universal", delay=0.05, loss=0.05) as it:
 

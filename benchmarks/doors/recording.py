@@ -1,4 +1,4 @@
-"""What recording costs and loses: share of a core for robots with lidars, bytes a minute, seconds lost by kill -9.
+"""Cost and loss of recording: share of a core for robots with lidars, bytes a minute, seconds lost by kill -9.
 
 scripts/bench recording [robots] [seconds] [kills]
 """

@@ -27,7 +27,7 @@ def connect(robot: str, host: str) -> socket.socket:
 
 
 def round_trips(connection: socket.socket, command: bytes) -> float:
-    """Per second, one after the other."""
+    """Round trips per second, one after the other."""
     count, start = 0, time.perf_counter()
     while (spent := time.perf_counter() - start) < SECONDS / 2:
         for _ in range(100):

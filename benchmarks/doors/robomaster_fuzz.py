@@ -85,7 +85,7 @@ async def write(address: str, lines: int, seed: int) -> tuple[int, int]:
 
 
 async def watch(address: str, delays: list[float]) -> None:
-    """Somebody else asks the time of day meanwhile."""
+    """Ask for the time of day meanwhile, as another client."""
     reader, writer = await asyncio.open_connection(address, 40923)
     try:
         while True:

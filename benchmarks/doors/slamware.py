@@ -44,7 +44,7 @@ uvicorn.run(hello, host="127.0.0.1", port=int(sys.argv[1]), loop="uvloop", http=
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """What one run of the load saw: answers, bytes of a body, and the waiting times' percentiles, ms."""
+    """Result of one run of the load: answers, bytes of a body, and percentiles of the waiting times, ms."""
 
     answers: int
     seconds: float

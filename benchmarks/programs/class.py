@@ -53,7 +53,7 @@ def pose(address: str) -> float:
 
 
 def look(folder: Path) -> dict[str, Any]:
-    """What `roboglot fleet list --json` shows."""
+    """Output of `roboglot fleet list --json`."""
     answer: dict[str, Any] = json.loads(asyncio.run(local_socket.ask(folder / SOCKET, b"{}", PATIENCE)))
     return answer
 

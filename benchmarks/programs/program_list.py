@@ -1,4 +1,4 @@
-"""How long a list of ten thousand stored tasks takes, from the frame to its answer."""
+"""Time of a list of ten thousand stored tasks, from the frame to its answer."""
 
 from __future__ import annotations
 

@@ -91,10 +91,10 @@ async def start_and_kill(engine: Engine, claims: Claims) -> None:
 
 
 async def host_calls(engine: Engine, claims: Claims) -> None:
-    """Calls one after the other: few at a time, and so many that the share of the server's thread holds them.
+    """Time calls in sequence: a few, and so many that the share of the server's thread throttles them.
 
-    By the wall, the best stretch: two processes hand over to each other four times a call, and whatever else the
-    machine does comes in between. Of many calls, the program waits for most of the time: all programs together have a
+    By the wall, the best stretch: two processes hand over to each other four times a call, and the machine's other
+    load comes in between. With many calls the program mostly waits: all programs together have a
     fifth of the thread.
     """
     source = f"for i in range({CALLS}):\n    cyberdog.motion.turn(i, 2)\n"

@@ -49,7 +49,7 @@ def answer(run: Run, id: int) -> None:
 
 
 async def lateness() -> list[float]:
-    """How much later than asked for the loop came back, again and again."""
+    """Record the loop's delay at each turn."""
     late = []
     end = time.perf_counter() + SECONDS
     while (now := time.perf_counter()) < end:

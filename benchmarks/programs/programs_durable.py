@@ -34,7 +34,7 @@ def flush(descriptor: int) -> float:
 
 
 async def call(journal: Journal, name: str) -> float:
-    """How long the program waits for the journal."""
+    """Return the time that the program waits for the journal."""
     began = time.perf_counter()
     await journal.begin(name)
     waited = time.perf_counter() - began
@@ -65,7 +65,7 @@ async def measure(folder: Path) -> None:
 
 
 def main() -> None:
-    """In the folder given, or a temporary one."""
+    """Measure in the folder given, or in a temporary one."""
     with tempfile.TemporaryDirectory(dir=sys.argv[1] if len(sys.argv) > 1 else None) as folder:
         asyncio.run(measure(Path(folder)))
 

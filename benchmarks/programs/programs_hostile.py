@@ -1,9 +1,9 @@
 """Claim: 50 hostile programs of ten kinds delay other clients of the robot by at most 20 ms (p99), over any protocol.
 
 The same requests are timed without programs and beside them: a pose over REST, the battery over plain text, a value
-over gRPC, and an inquiry over the frames' WebSocket. What the difference of the percentiles 99 is, counts: other
-programs on the machine delay both. A timer of the same process, which asks nobody, stands beside them: what it is late,
-the machine's processors were not there for the client itself. Then all programs are ended by one frame, and their
+over gRPC, and an inquiry over the frames' WebSocket. The difference of the 99th percentiles counts: other
+programs on the machine delay both. A timer of the same process runs beside them: its delay is time in which the client
+itself had no processor. Then all programs are ended by one frame, and their
 processes are waited for; and fifty that do nothing but compute are ended, as a pupil's teacher would.
 """
 

@@ -4,7 +4,7 @@
 
 Each figure is the time on the wall of a machine that may be busy, and after it what the page's own thread worked for
 it, which other work on the machine hardly changes. Peer of the same run: Blockly alone, loading the same blocks in the
-same browser, so that what the studio adds is told apart from the library. Needs playwright and Debian's chromium.
+same browser, which separates the studio's share from the library's. Needs playwright and Debian's chromium.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ async def until(page: Any, expression: str) -> None:
 
 
 class Work:
-    """What one page's thread works."""
+    """Work of one page's thread."""
 
     def __init__(self, page: Any) -> None:
         self._page = page

@@ -91,7 +91,7 @@ time_t time(time_t *there) {
 
 @dataclass(frozen=True)
 class Sight:
-    """What a node's watcher saw: a robot that let itself be driven ("drove"), or kept a place ("saved")."""
+    """Observation of a node's watcher: a robot that let itself be driven ("drove"), or kept a place ("saved")."""
 
     at: float
     node: str
@@ -134,7 +134,7 @@ class Node:
         self.start(ray("start", *where, "--num-cpus=2", "--object-store-memory=80000000"), environment)
 
     def has_joined(self) -> bool:
-        """Whether Ray says so since it was started."""
+        """True if Ray has reported this since its start."""
         return STARTED in (self._folder / f"{self.name}.log").read_text(errors="replace")[self._said :]
 
     def cut(self, *, off: bool) -> None:
@@ -206,7 +206,7 @@ class Fleet:
             time.sleep(0.2)
 
     def sights(self) -> Iterator[Sight]:
-        """What all watchers saw so far."""
+        """Observations of all watchers so far."""
         for name in self.nodes:
             for line in (self.folder / f"{name}.sights").read_text().splitlines():
                 at, *words = line.split()
@@ -230,7 +230,7 @@ class Fleet:
         return max((sight for sight in self.sights() if sight.robot == robot), key=lambda sight: sight.at).node
 
     def cut_connections(self) -> None:
-        """All of the database's: the head's and the shards'."""
+        """Cut all connections of the database: the head's and the shards'."""
         query = "SELECT count(pg_terminate_backend(pid)) FROM pg_stat_activity WHERE application_name = 'roboglot'"
         with psycopg.connect(self.server.url, autocommit=True) as connection:
             print(f"    {(connection.execute(query).fetchone() or (0,))[0]} connections cut")
@@ -277,7 +277,7 @@ def judge(claims: Claims, fleet: Fleet, name: str, began: float, ended: float) -
 
 
 def faults(fleet: Fleet) -> Iterator[tuple[str, Callable[[], float]]]:
-    """All of them by name; each returns when it has passed."""
+    """The faults by name; each returns when it has passed."""
 
     def server_away() -> float:
         fleet.server.stop()

@@ -29,7 +29,7 @@ GOALS = 8
 
 
 async def ended(action: Action, clock: LockstepClock) -> bool:
-    """Whether it succeeds."""
+    """Return True if it succeeds."""
     end = clock.time() + SECONDS_MAX
     while not action.status.ended and clock.time() < end:
         await clock.advance(0.5)
@@ -37,7 +37,7 @@ async def ended(action: Action, clock: LockstepClock) -> bool:
 
 
 async def goals_of(fleet: Fleet, clock: LockstepClock, start: Pose) -> list[tuple[float, float]]:
-    """How far the truth was from each goal where it was said to be met (m, rad)."""
+    """True distance from each goal that was reported as reached (m, rad)."""
     off = list[tuple[float, float]]()
     robot = fleet.robots["a"]
     for number, spot in enumerate(LAP[:GOALS]):

@@ -54,14 +54,14 @@ def used_by(command: str) -> float:
 
 
 def ready_of(plan: FleetPlan, number: int) -> Ready:
-    """What a shard with all its doors says when it is up."""
+    """Message of a shard with all its doors when it is up."""
     robots = plan.shards[number].settings["robots"]
     doors = [("Slamware", "1448"), ("RoboMaster", "40923"), ("CyberDog", "50052"), ("programs", "50053")]
     return Ready({robot["name"]: [(door, f"{robot['address']}:{port}") for door, port in doors] for robot in robots})
 
 
 async def simulate(plan: FleetPlan, registry: str, links: list[socket.socket], up: int) -> None:
-    """All programs: they take their robots, say so, then send heartbeats and renew until the coordinator ends."""
+    """Run the programs: claim robots, report it, then send heartbeats and renew until the coordinator ends."""
     databases = [open_registry(registry) for _ in range(CONNECTIONS)]
     residences = []
     for number, shard in enumerate(plan.shards):

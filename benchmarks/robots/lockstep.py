@@ -3,7 +3,7 @@
 The 100x of the physics and sensors alone is in fleet.py. Here every scan is matched as well, people walk,
 and on the way (it drives all that time) the robot maps, watches its path and plans. Counted by the processor time of
 the process, in windows. A loop of plain Python, timed in between, shows how much the machine's speed changes meanwhile;
-how fast it went by the clock on the wall, whatever else ran, is only printed.
+wall-clock speed, which other load changes, is only printed.
 """
 
 from __future__ import annotations

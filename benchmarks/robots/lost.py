@@ -1,4 +1,4 @@
-"""Claim: 100 kidnappings, 100 blackouts while mapping: always told, >= 95 % recovered, no wall twice in the map.
+"""Claim: 100 kidnappings, 100 blackouts while mapping: always reported, >= 95 % recovered, no wall twice in the map.
 
 A kidnapped robot is carried to another place of the floor that it has mapped; a blackout is ten seconds without scans
 in which it is pushed up to 3 m. It drives about and maps meanwhile. Told: ``LocalizationLost`` or ``RobotDisplaced``
@@ -86,7 +86,7 @@ class Trial:
                 await self.house.clock.advance(0.5)
 
     async def kidnap(self) -> None:
-        """To another place of the floor that is mapped by now."""
+        """Carry it to another place of the floor mapped so far."""
         known = self.house.floor(mapped(self.robot[Mapping].grid))
         away = known[np.hypot(*(known - (self.house.truth.x, self.house.truth.y)).T) > CARRIED_MIN]
         spot = (away if len(away) else known)[self.draw.integers(len(away) or len(known))]

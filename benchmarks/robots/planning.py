@@ -53,7 +53,7 @@ def cost_of(cost: NDArray[np.float32], path: Path) -> float:
 
 
 def timed(*plans: Callable[[], Path]) -> list[tuple[Path, float]]:
-    """What each finds, and the median of the processor seconds it takes; all in turns on the same machine."""
+    """Results of each and its median processor seconds; run in turns on the same machine."""
     seconds: list[list[float]] = [[] for _ in plans]
     for _ in range(REPEATS):
         for plan, taken in zip(plans, seconds, strict=True):

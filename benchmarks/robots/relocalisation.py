@@ -3,7 +3,7 @@
 Asked is what localization asks: where in the whole map was this scan taken. Right is within 10 cm and 3 degrees. Places
 that the map does not show (less than 85 % of the echoes on its surfaces) need no answer, nor do those of which a scan
 at a rival place says the same: nine in ten echoes within 15 cm. Half a map may
-show only the rival: no scan tells them apart, and what is believed then is counted as a twin. ``--quick``: 40 places a
+show only the rival: no scan separates them, and such a belief is counted as a twin. ``--quick``: 40 places a
 building. ``--drawn SEED``: the same of four buildings drawn from that seed, which nothing was tuned on.
 """
 
@@ -45,7 +45,7 @@ def is_right(found: Pose, truth: Pose) -> bool:
 
 
 async def is_alike(house: Building, points: ScanPoints, truth: Pose, found: list[Match]) -> bool:
-    """Whether a scan at one of the other places found would be the same."""
+    """Return True if a scan at one of the other places found would be the same."""
     for rival in found:
         if is_right(rival.pose, truth):
             continue
@@ -59,7 +59,7 @@ async def is_alike(house: Building, points: ScanPoints, truth: Pose, found: list
 
 
 async def verdict(house: Building, grid: EvidenceGrid, scan: LaserScan, seconds: list[float]) -> str:
-    """What becomes of one scan."""
+    """Outcome of one scan."""
     truth, points = house.truth, ScanReader().read(scan)
     began = time.thread_time()
     found = places(grid, points, None)
@@ -101,7 +101,7 @@ async def measure(name: str, count: int, seconds: list[float]) -> Counter[str]:
 
 
 def buildings(folder: str) -> Iterator[tuple[str, int]]:
-    """What to measure in, and at how many places."""
+    """Buildings to measure in, and the number of places."""
     if "--drawn" in sys.argv:
         seed = int(sys.argv[sys.argv.index("--drawn") + 1])
         for kind in KINDS:

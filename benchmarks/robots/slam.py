@@ -47,7 +47,7 @@ LAP = [(25.5, 10.0), (26.0, 7.0), (19.0, 9.8), (19.0, 7.0), (15.0, 6.5), (12.0, 
 
 @dataclass
 class Lap:
-    """What one run showed."""
+    """Result of one run."""
 
     errors: list[float] = field(default_factory=list)
     drift: float = 0.0

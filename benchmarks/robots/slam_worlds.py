@@ -36,7 +36,7 @@ SECONDS_MAX = 180.0  # for one goal
 
 @dataclass
 class Tour:
-    """What one run showed."""
+    """Result of one run."""
 
     errors: list[float] = field(default_factory=list)
     reached: int = 0

@@ -214,7 +214,7 @@ async def born(data: Path) -> AsyncIterator[Life]:
 
 
 async def live(share: float) -> list[dict[str, float]]:
-    """All of it in ten parts; the figures after each."""
+    """Run it in ten parts and print the figures after each."""
     figures = []
     with tempfile.TemporaryDirectory() as data:
         async with born(Path(data)) as life:

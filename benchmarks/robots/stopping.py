@@ -1,7 +1,7 @@
 """Claim: `roboglot stop --all` has 100 robots stand in <= 0.5 s.
 
-All drive by the text SDK. What is timed is what the command asks of a running `roboglot up`, from its wish until the
-answer that all stand. Reference: to be told by the same socket how they are, which waits for the program's own work.
+All drive by the text SDK. Timed is the command's request to a running `roboglot up`, until the answer that all stand.
+Reference: a status request over the same socket, which waits for the program's own work.
 
     scripts/bench stopping [--robots 100] [--times 5]
 """

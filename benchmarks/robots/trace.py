@@ -2,7 +2,7 @@
 
 Four bodies in the office, among people who walk: mapping, navigation, docking, lift, legs, gimbal and blaster, faults,
 and all the time all detectors, hearing, H.264 and Opus. Every scan, event, sighting, packet and pose goes into the
-digests. One process keeps what robots keep in memory, the other one on disk: the disk's pace is nobody's business.
+digests. One process keeps what robots keep in memory, the other one on disk: the disk's speed must not matter.
 A minute of it is a minute of processor time, for each of the two.
 
     scripts/bench trace [--minutes 10] [--seed 5]
@@ -92,7 +92,7 @@ def listen(fleet: Fleet, digest: Callable[[bytes], None]) -> None:
 
 
 def open_senses(fleet: Fleet) -> list[Viewer[Any]]:
-    """Somebody watches with all detectors, hears, and receives one robot's video and sound."""
+    """Subscribe to all detectors and to hearing, and to one robot's video and sound."""
     viewers: list[Viewer[Any]] = []
     for robot in fleet.robots.values():
         if Vision in robot:
@@ -104,7 +104,7 @@ def open_senses(fleet: Fleet) -> list[Viewer[Any]]:
 
 
 def state_of(fleet: Fleet, robot: Robot) -> bytes:
-    """Where the robot is, and what it measures and believes."""
+    """The robot's place, measurements and beliefs."""
     values: list[object] = [(fleet.world.truth.pose_of(robot.id), robot[Imu].reading, robot[Battery].state)]
     values.append((robot[Network].signal, robot[Network].state))
     if Localization in robot:

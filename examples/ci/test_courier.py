@@ -19,7 +19,7 @@ def arm(robot_server):
 
 
 def far(server, x, y):
-    """How far the robot really is from a place, seen from where it started, m."""
+    """True distance of the robot from a place given relative to its start, m."""
     moved = server.moved()
     return math.hypot(moved.x - x, moved.y - y)
 

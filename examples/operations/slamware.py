@@ -27,7 +27,7 @@ SECONDS_MAX = 240  # s of robot time for anything awaited
 
 
 class Hands(Protocol):
-    """What happens around the robot meanwhile."""
+    """Events around the robot meanwhile."""
 
     def wait(self, seconds: float) -> None:
         """Let robot time pass."""
@@ -196,7 +196,7 @@ def docks(client: Client) -> None:
 
 
 def slam(client: Client) -> None:
-    """Where it is, what it sees, and its map."""
+    """Its place, its sensors and its map."""
     for path in ("localization/pose", "localization/odopose", "localization/quality", "imu", "knownarea"):
         client.get(f"{SLAM}/{path}")
     for switch in ("localization", "mapping", "loopclosure"):
@@ -355,7 +355,7 @@ def packages(client: Client) -> None:
 
 
 def last(client: Client) -> None:
-    """What forgets the map, or switches the robot off."""
+    """Requests that delete the map or switch the robot off."""
     client.delete(f"{INDUSTRY}/tasks/templates/round-1")
     client.delete(f"{ARTIFACT}/pois")
     client.delete(f"{SLAM}/maps")

@@ -1,6 +1,6 @@
-"""A bad line between two ends of TCP: every packet takes a while, and those that get lost hold up all behind them.
+"""A bad line between two ends of TCP: each packet is delayed, and a lost one holds up those behind it.
 
-What is lost comes later, as TCP repeats it: RESENT after it would have come, each time anew with the same chance.
+TCP repeats what is lost: it arrives RESENT later, and each repetition has the same chance of loss.
 """
 
 from __future__ import annotations

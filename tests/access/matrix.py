@@ -92,7 +92,7 @@ async def dog_answers(folder: Path, name: str, codes: list[int]) -> dict[int, li
 
 
 async def dog_file_errors(folder: Path, name: str, asked: list[tuple[int, dict[str, object]]]) -> list[int]:
-    """With which error each ``getFile`` ends, for the app with the certificate of ``name``."""
+    """The error that ends each ``getFile``, for the app with the certificate of ``name``."""
     ca, certificate, key = (path.read_bytes() for path in export_app(folder, name, folder / f"app-{name}"))
     credentials = grpc.ssl_channel_credentials(ca, key, certificate)
     options = [("grpc.ssl_target_name_override", ROBOT_NAME)]

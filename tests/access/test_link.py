@@ -1,4 +1,4 @@
-"""The tunnel's frames and streams, whatever comes in whatever pieces."""
+"""The tunnel's frames and streams, in pieces of any size."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ class Tour:
         return self.robot[Navigation].navigate_to(goals, NavigationOptions(yaw=yaw, **options), source="test")
 
     def robot_finds_itself(self) -> Action:
-        """After it was carried elsewhere."""
+        """The robot after it was carried elsewhere."""
         return self.robot[Localization].relocalize()
 
     async def until(self, condition: Callable[[], object], seconds: float = 120.0) -> None:

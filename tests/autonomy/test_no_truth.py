@@ -74,7 +74,7 @@ def test_such_an_import_would_be_found(source: str) -> None:
 
 
 def test_nothing_private_of_a_component_is_touched() -> None:
-    """The simulated parts behind the interfaces know the truth: only what an interface tells may be read."""
+    """The simulated parts know the truth: autonomy may read only what their interfaces provide."""
     for file in (ROOT / "autonomy").rglob("*.py"):
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Attribute) and node.attr.startswith("_") and not node.attr.startswith("__"):

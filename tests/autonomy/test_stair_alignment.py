@@ -38,7 +38,7 @@ class Stand:
         self.world.start()
 
     async def put(self, before: float, degrees: float, aside: float, way: StairDirection = UP) -> None:
-        """So far before the edge, turned to the left, shifted along +y."""
+        """Place the dog so far before the edge, turned to the left, shifted along +y."""
         turn = math.radians(degrees)
         up = Pose(FOOT - before, MIDDLE + aside, turn)
         self.world.hands.place("a", up if way is UP else Pose(TOP + before, MIDDLE + aside, math.pi + turn))

@@ -74,7 +74,7 @@ def happened(served: Served) -> list[Event]:
 
 
 async def assert_untouched(served: Served, happened: list[Event]) -> None:
-    """Nothing was asked of the robot: no action, no program, no event but those of the passing of time."""
+    """Assert that no request reached the robot: no action, no program, no event but those of passing time."""
     await served.clock.advance(0.5)
     assert list(served.robot.actions.running()) == []
     assert [event for event in happened if type(event).__name__ in ("ActionChanged", "BeadFired", "Spoke")] == []

@@ -44,6 +44,6 @@ def test_refused_requests_are_listed_with_their_reason(text: str) -> None:
 
 
 def test_what_drivers_announce_is_what_they_add(text: str) -> None:
-    """But for what autonomy adds, and what only some robots have."""
+    """Components except those that autonomy adds, and those that only some robots have."""
     for name in DRIVERS:
         assert f"## What `{name}` does nearly" in text

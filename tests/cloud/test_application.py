@@ -46,7 +46,7 @@ async def test_frame_that_never_ends_is_not_waited_for(monkeypatch: pytest.Monke
 
 @pytest.fixture
 async def port() -> AsyncIterator[int]:
-    """Of a cloud that listens."""
+    """Address of a listening cloud."""
     database = Database(":memory:")
     config = Config(BackEnd(CloudStore(database)), lifespan="off", log_level="critical")
     config.load()
@@ -94,7 +94,7 @@ async def test_head_that_never_ends_is_not_waited_for(
 
 
 async def test_blank_lines_do_not_keep_a_connection(monkeypatch: pytest.MonkeyPatch, port: int) -> None:
-    """They end uvicorn's own patience with a connection that is kept for the next request."""
+    """They end uvicorn's keep-alive timeout."""
     reader, writer = await asyncio.open_connection("127.0.0.1", port)
     writer.write(REQUEST)
     await answer(reader)

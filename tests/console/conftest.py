@@ -66,7 +66,7 @@ def _fetch(request: Request) -> tuple[int, Any]:
 
 @pytest_asyncio.fixture
 async def shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Shown]:
-    """As ``roboglot up --world empty --lockstep`` starts it; the console takes any port."""
+    """A runtime as ``roboglot up --world empty --lockstep`` starts it; the console takes any port."""
     base = load_config(None, {"data": str(tmp_path), "world": "empty", "lockstep": True})
     config = replace(base, robots=(RobotConfig("a", "universal", ADDRESS),), console=ConsoleConfig(port=0))
     monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)

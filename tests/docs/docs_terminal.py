@@ -49,7 +49,7 @@ class Ended:
 
 @dataclass
 class Terminal:
-    """Someone who types, in a folder with the clone's .venv and examples, next to robot a."""
+    """A terminal in a folder with the clone's .venv and examples, beside robot a."""
 
     runtime: Runtime
     address: str
@@ -145,7 +145,7 @@ class Terminal:
 
 
 def commands(block: str) -> list[str]:
-    """Of a block of shell: lines, those that belong together in one; no comments."""
+    """Commands of a shell block, continued lines joined, comments dropped."""
     found: list[str] = []
     open_one = False
     for line in block.splitlines():

@@ -43,7 +43,7 @@ def snippet(page: str, words: str) -> str:
 
 
 async def run(code: str, clock: LockstepClock, **names: Any) -> None:
-    """Until it ends, or has looked on for a while."""
+    """Run it until it ends, or has watched for a while."""
     work = eval(compile(code, "page", "exec", ast.PyCF_ALLOW_TOP_LEVEL_AWAIT), names)
     running = asyncio.ensure_future(work) if work is not None else None
     end = clock.time() + SECONDS

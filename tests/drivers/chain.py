@@ -69,7 +69,7 @@ def ep_config() -> RoboMasterConfig:
 
 
 def url_of(door: RoboMasterDoor) -> str:
-    """As the command line takes it."""
+    """URL, as the command line takes it."""
     port = {e.label.removeprefix("RoboMaster "): e.address.rpartition(":")[2] for e in door.endpoints}
     return (
         f"robomaster://{EP_ADDRESS}:{port['text SDK']}?event={port['events']}&video={port['video']}"

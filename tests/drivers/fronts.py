@@ -42,7 +42,7 @@ SIDE, SPEED = 0.4, 0.3  # m, m/s
 class Front(Protocol):
     """A client: a side of a square and a left turn, going ahead until it is gone; what it reports, and where it goes.
 
-    ``battery`` is in percent, ``pose`` in a frame of its own (None: this protocol tells none of such a robot);
+    ``battery`` is in percent, ``pose`` in a frame of its own (None: this protocol reports none of such a robot);
     ``navigate`` goes to a point so far to the left by the robot's navigation.
     """
 
@@ -216,7 +216,7 @@ class Blocks:
         return Pose(x, y, 2 * math.atan2(z, w))
 
     async def navigate(self, left: float) -> None:
-        """In a map that was saved before, as programs want it."""
+        """Pose in a map saved before, as programs need it."""
         await self.robot[MapLibrary].put(StoredMap("office", self.robot[Mapping].grid, 0.0))
         here = self.robot[Localization].pose.compose(Pose(0.0, left))
         (code,) = await self.printed(

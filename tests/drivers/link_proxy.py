@@ -25,12 +25,12 @@ class Fault:
         self.deaf = False  # drops datagrams: a firewall before the push port
 
     def heal(self) -> None:
-        """All is well again."""
+        """End all faults."""
         self.__init__()  # type: ignore[misc]
 
 
 class Proxy:
-    """Between TCP clients and ``target``; listens on ``port``. ``back``: the robot is the one that dials."""
+    """Proxy between TCP clients and ``target``; listens on ``port``. ``back``: the robot dials."""
 
     def __init__(self, clock: Clock, target: tuple[str, int], fault: Fault, *, back: bool = False) -> None:
         self._clock, self._target, self.fault, self._back = clock, target, fault, back

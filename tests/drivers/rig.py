@@ -78,7 +78,7 @@ class Rig:
         await self._door.start()
 
     async def stop(self) -> None:
-        """As when the robot is switched off; its clients are hung up on."""
+        """Stop as a robot that is switched off; its connections close."""
         if self._door:
             await self._door.close()
             self._door = None
@@ -101,12 +101,12 @@ class Rig:
             yield app
 
     def cut(self) -> None:
-        """All connections break."""
+        """Break all connections."""
         for proxy in self.proxies:
             proxy.cut()
 
     async def close(self) -> None:
-        """All of it."""
+        """Close everything."""
         for proxy in self.proxies:
             await proxy.close()
         await self._reported.close()

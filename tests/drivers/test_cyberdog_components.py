@@ -1,4 +1,4 @@
-"""Components of a dog besides legs and lidar, through a driver: a simulated dog behind its gRPC door, in real time."""
+"""Components of a dog but legs and lidar, through a driver: a simulated dog behind its gRPC door, in real time."""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -82,7 +82,7 @@ async def driven(
 
 
 def likeness(one: Frame, other: Frame) -> float:
-    """Of their brightness, coarsely: 1 the same, about 0 for strangers."""
+    """Correlation of their coarse brightness: 1 for the same picture, about 0 for strangers."""
     small = [frame.luma[: 720 // 16 * 16].reshape(45, 16, 80, 16).mean(axis=(1, 3)).ravel() for frame in (one, other)]
     return float(np.corrcoef(*small)[0, 1])
 

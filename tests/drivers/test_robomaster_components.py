@@ -36,7 +36,7 @@ pytestmark = pytest.mark.world("empty", body="robomaster_ep")
 
 @pytest.fixture(params=["spec", "fw70"])
 def profile(request: pytest.FixtureRequest) -> str:
-    """As the manual has it and as robots do."""
+    """Both profiles: the manual's, and robots'."""
     return str(request.param)
 
 

@@ -1,4 +1,4 @@
-"""From boxes in an EP's picture to places, and the numbers of people."""
+"""Places from boxes in an EP's picture, and the numbers of people."""
 
 import math
 

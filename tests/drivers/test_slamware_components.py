@@ -1,4 +1,4 @@
-"""Components of a Slamware robot besides wheels and lidar, through a driver: one behind its REST door."""
+"""Components of a Slamware robot other than wheels and lidar, through a driver: one behind its REST door."""
 
 from __future__ import annotations
 

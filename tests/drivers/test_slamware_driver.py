@@ -49,14 +49,14 @@ from tests.narrowing import of_kind
 
 
 def points_of(scan: LaserScan) -> np.ndarray:
-    """In base_link, m, (n, 2)."""
+    """Points in base_link, m, (n, 2)."""
     seen = np.isfinite(scan.ranges)
     angles, ranges = scan.angles[seen] + scan.mount.yaw, scan.ranges[seen]
     return np.stack([scan.mount.x + ranges * np.cos(angles), scan.mount.y + ranges * np.sin(angles)], axis=1)
 
 
 def distances_between(points: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """From each point to the nearest of the others."""
+    """Distance from each point to the nearest of the others."""
     return np.linalg.norm(points[:, None] - others[None], axis=2).min(axis=1)
 
 

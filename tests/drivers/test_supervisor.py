@@ -17,7 +17,7 @@ UNKNOWN = Description(maker="", model="", serial="", hardware_version="", softwa
 
 
 async def pauses_of(clock: LockstepClock, there: Collection[int], served: float) -> tuple[list[float], set[LinkState]]:
-    """Between the tries, of which those in ``there`` find it for ``served`` s; and the states on the way."""
+    """Pauses between attempts, of which those in ``there`` find it for ``served`` s; and the states meanwhile."""
     robot = Robot("a", UNKNOWN, clock)
     link = Link("ep://away", clock, robot.events, Health(clock, robot.events))
     tried: list[float] = []
@@ -32,7 +32,7 @@ async def pauses_of(clock: LockstepClock, there: Collection[int], served: float)
         raise LinkLost("it left")
 
     async def stop() -> None:
-        """It cannot be commanded."""
+        """Refuse commands."""
 
     supervisor = Supervisor(link, clock, begin, serve)
     supervisor.start()

@@ -15,7 +15,7 @@ WIDTH, HEIGHT = 320, 176
 
 
 def picture(number: int, stamp: float = 0.0) -> Frame:
-    """Grey slopes with a bright bar whose place tells the number: 8 pixels further right each time."""
+    """Grey slopes with a bright bar whose place encodes the number: 8 pixels further right each time."""
     planes = np.full((HEIGHT * 3 // 2, WIDTH), 128, np.uint8)
     planes[:HEIGHT] = 40 + np.arange(HEIGHT)[:, None] // 2
     planes[:HEIGHT, 8 * number : 8 * number + 8] = 220

@@ -110,7 +110,7 @@ def world() -> Iterator[World]:
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module", params=[True, False], ids=["rules", "jail-only"])
 async def played(request: pytest.FixtureRequest, world: World) -> AsyncIterator[tuple[bool, dict[str, Played]]]:
-    """All attacks, a few at a time; and after them the engine still works and nothing of theirs is left."""
+    """Run all attacks, a few at a time; then the engine still works, and no trace of them is left."""
     before = open_descriptors()
     with pytest.MonkeyPatch.context() as patch:
         # A tenth of them uses up a second of processor time, which takes minutes on a busy machine.

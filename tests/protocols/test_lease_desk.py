@@ -42,7 +42,7 @@ ADDRESS = "127.0.0.83"
 
 @pytest.fixture
 async def desk(robot: Robot, world: World, tmp_path: Path) -> AsyncIterator[Path]:
-    """Its folder."""
+    """The desk's folder."""
     made = LeaseDesk(tmp_path, world.robots, world.hands)
     await made.open()
     yield tmp_path

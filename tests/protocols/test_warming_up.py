@@ -1,4 +1,4 @@
-"""While kernels are compiled every door says that navigation is not ready, in its own words, and drives by hand."""
+"""Doors while kernels compile: each says in its own words that navigation is not ready, and drives by hand."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A session in lockstep in which everybody does something: four protocols, a dog's app, hands, the console's desk."""
+"""A lockstep session with all inputs: four protocols, a dog's app, hands, the console's desk."""
 
 from __future__ import annotations
 

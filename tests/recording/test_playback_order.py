@@ -1,4 +1,4 @@
-"""In which order and at which times a recorded session answers."""
+"""Order and times of a played recording's answers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Between a client and a robot: every byte passes, what it means is recorded, and a full disk stops nothing."""
+"""The proxy between client and robot: every byte passes, its meaning is recorded, and a full disk stops nothing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Messages are found by their time, whatever chunks they stand in, also where chunks overlap and files are cut off."""
+"""Messages are found by time in any chunk, with overlapping chunks and truncated files, too."""
 
 from __future__ import annotations
 

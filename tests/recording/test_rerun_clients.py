@@ -199,7 +199,7 @@ async def test_what_cannot_be_repeated_is_said(tmp_path: Path) -> None:
 
 
 async def test_a_door_without_a_way_is_named(tmp_path: Path) -> None:
-    """No KeyError, whatever protocol a recording has."""
+    """No protocol in a recording raises KeyError."""
     async with begun(tmp_path) as session:
         await session.rest.get_pose()
         recording = Recording(tmp_path)

@@ -155,7 +155,7 @@ def test_manifest_has_only_known_fields_and_locked_ray(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["fleet.yaml", "campaign.yaml"])
 def test_kubernetes_own_schema_takes_a_manifests_pods(name: str) -> None:
-    """By the package kubernetes-validate (22 MB, so development goes without): no further field, no other type."""
+    """Validate by kubernetes-validate (22 MB, so not among the tools): no unknown field, no wrong type."""
     kubernetes = pytest.importorskip("kubernetes_validate", reason="the package kubernetes-validate is not installed")
     spec = yaml.safe_load((KUBERAY / name).read_text())["spec"]
     cluster = spec.get("rayClusterSpec", spec)

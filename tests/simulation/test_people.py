@@ -1,4 +1,4 @@
-"""People do what their script or a test tells them, one thing after the other."""
+"""People follow their script or a test, one step after the other."""
 
 import math
 

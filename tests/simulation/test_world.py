@@ -228,7 +228,7 @@ async def test_robots_scan_in_turns_in_real_time(clock, ticks):
 
 
 def busy():
-    """Keep the loop busy for 20 s of robot time, in which nobody simulates."""
+    """Keep the loop busy for 20 s of robot time, without simulation."""
     time.sleep(0.001)
 
 

@@ -73,14 +73,14 @@ class PostgreSQLServer:
         raise RuntimeError("PostgreSQL did not start")
 
     def stop(self) -> None:
-        """At once; every client loses the connection."""
+        """Stop at once; every client loses the connection."""
         if self._server:
             self._server.send_signal(signal.SIGQUIT)  # does not wait for clients
             self._server.wait(20)
             self._server = None
 
     def empty(self) -> None:
-        """As if no one had been there."""
+        """Empty the database."""
         with psycopg.connect(self.url, autocommit=True, connect_timeout=5) as connection:
             connection.execute("DROP SCHEMA public CASCADE")
             connection.execute("CREATE SCHEMA public")

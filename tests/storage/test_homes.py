@@ -284,7 +284,7 @@ async def test_freed_robot_returns_to_its_program_if_unclaimed(database: Transac
 
 
 class Held:
-    """Leaves the transaction of a call open until it is told to end it."""
+    """Keeps the transaction of a call open until it is released."""
 
     def __init__(self, database: Transactions) -> None:
         self._database, self.done, self.go = database, threading.Event(), threading.Event()

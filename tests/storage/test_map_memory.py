@@ -29,7 +29,7 @@ OLD, NEW = PointOfInterest("old", Pose(1, 2, 3), {}), PointOfInterest("new", Pos
 
 @dataclass
 class Parts:
-    """As one start of the robot sees them."""
+    """The stores as one start of the robot sees them."""
 
     places: StoredPlaces
     annotations: StoredAnnotations

@@ -40,7 +40,7 @@ class Echo(asyncio.Protocol):
 
 @contextlib.asynccontextmanager
 async def port(folder: Path, *, plain: bool = True, admit: bool = True) -> AsyncIterator[tuple[int, ssl.SSLContext]]:
-    """Its number, and what a client needs to trust it."""
+    """Its port, and the certificate that a client must trust."""
     Echo.opened = 0
     tls = Tls(server_context(*ensure_site(folder, {"127.0.0.1", "localhost"})), plain)
     loop = asyncio.get_running_loop()

@@ -47,7 +47,7 @@ async def test_no_robot_of_a_convoy_believes_to_stand(seed: int) -> None:
 
 
 async def test_robot_whose_neighbours_move_along_believes_its_wheels() -> None:
-    """Between two walls that show no way, most echoes say that it stands: those of robots that drive as fast."""
+    """Between two bare walls most echoes come from robots that drive as fast, and suggest that it stands."""
     clock, database = LockstepClock(), Database(":memory:")
     robots = [RobotConfig(f"r{n}", body="hermes") for n in range(5)]
     fleet = build_fleet(CORRIDOR, robots, clock=clock, seed=1, database=database)

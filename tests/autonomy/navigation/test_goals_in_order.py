@@ -59,7 +59,7 @@ goals = st.lists(
 def test_a_follower_passes_all_goals_in_order(
     spots: list[tuple[float, float]], holonomic: bool, tolerance: float
 ) -> None:
-    """In the plane, on wheels that do as they are bid within their limits; straight lines from goal to goal."""
+    """Simulate in the plane, on ideal wheels within their limits; straight lines from goal to goal."""
     limits = BaseLimits(
         twist=Twist(1.2, 1.2 * holonomic, 1.8), linear_acceleration=0.8, angular_acceleration=3.0, holonomic=holonomic
     )

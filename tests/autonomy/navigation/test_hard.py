@@ -1,4 +1,4 @@
-"""With bad sensors (the preset `hard`): goals, docking and following within twice what they keep otherwise."""
+"""Goals, docking and following with bad sensors (the preset `hard`): within twice the usual limits."""
 
 from __future__ import annotations
 

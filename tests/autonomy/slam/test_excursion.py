@@ -27,7 +27,7 @@ NEAR = 0.15  # m
 
 
 async def steer(tour: Tour, *spots: tuple[float, float]) -> None:
-    """Someone drives it by hand, and sees where it really is."""
+    """Drive it by hand, along its true place."""
     for x, y in spots:
         while (away := math.hypot(x - tour.truth.x, y - tour.truth.y)) > 0.2:
             off = wrap_angle(math.atan2(y - tour.truth.y, x - tour.truth.x) - tour.truth.yaw)

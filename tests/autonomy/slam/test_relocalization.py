@@ -27,7 +27,7 @@ LONG_CORRIDOR = str(Path(__file__).parents[3] / "benchmarks" / "worlds" / "corri
 
 
 async def carried(tour: Tour, x: float, y: float, deg: float) -> None:
-    """Someone carries the robot there while its lidar's scans are not looked at."""
+    """Carry the robot there while its scans are ignored."""
     tour.robot[Mapping].enable(False)
     tour.robot[Localization].enable(False)
     tour.world.hands.place("a", Pose(x, y, math.radians(deg)))

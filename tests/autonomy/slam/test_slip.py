@@ -1,4 +1,4 @@
-"""Wheels that turn in vain where the map cannot tell: judged by the world."""
+"""Wheel slip where the map cannot show it, judged by the world."""
 
 from __future__ import annotations
 

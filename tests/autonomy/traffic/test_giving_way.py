@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @pytest.mark.world("empty")
 async def test_looks_ahead_after_going_aside(tour: Tour, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It gives way, finds no route, goes aside once more from there, and then there is one."""
+    """Let it give way, find no route, go aside once more, and find one."""
     asked, first, plans = dict.fromkeys(("is_due", "is_due_without_route"), 0), Replanner.first, 0
 
     def once(name: str) -> None:

@@ -89,7 +89,7 @@ async def test_what_is_watched_ends_with_the_client(client) -> None:
 
 
 async def test_two_robots_share_push_port_and_are_distinguished() -> None:
-    """By the address that a datagram comes from."""
+    """Robots are told apart by the sender's address of a datagram."""
     import socket
 
     number = free_port()

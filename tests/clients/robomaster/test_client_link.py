@@ -201,7 +201,7 @@ async def test_connecting_again(client, run) -> None:
 
 
 async def test_a_robot_that_vanishes_will_be_noticed(client) -> None:
-    """By the kernel, which asks it after a second of silence and gives it up after four."""
+    """The kernel probes after a second of silence and gives up after four."""
     connection = client._link._transport.get_extra_info("socket")
     assert connection.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
     assert connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT) == 4000

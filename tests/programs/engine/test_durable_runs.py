@@ -155,7 +155,7 @@ async def test_task_goes_on_where_its_server_was_killed(second: Callable[[], Pro
 async def test_unfinished_motion_is_reported_and_not_repeated(
     second: Callable[[], ProgramService], tmp_path: Path, call: str
 ) -> None:
-    """A result with a state tells it, and the program goes on; where there is none, the call raises."""
+    """A result with a state reports it, and the program goes on; without one, the call raises."""
     first_life(tmp_path / "robot.db", PROGRAM, "step 2")
     database = Database(tmp_path / "robot.db")
     store = DatabaseJournalStore(database, "a")
@@ -268,7 +268,7 @@ def test_what_only_reads_may_be_asked_again(name: str, acts: bool) -> None:
 
 
 async def test_a_task_that_is_new_has_no_past(second: Callable[[], ProgramService]) -> None:
-    """A second run of a task begins at its beginning, whatever the first one was given."""
+    """A second run of a task starts from the beginning, with nothing of the first."""
     service = second()
     for _ in range(2):
         await service.save(StoredProgram("t", "", "", "single", "now", "cyberdog.task.start()\nprint('once')", ""))

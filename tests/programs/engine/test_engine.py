@@ -118,7 +118,7 @@ async def test_opening_in_the_background_does_not_wait() -> None:
 
 
 async def test_without_a_filter_nothing_runs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a machine whose system calls are unknown, and where the filter loads but doesn't hold."""
+    """Machines with unknown system calls, and with a filter that loads but doesn't hold."""
     for trick in (
         "import platform; platform.machine = lambda: 'pdp11'",
         "from roboglot.programs.worker import seccomp; seccomp.load = lambda *a: None",

@@ -1,4 +1,4 @@
-"""A run that is held: what a front end was told of it is found after a crash, and nothing goes on before it may."""
+"""Held runs: a front end finds their reported state after a crash, and nothing continues too early."""
 
 from __future__ import annotations
 

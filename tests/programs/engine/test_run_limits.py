@@ -79,7 +79,7 @@ async def test_calls_above_rate_are_slowed_down_not_ended(engine: Engine) -> Non
 
 
 async def test_large_arguments_are_slowed_down_too(engine: Engine) -> None:
-    """To read a megabyte of nested lists takes the server longer than it takes a forger to send it."""
+    """Reading a megabyte of nested lists takes the server longer than sending it takes a forger."""
     loop = asyncio.get_running_loop()
     before = loop.time()
     played = await play(engine, "x = '-' * 400000\nfor i in range(4): cyberdog.echo(x)", limits=Limits(call_rate=10**6))
@@ -126,9 +126,9 @@ async def test_greedy_programs_get_turns_one_by_one() -> None:
 
 
 async def test_hostile_programs_together_keep_to_the_share(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever they send, the server's thread has most of its time for others.
+    """No message takes most of the server's thread from others.
 
-    What they are charged is counted, and what they cost is compared with it: both hold on a busy machine, too.
+    The charge is compared with the cost: both hold on a busy machine, too.
     """
     light = SHARE_MAX / 100  # each uses more than that, however little a busy machine gives
     monkeypatch.setattr(share_module, "LIGHT", light)

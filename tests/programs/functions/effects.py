@@ -1,4 +1,4 @@
-"""Effects of the reference page's examples on the world, besides their output, by the function's name."""
+"""Effects of the reference page's examples on the world, beyond their output, by the function's name."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ NEAR, ABOUT = 0.05, math.radians(2.0)
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """After an example: how far the world has the robot from where it began (m, rad, in base_link there), what the
-    robot's actions of that time were to do, and what the program showed.
+    """State after an example: the robot's true displacement (m, rad, in base_link at its start), its actions, and the
+    program's output.
     """
 
     robot: Robot

@@ -1,4 +1,4 @@
-"""cyberdog.follow: the robot stays behind the person whom it knows."""
+"""cyberdog.follow: the robot stays behind a person it knows."""
 
 from __future__ import annotations
 

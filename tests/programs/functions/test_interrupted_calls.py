@@ -30,7 +30,7 @@ _NAMES |= {"true": True, "false": False, "MotionSequence": lambda: Record("Motio
 
 
 def arguments(name: str) -> tuple[list[object], dict[str, object]]:
-    """Those of the function's example, which are right."""
+    """Arguments of the function's example, which are valid."""
     for node in ast.walk(ast.parse(examples()[name].code)):
         if isinstance(node, ast.Call) and ast.unparse(node.func) == name:
             try:

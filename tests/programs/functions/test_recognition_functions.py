@@ -23,7 +23,7 @@ HOLD, THUMB = ENUMS["GestureType"]["stop_sign"], ENUMS["GestureType"]["thumb_up"
 
 @pytest.fixture
 async def anna(caller: Caller, world: World) -> Actor:
-    """Someone who stands before the camera, and no one else in sight."""
+    """A person in front of the camera, and no one else in sight."""
     world.hands.place("a", Pose(2.0, 5.0))
     ben, anna = world.hands.person("ben"), world.hands.person("anna")
     ben.stand()

@@ -29,7 +29,7 @@ TROT = [("0110", 6), ("1111", 1), ("1001", 6), ("1111", 1)]
 
 
 def sequence(*paces: dict[str, Any], name: str = "hop", gaits: list[tuple[str, int]] = STANDING) -> Record:
-    """As a program makes it and the worker sends it; a gait is who stands, in the order of FEET, and 30 ms units."""
+    """A sequence as the worker sends it; a gait lists standing feet in the order of FEET, and 30 ms units."""
     made: Any = RECORDS.class_of("MotionSequence")(name=name)  # type: ignore[call-arg]
     for down, duration in gaits:
         fields = {foot: int(digit) for foot, digit in zip(FEET, down, strict=True)}

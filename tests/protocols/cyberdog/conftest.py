@@ -63,7 +63,7 @@ async def app(messages: Messages, pems: Pems) -> AsyncIterator[App]:
 
 @pytest.fixture
 async def door(robot: Robot, data: Path, app: App) -> AsyncIterator[CyberDogDoor]:
-    """It learns the app's address from the first request."""
+    """A robot that learns the app's address from the first request."""
     opened = CyberDogDoor(robot, ADDRESS, CyberDogConfig(port=0, app_port=app.port), data)
     app.robot = opened
     await opened.start()

@@ -146,7 +146,7 @@ async def test_second_client_does_not_take_app_s_place(door, client, app, pems, 
 
 
 class Dialling(AppLink):
-    """No one ever answers: every attempt lasts five seconds."""
+    """No app answers: every attempt lasts five seconds."""
 
     async def _keep(self, _target: str) -> bool:
         self.attempts = [*getattr(self, "attempts", []), self._clock.time()]

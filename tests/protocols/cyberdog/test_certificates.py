@@ -68,7 +68,7 @@ def test_export_gives_a_client_what_it_needs(tmp_path: Path) -> None:
 
 
 def test_two_robots_starting_together_agree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """While one makes its own, the other's appear."""
+    """Another robot's certificates appear while one makes its own."""
     real, mine = certificates._write, []
 
     def interrupted(path: Path, data: bytes, *, private: bool = False) -> None:

@@ -1,4 +1,4 @@
-"""The server: who gets in, what is answered to whom, what hostile clients get."""
+"""The server: admission, answers, and hostile clients."""
 
 from __future__ import annotations
 

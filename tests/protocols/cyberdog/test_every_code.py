@@ -1,4 +1,4 @@
-"""No code without a test: each that is there is asked for over TLS, and each push is read from an app's server."""
+"""Each code is requested over TLS, and each push read from an app's server."""
 
 from __future__ import annotations
 

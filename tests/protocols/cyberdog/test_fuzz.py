@@ -49,7 +49,7 @@ def broken(rng: random.Random, params: Any) -> Any:
 
 
 def requests(rng: random.Random) -> list[tuple[int, Any]]:
-    """Of every code, some as they should be, most of them not."""
+    """Requests of every code, a few valid, most of them not."""
     names = {int(operation.key): operation.names or () for operation in TABLE}
     known: dict[int, list[Any]] = {code: [] for code in names}
     for code, params, _ in examples("cyberdog.md"):

@@ -51,7 +51,7 @@ def test_depth_and_length_break_nothing(text: str) -> None:
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_requests_of_any_shape_are_answered(data: st.DataObject, dog_of_no_robot: Any, caplog: Any) -> None:
-    """Whatever is in the fields: an answer, or an error in-band. Nothing else gets out of a handler."""
+    """Any content of the fields gets an answer or an in-band error; no handler raises."""
     code = data.draw(st.sampled_from(sorted(KNOWN)))
     fields = data.draw(st.dictionaries(st.sampled_from(_names(code)) | st.text(max_size=5), json_values, max_size=6))
 
@@ -80,7 +80,7 @@ def dog_of_no_robot() -> Any:
         connected = False
 
         def push(self, *_: object) -> None:
-            """To no one."""
+            """Send nothing."""
 
         def forget(self) -> None:
             """Do nothing: no robot is known."""
@@ -120,7 +120,7 @@ async def _idle(robot: ServedRobot) -> None:
 
 @pytest.mark.slow  # a load test
 async def test_ten_thousand_streams_at_robot_of_its_own(tmp_path: Path, messages: Messages) -> None:
-    """All ask for something that takes long: some wait in line, and other apps are answered all the same."""
+    """All request something slow: some wait in line, and other apps still get answers."""
     arguments = ("--robot", "a=cyberdog2", "--world", "empty")
     with served(tmp_path / "data", *arguments, address=LONELY) as robot:
         tls = tmp_path / "data" / "cyberdog" / "tls"

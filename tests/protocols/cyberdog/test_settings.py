@@ -24,7 +24,7 @@ DEFAULT = "铁蛋"
 
 @pytest.fixture
 def anna(world, robot):
-    """She stands two metres ahead of the robot and looks at it."""
+    """A person two metres ahead of the robot who looks at it."""
     person = world.hands.person("anna")
     at = person.pose
     world.hands.place("a", Pose(at.x - 2.0, at.y, 0.0))

@@ -135,7 +135,7 @@ async def test_an_update_from_download_to_reboot(client, app: App, robot, data, 
 
 
 async def test_fetched_and_installed_update_survives_a_crash(client, robot, forward) -> None:
-    """The program is killed and started anew: a new component over the same settings."""
+    """Restart a killed program: a new component over the same settings."""
 
     def next_life() -> SimulatedFirmware:
         robot[Disk].release("firmware package")

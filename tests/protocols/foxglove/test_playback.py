@@ -101,7 +101,7 @@ async def playing(film: Path, opened: Opened) -> Scene:
 
 
 def states(viewer: Viewer) -> list[State]:
-    """All that the server has said about how it plays."""
+    """Playback states sent by the server."""
     found = []
     for data in viewer.binary:
         assert data[0] == 5

@@ -15,7 +15,7 @@ from tests.protocols.robomaster.text_client import ADDRESS, Inbox, TextClient, p
 
 @pytest.fixture
 def inbox_at() -> Iterator[Callable[[str, int], Inbox]]:
-    """More of them, at a host and port."""
+    """Maker of further clients, at a host and port."""
     opened: list[Inbox] = []
 
     def open_one(host: str, port: int) -> Inbox:

@@ -20,7 +20,7 @@ PATIENCE = 100  # s, on a busy machine
 
 
 async def until(condition: Callable[[], object]) -> None:
-    """Wait for what the other end does by itself, and does not tell."""
+    """Wait for something that the other end does unprompted and unreported."""
     async with asyncio.timeout(PATIENCE):
         while not condition():  # noqa: ASYNC110
             await asyncio.sleep(0.005)

@@ -93,7 +93,7 @@ def key_of(text: str) -> str:
 
 
 def fill(template: str, ranges: dict[str, Range], **chosen: object) -> str:
-    """With something harmless for what wasn't chosen."""
+    """Fill in harmless values for what wasn't chosen."""
     harmless = {n: r.split()[0] if isinstance(r, str) else _text(max(r[0], min(r[1], 1))) for n, r in ranges.items()}
     return template.format(**harmless | {name: str(value) for name, value in chosen.items()})
 

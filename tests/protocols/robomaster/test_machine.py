@@ -87,7 +87,7 @@ class Machine(RuleBasedStateMachine):
 
     @initialize(target=clients)
     def open_door(self) -> Any:
-        """With two clients in SDK mode: from there everything else is near."""
+        """Start with two clients in SDK mode, close to all other states."""
         self.inbox = Inbox("127.0.0.1")
         self.modes: Any = None
         self.members: set[TextClient] = set()

@@ -1,4 +1,4 @@
-"""The pilot's port, and addresses that everybody knows."""
+"""The pilot's port, and well-known addresses."""
 
 import asyncio
 

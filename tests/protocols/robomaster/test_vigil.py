@@ -47,7 +47,7 @@ def test_the_robot_stops_when_the_cable_is_cut(network: None, groups: str, order
 
 @pytest.fixture
 def driver():
-    """On another host, as far as its address goes; its socket has a living end."""
+    """A client on another host, by its address; its socket has a living end."""
     with socket.create_server(("127.0.0.1", 0)) as server, socket.create_connection(server.getsockname()) as near:
         far, _ = server.accept()
         with far:

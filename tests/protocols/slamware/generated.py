@@ -298,7 +298,7 @@ def tell(request: Request, reply: httpx.Response, problem: str) -> str:
 
 
 def main() -> None:
-    """Against a robot that is up: ask, and tell what was wrong."""
+    """Send them to a running robot and print the misfits."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--url", default="http://127.0.0.1:1448")
     parser.add_argument("--count", type=int, default=20_000)

@@ -126,7 +126,7 @@ class Writer:
         return key, 0 if self.known.get(key) and chance.random() < 0.4 else chance.randrange(1, 1 << 30)
 
     def run(self, port: int, chance: random.Random) -> None:
-        """Until the robot is dead."""
+        """Write until the robot is dead."""
         with contextlib.closing(Client(port)) as ask:
             while self.go_on(ask, chance):
                 pass
@@ -321,7 +321,7 @@ def run(kills: int, seed: int, folder: Path) -> list[str]:
 def write_and_kill(
     writers: list[Writer], process: ForkServerProcess, port: int, chance: random.Random, patience: float
 ) -> None:
-    """All write at once; after a while, and when all have written or ``patience`` (s) is over, the robot is dead."""
+    """Let all write at once; after a while, when all have written or ``patience`` (s) is over, kill the robot."""
     threads = [threading.Thread(target=writer.run, args=(port, random.Random(chance.random()))) for writer in writers]
     for thread in threads:
         thread.start()
@@ -335,7 +335,7 @@ def write_and_kill(
 
 
 def main() -> None:
-    """Kill, look, tell."""
+    """Kill, compare, print."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)

@@ -1,4 +1,4 @@
-"""Expectations of HTTP clients and the manual's own examples of the door, whatever the chapter."""
+"""Expectations of HTTP clients, and the manual's own examples, across chapters."""
 
 from __future__ import annotations
 

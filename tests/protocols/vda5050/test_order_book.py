@@ -1,4 +1,4 @@
-"""Orders accepted and refused by chapter 6.1; the book stays consistent, whatever comes."""
+"""Orders accepted and refused by chapter 6.1; the book stays consistent with any input."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """A server of tasks whose robot speaks into a file, for tests that kill it.
 
 python killed_robot.py DATABASE FILE TASKS BEGIN PARENT: keeps so many tasks running, recovers those that a killed
-server left behind, and tells on standard output what it asks for and what was acknowledged. With 0 for BEGIN it starts
+server left behind, and prints its requests and their acknowledgements. With 0 for BEGIN it starts
 nothing new and says "over" when nothing is under way any more. It ends with PARENT, also if that is killed. Each run
 has a number of its own, and says it with each step.
 """

@@ -54,7 +54,7 @@ async def test_frames_that_are_none(app: FrontEnd) -> None:
 )
 def test_every_frame_gets_an_answer(text: str) -> None:
     async def ask() -> None:
-        """With a service that runs nothing: this is about frames."""
+        """A door whose service runs nothing: frames only."""
         door = FrontEndOnly()
         await door.receive(text)
         assert door.sent

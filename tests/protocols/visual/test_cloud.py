@@ -117,7 +117,7 @@ def database() -> Any:
 
 
 async def sent(app: FrontEnd, database: Database) -> None:
-    """Until the outbox is empty."""
+    """Wait until the outbox is empty."""
     box = Outbox(database, app.service.robot.id)
     async with asyncio.timeout(10):
         while await box.first() is not None:

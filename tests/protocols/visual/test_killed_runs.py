@@ -82,7 +82,7 @@ async def test_runs_survive_kills(tmp_path: Path) -> None:
 
 
 async def test_no_robot_outlives_a_killed_test(tmp_path: Path) -> None:
-    """Its parent, as pytest would, starts it and is killed."""
+    """Start it from a parent that is killed, as pytest might be."""
     start = (
         "import os, subprocess, sys\n"
         "robot = subprocess.Popen([*sys.argv[1:], str(os.getpid())], stdout=subprocess.PIPE)\n"

@@ -39,7 +39,7 @@ def dog(simulate):
 
 
 async def test_all_jumps_and_walks_end_where_table_says(tmp_path):
-    """All at once, a robot for each; side by side in an open field, without sensors that take time."""
+    """Run all at once, a robot for each, side by side in an open field, without costly sensors."""
     text = (BODIES / "cyberdog2.toml").read_text()
     simple = text[: text.index("[imu]")] + text[text.index("[battery]") : text.index("[dock_contact]")]
     (tmp_path / "dog.toml").write_text(simple)

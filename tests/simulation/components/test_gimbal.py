@@ -1,4 +1,4 @@
-"""The gimbal: who follows whom, limits, frames, what moves it and what does not."""
+"""The gimbal: modes, limits, frames, and what moves it."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""From a region of the picture to a place before the robot, and back."""
+"""Conversion from a region of the picture to a place before the robot, and back."""
 
 from __future__ import annotations
 

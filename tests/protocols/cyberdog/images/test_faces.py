@@ -13,7 +13,7 @@ pytestmark = pytest.mark.world("playground", body="cyberdog2")
 
 @pytest.fixture
 async def anna(world, robot, client, app, passing):
-    """She stands three metres ahead of the robot, whose app is connected."""
+    """A person three metres ahead of the robot, whose app is connected."""
     person = world.hands.person("anna")
     world.hands.place("a", Pose(person.pose.x - 3.0, person.pose.y, 0.0))
     await client.ask(10001)

@@ -14,7 +14,7 @@ pytestmark = pytest.mark.world("playground", body="cyberdog2")
 
 @pytest.fixture
 async def anna(world, robot, client, app, passing):
-    """She stands three metres ahead of the robot, whose app is connected."""
+    """A person three metres ahead of the robot, whose app is connected."""
     person = world.hands.person("anna")
     world.hands.place("a", Pose(person.pose.x - 3.0, person.pose.y, 0.0))
     await client.ask(10001)
@@ -79,7 +79,7 @@ async def test_choice_is_optional_but_side_must_be_known(client, app, robot, ann
 async def test_thing_in_picture_is_followed_wherever_it_goes(
     client: Client, app: App, robot, world, anna, passing, forward
 ) -> None:
-    """Of what the camera makes out nothing is asked: she is a thing like any other, that the lidar sees."""
+    """The camera is not needed: the lidar sees her as it sees any thing."""
     await forward(seconds=0.3)  # it has seen her: sockets may be quicker than its first scan
     stream = Stream(client, 6004, {"type": 13, "object_tracking": True, "keep_distance": 1.0})
     await passing(lambda: 501 in stream.codes)

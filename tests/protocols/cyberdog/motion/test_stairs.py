@@ -24,13 +24,13 @@ FOOT, BEFORE = 4.0, 0.55  # m
 
 @pytest.fixture(autouse=True)
 async def unheard(app):
-    """No app connects: robot time runs ahead of its answers here, and one that is lost would end what is tested."""
+    """No app connects: robot time runs ahead of its answers, and a lost one would end the action under test."""
     app.silent = True
 
 
 @pytest.fixture
 async def stands(robot, world, forward):
-    """It stands before the flight."""
+    """A dog that stands before the flight."""
     world.hands.place("a", BEFORE_THE_STEP)
     await forward(seconds=0.5)
 

@@ -41,7 +41,7 @@ async def door(robot: Robot, forward: Forward, cloud: Path) -> AsyncIterator[Sla
 
 
 def give(cloud: Path, name: str, **task: Any) -> Callable[[], str]:
-    """The cloud gives a task; the answer tells what became of it."""
+    """Have the cloud give a task; return its outcome."""
     (cloud / "tasks" / f"{name}.json").write_text(json.dumps(task))
     return lambda: next((cloud / "tasks").glob(f"{name}.[!w]*")).suffix
 

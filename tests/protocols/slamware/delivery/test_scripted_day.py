@@ -82,7 +82,7 @@ class Day(Screen):
         return Pose(pose["x"], pose["y"], pose["yaw"])
 
     async def take(self, box: int) -> None:
-        """Someone opens the box and takes what is in it."""
+        """Open the box and empty it, as a customer does."""
         assert await self.say("start_pickup") == 204
         await self.operate(box, ":open")
         await self.forward(seconds=4)

@@ -1,4 +1,4 @@
-"""Between files and floors: what goes in comes out, what no one understands byte for byte; too much is not read."""
+"""Composite maps to files and back: everything survives, unknown parts byte for byte; oversized ones are refused."""
 
 from __future__ import annotations
 

@@ -213,7 +213,7 @@ async def test_the_origin_moves_with_all_that_is_drawn(robot: Robot, client: htt
 async def test_moved_origin_is_forgotten_with_map_in_memory(
     robot: Robot, client: httpx.AsyncClient, forward: Forward, drawn: None
 ) -> None:
-    """After a restart the grid is the saved one: what is drawn lies on it where it lay."""
+    """After a restart the grid is the saved one, and drawings lie where they lay."""
     await ok(await client.post(f"{MULTI}/stcm/:save"))
     await ok(await client.put(f"{SLAM}/maps/origin", json={"new_origin": {"x": 1.0, "y": -0.5}}))
     await ok(await client.post(f"{ARTIFACT}/pois", json={**DESK, "id": "later"}))
@@ -229,7 +229,7 @@ async def test_moved_origin_is_forgotten_with_map_in_memory(
 async def test_a_cleared_map_is_forgotten_in_memory_only(
     robot: Robot, client: httpx.AsyncClient, forward: Forward, drawn: None
 ) -> None:
-    """After a restart the saved grid is back, and on it what was drawn on it: nothing of the new map's."""
+    """After a restart the saved grid is back with its own drawings, and none of the new map's."""
     await ok(await client.post(f"{MULTI}/stcm/:save"))
     (dock,) = (await client.get(f"{SLAM}/homedocks")).json()
     saved = robot[Mapping].grid.log_odds.shape

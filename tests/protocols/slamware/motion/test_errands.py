@@ -213,7 +213,7 @@ async def test_recovery_gives_up_in_time_turning_if_allowed(
 async def test_search_that_finds_several_places_lets_time_pass(
     robot: Robot, client: httpx.AsyncClient, forward: Forward, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    """It looked again in the same instant, for ever: in lockstep the world stood still."""
+    """It polled for ever within one instant: in lockstep the world stood still."""
     looks = itertools.count(1)
 
     async def several(_localization: object, _region: object) -> tuple[list[None], Pose]:
