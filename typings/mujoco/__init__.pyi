@@ -163,12 +163,14 @@ class MjData:
     mocap_quat: _Floats
     ncon: int
     nefc: int
+    qacc: _Floats
     qfrc_applied: _Floats
     qpos: _Floats
     qvel: _Floats
     def __init__(self, model: MjModel) -> None: ...
 
 def mj_forward(model: MjModel, data: MjData) -> None: ...
+def mj_kinematics(model: MjModel, data: MjData) -> None: ...
 def mj_step(model: MjModel, data: MjData, nstep: int = ...) -> None: ...
 def mj_ray(
     model: MjModel,

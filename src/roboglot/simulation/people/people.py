@@ -145,10 +145,19 @@ class Walker:
         self.walking, moved, self.displaced = False, self.displaced, False
         if self.doing is None and ((self._told is None and not self._script) or not self._begin()):
             return moved
-        before, self._elapsed = self.pose, self._elapsed + seconds
-        if self._do(seconds, robots, free):
+        self._elapsed += seconds
+        doing, before = self.doing, self.pose
+        if isinstance(doing, Walk):  # the most frequent step
+            over = self._walk_on(doing, robots, seconds, free)
+        elif isinstance(doing, Wait):  # and what else they do much
+            over = self._elapsed >= doing.seconds
+        else:
+            over = self._do(seconds)
+        if over:
             self.doing = None
         after = self.pose
+        if after is before:
+            return moved
         return moved or after.x != before.x or after.y != before.y or after.yaw != before.yaw
 
     def _begin(self) -> bool:
@@ -168,14 +177,9 @@ class Walker:
                 self.emotion = emotion
         return self.doing is not None
 
-    def _do(self, seconds: float, robots: Sequence[Placed], free: Free) -> bool:
-        """True if the step is over."""
-        doing = self.doing
-        if isinstance(doing, Walk):  # the most frequent step
-            return self._walk_on(doing, robots, seconds, free)
-        if isinstance(doing, Wait):  # and what else they do much
-            return self._elapsed >= doing.seconds
-        match doing:
+    def _do(self, seconds: float) -> bool:
+        """Do anything but walk and wait; True if the step is over."""
+        match self.doing:
             case Look(at=at):
                 return self._turn(self.pose.point.bearing_to(Point(*at)), TURN_RATE * seconds)
             case Show(seconds=span):

@@ -42,7 +42,7 @@ class Meetings:
         self._revision = -1
         self._pairs = np.triu_indices(len(hulls), 1)
         self._others: tuple[NDArray[np.int64], list[float], list[float]] | None = None  # see ``_there``
-        self._off = False  # whether checks are switched off
+        self.off = False  # whether the search is switched off
         self._left = 0.0  # s until the next check
         self._wait = AGAIN
 
@@ -56,7 +56,7 @@ class Meetings:
         if not self._possible:
             return
         revision = sum(self._props.revisions.values())
-        if revision != self._revision or (self._off and not all(map(self._as_expected, self._hulls))):
+        if revision != self._revision or (self.off and not all(map(self._as_expected, self._hulls))):
             self._revision = revision
             self.forget()
         self._left -= seconds
@@ -64,12 +64,12 @@ class Meetings:
             return
         free = self._free() if self._is_calm() else 0.0
         self._switch(off=bool(free >= WORTH))
-        self._wait = AGAIN if self._off else min(2.0 * self._wait, AGAIN_MAX)
-        self._left = free - seconds if self._off else self._wait
+        self._wait = AGAIN if self.off else min(2.0 * self._wait, AGAIN_MAX)
+        self._left = free - seconds if self.off else self._wait
 
     def _switch(self, *, off: bool) -> None:
-        if off is not self._off:
-            self._off = off
+        if off is not self.off:
+            self.off = off
             flags = int(self._model.opt.disableflags)
             self._model.opt.disableflags = flags | NO_CONTACTS if off else flags & ~NO_CONTACTS
 

@@ -15,6 +15,7 @@ from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Pose
 from roboglot.simulation.bodies.body import Body
 from roboglot.simulation.bodies.hull import Hull, Touch
+from roboglot.simulation.bodies.sleep import Sleep
 from roboglot.simulation.building.blueprint import Kind, Solid
 from roboglot.simulation.building.props import AWAY, OBSTACLES_MAX, Props
 from roboglot.simulation.building.terrain import Ground
@@ -79,24 +80,35 @@ class Physics:
         self.things = Things(model, self._data, world)
         calm = not (self.ground.uneven or any(floor.things for floor in world.floors))
         self._meetings = Meetings(model, self._data, list(self.hulls.values()), self.props, possible=calm)
+        self._sleep = Sleep(model, self._data)
 
     def step(self, seconds: float, meanwhile: Callable[[float], None] | None = None) -> None:
         """Let ``seconds`` pass with the controls as they are, and note what touches whom.
 
         ``meanwhile`` is called after every small step with its length, for what must not jump.
         """
-        steps = round(seconds / TIMESTEP)
         for hull in self.hulls.values():
             if hull.hand is not None:
                 hull.handle()
         self._meetings.look(seconds)
+        if meanwhile is None and self._meetings.off and self._sleep.lasts:
+            self.rays.outdate()
+            return
+        steps = round(seconds / TIMESTEP)
         if meanwhile is None:
             mujoco.mj_step(self._model, self._data, nstep=steps)
         else:
             for _ in range(steps):
                 mujoco.mj_step(self._model, self._data)
                 meanwhile(TIMESTEP)
-        positions, velocities = self._data.qpos.tolist(), self._data.qvel.tolist()
+        self._see()
+
+    def _see(self) -> None:
+        """Take from a step where all are, and what they touch."""
+        velocities = self._data.qvel.tolist()
+        if self._sleep.settle(velocities):
+            velocities = self._data.qvel.tolist()
+        positions = self._data.qpos.tolist()
         loose = []
         standing = self._feet
         for hull in self.hulls.values():

@@ -30,6 +30,16 @@ class Rays:
         self._model, self._data, self._mujoco = model, data, mujoco
         self._kinds: dict[Hull, NDArray[np.int32]] = {}  # of all shapes except those of the observing robot
         self._kernel: Callable[..., NDArray[np.float64]] | None = None
+        self._outdated = False  # whether people and props may have moved since the physics placed all shapes
+
+    def outdate(self) -> None:
+        """Take note that the physics sleeps while people walk on."""
+        self._outdated = True
+
+    def _place_shapes(self) -> None:
+        if self._outdated:
+            self._outdated = False
+            self._mujoco.mj_kinematics(self._model, self._data)
 
     def load_kernel(self) -> None:
         """Cast by the compiled kernel from now on, where the world has no other shapes than it knows.
@@ -49,6 +59,7 @@ class Rays:
 
         From each of the ``origins`` (m x 3) go as many of them, in their order.
         """
+        self._place_shapes()
         if self._kernel is None:
             bundles = np.split(directions, len(origins))
             parts = zip(origins, bundles, strict=True)
@@ -77,6 +88,7 @@ class Rays:
 
     def meet(self, origin: NDArray[np.float64], way: NDArray[np.float64], viewer: Hull) -> tuple[float, str] | None:
         """Return the first hit on the straight ``way`` from ``origin`` (3 each, m): its share of it, and its name."""
+        self._place_shapes()
         found = np.zeros(1, np.int32)
         with self._looking_through(viewer):
             share = self._mujoco.mj_ray(self._model, self._data, origin, way, SEEN, True, -1, found)

@@ -1,0 +1,53 @@
+"""Sleep of the physics: while everything rests and no input changes, a step would change nothing, and none is done.
+
+A step of bodies at rest moves them by rounding alone. That is taken back, so that a world in which steps are done all
+the same (to look for contacts) stays the same to the last bit.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from mujoco import MjData, MjModel
+
+RESTS = 1e-12  # m/s, rad/s and their rates up to which a body counts as at rest: rounding leaves less than 1e-13
+
+
+class Sleep:
+    """Keeps places, velocities and inputs with which everything came to rest."""
+
+    def __init__(self, model: MjModel, data: MjData) -> None:
+        self._data = data
+        self._inputs = data.ctrl, data.qfrc_applied, model.actuator_gainprm, model.actuator_forcerange
+        self._kept: tuple[bytes, ...] = ()  # empty: something moved
+        self._places, self._rates = data.qpos.copy(), data.qvel.copy()
+        self._there: tuple[bytes, ...] = ()  # the bytes of these two
+
+    @property
+    def lasts(self) -> bool:
+        """True while nothing differs from when everything came to rest."""
+        data = self._data
+        return bool(self._kept) and (data.qpos.tobytes(), data.qvel.tobytes()) == self._there and self._same
+
+    def settle(self, velocities: list[float]) -> bool:
+        """Look at a step that was done; True if all rested before and after it, and what it moved was taken back."""
+        data = self._data
+        if data.nefc or not (_tiny(velocities) and _tiny(data.qacc.tolist())):
+            self._kept = ()
+            return False
+        if self._kept and self._same and abs(data.qpos - self._places).max() <= RESTS:
+            data.qpos[:], data.qvel[:] = self._places, self._rates
+            return True
+        self._places, self._rates = data.qpos.copy(), data.qvel.copy()
+        self._there = self._places.tobytes(), self._rates.tobytes()
+        self._kept = tuple(each.tobytes() for each in self._inputs)
+        return False
+
+    @property
+    def _same(self) -> bool:
+        return all(each.tobytes() == kept for each, kept in zip(self._inputs, self._kept, strict=True))
+
+
+def _tiny(numbers: list[float]) -> bool:
+    return bool(numbers) and max(numbers) <= RESTS and min(numbers) >= -RESTS
