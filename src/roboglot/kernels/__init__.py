@@ -25,7 +25,7 @@ NAVIGATION = (
     "relocation",
     "smoothing",
 )
-MODULES = (*NAVIGATION, "raster_shading", "raster", "sweep", "rays", "raster_rooms")
+MODULES = (*NAVIGATION, "raster_shading", "raster", "sweep", "rays", "raster_rooms", "posing")
 
 
 @contextmanager

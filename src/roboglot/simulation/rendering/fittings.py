@@ -6,11 +6,12 @@ State comes from the parts; meshes are around a robot's origin on the floor, +x 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache, partial
 
 import numpy as np
 
+from roboglot.model.components.interaction.light import DARK as DARKNESS
 from roboglot.model.components.interaction.light import Colour, Light
 from roboglot.model.components.motion.arm import Arm
 from roboglot.model.components.motion.gimbal import Gimbal
@@ -62,16 +63,13 @@ def fittings(robot: Robot, hull: Hull) -> Iterator[Make]:
     if Light in robot:
         light = robot[Light]
         for zone in light.zones:
-            lamps = light.lamps(zone)
-            red, green, blue = (
-                (lamp.red for lamp in lamps),
-                (lamp.green for lamp in lamps),
-                (lamp.blue for lamp in lamps),
-            )
-            mean = Colour(*(sum(part) // len(lamps) for part in (red, green, blue)))
-            if zone.startswith("gimbal"):
+            on_gimbal = zone.startswith("gimbal")
+            if not on_gimbal and zone not in PLACES:
+                continue
+            mean = _mean(light.lamps(zone))
+            if on_gimbal:
                 gimbal_colours += (mean,)
-            elif zone in PLACES and mean != Colour():
+            elif mean != DARKNESS:
                 yield partial(_lamp, zone, mean, body.hull.radius, round(belly, 3), body.hull.torso_height)
     if body.walks and Legs in robot:
         for foot in robot[Legs].feet.values():
@@ -83,7 +81,7 @@ def fittings(robot: Robot, hull: Hull) -> Iterator[Make]:
         angles = robot[Gimbal].angles
         at = (gimbal.forward, 0.0, round(belly, 3) + gimbal.above_belly)
         muzzle = blaster.muzzle if blaster else 0.0
-        yield partial(_gimbal, at, round(angles.pitch, 3), round(angles.yaw, 3), muzzle, gimbal_colours)
+        yield partial(_gimbal, at, round(angles.pitch, 2), round(angles.yaw, 2), muzzle, gimbal_colours)
     arm, gripper = body.get(ArmSection), body.get(GripperSection)
     if arm and Arm in robot:
         end = robot[Arm].position
@@ -94,6 +92,17 @@ def fittings(robot: Robot, hull: Hull) -> Iterator[Make]:
         yield partial(_arm, shoulder, (round(end.x, 3), round(end.z, 3)), reach, round(opening, 3), fingers)
 
 
+def _mean(lamps: Sequence[Colour]) -> Colour:
+    """Return the colour of a zone from afar."""
+    if lamps.count(lamps[0]) == len(lamps):
+        return lamps[0]
+    return Colour(
+        sum(lamp.red for lamp in lamps) // len(lamps),
+        sum(lamp.green for lamp in lamps) // len(lamps),
+        sum(lamp.blue for lamp in lamps) // len(lamps),
+    )
+
+
 @lru_cache(maxsize=256)
 def _lamp(zone: str, colour: Colour, radius: float, belly: float, torso: float) -> Mesh:
     direction, width, height = PLACES[zone]
@@ -102,7 +111,7 @@ def _lamp(zone: str, colour: Colour, radius: float, belly: float, torso: float) 
     return card(at, direction, (width * radius, max(0.012, 0.07 * torso)), paint)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=512)
 def _gimbal(
     at: tuple[float, float, float], pitch: float, yaw: float, muzzle: float, colours: tuple[Colour, ...]
 ) -> Mesh:
@@ -146,7 +155,7 @@ def _arm(shoulder: tuple[float, float], end: tuple[float, float], reach: float, 
     return joined(parts)
 
 
-@lru_cache(maxsize=512)
+@lru_cache(maxsize=1024)
 def _leg(hip: tuple[float, float, float], foot: tuple[float, float, float]) -> Mesh:
     """A thigh and a shank with the knee behind, and a paw."""
     x, y, z = foot[0], foot[1], foot[2] + PAW

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from roboglot.kernels.posing import darken
 from roboglot.kernels.raster_rooms import ROOMS_MAX, label, look
 from roboglot.model.geometry import Pose
 from roboglot.simulation.building.blueprint import Kind, Solid
@@ -49,15 +50,8 @@ class Plan:
     def shadows_with(self, discs: Iterable[tuple[float, float, float]]) -> Cells:
         """``shadows``, and soft ones under what stands at (x, y) with a radius."""
         shadows = self.shadows.copy()
-        for x, y, radius in discs:
-            reach = radius + SOFTNESS * self.cell
-            rows, columns = self._window(x - reach, y - reach, x + reach, y + reach)
-            if rows.stop <= rows.start or columns.stop <= columns.start:
-                continue
-            off_y = self.y + (np.arange(rows.start, rows.stop) + 0.5)[:, None] * self.cell - y
-            off_x = self.x + (np.arange(columns.start, columns.stop) + 0.5) * self.cell - x
-            dark = 0.6 * np.clip((reach - np.hypot(off_x, off_y)) / (reach - 0.5 * radius), 0.0, 1.0)
-            shadows[rows, columns] = shadows[rows, columns] * (1.0 - dark)
+        under = np.array(list(discs), dtype=np.float64).reshape(-1, 3)
+        darken(shadows, under, self.x, self.y, self.cell, SOFTNESS * self.cell)
         return shadows
 
     def _window(self, x0: float, y0: float, x1: float, y1: float) -> tuple[slice, slice]:

@@ -13,10 +13,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from roboglot.kernels.posing import pose
+
 Floats = NDArray[np.float64]
 Rgb = tuple[int, int, int]
-SUN = np.array((0.35, 0.55, 0.76)) / math.sqrt(0.35**2 + 0.55**2 + 0.76**2)  # direction of the main light
 FLAT = -1
+UNTURNED = np.eye(3)
 EVERYWHERE = 0  # the room of shapes drawn regardless of the visible rooms
 
 
@@ -31,9 +33,12 @@ class Paint:
     glows: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Mesh:
-    """n quads: corners (n, 4, 3), texture origin and axes (n, 3, 3), paints (n, 8), textures (n), rooms (n)."""
+    """n quads: corners (n, 4, 3), texture origin and axes (n, 3, 3), paints (n, 8), textures (n), rooms (n).
+
+    Equal to itself alone, so that caches know one again.
+    """
 
     corners: Floats
     mappings: Floats
@@ -48,18 +53,23 @@ class Mesh:
 
     def moved(self, rotation: Floats, to: tuple[float, float, float]) -> Mesh:
         """Turned by a rotation matrix, then moved, and lit anew."""
-        mappings = self.mappings @ rotation.T
-        mappings[:, 0] += to
-        corners = self.corners @ rotation.T + to
-        paints = self.paints.copy()
-        paints[:, 6] = np.where(paints[:, 7] > 0, _lights(corners), paints[:, 6])
-        return Mesh(corners, mappings, paints, self.textures, self.rooms)
+        return posed([(self, rotation, to)])
 
 
 def joined(meshes: Iterable[Mesh]) -> Mesh:
     """All in one."""
     parts = list(meshes) or [mesh_of([], [])]
     return Mesh(*(np.concatenate([getattr(part, name) for part in parts]) for name in Mesh.__dataclass_fields__))
+
+
+def posed(parts: Sequence[tuple[Mesh, Floats, tuple[float, float, float]]]) -> Mesh:
+    """All in one, each turned by its rotation matrix, then moved, and lit anew; most of it without the lock."""
+    whole = joined(mesh for mesh, _, _ in parts)
+    counts = [len(mesh.textures) for mesh, _, _ in parts]
+    owners = np.repeat(np.arange(len(parts), dtype=np.int32), counts)
+    poses = np.array([[*turn.ravel().tolist(), *to] for _, turn, to in parts], dtype=np.float64).reshape(-1, 12)
+    pose(whole.corners, whole.mappings, whole.paints, owners, poses)
+    return whole
 
 
 def colour(rgb: Rgb) -> tuple[float, float, float]:
@@ -79,20 +89,20 @@ def mesh_of(quads: Sequence[Sequence[Sequence[float]]], paints: Sequence[Paint],
     """Quads (four corners each) with a paint each; textures run along the first edge and up the last one."""
     corners = np.array(quads, dtype=np.float64).reshape(-1, 4, 3)
     along, up = corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0]
-    lights = _lights(corners).tolist()
-    rows = [paint_row(paint, 1.0 if paint.glows else light) for paint, light in zip(paints, lights, strict=True)]
+    rows = [paint_row(paint, 1.0) for paint in paints]
     tiles = np.array([paint.tile for paint in paints]).reshape(-1, 2)
     mappings = np.empty((len(corners), 3, 3))
     mappings[:, 0] = corners[:, 0]
     mappings[:, 1] = unit(along) / tiles[:, :1]
     mappings[:, 2] = unit(up) / tiles[:, 1:]
-    return Mesh(
+    mesh = Mesh(
         corners,
         mappings,
         np.array(rows, dtype=np.float32).reshape(-1, 8),
         np.array([paint.texture for paint in paints], dtype=np.int32),
         np.full(len(corners), room, dtype=np.int32),
     )
+    return mesh.moved(UNTURNED, (0.0, 0.0, 0.0))  # lit
 
 
 def unit(vectors: Floats) -> Floats:
@@ -105,13 +115,6 @@ def cross(a: Floats, b: Floats) -> Floats:
     """The cross product; numpy's takes thrice as long for a few vectors."""
     product: Floats = a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]]
     return product
-
-
-def _lights(corners: Floats) -> Floats:
-    """A lit ceiling everywhere, more from one side: so that edges show."""
-    normals = unit(cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    lights: Floats = 0.86 + 0.10 * normals[:, 2] + 0.20 * np.maximum(-0.6, normals @ SUN)
-    return lights
 
 
 def box(size: Sequence[float], side: Paint, top: Paint, base: float = 0.0, room: int = EVERYWHERE) -> Mesh:

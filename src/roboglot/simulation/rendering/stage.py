@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from roboglot.simulation.building.props import Props
 from roboglot.simulation.building.tags import moving_tags
 from roboglot.simulation.building.things import Thing
 from roboglot.simulation.people.people import Walker
-from roboglot.simulation.rendering.figures import can, person, robot
+from roboglot.simulation.rendering.figures import ROBOTS, can, person, robot
 from roboglot.simulation.rendering.fittings import bead, car, fittings
 from roboglot.simulation.rendering.floor_plan import Plan, plan_of
 from roboglot.simulation.rendering.interior import (
@@ -37,6 +37,7 @@ from roboglot.simulation.rendering.shapes import (
     Mesh,
     joined,
     paint_row,
+    posed,
 )
 from roboglot.simulation.rendering.textures import Masks
 from roboglot.simulation.rendering.views import REACH, Eye, Figure, Ground, Instant, Scene
@@ -84,9 +85,10 @@ class Stage:
     def scene(self, instant: Instant) -> Scene:
         """All there is to draw; may run in any thread."""
         plan, still, ground = self._floor(instant.floor)
-        moving = [figure.make().moved(figure.rotation, (figure.x, figure.y, figure.z)) for figure in instant.figures]
-        shadows = plan.shadows_with((figure.x, figure.y, figure.radius) for figure in instant.figures)
-        meshes = (still, joined(moving)) if moving else (still,)
+        figures = instant.figures
+        moving = [(figure.make(), figure.rotation, (figure.x, figure.y, figure.z)) for figure in figures]
+        shadows = plan.shadows_with((figure.x, figure.y, figure.radius) for figure in figures)
+        meshes = (still, posed(moving)) if moving else (still,)
         return Scene(meshes, ground, plan, shadows, self._masks.rows)
 
     def _floor(self, number: int) -> tuple[Plan, Mesh, Ground]:
@@ -119,7 +121,7 @@ class Stage:
         for index, hull in enumerate(self._hulls):
             pose, section = hull.pose, hull.body.hull
             if hull.floor == number and hull is not viewer and sector.has(pose.x, pose.y, section.radius + REACH):
-                make = partial(robot, index, section, round(hull.belly, 2), hull.body.walks)
+                make = partial(robot, index % len(ROBOTS), section, round(hull.belly, 2), hull.body.walks)
                 if owner := self._life.robots.get(hull.name):
                     make = partial(_together, (make, *fittings(owner, hull)))
                 yield Figure(make, pose.x, pose.y, hull.elevation, rotation(hull.tilt, pose.yaw), section.radius)
@@ -154,7 +156,13 @@ class Stage:
 
 
 def _together(makes: tuple[Callable[[], Mesh], ...]) -> Mesh:
-    return joined([make() for make in makes])
+    return _joined(tuple(make() for make in makes))
+
+
+@lru_cache(maxsize=256)
+def _joined(meshes: tuple[Mesh, ...]) -> Mesh:
+    """A robot with its fittings: it is the same in the next picture, unless it moved an arm or a leg."""
+    return joined(meshes)
 
 
 def _inside(height: float, elevation: float, storey: float) -> bool:

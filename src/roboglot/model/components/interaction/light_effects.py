@@ -21,6 +21,7 @@ from roboglot.model.errors import InvalidGoal, NotFound
 
 FADING = 4.0  # pulses fall to 1/e this many times per period
 TAIL = 3  # lamps that trail a running light
+STEADY = frozenset({LightEffect.SOLID, LightEffect.OFF})
 COLOURFUL = frozenset({LightEffect.RAINBOW, LightEffect.CORNERS, LightEffect.BAND})
 FIGURES = {LightEffect.CORNERS: 4, LightEffect.TRIAD: 3}  # number of parts of the ring for each
 RUNNING = frozenset({LightEffect.SCROLLING, LightEffect.FILLING, LightEffect.BOUNCING, LightEffect.BAND, *FIGURES})
@@ -80,7 +81,11 @@ class ShownLight(Light):
         return self._last[zone]
 
     def lamps(self, zone: str) -> tuple[Colour, ...]:
-        now, lamps = self._clock.time(), self._lamps(zone)
+        lamps = self._lamps(zone)
+        first = lamps[0]
+        if first.effect in STEADY and lamps.count(first) == len(lamps):  # as most are: cameras ask for each picture
+            return (first.colour if first.effect is LightEffect.SOLID else DARK,) * len(lamps)
+        now = self._clock.time()
         return tuple(
             (_hue(command, now) if command.effect in COLOURFUL else command.colour)
             .dimmed(_brightness(command, now, index, len(lamps)))

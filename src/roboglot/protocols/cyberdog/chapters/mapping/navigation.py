@@ -27,7 +27,10 @@ GOOD_FIT = 0.5  # quality of localization from which the robot counts as localiz
 GIVE_UP_AFTER = 120.0  # s
 NEAR = 0.5  # m around the believed pose that are searched first
 LOOK_AT_MOST = 1.5  # s
-FIRST_SCAN_MAX, FIRST_SCAN_PERIOD = 3.0, 0.1  # s that a robot just switched on may take to begin its map; s between looks
+FIRST_SCAN_MAX, FIRST_SCAN_PERIOD = (
+    3.0,
+    0.1,
+)  # s that a robot just switched on may take to begin its map; s between looks
 PATH_PERIOD = 1.0  # s between two paths
 
 
