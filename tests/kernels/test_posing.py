@@ -1,4 +1,4 @@
-"""What moves in a picture: turned, moved, lit and with a shadow as plain arithmetic has it."""
+"""Moving quads of a picture: turned, moved, lit and with a shadow as plain arithmetic has it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from roboglot.kernels.posing import SUN, darken, pose
 from roboglot.simulation.bodies.hull import rotation
 
 
-def test_quads_follow_their_owner_and_are_lit_anew():
+def test_quads_follow_their_owners_and_are_lit():
     rng = np.random.default_rng(3)
     corners, mappings = rng.normal(size=(40, 4, 3)), rng.normal(size=(40, 3, 3))
     paints = rng.random((40, 8)).astype(np.float32)
