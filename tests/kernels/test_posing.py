@@ -31,7 +31,7 @@ def test_quads_follow_their_owners_and_are_lit():
     np.testing.assert_array_equal(paints[:, :6], before[2][:, :6])
 
 
-def test_shadows_lie_under_discs_and_end_at_the_edge():
+def test_shadows_lie_under_discs():
     shadows = np.full((30, 40), 200, np.uint8)
     darken(shadows, np.array(((2.0, 1.5, 0.4), (50.0, 1.0, 0.4), (0.0, 0.0, 0.3))), 0.0, 0.0, 0.1, 0.3)
     ys, xs = (np.indices(shadows.shape) + 0.5) * 0.1
