@@ -329,3 +329,10 @@ async def test_a_robot_without_a_lidar_says_so(bare_client: httpx.AsyncClient) -
     assert reply.status_code == 501
     assert (await bare_client.get(f"{SYSTEM}/robot/health")).json()["hasLidarDisconnected"] is True
     assert Lidar.__name__.lower() in reply.text
+
+
+async def test_without_a_place_it_is_on_no_floor(bare_client: httpx.AsyncClient) -> None:
+    """Nor is it outside of all elevators while none is drawn."""
+    reply = await bare_client.get("/api/multi-floor/map/v1/floors/:current")
+    assert reply.status_code == 501
+    assert "localization" in reply.text

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import math
 
 import pytest
@@ -13,7 +14,9 @@ from roboglot.model.components.motion.legs import Legs, Posture
 from roboglot.model.components.motion.motions import Motion
 from roboglot.model.components.motion.motors import Motors
 from roboglot.model.geometry import Pose
+from roboglot.protocols.cyberdog.chapters.motion.motion_table import POSES
 from roboglot.testing import assert_pose
+from roboglot.wire.cyberdog.chapters.motion.motion import RELATIVE_SHIFT_MAX, RELATIVE_TURN_MAX
 from tests.protocols.cyberdog.phone import App, Client, answered, until
 
 pytestmark = pytest.mark.world("playground", body="cyberdog2")
@@ -118,6 +121,22 @@ async def test_body_poses(client, robot, forward) -> None:
     assert (await client.ask(1004, {**pose, "duration": 0}))["code"] == 3010
     assert (await answered(client, 1004, {"motion_id": 201}, forward))["code"] == 0  # free: half a second
     assert robot[Legs].attitude.pitch == pytest.approx(0.0, abs=0.01)
+
+
+async def test_a_pose_beyond_its_range_is_refused(client, robot, forward) -> None:
+    """Every pose, on every axis."""
+    limits, before = robot[Legs].limits, robot[Legs].attitude
+    turns, shifts = [limits.angle] * 3, [limits.shift, limits.shift, limits.highest]
+    for number, (relative, _) in POSES.items():
+        most = {"rpy_des": [RELATIVE_TURN_MAX] * 3 if relative else turns}
+        most["pos_des"] = list(RELATIVE_SHIFT_MAX) if relative else shifts
+        for name, axis, sign in itertools.product(most, range(3), (1, -1)):
+            for value in (1.001 * most[name][axis], 99.0):
+                asked = {"motion_id": number, name: [sign * value if k == axis else 0.0 for k in range(3)]}
+                answer = await client.ask(1004, {**asked, "duration": 500})
+                assert answer == {"motion_id": number, "result": False, "code": 3010}, asked
+    await forward(seconds=1)
+    assert robot[Legs].attitude == before
 
 
 async def test_servo_frames_choose_gait_pose_and_the_lift(client, robot, forward) -> None:

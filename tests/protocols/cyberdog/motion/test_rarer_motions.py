@@ -69,6 +69,10 @@ async def test_frames_add_to_the_body_pose_within_limits(client, app: App, robot
     assert {push["code"] for push in app.of(1003)} == {0}
     await client.ask(1002, {"motion_id": 201, "rpy_des": [0, 2.0, 0]})
     await until(lambda: app.of(1003)[-1]["code"] == 3010)
+    await client.ask(1002, {"motion_id": 201})
+    await until(lambda: app.of(1003)[-1]["code"] == 0)
+    await client.ask(1002, {"motion_id": 202, "rpy_des": [0, 99.0, 0]})
+    await until(lambda: app.of(1003)[-1]["code"] == 3010)
     await client.ask(1002, {"motion_id": 203, "rpy_des": [0, 0.1, 0]})  # takes a duration: not a servo motion
     await until(lambda: app.of(1003)[-1]["code"] == 3008)
 

@@ -33,6 +33,7 @@ from roboglot.protocols.cyberdog.chapters.motion.motion_table import (
     USERS,
     WALK_STANDS,
     WALKS,
+    may_be_added,
 )
 from roboglot.protocols.cyberdog.chapters.motion.readiness import machine_state, posture_of, refusal_of
 from roboglot.protocols.cyberdog.errors import codes_of
@@ -115,6 +116,8 @@ class Gaits:
             return Executed(refusal, SwitchStatus.LOW_BATTERY if refusal is MotionCode.LOW_BATTERY else status)
         if not self._frames_may_ask_for(motion):
             return Executed(MotionCode.UNSUPPORTED)
+        if _asks_too_much(motion, wish):
+            return Executed(MotionCode.PARAMETERS)
         if self.busy:
             return Executed(MotionCode.BUSY)
         if under_way(self._rising):
@@ -245,6 +248,8 @@ class Gaits:
         given, free = wish.seconds > 0, motion == Motion.USER_GAIT or (motion in POSES and not POSES[motion][1])
         if not 0 <= wish.seconds <= DURATION_MAX or (not free and given == (motion in FIXED_TIME)):
             return MotionCode.PARAMETERS
+        if _asks_too_much(motion, wish):
+            return MotionCode.PARAMETERS
         if motion in PRESETS or (motion in USERS and not self._robot[Legs].choreography.steps):
             return MotionCode.NO_SEQUENCE
         if motion == Motion.EMERGENCY_STOP or (motion == Motion.LIE_DOWN and self._last in DANCES):
@@ -263,3 +268,9 @@ class Gaits:
         if action is not None:
             self._last, self._performing = motion, action
         return action
+
+
+def _asks_too_much(motion: int, wish: Wish) -> bool:
+    """Return whether a relative pose leaves its range; the legs check absolute ones."""
+    relative, _ = POSES.get(motion, (False, False))
+    return relative and not may_be_added(wish.body)

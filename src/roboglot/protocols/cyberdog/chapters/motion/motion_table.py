@@ -8,8 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from roboglot.model.components.motion.gaits import Gait
+from roboglot.model.components.motion.legs import BodyPose
 from roboglot.model.components.motion.motions import Motion as Figure
-from roboglot.wire.cyberdog.chapters.motion.motion import Motion
+from roboglot.wire.cyberdog.chapters.motion.motion import RELATIVE_SHIFT_MAX, RELATIVE_TURN_MAX, Motion
 from roboglot.wire.cyberdog.chapters.motion.names import FIGURE_NAMES, WALK_NAMES
 
 WALKS: Mapping[int, Gait] = {number: Gait[name] for number, name in WALK_NAMES.items()}
@@ -40,3 +41,10 @@ FIXED_TIME = POSTURES | FIGURES.keys() | PRESETS | {Motion.TROT_PASSIVE, Motion.
 MAY_LAST = WALKS.keys() | POSES.keys() | {Motion.USER_GAIT}
 KNOWN = FIXED_TIME | MAY_LAST | STATES
 ON_LEGS = FIGURES.keys() | POSES.keys() | USERS | PRESETS | STATES
+
+
+def may_be_added(by: BodyPose) -> bool:
+    """Return whether a relative pose may ask for so much; NaN may not. The legs do as much of it as they can."""
+    shift, turn = (by.shift.x, by.shift.y, by.height or 0.0), by.attitude
+    turns = all(abs(angle) <= RELATIVE_TURN_MAX for angle in (turn.roll, turn.pitch, turn.yaw))
+    return turns and all(abs(value) <= most for value, most in zip(shift, RELATIVE_SHIFT_MAX, strict=True))

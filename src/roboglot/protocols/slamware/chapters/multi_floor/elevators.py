@@ -80,12 +80,11 @@ class Elevator:
         door, yaw = (self.area.end, self.inward + math.pi) if rear else (self.area.start, self.inward)
         return Pose(door.x, door.y, wrap_angle(yaw)).compose(Pose(-self.sill - self.distance))
 
-    def relation(self, robot: Robot) -> PoseRelation:
-        """Return where the robot's middle is, and whether its hull reaches over a door's sill."""
-        here = robot[Localization].pose
+    def relation(self, here: Pose, radius: float) -> PoseRelation:
+        """Return where the robot's middle is, and whether its hull (``radius``, m) reaches over a door's sill."""
         if self.area.contains(here):
             return PoseRelation.IN
-        reach = self.sill + robot.description.radius
+        reach = self.sill + radius
         before = Pose(self.area.start.x, self.area.start.y, self.inward).compose(Pose(-reach)).point
         behind = Pose(self.area.end.x, self.area.end.y, self.inward).compose(Pose(reach)).point
         start = self.area.start if self.doors is DoorType.REAR else before
@@ -129,8 +128,9 @@ def elevators_here(robot: Robot) -> list[Elevator]:
 
 
 def elevator_around(robot: Robot) -> str:
-    """The id of the one that the robot is in; empty outside."""
-    found = (e.id for e in elevators_here(robot) if e.relation(robot) is PoseRelation.IN)
+    """The id of the one that the robot is in; empty outside. Raises ComponentMissing without Localization."""
+    here, radius = robot[Localization].pose, robot.description.radius
+    found = (e.id for e in elevators_here(robot) if e.relation(here, radius) is PoseRelation.IN)
     return next(found, "")
 
 
@@ -157,4 +157,5 @@ async def get_elevators_by_id(context: Context, elevator_id: Identifier) -> Elev
 @TABLE.on(f"GET {API}/{{elevator_id}}/pose_relation", right=Right.SEE, needs=(Localization, MapAnnotations))
 async def get_pose_relation_to_elevator(context: Context, elevator_id: Identifier) -> PoseRelation:
     """Return whether the robot is in the elevator, over its sill or outside; 400 if there is none."""
-    return elevator_called(context.robot, elevator_id).relation(context.robot)
+    robot = context.robot
+    return elevator_called(robot, elevator_id).relation(robot[Localization].pose, robot.description.radius)

@@ -32,6 +32,8 @@ class Motion(IntEnum):
 ALLOWED_ON_LOW_BATTERY = frozenset(
     {Motion.EMERGENCY_STOP, Motion.LIE_DOWN, Motion.LIE_DOWN_PASSIVE, Motion.STAND_UP, Motion.POSE_RELATIVE}
 )
+# Most that a relative pose may ask for, by the developer guide's table of parameters: x, y, z in m, each angle in rad.
+RELATIVE_SHIFT_MAX, RELATIVE_TURN_MAX = (0.4, 0.3, 0.2), 0.9
 # Motions that lead out of an emergency stop, or into it.
 ALLOWED_WHEN_STOPPED = frozenset({Motion.EMERGENCY_STOP, Motion.STAND_UP})
 
