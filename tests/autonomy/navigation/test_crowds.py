@@ -14,6 +14,7 @@ from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
 from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.events import BumperPressed
 from roboglot.model.geometry import Pose, Twist
 from roboglot.storage.database import Database
 from tests.crowd import CORRIDOR, SHOVED, SURE, crowd, leave
@@ -120,6 +121,25 @@ async def test_a_lidar_sees_no_gap_in_a_robot(looking: str) -> None:
         assert scan.ranges[ray] == pytest.approx(gap, abs=0.06), name
     await fleet.close()
     database.close()
+
+
+async def test_what_stands_below_the_lidar_is_not_touched() -> None:
+    """Two low robots leave no gap; the dog, which sees them from in front only, looks for one."""
+    clock, database, bodies = LockstepClock(), Database(":memory:"), ("cyberdog2", "robomaster_ep", "robomaster_ep")
+    robots = [RobotConfig(name, body=body) for name, body in zip("abc", bodies, strict=True)]
+    fleet = build_fleet(CORRIDOR, robots, clock=clock, seed=1, database=database)
+    for name, place in zip("abc", (Pose(2.0, 3.0), Pose(4.0, 2.75), Pose(4.0, 3.25)), strict=True):
+        fleet.world.hands.place(name, place)
+    await fleet.start(wait=True)
+    await clock.advance(1.0)
+    robot = fleet.robots["a"]
+    presses: list[BumperPressed] = []
+    robot.events.listen(BumperPressed, presses.append)
+    robot[Navigation].navigate_to([Pose(4.0).point], NavigationOptions())
+    await clock.advance(8.0)
+    await fleet.close()
+    database.close()
+    assert not presses
 
 
 async def test_a_fast_robot_touches_softly() -> None:

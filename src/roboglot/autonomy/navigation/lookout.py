@@ -79,17 +79,20 @@ class Lookout:
         self._planner.forget_soon(self._traffic.moving, event.stamp)
         self._planner.forget(self._traffic.far(pose))
         if self.follower:
-            self._look_ahead(self.follower, pose, points)
+            beside = self._planner.low_around(pose, self._tuning.horizon, event.stamp)
+            self._look_ahead(self.follower, pose, points, beside)
             if (width := self._narrow.entered(scan.points)) is not None:
                 self._robot.events.publish(CorridorEntered(stamp=event.stamp, action=self._action, width=width))
 
-    def _look_ahead(self, follower: Follower, pose: Pose, points: NDArray[np.float64]) -> None:
-        """Find what stands in the way."""
+    def _look_ahead(
+        self, follower: Follower, pose: Pose, seen: NDArray[np.float64], remembered: NDArray[np.float64]
+    ) -> None:
+        """Find what stands in the way: what is ``seen`` now, and what is ``remembered`` as cells."""
         tuning, planner = self._tuning, self._planner
-        path = self._path(follower, pose)
+        path, points = self._path(follower, pose), np.concatenate((seen, remembered)) if len(remembered) else seen
         tight = planner.free_way(path, points, pose, tuning.slow_margin)
         if math.isfinite(tight):
-            self.gap = follower.route.centre(points, planner.radius + tuning.slow_margin)
+            self.gap = follower.route.centre(seen, planner.radius + tuning.slow_margin)
             path = self._path(follower, pose)
             tight = planner.free_way(path, points, pose, tuning.slow_margin)
         follower.slow_at = follower.along + tight

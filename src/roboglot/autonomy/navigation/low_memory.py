@@ -8,7 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.autonomy.navigation.low_sight import LowView
+from roboglot.autonomy.navigation.low_sight import NONE, LowView
+from roboglot.autonomy.navigation.rules import Frame
 from roboglot.autonomy.navigation.scan_memory import Cells
 from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
 from roboglot.kernels.depth import remember_low
@@ -40,3 +41,16 @@ class LowMemory:
     def seen(self, grid: EvidenceGrid) -> NDArray[np.float32]:
         """Return the time (s) of the last sighting in each of the map's cells; 0: never."""
         return self._seen.of(grid)
+
+    def around(self, grid: EvidenceGrid, pose: Pose, reach: float, since: float) -> Points:
+        """Return the middles (map, m; n, 2) of cells within ``reach`` m in which something was seen ``since`` then.
+
+        Most of these sensors see little: what a robot passes, or stands beside, is out of their sight.
+        """
+        seen, frame = self.seen(grid), Frame(grid.corner, grid.evidence.shape)
+        rows, columns = frame.around((pose.point,), reach)
+        row, column = np.nonzero(seen[rows, columns] >= max(since, 1e-3))
+        if not len(row):
+            return NONE
+        x, y = frame.centres(rows, columns)
+        return np.stack((x[0, column], y[row, 0]), axis=1)

@@ -299,6 +299,10 @@ class Planner:
         """Remember what stands beside the lidar's plane and is not among ``echoes`` (map); returns it in map (n, 2)."""
         return self._low.observe(self._belief.map, view, echoes, pose, now)
 
+    def low_around(self, pose: Pose, reach: float, now: float) -> NDArray[np.float64]:
+        """Return what stands there within ``reach`` m as far as remembered, in map (n, 2)."""
+        return self._low.around(self._belief.map, pose, reach, now - OBSTACLE_SECONDS)
+
     def doubt(self, now: float) -> bool:
         """Look for a while whether what stands alone on the map is there at all; True if that was done already."""
         already = now < self._doubted_until
