@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import math
+from collections.abc import Callable
 from functools import partial
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboglot.model.clock import LEAD, LOCKSTEP_EPOCH, LockstepClock, PatientClock, RealClock
+from roboglot.model.clock import LEAD, LOCKSTEP_EPOCH, PATIENCE, REST, WORK, LockstepClock, PatientClock, RealClock
 
 
 async def test_nothing_happens_until_time_passes() -> None:
@@ -256,6 +257,11 @@ async def test_a_faster_clock_wakes_its_sleepers_sooner() -> None:
     assert not clock._timers
 
 
+async def _until(true: Callable[[], bool]) -> None:
+    while not true():  # noqa: ASYNC110 - no event says so
+        await asyncio.sleep(0)
+
+
 async def test_longer_work_gives_others_their_turn() -> None:
     clock, loop, done = RealClock(), asyncio.get_running_loop(), list[str]()
 
@@ -270,11 +276,32 @@ async def test_longer_work_gives_others_their_turn() -> None:
     for name in "abc":
         clock.in_turn(partial(job, name))
     assert not done
-    for _ in range(5):
-        await asyncio.sleep(0)
+    await _until(lambda: "c" in done)
     assert [name for name in done if len(name) == 1] == ["a", "b", "c"]
     assert done.index("after a") < done.index("c")
     assert [type(failure) for failure in failures] == [ZeroDivisionError]  # the next one had its turn all the same
+
+
+@pytest.mark.parametrize(("speed", "waits", "rests"), [(1.0, 0.0, True), (4.0, 0.0, False), (1.0, PATIENCE, False)])
+async def test_loop_rests_between_long_work(monkeypatch, speed: float, waits: float, rests: bool) -> None:
+    clock, loop, done, now = RealClock(speed), asyncio.get_running_loop(), list[str](), [0.0]
+    later: list[float] = []
+
+    def work(name: str) -> None:
+        done.append(name)
+        now[0] += WORK + waits
+
+    def rest(delay: float, job: Callable[[], None]) -> asyncio.Handle:
+        later.append(delay)
+        return loop.call_soon(job)
+
+    monkeypatch.setattr("roboglot.model.clock.time.perf_counter", lambda: now[0])
+    monkeypatch.setattr(loop, "call_later", rest)
+    for name in "abc":
+        clock.in_turn(partial(work, name), first=name == "c")
+    await _until(lambda: len(done) == 3)
+    assert done == ["c", "a", "b"]
+    assert later == ([REST] * 2 if rests else [])
 
 
 def test_longer_work_is_done_at_once_in_lockstep() -> None:

@@ -23,6 +23,8 @@ YIELD_AFTER = 0.5  # s of lockstep time
 ROUNDS_MAX = 200  # of the event loop
 LEAD = 0.1  # s by which a patient clock may be ahead of the world
 STANDING = 0.002  # real s between two checks of a patient clock that stands still
+WORK, REST = 0.003, 0.001  # real s of jobs after which the loop has so long for other things
+PATIENCE = 0.02  # real s that a job may wait where there are rests
 LOCKSTEP_EPOCH = 1_767_225_600.0  # 2026-01-01T00:00:00Z: lockstep traces contain no real date
 
 
@@ -69,7 +71,9 @@ class RealClock(Clock):
         self._until = math.inf  # robot time at which the clock stops
         self._timers: set[_RealTimer] = set()
         self._speed = 1.0
-        self._jobs: deque[Callable[[], None]] = deque()
+        self._jobs: deque[tuple[float, Callable[[], None]]] = deque()  # with the instant since which each waits
+        self._turn: asyncio.Handle | None = None  # of the next of them, or of the one under way
+        self._worked = 0.0  # s of jobs since the last rest
         self.set_speed(speed)
 
     @property
@@ -94,19 +98,37 @@ class RealClock(Clock):
         self._timers.add(timer)
         return timer
 
-    def in_turn(self, job: Callable[[], None]) -> None:
-        self._jobs.append(partial(copy_context().run, job))
-        if len(self._jobs) == 1:
-            asyncio.get_running_loop().call_soon(self._next_job)
+    def in_turn(self, job: Callable[[], None], *, first: bool = False) -> None:
+        entry = time.perf_counter(), partial(copy_context().run, job)
+        if first:
+            self._jobs.appendleft(entry)
+        else:
+            self._jobs.append(entry)
+        if self._turn is None:
+            self._arm()
+
+    def _arm(self) -> None:
+        """Have the next job done: at once, or after a rest in which requests of several steps are answered.
+
+        There is none for one who has waited long, and none where time is to pass faster than outside.
+        """
+        loop, rests = asyncio.get_running_loop(), self._worked >= WORK and self._speed <= 1.0
+        if rests and time.perf_counter() - min(self._jobs[0][0], self._jobs[-1][0]) < PATIENCE:
+            self._worked = 0.0
+            self._turn = loop.call_later(REST, self._next_job)
+        else:
+            self._turn = loop.call_soon(self._next_job)
 
     def _next_job(self) -> None:
         """Do one of them; the loop sees to its sockets before the next."""
+        began = time.perf_counter()
         try:
-            self._jobs[0]()
+            self._jobs.popleft()[1]()
         finally:
-            self._jobs.popleft()
+            self._worked += time.perf_counter() - began
+            self._turn = None
             if self._jobs:
-                asyncio.get_running_loop().call_soon(self._next_job)
+                self._arm()
 
     def set_speed(self, speed: float) -> None:
         """Run ``speed`` times as fast as real time from now on. Raises ValueError unless it is above 0."""

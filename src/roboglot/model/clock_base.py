@@ -48,8 +48,11 @@ class Clock(ABC):
         """Have something happen that comes from outside. Lockstep robots learn of it when they have come to rest."""
         happening()
 
-    def in_turn(self, job: Callable[[], None]) -> None:
-        """Do a longer piece of work: at once, or soon where time passes by itself, when others have had their turn."""
+    def in_turn(self, job: Callable[[], None], *, first: bool = False) -> None:  # noqa: ARG002 - nothing waits here
+        """Do a longer piece of work: at once, or soon where time passes by itself, when others have had their turn.
+
+        ``first``: before all others that wait.
+        """
         job()
 
     def hold(self, work: object, seconds: float = HOLD_MAX) -> None:  # noqa: B027 - time that passes waits for nothing

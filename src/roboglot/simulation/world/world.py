@@ -217,10 +217,15 @@ class World:
         return self._origin + (self._ticks + 1) * TICK
 
     def _beat(self) -> None:
+        self._clock.in_turn(self._advance, first=True)
+
+    def _advance(self) -> None:
         """Do a tick that is due; others get their turn before the next one, even if it is due as well.
 
         A machine that is too slow skips robot time instead of running after it.
         """
+        if self._timer is None:
+            return  # closed
         due = int((self._clock.time() - self._origin) / TICK + 1e-6) - self._ticks
         if due > BEHIND_MAX:
             self._origin += (due - 1) * TICK
