@@ -3,7 +3,7 @@ import * as Blockly from "blockly";
 import { effect, signal } from "@preact/signals";
 import { kept, keysUnder, language, say, t, theme as shade } from "../base.js";
 import { defineModule, newId, pythonOf } from "./blocks.js";
-import { together } from "./speed.js";
+import { inject, together } from "./speed.js";
 import { found, noteUse, recentBlocks, theme, toolbox, wanted } from "./toolbox.js";
 
 export const look = kept("studio.look", "plain");
@@ -35,7 +35,7 @@ export function remake() {
   Blockly.setLocale(Blockly.messages[language.value] ?? Blockly.messages.en);
   Blockly.Msg.PROCEDURES_HUE = "#a33b5e";
   for (const key of keysUnder("blockly.")) Blockly.Msg[key] = t(`blockly.${key}`); // which Blockly has in English only
-  workspace = Blockly.inject(place, {
+  workspace = inject(place, {
     toolbox: toolbox(modules.value.flatMap(defineModule), allowed), renderer: "zelos", theme: theme(look.value), media: "/studio/vendor/media/", sounds: false,
     trashcan: true, comments: true, maxTrashcanContents: 20, move: { scrollbars: true, drag: true, wheel: true },
     zoom: { controls: true, wheel: false, pinch: true, startScale: place.clientWidth < 600 ? 0.65 : 0.8, maxScale: 2, minScale: 0.3 },
@@ -89,7 +89,7 @@ export function load(state, fresh = true) {
   const group = Blockly.Events.getGroup();
   try {
     Blockly.Events.setRecordUndo(false);
-    together(() => Blockly.serialization.workspaces.load(tidied(state), workspace));
+    together(workspace, () => Blockly.serialization.workspaces.load(tidied(state), workspace));
   } finally {
     Blockly.Events.setRecordUndo(true);
     Blockly.Events.setGroup(group);
@@ -132,7 +132,7 @@ export function showModules() { if (workspace) workspace.updateToolbox(toolbox(m
 
 /** Blocks to look at, in `element`. @param {HTMLElement} element @param {any} state */
 export function picture(element, state) {
-  const made = Blockly.inject(element, { readOnly: true, renderer: "zelos", theme: theme(look.value), media: "/studio/vendor/media/", sounds: false,
+  const made = inject(element, { readOnly: true, renderer: "zelos", theme: theme(look.value), media: "/studio/vendor/media/", sounds: false,
     move: { scrollbars: true, drag: true }, zoom: { controls: false, startScale: 0.65 } });
   Blockly.serialization.workspaces.load(state, made);
   return made;
