@@ -205,6 +205,6 @@ async def test_a_door_without_a_way_is_named(tmp_path: Path) -> None:
         recording = Recording(tmp_path)
         request = ("vda5050", "broker:1883", "", Direction.REQUEST, "order", b"{}")
         recording.exchanges.append(Exchange(0.1, "a", *request))
-        inputs = Inputs(recording, session.clock, lambda _robot, _door: None, lambda _given: asyncio.sleep(0))
+        inputs = Inputs(recording, session.clock, lambda _place: None, lambda _given: asyncio.sleep(0))
         await inputs.play(0.2)
     assert inputs.unheard == ["a client of vda5050, whose messages cannot be repeated, at 0.100"]

@@ -26,8 +26,8 @@ LOOK = 0.0005  # real s between two checks
 HANDED_ON = ("ipv4:", "ipv6:", "unix:")  # prefixes of the names of gRPC connections
 AT_ONCE = 1e-9  # s of robot time
 DRAINED = (TextLine, FrameLine, FoxgloveLine)  # connections of which answers are read, and not waited for
-Where = Callable[[str, str], Line | None]  # robot and door
 Place = tuple[str, str, str]  # robot, door, the client's end
+Where = Callable[[Place], Line | None]
 Key = tuple[str, str, str]  # robot, door, and what is heard
 Repeat = Callable[[Input], Awaitable[object]]
 
@@ -42,7 +42,7 @@ def is_of_client(exchange: Exchange) -> bool:
 class Inputs:
     """Plays the inputs of a recording.
 
-    ``where`` returns a new connection to a robot's door, not yet open, None where there is no way to repeat one;
+    ``where`` returns a new connection to a robot's door, not yet open, as that client had; None where none can be made;
     ``repeat`` does what one other input says.
     """
 
@@ -171,7 +171,7 @@ class Inputs:
         if (line := self._lines.get(place)) is not None:
             return line
         robot, door, _ = place
-        if (line := self._where(robot, door)) is None:
+        if (line := self._where(place)) is None:
             self._miss(f"a client of {door}, whose messages cannot be repeated,", stamp)
             return None
         line.clock = RealClock()
@@ -186,6 +186,7 @@ class Inputs:
         self._lines[place] = line
         if isinstance(line, DRAINED):
             self._follow(line.drain())
+        if isinstance(line, DRAINED) and line.comes:
             await self._wait_for({(robot, door, outside.CAME): came + 1})
         return line
 

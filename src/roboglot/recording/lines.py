@@ -49,7 +49,12 @@ def status_of(door: str, payload: bytes) -> str:
 
 
 class Line(ABC):
-    """``open`` and ``close`` it; ``ask`` sends one request and returns the answers. Raises ClientError."""
+    """``open`` and ``close`` it; ``ask`` sends one request and returns the answers. Raises ClientError.
+
+    ``comes``: the robot notices when it is opened. ``own``: the address of this machine that it comes from; empty: any.
+    """
+
+    comes, own = True, ""
 
     def __init__(self, host: str, port: int, clock: Clock, pushed: Pushed) -> None:
         self.host, self.port, self.clock, self.pushed = host, port, clock, pushed
@@ -91,7 +96,8 @@ class TextLine(Line):
 
     async def open(self) -> None:
         try:
-            connecting = asyncio.open_connection(self.host, self.port, limit=LINE_MAX)
+            local = (self.own, 0) if self.own else None
+            connecting = asyncio.open_connection(self.host, self.port, limit=LINE_MAX, local_addr=local)
             self._reader, self._writer = await self.clock.wait_for(connecting, PATIENCE)
         except (OSError, TimeoutError) as error:
             raise LinkLost(f"{self.host}:{self.port} cannot be reached: {error}") from None

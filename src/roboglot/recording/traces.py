@@ -21,6 +21,7 @@ LEFT_OUT = frozenset({"/log"})  # log lines contain ports
 COMING = frozenset({CAME, GONE})  # inputs that a rerun gives by itself, and reports where it cannot
 SAID = ("roboglot.Exchange", "roboglot.Input")
 ADDRESS = re.compile(rb"((?:\d{1,3}\.){3}\d{1,3}|[0-9a-f]*:[0-9a-f:.]+):\d{1,5}(?!\d)")
+HERE = b"127.0.0.1"  # where a rerun's clients are
 UNCOUNTED = ("connection", "client", "turn")  # of exchanges and inputs: ends of clients, and a visible order
 
 
@@ -77,19 +78,29 @@ def _counts(record: Record) -> bool:
 
 
 class _Ends:
-    """Clients' addresses so far; their ports are the machine's choice, also where they stand in actions' sources."""
+    """Clients' addresses so far, also where they stand in actions' sources.
+
+    Their ports are the machine's choice, and clients of other machines are this one's in a rerun.
+    """
 
     def __init__(self) -> None:
         self._seen: set[bytes] = set()
+        self._hosts: set[bytes] = set()
+        self._elsewhere: re.Pattern[bytes] | None = None
 
     def note(self, record: Record) -> None:
         """Remember its sender."""
         if record.schema in SAID and (found := ADDRESS.search(str(record.json()["connection"]).encode())):
             self._seen.add(found[0])
+            if found[1] != HERE and found[1] not in self._hosts:
+                self._hosts.add(found[1])
+                names = b"|".join(re.escape(host) for host in sorted(self._hosts, key=len, reverse=True))
+                self._elsewhere = re.compile(rb"(?<![\w.:])(?:" + names + rb")(?![\w.:])")
 
-    def without_ports(self, data: bytes) -> bytes:
+    def without(self, data: bytes) -> bytes:
         """Return JSON without them."""
-        return ADDRESS.sub(lambda found: found[1] if found[0] in self._seen else found[0], data)
+        data = ADDRESS.sub(lambda found: found[1] if found[0] in self._seen else found[0], data)
+        return data if self._elsewhere is None else self._elsewhere.sub(HERE, data)
 
 
 def _stream(record: Record) -> tuple[str, str, str]:
@@ -107,11 +118,11 @@ def _bytes(record: Record, ends: _Ends) -> bytes:
     if not record.schema.startswith("roboglot."):
         return record.data
     if record.schema not in SAID:
-        return ends.without_ports(record.data)
+        return ends.without(record.data)
     value: dict[str, object] = record.json()
     for name in UNCOUNTED:
         value.pop(name, None)
-    return ends.without_ports(json.dumps(value, sort_keys=True).encode())
+    return ends.without(json.dumps(value, sort_keys=True).encode())
 
 
 def _words(message: tuple[str, int, bytes] | None) -> str:

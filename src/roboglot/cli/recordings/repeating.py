@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
+import os
 from collections.abc import Mapping, Sequence
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from roboglot.console import desk, program_runs, teleop
@@ -15,7 +18,8 @@ from roboglot.model.inputs.outside import ANSWER, Input
 from roboglot.operations import BadParameters
 from roboglot.programs.errors import ProgramError
 from roboglot.protocols import lease_desk
-from roboglot.recording.lines import Answers, Line
+from roboglot.protocols.robomaster.ports import pilot_port
+from roboglot.recording.lines import Answers, Line, TextLine
 
 if TYPE_CHECKING:
     from roboglot.protocols.ros2.server import Ros2Door
@@ -39,6 +43,37 @@ class Ros2Line(Line):
 
     async def close(self) -> None:
         """Do nothing."""
+
+
+class SerialTextLine(TextLine):
+    """A client at the end of a serial line."""
+
+    comes = False  # the line itself is the robot's client, from its start on
+
+    def __init__(self, link: Path) -> None:
+        self._link = link
+
+    async def open(self) -> None:
+        """Open the terminal. Raises OSError."""
+        self._end = os.open(self._link, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        self._closed = asyncio.Event()
+
+    async def ask(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:  # noqa: ARG002
+        """Send one command; its answer is drained."""
+        os.write(self._end, payload.rstrip(b" ;") + b";")
+        return []
+
+    async def drain(self) -> None:
+        """Read and discard what the robot says."""
+        loop = asyncio.get_running_loop()
+        loop.add_reader(self._end, os.read, self._end, 1 << 16)
+        await self._closed.wait()
+
+    async def close(self) -> None:
+        """Close this end."""
+        asyncio.get_running_loop().remove_reader(self._end)
+        os.close(self._end)
+        self._closed.set()
 
 
 class Repeater:
@@ -87,6 +122,8 @@ class Repeater:
                 teleop.Pad(self._robots[given.robot], values["source"]).move(*shares)
             case teleop.PAD:
                 teleop.Pad(self._robots[given.robot], values["source"]).let_go(values["why"])
+            case pilot_port.PILOT:
+                pilot_port.do_again(self._robots[given.robot], given)
             case lease_desk.LEASE:
                 request = lease_desk.Request(given.name, given.robot, values["who"])  # type: ignore[arg-type]
                 await self._runtime.leases.do(request, self._robots[given.robot])

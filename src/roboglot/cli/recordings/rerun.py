@@ -18,12 +18,14 @@ from roboglot.hosting.visible import visible
 
 if TYPE_CHECKING:
     from roboglot.config import Config
+    from roboglot.recording.inputs import Place
     from roboglot.recording.lines import Line
     from roboglot.recording.reader import Recording
     from roboglot.runtime import Runtime
 
 NEW = "rerun.mcap"
 BEGIN_MAX = 0.001  # s of robot time at which a recording begins at the latest
+LOOPBACK = "127."
 KEPT = "kept"  # the fact "data" of a recording whose robots had stored things when they started
 
 
@@ -86,7 +88,7 @@ def configuration(recording: Recording, folder: Path) -> Config:
     if why := _why_not(recording, config):
         raise NoRerun(why)
     record = dataclasses.replace(config.record, to=str(folder / NEW), ring=False)
-    console, doors = ConsoleConfig(enabled=False), _alone(config.doors)
+    console, doors = ConsoleConfig(enabled=False), _alone(config.doors, folder)
     return dataclasses.replace(config, record=record, console=console, database="", registry="", doors=doors)
 
 
@@ -106,10 +108,14 @@ def _why_not(recording: Recording, config: Config) -> str:
     return ""
 
 
-def _alone(doors: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the doors' settings without the ROS 2 routers that they dial: a rerun meets no one else."""
-    ros2 = doors.get("ros2")
-    return doors if ros2 is None else {**doors, "ros2": dataclasses.replace(ros2, connect=())}
+def _alone(doors: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
+    """Return the doors' settings for a rerun that meets no one else: no ROS 2 routers, serial lines in ``folder``."""
+    own = dict(doors)
+    if (ros2 := doors.get("ros2")) is not None:
+        own["ros2"] = dataclasses.replace(ros2, connect=())
+    if (text := doors.get("robomaster")) is not None and text.uart:
+        own["robomaster"] = dataclasses.replace(text, uart=str(folder / "uart"))
+    return own
 
 
 def reasons(recording: Recording) -> list[str]:
@@ -137,7 +143,7 @@ async def run(recording: Recording, config: Config) -> list[str]:
     runtime = Runtime(config)
     assert isinstance(runtime.clock, LockstepClock)
     repeat = Repeater(runtime)
-    inputs = Inputs(recording, runtime.clock, lambda robot, door: _line(runtime, robot, door), repeat)
+    inputs = Inputs(recording, runtime.clock, lambda place: _line(runtime, place), repeat)
     for robot in runtime.fleet.robots.values():
         robot.tap.listen(inputs.hear)
         robot.outside.listen(inputs.notice)
@@ -151,22 +157,27 @@ async def run(recording: Recording, config: Config) -> list[str]:
     return inputs.unheard
 
 
-def _line(runtime: Runtime, robot: str, door: str) -> Line | None:
+def _line(runtime: Runtime, place: Place) -> Line | None:
     """Return a connection to a door, by its own port; None where no client of its kind can be repeated."""
-    from roboglot.cli.recordings.repeating import Ros2Line
+    from roboglot.cli.recordings.repeating import Ros2Line, SerialTextLine
     from roboglot.model.clock import RealClock
+    from roboglot.protocols.robomaster.ports.serial_line import SERIAL
     from roboglot.recording.lines import LINES, PORTS, DogLine, FoxgloveLine
 
-    config = runtime.config
+    config, (robot, door, client) = runtime.config, place
     host = next(one.address for one in config.robots if one.name == robot)
     section = config.doors.get(door)
     if door == "ros2":
         return Ros2Line(runtime.doors[robot])
+    if door == "robomaster" and client.startswith(SERIAL):
+        return SerialTextLine(Path(f"{getattr(section, 'uart', '')}-{robot}"))
     kind: type[Line] | None = FoxgloveLine if door == "foxglove" else LINES.get(door)
     if kind is None:
         return None
     port = getattr(section, "control_port" if door == "robomaster" else "port", PORTS.get(door, 0))
     line = kind(host, port, RealClock(), lambda _operation, _data: None)
+    if client.startswith(LOOPBACK):  # pushes go to each host with a client
+        line.own = client.rpartition(":")[0]
     if isinstance(line, DogLine):  # no app: its answers are in the recording
         line.options = {} if getattr(section, "plaintext", False) else {"certs": str(_certificates(config))}
     return line

@@ -23,7 +23,7 @@ from roboglot.protocols.robomaster.ports.discovery import announce
 from roboglot.protocols.robomaster.ports.event_port import Readers
 from roboglot.protocols.robomaster.ports.media_port import MediaPort
 from roboglot.protocols.robomaster.ports.pilot_port import Pilots
-from roboglot.protocols.robomaster.ports.serial_line import LINE_END, SerialLine
+from roboglot.protocols.robomaster.ports.serial_line import LINE_END, SERIAL, SerialLine
 from roboglot.protocols.robomaster.table import implemented, key_of
 from roboglot.wire.robomaster.replies import PROFILES
 
@@ -145,7 +145,7 @@ class RoboMasterDoor:
         """A datagram to the client's host, from the robot's own address; or down the serial line."""
         place, admission = f"{host}:{self._config.push_port}", self.context.robot.admission
         self._note(datagram, place)
-        if self._serial and host == str(self._serial_link):
+        if self._serial and host == SERIAL:
             self._serial.write(datagram + LINE_END)
         elif self._datagrams and admission.carries_datagrams(place):  # a tunnel takes its copies from the tap
             self._datagrams.send(datagram, host, self._config.push_port)

@@ -13,11 +13,14 @@ from typing import cast
 
 from roboglot.model.components.interaction.input_device import InputDevice, MouseButton
 from roboglot.model.errors import InvalidGoal, RobotError
+from roboglot.model.inputs.outside import Input
 from roboglot.model.robot import Robot
 from roboglot.protocols.robomaster.limits import PILOT_LINE_MAX, PILOTS_MAX
 from roboglot.protocols.robomaster.strangers import Greeting, turn_away_strangers
 
 Act = Callable[[InputDevice, Sequence[str]], None]
+PILOT = "pilot"  # the kind of these inputs in a recording
+LINE, LET_GO = "line", "let go"
 
 
 def _press(device: InputDevice, words: Sequence[str]) -> None:
@@ -79,25 +82,45 @@ class _Pilot(asyncio.Protocol):
             return
         *lines, self._tail = (self._tail + turn_away_strangers(self._greeting, self.transport, data)).split(b"\n")
         for line in lines:
-            self.transport.write(f"{self._do(line.decode(errors='replace').split())}\n".encode())
+            self.transport.write(f"{self._do(line.decode(errors='replace'))}\n".encode())
         if len(self._tail) > PILOT_LINE_MAX or self.transport.get_write_buffer_size() > PILOT_LINE_MAX:
             self.transport.abort()
 
     def connection_lost(self, _exc: Exception | None) -> None:
         if self.transport in self._pilots.transports:
             self._pilots.transports.discard(self.transport)
-            if InputDevice in self._pilots.robot:
-                device = self._pilots.robot[InputDevice]
-                _release(device, device.state.keys)
-                device.click()
-                device.move_mouse(0.0, 0.0)
+            _let_go(self._pilots.robot)
 
-    def _do(self, words: Sequence[str]) -> str:
+    def _do(self, text: str) -> str:
         try:
-            act = ACTS[words[0]] if words and words[0] in ACTS else None
-            if act is None:
-                raise InvalidGoal(f"it is one of {', '.join(ACTS)}")
-            act(self._pilots.robot[InputDevice], words[1:])
+            _act(self._pilots.robot, text)
         except (RobotError, ValueError) as error:
             return f"error: {error}"
         return "ok"
+
+
+def do_again(robot: Robot, noted: Input) -> None:
+    """Do what a pilot did. Raises what that raised."""
+    if noted.name == LET_GO:
+        _let_go(robot)
+    else:
+        _act(robot, str(noted.values["text"]))
+
+
+def _act(robot: Robot, text: str) -> None:
+    words = text.split()
+    act = ACTS[words[0]] if words and words[0] in ACTS else None
+    if act is None:
+        raise InvalidGoal(f"it is one of {', '.join(ACTS)}")
+    with robot.outside.noting(PILOT, LINE, {"text": text}):
+        act(robot[InputDevice], words[1:])
+
+
+def _let_go(robot: Robot) -> None:
+    """Let go of everything."""
+    if InputDevice in robot:
+        device = robot[InputDevice]
+        with robot.outside.noting(PILOT, LET_GO, {}):
+            _release(device, device.state.keys)
+            device.click()
+            device.move_mouse(0.0, 0.0)

@@ -15,6 +15,7 @@ from pathlib import Path
 from roboglot.protocols.robomaster.limits import OUTPUT_MAX
 
 READ_MAX = 4096  # bytes at a time
+SERIAL = "serial line"  # the host of a client there
 LINE_END = b"\n"
 
 
@@ -22,7 +23,7 @@ class SerialLine(asyncio.Transport):
     """A transport over the terminal's master side, for a protocol as on the control port; raises OSError."""
 
     def __init__(self, link: Path, protocol: Callable[[], asyncio.Protocol]) -> None:
-        super().__init__({"peername": (str(link), 0)})
+        super().__init__({"peername": (SERIAL, 0)})
         self._link = link
         self._master, slave = os.openpty()
         tty.setraw(slave)
