@@ -282,14 +282,16 @@ async def test_longer_work_gives_others_their_turn() -> None:
     assert [type(failure) for failure in failures] == [ZeroDivisionError]  # the next one had its turn all the same
 
 
-@pytest.mark.parametrize(("speed", "waits", "rests"), [(1.0, 0.0, True), (4.0, 0.0, False), (1.0, PATIENCE, False)])
-async def test_loop_rests_between_long_work(monkeypatch, speed: float, waits: float, rests: bool) -> None:
+@pytest.mark.parametrize(
+    ("speed", "seconds", "rests"), [(1.0, WORK, 2), (1.0, 0.6 * WORK, 1), (1.0, 2 * PATIENCE, 2), (4.0, WORK, 0)]
+)
+async def test_loop_rests_between_long_work(monkeypatch, speed: float, seconds: float, rests: int) -> None:
     clock, loop, done, now = RealClock(speed), asyncio.get_running_loop(), list[str](), [0.0]
     later: list[float] = []
 
     def work(name: str) -> None:
         done.append(name)
-        now[0] += WORK + waits
+        now[0] += seconds
 
     def rest(delay: float, job: Callable[[], None]) -> asyncio.Handle:
         later.append(delay)
@@ -301,7 +303,7 @@ async def test_loop_rests_between_long_work(monkeypatch, speed: float, waits: fl
         clock.in_turn(partial(work, name), first=name == "c")
     await _until(lambda: len(done) == 3)
     assert done == ["c", "a", "b"]
-    assert later == ([REST] * 2 if rests else [])
+    assert later == [REST] * rests
 
 
 def test_longer_work_is_done_at_once_in_lockstep() -> None:

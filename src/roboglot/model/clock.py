@@ -24,7 +24,7 @@ ROUNDS_MAX = 200  # of the event loop
 LEAD = 0.1  # s by which a patient clock may be ahead of the world
 STANDING = 0.002  # real s between two checks of a patient clock that stands still
 WORK, REST = 0.003, 0.001  # real s of jobs after which the loop has so long for other things
-PATIENCE = 0.02  # real s that a job may wait where there are rests
+PATIENCE, LONG_WORK = 0.02, 0.012  # real s after which a job has waited long; in place of WORK then
 LOCKSTEP_EPOCH = 1_767_225_600.0  # 2026-01-01T00:00:00Z: lockstep traces contain no real date
 
 
@@ -110,10 +110,10 @@ class RealClock(Clock):
     def _arm(self) -> None:
         """Have the next job done: at once, or after a rest in which requests of several steps are answered.
 
-        There is none for one who has waited long, and none where time is to pass faster than outside.
+        Rests are fewer while a job has waited long, and there are none where time is to pass faster than outside.
         """
-        loop, rests = asyncio.get_running_loop(), self._worked >= WORK and self._speed <= 1.0
-        if rests and time.perf_counter() - min(self._jobs[0][0], self._jobs[-1][0]) < PATIENCE:
+        loop, waited = asyncio.get_running_loop(), time.perf_counter() - min(self._jobs[0][0], self._jobs[-1][0])
+        if self._worked >= (WORK if waited < PATIENCE else LONG_WORK) and self._speed <= 1.0:
             self._worked = 0.0
             self._turn = loop.call_later(REST, self._next_job)
         else:
