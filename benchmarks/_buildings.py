@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from roboglot.autonomy.slam.evidence import EvidenceGrid
 from roboglot.autonomy.slam.painting import paint
@@ -59,11 +60,12 @@ class Building:
         assert scan is not None
         return scan
 
-    def floor(self, grid: EvidenceGrid) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    def floor(self, grid: EvidenceGrid) -> npt.NDArray[np.float64]:
         """Places (n, 2; m) on known floor where the hull has room."""
         room = distances((grid.evidence >= 0).astype(np.uint8), 20.0) * 0.05
         rows, columns = np.nonzero(room > self.fleet.robots["a"].description.radius + MARGIN)
-        return (np.stack([columns, rows], axis=1) + 0.5) * 0.05 + (grid.corner.x, grid.corner.y)
+        cells = np.stack([columns, rows], axis=1).astype(np.float64)
+        return (cells + 0.5) * 0.05 + (grid.corner.x, grid.corner.y)
 
     async def survey(self, east: float = math.inf) -> EvidenceGrid:
         """A map of all that can be reached without going farther ``east`` (m from the start)."""

@@ -25,7 +25,7 @@ PATIENCE = 30.0  # s
 
 
 class Page(BaseHTTPRequestHandler):
-    """GET / is the page; POST /offer answers an offer; POST /seen is what the page saw so far."""
+    """GET / is the page; POST /offer answers an offer; POST /seen reports what the page saw so far."""
 
     def __init__(self, dog: CyberDogClient, loop: asyncio.AbstractEventLoop, seen: list[Any], *args: Any) -> None:
         self.dog, self.loop, self.seen = dog, loop, seen
@@ -40,12 +40,12 @@ class Page(BaseHTTPRequestHandler):
     def do_POST(self) -> None:
         try:
             length = max(0, min(BODY_MAX, int(self.headers["Content-Length"] or 0)))
-            told = json.loads(self.rfile.read(length))
+            body = json.loads(self.rfile.read(length))
             if self.path == "/seen":
-                self.seen.append(told)
+                self.seen.append(body)
                 answer = {}
             else:
-                uid, sdp = told["uid"], told["sdp"]
+                uid, sdp = body["uid"], body["sdp"]
                 asking = asyncio.run_coroutine_threadsafe(self.dog.negotiate(uid, sdp), self.loop)
                 answer = {"sdp": asking.result(PATIENCE)}
         except (ValueError, KeyError, TypeError):
@@ -67,7 +67,7 @@ class Page(BaseHTTPRequestHandler):
 
 
 def serve(dog: CyberDogClient, port: int, seen: list[Any]) -> ThreadingHTTPServer:
-    """The page at 127.0.0.1, in threads of its own; ``shutdown`` ends it. What the pages saw is added to ``seen``."""
+    """The page at 127.0.0.1, in threads of its own; ``shutdown`` ends it. Reports of the pages are added to ``seen``."""
     server = ThreadingHTTPServer(("127.0.0.1", port), partial(Page, dog, asyncio.get_running_loop(), seen))
     threading.Thread(target=server.serve_forever, daemon=True).start()
     return server

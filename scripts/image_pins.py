@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import sys
+from collections.abc import Set
 from pathlib import Path
 
 from packaging.markers import Marker, default_environment
@@ -12,8 +13,10 @@ from packaging.markers import Marker, default_environment
 
 def pins(lock: str, python: str) -> str:
     """Return the lines without markers, those that do not count left out."""
-    about = dict(default_environment()) | {"python_version": python, "python_full_version": f"{python}.0"}
-    about |= {
+    about: dict[str, str | Set[str]] = {
+        **{name: str(value) for name, value in default_environment().items()},
+        "python_version": python,
+        "python_full_version": f"{python}.0",
         "sys_platform": "linux",
         "platform_system": "Linux",
         "os_name": "posix",

@@ -59,7 +59,7 @@ class Hands:
 
     def press_call_button(self, place: str) -> None:
         """Call the robot to a place."""
-        self._server.call(self._server.robot[Industry].call, CallKind.PLAIN, place)
+        self._server.loop.run(self._server.robot[Industry].call, CallKind.PLAIN, place)
 
 
 def example() -> ModuleType:

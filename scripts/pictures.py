@@ -90,9 +90,9 @@ async def until_done(clock: LockstepClock, action: Action, watch: Callable[[], o
 
 async def scan(fleet: Fleet, clock: LockstepClock, folder: Path) -> None:
     """One scan over the true floor plan."""
-    fleet.world.place("a", Pose(12.0, 9.8, math.radians(20)))
+    fleet.world.hands.place("a", Pose(12.0, 9.8, math.radians(20)))
     await clock.advance(3.0)
-    here, seen = fleet.world.pose_of("a"), fleet.robots["a"][Lidar].scan
+    here, seen = fleet.world.truth.pose_of("a"), fleet.robots["a"][Lidar].scan
     assert seen is not None
     plan = Plan(fleet, (4.0, 4.0), (22.0, 16.0), 55)
     plan.walls()
@@ -102,7 +102,7 @@ async def scan(fleet: Fleet, clock: LockstepClock, folder: Path) -> None:
         for r, a in zip(seen.ranges[good].tolist(), seen.angles[good].tolist(), strict=True)
     ]
     plan.dots(ends, RED)
-    plan.dots([(pose.x, pose.y) for floor, pose in fleet.world.people if floor == 0], GOLD, 9)
+    plan.dots([(pose.x, pose.y) for floor, pose in fleet.world.truth.people if floor == 0], GOLD, 9)
     plan.robot(here, BLUE)
     plan.legend((RED, "what the lidar says"), (GOLD, "people"), (BLUE, "the robot"), (WALL, "the world"))
     plan.save(folder / "sim-scan.png")
@@ -110,12 +110,12 @@ async def scan(fleet: Fleet, clock: LockstepClock, folder: Path) -> None:
 
 async def mapped(fleet: Fleet, clock: LockstepClock, folder: Path) -> None:
     """The map after a tour: what was measured, what odometry and localization believed, and the truth."""
-    robot, start = fleet.robots["a"], fleet.world.pose_of("a")
+    robot, start = fleet.robots["a"], fleet.world.truth.pose_of("a")
     tracks: dict[str, list[Spot]] = {"truth": [], "odometry": [], "believed": []}
 
     def watch() -> None:
         for name, pose in (
-            ("truth", fleet.world.pose_of("a")),
+            ("truth", fleet.world.truth.pose_of("a")),
             ("odometry", start.compose(robot[Odometry].reading.pose)),
             ("believed", start.compose(robot[Localization].pose)),
         ):
@@ -145,7 +145,7 @@ async def mapped(fleet: Fleet, clock: LockstepClock, folder: Path) -> None:
 async def sights(fleet: Fleet, clock: LockstepClock, folder: Path) -> None:
     """A picture, and the detectors' results on it."""
     robot, kinds = fleet.robots["a"], {"people": RED, "markers": BLUE, "tags": GREEN, "gestures": GOLD}
-    fleet.world.place("a", Pose(2.2, 3.4, math.radians(16)))
+    fleet.world.hands.place("a", Pose(2.2, 3.4, math.radians(16)))
     viewers = {kind: getattr(robot[Vision], kind).subscribe() for kind in kinds}
     await clock.advance(1.5)
     frame = await robot[Camera].capture()
@@ -164,10 +164,10 @@ async def sights(fleet: Fleet, clock: LockstepClock, folder: Path) -> None:
 
 async def shelf(fleet: Fleet, clock: LockstepClock, folder: Path) -> None:
     """A way under a shelf, by its legs."""
-    robot, start, track = fleet.robots["a"], fleet.world.pose_of("a"), list[Spot]()
+    robot, start, track = fleet.robots["a"], fleet.world.truth.pose_of("a"), list[Spot]()
 
     def watch() -> None:
-        track.append((fleet.world.pose_of("a").x, fleet.world.pose_of("a").y))
+        track.append((fleet.world.truth.pose_of("a").x, fleet.world.truth.pose_of("a").y))
 
     await clock.advance(1.0)
     (stand,) = fleet.world.building.shelves
@@ -177,7 +177,7 @@ async def shelf(fleet: Fleet, clock: LockstepClock, folder: Path) -> None:
         await clock.advance(0.1)
         watch()
         seen = robot[Lidar].scan
-        here = fleet.world.pose_of("a")
+        here = fleet.world.truth.pose_of("a")
     await until_done(clock, docking, watch)
     plan = Plan(fleet, (2.2, 4.2), (9.2, 8.0), 140)
     plan.walls()
@@ -191,7 +191,7 @@ async def shelf(fleet: Fleet, clock: LockstepClock, folder: Path) -> None:
     plan.pen.polygon([plan.at(corner.x, corner.y) for corner in board], outline=INK, fill="#f3ead8")
     plan.dots(ends, RED, 3)
     plan.line(track, BLUE, 4)
-    plan.robot(fleet.world.pose_of("a"), BLUE)
+    plan.robot(fleet.world.truth.pose_of("a"), BLUE)
     plan.legend((RED, "the scan that its legs were found in"), (BLUE, "the robot's way"), ("#f3ead8", "the shelf"))
     plan.save(folder / "sim-shelf.png")
 

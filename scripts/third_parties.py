@@ -26,9 +26,9 @@ def licence(package: str) -> str:
         about = metadata(package)
     except PackageNotFoundError:
         return ""
-    named = about.get("License-Expression") or ""
+    (named, *_) = about.get_all("License-Expression") or [""]
     classified = [c.rpartition(" :: ")[2] for c in about.get_all("Classifier") or () if c.startswith("License ::")]
-    lines = (about.get("License") or "").strip().splitlines()
+    lines = "".join(about.get_all("License") or ()).strip().splitlines()
     return named or ", ".join(classified) or (lines[0][:WORDS_MAX] if lines else "see the package")
 
 

@@ -41,6 +41,8 @@ SOURCES = sorted(p for p in (ROOT / "src").rglob("*.py") if not p.name.endswith(
 
 TESTS = sorted((ROOT / "tests").rglob("*.py"))
 
+TOOLS = sorted(path for folder in ("benchmarks", "scripts", "examples") for path in (ROOT / folder).rglob("*.py"))
+
 BY_PROGRAM = [ROOT / "docs" / name for name in ("capabilities.md", "coverage.md", "reference/programs.md")]
 PAGES = sorted(p for p in [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")] if p not in BY_PROGRAM)
 
@@ -118,7 +120,7 @@ def test_names_of_tests_are_short() -> None:
     assert {name for name in names if len(name.split("_")) - 1 > NAME_MAX} == set()
 
 
-@pytest.mark.parametrize("texts", [SOURCES, PAGES, TESTS], ids=["src", "docs", "tests"])
+@pytest.mark.parametrize("texts", [SOURCES, PAGES, TESTS, TOOLS], ids=["src", "docs", "tests", "tools"])
 def test_plain_words(texts: list[Path]) -> None:
     """The words of scripts/words.txt make a sentence be read twice; a few are data or another's own words."""
     words = [line.partition("->")[0] for line in (ROOT / "scripts" / "words.txt").read_text().splitlines()]
@@ -136,7 +138,7 @@ def docstrings(path: Path) -> Iterator[tuple[int, str]]:
             yield from [(node.body[0].lineno, text)] if text else []
 
 
-@pytest.mark.parametrize("files", [SOURCES, TESTS], ids=["src", "tests"])
+@pytest.mark.parametrize("files", [SOURCES, TESTS, TOOLS], ids=["src", "tests", "tools"])
 def test_docstrings_begin_with_verb_or_noun(files: list[Path]) -> None:
     """They name a thing or say what is done; a question or a subordinate clause has to be read twice."""
     found = [

@@ -90,5 +90,5 @@ async def main(robots: int, viewers: int, seconds: float) -> None:
 
 
 if __name__ == "__main__":
-    given = [float(text) for text in sys.argv[1:]]
-    asyncio.run(main(*(int(v) for v in (given + [25, 5][len(given) :])[:2]), given[2] if len(given) > 2 else 10.0))
+    robots, viewers, seconds = [*sys.argv[1:], *("25", "5", "10")[len(sys.argv) - 1 :]]
+    asyncio.run(main(int(robots), int(viewers), float(seconds)))

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import asyncio
 import statistics
-import sys
 import tempfile
 import time
 from collections.abc import Awaitable, Callable
+from functools import partial
 from pathlib import Path
 
 from _claim import Claims
@@ -36,10 +36,10 @@ PATIENCE = 2.0
 
 
 class Relay:
-    """Relay of a connection that notes when something that ``wanted`` finds goes to the robot."""
+    """Relay of a connection that notes when a certain message goes to the robot."""
 
     def __init__(self) -> None:
-        self._wanted: Callable[[bytes], bool] | None = None
+        self._wanted: tuple[bytes, ...] = ()
         self._seen: asyncio.Future[float] | None = None
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -60,15 +60,15 @@ class Relay:
     async def _pass(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, to_robot: bool) -> None:
         try:
             while data := await reader.read(1 << 16):
-                if to_robot and self._wanted and self._wanted(data) and self._seen and not self._seen.done():
+                if to_robot and self._seen and not self._seen.done() and all(part in data for part in self._wanted):
                     self._seen.set_result(time.perf_counter())
                 writer.write(data)
         except ConnectionError:
             pass
         writer.close()
 
-    async def until(self, wanted: Callable[[bytes], bool], send: Callable[[], None]) -> float:
-        """ms from ``send`` to what it causes."""
+    async def until(self, wanted: tuple[bytes, ...], send: Callable[[], None]) -> float:
+        """Return the ms from ``send`` until a message with all of ``wanted`` goes to the robot."""
         self._wanted, self._seen = wanted, asyncio.get_running_loop().create_future()
         start = time.perf_counter()
         send()
@@ -85,9 +85,7 @@ async def text_latency(relay: Relay, host: str, port: int) -> float:
     for number in range(ROUNDS):
         speed = 0.1 if number % 2 else -0.1
         wanted = f"chassis speed x {speed:g}".encode()
-        taken.append(
-            await relay.until(lambda data, w=wanted: w in data, lambda w=wanted: writer.write(w + b" y 0 z 0;"))
-        )
+        taken.append(await relay.until((wanted,), partial(writer.write, wanted + b" y 0 z 0;")))
         await reader.readuntil(b";")
         await asyncio.sleep(0.03)
     writer.write(b"quit;")
@@ -104,12 +102,7 @@ async def rest_latency(relay: Relay, host: str, port: int) -> float:
         direction = f'"direction":{number % 2}'.encode()
         body = b'{"action_name":"slamtec.agent.actions.MoveByAction","options":{%s,"duration":300}}' % direction
         head = b"POST /api/core/motion/v1/actions HTTP/1.1\r\nhost: x\r\ncontent-length: %d\r\n\r\n" % len(body)
-        request = head + body
-        taken.append(
-            await relay.until(
-                lambda data, d=direction: b"/actions " in data and d in data, lambda r=request: writer.write(r)
-            )
-        )
+        taken.append(await relay.until((b"/actions ", direction), partial(writer.write, head + body)))
         answer = await reader.readuntil(b"\r\n\r\n")
         length = int(answer.lower().partition(b"content-length: ")[2].split(b"\r")[0])
         await reader.readexactly(length)
@@ -241,4 +234,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

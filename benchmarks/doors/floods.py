@@ -77,7 +77,7 @@ def main(count: int) -> None:
                 quiet = latencies(None)
                 busy.kill()
             usual = quiet[int(0.99 * len(quiet))]
-            print(f"nobody floods, a core is busy: p99 {usual:.2f} ms of {len(quiet)} requests")
+            print(f"no flood, a core is busy: p99 {usual:.2f} ms of {len(quiet)} requests")
             for flood in (*FLOODS, *(BY_TOOLS if shutil.which("openssl") else ())):
                 before = robot.resident_megabytes
                 command = [sys.executable, "-m", "tests.access.floods", flood, ADDRESS, str(count), str(phone)]

@@ -1,4 +1,4 @@
-"""What the recording proxy adds to an answer, by turns with and without it: Slamware, RoboMaster, programs, CyberDog.
+"""Delay that the recording proxy adds to an answer of each vendor's door, in turns with and without it.
 
 A CyberDog is asked over TLS, with certificates at both ends, and without. Robot, proxy and client are processes of
 their own, as they are in use; the robot's time stands still, so that no simulated world is in the figures.

@@ -75,10 +75,10 @@ async def measure(robot: ServedRobot, pupils: list[Pupil], seconds: float) -> tu
         cpu, began, pushes = robot.cpu_seconds, time.perf_counter(), sum(pupil.pushes for pupil in pupils)
         await asyncio.sleep(seconds - 2)
         spent = time.perf_counter() - began
-        told = sum(pupil.pushes for pupil in pupils) - pushes
-        return (robot.cpu_seconds - cpu) / spent, told / len(pupils) / PUSHES / spent
+        received = sum(pupil.pushes for pupil in pupils) - pushes
+        return (robot.cpu_seconds - cpu) / spent, received / len(pupils) / PUSHES / spent
 
-    used, *_ = await asyncio.gather(processor(), *(pupil.run(seconds) for pupil in pupils))
+    used, _ = await asyncio.gather(processor(), asyncio.gather(*(pupil.run(seconds) for pupil in pupils)))
     return used
 
 

@@ -86,7 +86,7 @@ class Connection(asyncio.Protocol):
 
 async def ask(address: str, port: int, path: str, seconds: float) -> Load:
     """Ask for ``path`` on all connections, as fast as they are answered."""
-    request = f"GET {path} HTTP/1.1\r\nHost: robot\r\nAccept: application/json\r\n\r\n".encode()
+    request = f"GET {path} HTTP/1.1\r\nHost: {address}\r\nAccept: application/json\r\n\r\n".encode()
     loop, waited = asyncio.get_running_loop(), list[float]()
     connections, began = [], time.perf_counter()
     for _ in range(CONNECTIONS):

@@ -18,7 +18,7 @@ from roboglot.programs.stores import StoredProgram
 from roboglot.programs.tasks.service import TASKS_MAX, ProgramService
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
-from roboglot.storage.programs import SqliteProgramStore, program_stores
+from roboglot.storage.programs import DatabaseProgramStore, program_stores
 
 BODY = "cyberdog.motion.turn(90)\n" * 40
 STYLE = json.dumps({"blocks": {"languageVersion": 0, "blocks": [{"type": "turn", "fields": {"angle": 90}}] * 10}})
@@ -29,7 +29,7 @@ async def main() -> None:
     claims = Claims()
     with tempfile.TemporaryDirectory() as folder:
         database, engine = Database(Path(folder) / "roboglot.db"), Engine()
-        store = SqliteProgramStore(database, "a")
+        store = DatabaseProgramStore(database, "a")
         for number in range(TASKS_MAX):
             task = StoredProgram(f"t{number}", "a task", STYLE, "single", "now", BODY, "wait_run")
             await store.put(task, [f"m{number % 50}"])

@@ -19,7 +19,7 @@ from _claim import Claims
 
 from roboglot.programs.engine.journal import Journal, header_of
 from roboglot.storage.database import Database
-from roboglot.storage.journals import SqliteJournalStore
+from roboglot.storage.journals import DatabaseJournalStore
 
 ROUNDS, CALLS = 6, 50
 PAGE = bytes(4120)  # bytes that a commit adds to the database's log
@@ -45,7 +45,7 @@ async def call(journal: Journal, name: str) -> float:
 async def measure(folder: Path) -> None:
     claims = Claims()
     database = Database(folder / "robot.db")
-    journal = Journal(SqliteJournalStore(database, "a"), "task")
+    journal = Journal(DatabaseJournalStore(database, "a"), "task")
     await journal.open(header_of("pass", {}, 0))
     descriptor = os.open(folder / "plain", os.O_CREAT | os.O_WRONLY | os.O_APPEND)
     flushes, doing, reading = [], [], []

@@ -285,6 +285,10 @@ def faults(fleet: Fleet) -> Iterator[tuple[str, Callable[[], float]]]:
         fleet.server.start()
         return time.monotonic()
 
+    def connections_cut() -> float:
+        fleet.cut_connections()
+        return time.monotonic()
+
     def clock_jumps() -> float:
         for ahead in (DAY, -DAY):
             fleet.jump(ahead)
@@ -307,7 +311,7 @@ def faults(fleet: Fleet) -> Iterator[tuple[str, Callable[[], float]]]:
         fleet.nodes[fleet.where("a1")].kill()
         return time.monotonic()
 
-    yield "connections", lambda: fleet.cut_connections() or time.monotonic()
+    yield "connections", connections_cut
     yield "server", server_away
     yield "clock", clock_jumps
     yield "split", split

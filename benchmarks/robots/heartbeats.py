@@ -138,8 +138,8 @@ def look_by_ray(claims: Claims, plan: FleetPlan, seconds: float) -> None:
         def look(self, known: int) -> bytes:
             import msgspec
 
-            told = None if known else said[0]
-            return msgspec.json.encode(Condition(1, "node", 7, True, True, told, Beat(1.0, 0, 0.0), None, []))
+            state = None if known else said[0]
+            return msgspec.json.encode(Condition(1, "node", 7, True, True, state, Beat(1.0, 0, 0.0), None, []))
 
         def stop(self) -> bytes:
             return b""

@@ -1,10 +1,10 @@
 """Claim: 100 kidnappings, 100 blackouts while mapping: always reported, >= 95 % recovered, no wall twice in the map.
 
 A kidnapped robot is carried to another place of the floor that it has mapped; a blackout is ten seconds without scans
-in which it is pushed up to 3 m. It drives about and maps meanwhile. Told: ``LocalizationLost`` or ``RobotDisplaced``
-within 10 s. Recovered: within 60 s the place is known again, to 15 cm and 5 degrees; a robot that does not find it
-standing may look around. A wall is there twice where the map shows half a metre of one, and scans painted at where the
-robot truly was show none within 15 cm. ``--quick``: one tour a building; ``--show``: each event.
+in which it is pushed up to 3 m. It drives about and maps meanwhile. Reported: ``LocalizationLost`` or
+``RobotDisplaced`` within 10 s. Recovered: within 60 s the place is known again, to 15 cm and 5 degrees; a robot that
+does not find it standing may look around. A wall is there twice where the map shows half a metre of one, and scans
+painted at where the robot truly was show none within 15 cm. ``--quick``: one tour a building; ``--show``: each event.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from roboglot.model.maps import OccupancyGrid
 TOURS = {"office": 4, "depot": 3, "tower": 3}  # for ten kidnappings and ten blackouts
 EVENTS = 20
 DRIVEN_SECONDS = 25.0  # between two events
-TOLD_SECONDS, STANDING_SECONDS, RECOVERED_SECONDS = 10.0, 20.0, 60.0
+REPORT_SECONDS, STANDING_SECONDS, RECOVERED_SECONDS = 10.0, 20.0, 60.0
 GOOD, GOOD_YAW = 0.15, math.radians(5.0)
 BLACKOUT_SECONDS, PUSHED = 10.0, 3.0  # s, m at most
 CARRIED_MIN = 3.0  # m
@@ -53,7 +53,7 @@ class Trial:
     floor: NDArray[np.float64]  # (n, 2) in m, map frame: places with enough room
     truth: EvidenceGrid = field(default_factory=EvidenceGrid)
     count: Counter[str] = field(default_factory=Counter)
-    told: list[float] = field(default_factory=list)
+    reports: list[float] = field(default_factory=list)
     painted: float = -math.inf
 
     def __post_init__(self) -> None:
@@ -68,8 +68,8 @@ class Trial:
                     paint(self.truth, points, self.house.truth, fill=True)
 
         robot.events.listen(ScanTaken, look)
-        robot.events.listen(LocalizationLost, lambda event: self.told.append(event.stamp))
-        robot.events.listen(RobotDisplaced, lambda event: self.told.append(event.stamp))
+        robot.events.listen(LocalizationLost, lambda event: self.reports.append(event.stamp))
+        robot.events.listen(RobotDisplaced, lambda event: self.reports.append(event.stamp))
 
     @property
     def is_right(self) -> bool:
@@ -112,9 +112,9 @@ class Trial:
     async def suffer(self, name: str) -> None:
         """One event, and what came of it."""
         clock, localization, began = self.house.clock, self.robot[Localization], self.house.clock.time()
-        self.told.clear()
+        self.reports.clear()
         if localization.lost is not None:  # still reported: it was pushed beyond its map
-            self.told.append(began)
+            self.reports.append(began)
         await (self.kidnap() if name == "kidnapping" else self.black_out())
         deadline, found, looked = clock.time() + RECOVERED_SECONDS, math.inf, False
         after = clock.time()
@@ -125,15 +125,15 @@ class Trial:
             elif clock.time() - after >= STANDING_SECONDS and not looked:
                 looked = True
                 localization.relocalize(may_move=True)
-        told = bool(self.told) and min(self.told) <= after + TOLD_SECONDS
+        reported = bool(self.reports) and min(self.reports) <= after + REPORT_SECONDS
         self.count[name] += 1
-        self.count[f"{name} told"] += told
+        self.count[f"{name} reported"] += reported
         self.count[f"{name} recovered"] += math.isfinite(found)
         self.count[f"{name} wrong"] += not math.isfinite(found) and localization.lost is None
-        if "--show" in sys.argv or not told or not math.isfinite(found):
+        if "--show" in sys.argv or not reported or not math.isfinite(found):
             off = localization.pose.distance_to(self.house.truth)
             print(
-                f"    {name} at {began:.0f} s: {'told' if told else 'NOT TOLD'}, found after {found:.0f} s, "
+                f"    {name} at {began:.0f} s: {'' if reported else 'NOT '}reported, found after {found:.0f} s, "
                 f"{off:.2f} m off, {localization.lost}; {self.house.truth}",
                 flush=True,
             )
@@ -201,7 +201,7 @@ async def main() -> None:
     for kind in ("kidnapping", "blackout"):
         count = max(1, total[kind])
         claims.at_least(f"{kind}s", total[kind], 1 if "--quick" in sys.argv else 100, "")
-        claims.at_least(f"{kind}s told", 100.0 * total[f"{kind} told"] / count, 100.0, "%")
+        claims.at_least(f"{kind}s reported", 100.0 * total[f"{kind} reported"] / count, 100.0, "%")
         claims.at_least(f"{kind}s recovered", 100.0 * total[f"{kind} recovered"] / count, 100.0 * RECOVERED_SHARE, "%")
         claims.at_most(f"{kind}s found at a wrong place", total[f"{kind} wrong"], 0, "")
     claims.at_most("walls that are there twice", total["doubled"], 0, "")

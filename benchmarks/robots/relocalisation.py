@@ -85,7 +85,8 @@ async def measure(name: str, count: int, seconds: list[float]) -> Counter[str]:
         floor, draw = house.floor(whole), np.random.default_rng(1)
         maps = {"whole": whole, "half": await house.survey(max(BEGUN, float(np.median(floor[:, 0]))))}
         for number in draw.integers(0, len(floor), count):
-            pose = Pose(*floor[number].tolist(), float(draw.uniform(-math.pi, math.pi)))
+            x, y = floor[number].tolist()
+            pose = Pose(x, y, float(draw.uniform(-math.pi, math.pi)))
             for part, grid in maps.items():
                 if part == "half" and Path(name).stem in SYMMETRIC:
                     continue  # only what is missing tells this wing from the other

@@ -229,8 +229,8 @@ async def live(share: float) -> list[dict[str, float]]:
                     for _ in range(max(1, int(count * share / PARTS))):
                         await step()
                 figures.append(measure())
-                told = ", ".join(f"{name} {value:,.0f}" for name, value in figures[-1].items())
-                print(f"part {part + 1}: {told}; {time.monotonic() - began:.0f} s; {dict(life.done)}", flush=True)
+                found = ", ".join(f"{name} {value:,.0f}" for name, value in figures[-1].items())
+                print(f"part {part + 1}: {found}; {time.monotonic() - began:.0f} s; {dict(life.done)}", flush=True)
     return figures
 
 

@@ -51,9 +51,8 @@ class Client:
 
     def ask(self, method: str, path: str, body: object = None) -> Any:
         """Return the answer, decoded if it is JSON. Raises RuntimeError with the robot's reason."""
-        binary = isinstance(body, bytes)
-        data = body if binary or body is None else json.dumps(body)
-        kind = "application/octet-stream" if binary else "application/json"
+        data = body if isinstance(body, bytes) or body is None else json.dumps(body)
+        kind = "application/octet-stream" if isinstance(body, bytes) else "application/json"
         link = HTTPConnection(self._address, 1448, timeout=60)
         link.request(method, path, data, {"content-type": kind} if data else {})
         reply = link.getresponse()

@@ -13,4 +13,4 @@ for ring in range(1, 9):
         cyberdog.motion.stretch_the_body()
         break
 else:
-    print("nobody at home")
+    print("no one at home")

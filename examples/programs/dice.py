@@ -24,4 +24,4 @@ for player in players:
     print(player.name, player.points)
 best = max(player.points for player in players)
 winners = [player.name for player in players if player.points == best]
-print("winner:", winners[0] if len(winners) == 1 else "nobody")
+print("winner:", winners[0] if len(winners) == 1 else "no one")

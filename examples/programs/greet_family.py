@@ -6,7 +6,7 @@ greeted = set()
 for _ in range(3):
     found = cyberdog.personnel.face_recognized([], False, 30)
     if found.state.code != StateCode.success:
-        print("nobody there")
+        print("no one there")
         break
     for name, face in found.dictionary.items():
         if name in greeted:

@@ -17,7 +17,7 @@ print("I listen for", len(words), "phrases")
 while True:
     heard = cyberdog.train.training_words_recognized(20).response
     if heard.value == "":
-        print("nobody speaks")
+        print("no one speaks")
         break
     print("heard", heard.trigger)
     if heard.value == "shutdown":
