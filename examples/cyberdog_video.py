@@ -67,7 +67,7 @@ class Page(BaseHTTPRequestHandler):
 
 
 def serve(dog: CyberDogClient, port: int, seen: list[Any]) -> ThreadingHTTPServer:
-    """The page at 127.0.0.1, in threads of its own; ``shutdown`` ends it. Reports of the pages are added to ``seen``."""
+    """The page at 127.0.0.1, in threads of its own; ``shutdown`` ends it. ``seen`` gets the pages' reports."""
     server = ThreadingHTTPServer(("127.0.0.1", port), partial(Page, dog, asyncio.get_running_loop(), seen))
     threading.Thread(target=server.serve_forever, daemon=True).start()
     return server
