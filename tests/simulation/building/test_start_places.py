@@ -1,72 +1,59 @@
-"""Start places of robots that no one placed."""
+"""Start places of many robots: side by side while they are few, then over the rooms, with room ahead."""
 
 from __future__ import annotations
 
-import re
-from pathlib import Path
+import math
+from dataclasses import replace
 
 import pytest
 
-from roboglot.config import parse_robot
 from roboglot.model.geometry import Pose
-from roboglot.simulation.bodies.files import load_body
-from roboglot.simulation.world.placing import AHEAD, Places
+from roboglot.simulation.building.rooms import Rooms, rooms_of
+from roboglot.simulation.world.placing import AHEAD, BESIDE, DOOR, TOGETHER, Places
 from roboglot.simulation.world.world_files import load_world
 
-BODIES = ("universal", "hermes", "robomaster_ep", "cyberdog2", "universal", "universal")
-RADII = [load_body(name).hull.radius for name in BODIES]
-CORRIDOR = 8.5, 11.5  # m, of y
+RADII = (0.25, 0.22, 0.3)
 
 
-@pytest.fixture
-def places() -> Places:
-    return Places(load_world("office"))
+def spread(world: str, count: int) -> tuple[list[tuple[Pose, float]], Rooms]:
+    """Return places and radii of so many robots on the ground floor, and its rooms."""
+    description = load_world(world)
+    places = Places(description)
+    radii = [RADII[n % len(RADII)] for n in range(count)]
+    found = [(places.next(None, 0, radius)[0], radius) for radius in radii]
+    return found, rooms_of(description.floors[0], description.lift)
 
 
-def test_robots_start_in_one_room_and_can_leave(places: Places) -> None:
-    stand = [(places.next(None, 0, radius)[0], radius) for radius in RADII]
-    for pose, radius in stand:
-        assert CORRIDOR[0] < pose.y - radius < pose.y + radius < CORRIDOR[1]
-        ahead = pose.compose(Pose(AHEAD))
-        assert Places(places.world).free(ahead, 0, radius)
-        others = [(other, r) for other, r in stand if other is not pose]
-        assert all(min(place.distance_to(other) for place in (pose, ahead)) >= radius + r for other, r in others)
+def room_of(rooms: Rooms, pose: Pose) -> int:
+    """Return the number of the room where this is."""
+    (number,) = (n for n, cells in enumerate(rooms.rooms) if rooms.cell_at(pose.x, pose.y) in cells)
+    return number
 
 
-def test_a_crowd_stands_wherever_there_is_room(places: Places) -> None:
-    stand = [places.next(None, 0, 0.25)[0] for _ in range(100)]
-    assert all(a.distance_to(b) >= 0.5 for i, a in enumerate(stand) for b in stand[:i])
-    assert any(not CORRIDOR[0] < pose.y < CORRIDOR[1] for pose in stand)
+def test_few_robots_start_side_by_side() -> None:
+    placed, rooms = spread("office", TOGETHER)
+    assert len({room_of(rooms, pose) for pose, _ in placed}) == 1
 
 
-def test_robot_with_given_place_stands_there_or_nowhere(places: Places) -> None:
-    wanted = Pose(20.0, 10.0, 1.0)
-    assert places.next(wanted, 0, 0.25) == (wanted, 0)
-    with pytest.raises(ValueError, match="cannot stand"):
-        places.next(Pose(20.2, 10.0), 0, 0.25)
+@pytest.mark.parametrize("count", [25, 60])
+def test_many_robots_start_in_all_rooms(count: int) -> None:
+    placed, rooms = spread("office", count)
+    crowds = [0] * len(rooms.rooms)
+    for pose, _ in placed:
+        crowds[room_of(rooms, pose)] += 1
+    assert min(crowds) >= 1
+    assert max(crowds) <= max(TOGETHER, 1.6 * count / len(crowds))
+    before = Places(load_world("office"), _taken=[(pose, 0, radius) for pose, radius in placed[:TOGETHER]])
+    for pose, radius in placed[TOGETHER:]:
+        assert before.free(pose, 0, radius + 0.4 * BESIDE)
+        assert before.free(pose.compose(Pose(AHEAD)), 0, radius)
+        assert all(math.dist((pose.x, pose.y), door) >= DOOR + radius for door in rooms.doors)
+        before = replace(before, _taken=[*before._taken, (pose, 0, radius)])
 
 
-def test_first_robot_of_bare_world_stands_in_middle(tmp_path: Path) -> None:
-    bare = tmp_path / "bare.toml"
-    bare.write_text('name = "bare"\n[[floors]]\nname = "hall"\nsize = [6, 4]\n')
-    places = Places(load_world(bare))
-    assert places.next(None, 0, 0.25) == (Pose(3.0, 2.0), 0)
-    assert places.next(None, 0, 0.25) == (Pose(3.0, 1.2), 0)
-
-
-def test_refusal_names_a_place_nearby_that_is_free(places: Places) -> None:
-    with pytest.raises(ValueError, match="cannot stand at") as refused:
-        places.next(Pose(3.0, 2.0), 0, 0.3)
-    x, y = map(float, str(refused.value).rpartition(" ")[2].split(","))
-    assert Pose(3.0, 2.0).distance_to(Pose(x, y)) < 1.0
-    assert places.next(Pose(x, y), 0, 0.3) == (Pose(x, y), 0)
-
-
-def test_example_of_the_documents_starts(places: Places) -> None:
-    text = (Path(__file__).parents[3] / "docs" / "scale.md").read_text()
-    shown = [parse_robot(robot) for robot in re.findall(r"--robot (\w+=\S+)", text)]
-    assert len(shown) >= 2
-    for robot in shown:
-        assert robot.start is not None
-        start = Pose(robot.start.x, robot.start.y, robot.start.yaw)
-        assert places.next(start, robot.start.floor, load_body(robot.body).hull.radius)[0] == start
+def test_doors_part_rooms_and_gaps_join() -> None:
+    rooms = rooms_of(load_world("office").floors[0], load_world("office").lift)
+    assert sorted(round(rooms.area(n)) for n in range(len(rooms.rooms)))[-1] < 90  # m²: the corridor
+    assert len(rooms.rooms) == 9
+    corridor = load_world("tests/autonomy/worlds/one_corridor.toml").floors[0]
+    assert len(rooms_of(corridor, None).rooms) == 1  # it opens into a hall

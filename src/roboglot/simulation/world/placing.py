@@ -1,6 +1,7 @@
 """Start places of robots: as configured, at the world's start, on docks (facing away), or beside the first one.
 
-Beside it means side by side in the same room with room ahead, so that each can drive off; a crowd has to do without.
+Beside it means side by side in the same room with room ahead, so that each can drive off. More robots than TOGETHER
+are spread over the floor's rooms, the emptiest first, away from doors; where rooms are full they have to do without.
 """
 
 from __future__ import annotations
@@ -9,14 +10,18 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from roboglot.model.geometry import Pose
+from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.simulation.building.blueprint import Solid, solids_of
+from roboglot.simulation.building.rooms import Rooms, rooms_of
 from roboglot.simulation.world.description import WorldDescription
 
 CONTACT_GAP = 0.005  # m between hull and dock at start
 BESIDE = 0.3  # m between robots that start side by side
 SEARCH = 40.0  # m around the first robot
 SAME_ROOM = 5.0  # m around it that are searched for a good place
+TOGETHER = 6  # robots that start side by side
+DOOR = 0.9  # m around a door's middle that a spread robot leaves free
+TURNS = (0.0, math.pi, math.pi / 2, -math.pi / 2)  # from the first robot's yaw, until there is room ahead
 CLEAR = 0.3, 0.05  # m around a robot in a crowd, while such places exist
 AHEAD = 0.6  # m that must be free in front of a good place
 NEAR, NEAR_STEP = 3.0, 0.1  # m around an occupied place that are searched for an alternative to suggest, and the step
@@ -45,6 +50,8 @@ class Places:
     _crowded: set[int] = field(default_factory=set)  # floors without good places
     _solids: dict[int, list[Solid]] = field(default_factory=dict)
     _searches: dict[tuple[int, float, Pose], _Search] = field(default_factory=dict)
+    _rooms: dict[int, Rooms] = field(default_factory=dict)
+    _spots: dict[tuple[int, float, int], Iterator[Pose]] = field(default_factory=dict)  # by floor, radius and room
 
     def next(self, wanted: Pose | None, floor: int, radius: float) -> tuple[Pose, int]:
         """Pose and floor for one more robot. Raises ValueError if it cannot stand where it should, or anywhere."""
@@ -69,6 +76,8 @@ class Places:
         here = [pose for pose, number, _ in self._taken if number == floor]
         (x, y), (width, depth) = self.world.floors[floor].origin, self.world.floors[floor].size
         around = here[0] if here else Pose(x + width / 2, y + depth / 2)
+        if len(here) >= TOGETHER:
+            yield from self._spread(floor, radius, here)
         search = self._searches.get((floor, radius, around))
         if search is None:
             search = self._searches[floor, radius, around] = self._search(floor, radius, around)
@@ -78,6 +87,37 @@ class Places:
             self._crowded.add(floor)
         for place in search.rest:
             yield place
+
+    def _spread(self, floor: int, radius: float, here: Sequence[Pose]) -> Iterator[tuple[Pose, int]]:
+        """Yield places in the rooms, those with the fewest robots for their size first; none where there is one room.
+
+        A room's places are looked at once: what was none is none for the next robot, robots only get more.
+        """
+        if floor not in self._rooms:
+            self._rooms[floor] = rooms_of(self.world.floors[floor], self.world.lift)
+        rooms = self._rooms[floor]
+        if len(rooms.rooms) < 2:
+            return
+        cells = [rooms.cell_at(pose.x, pose.y) for pose in here]
+        crowds = [sum(cell in room for cell in cells) / rooms.area(n) for n, room in enumerate(rooms.rooms)]
+        for number in sorted(range(len(crowds)), key=lambda n: (crowds[n], n)):
+            spots = self._spots.get((floor, radius, number))
+            if spots is None:
+                spots = self._spots[floor, radius, number] = self._roomy(rooms, number, floor, radius, here[0].yaw)
+            for pose in spots:  # `yield from` would close it together with this generator
+                yield pose, floor
+
+    def _roomy(self, rooms: Rooms, number: int, floor: int, radius: float, yaw: float) -> Iterator[Pose]:
+        """Yield places in a room that are clear of all, and of doors, with room ahead in some direction."""
+        for x, y in rooms.spots(number, 2 * radius + BESIDE):
+            if any(math.dist((x, y), door) < DOOR + radius for door in rooms.doors):
+                continue
+            poses = [Pose(x, y, wrap_angle(yaw + turn)) for turn in TURNS]
+            if not self.free(poses[0], floor, radius + CLEAR[0] / 2):
+                continue
+            ahead = (pose for pose in poses if self.free(pose.compose(Pose(AHEAD)), floor, radius))
+            if (pose := next(ahead, None)) is not None:
+                yield pose
 
     def _near(self, wanted: Pose, floor: int, radius: float) -> Pose | None:
         """Return a free place within ``NEAR`` of one that is taken, the nearest of a grid."""
