@@ -20,7 +20,9 @@ from roboglot.protocols.visual.config import VisualConfig
 from roboglot.runtime import Runtime
 from tests.browser.served import ADDRESS, FRIEND, PAGE_PATIENCE, REBOUND, STRANGER, OpenConsole, Page, Served
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+# The shell is the same engine without a browser's own windows, which take as much of the processor as the pages.
+KINDS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
+CHROMIUM = next(filter(None, map(shutil.which, KINDS)), None)
 OPTIONS = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
 SITE = b"<!doctype html><meta charset=utf-8><title>a page</title><p>hello</p>"
 
@@ -38,7 +40,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             if async_api is None:
                 item.add_marker(pytest.mark.skip(reason="no playwright in this environment (scripts/test brings it)"))
             elif CHROMIUM is None:
-                item.add_marker(pytest.mark.skip(reason="no chromium here (Debian: apt-get install chromium)"))
+                item.add_marker(
+                    pytest.mark.skip(reason="no chromium here (Debian: apt-get install chromium-headless-shell)")
+                )
 
 
 class _Page(BaseHTTPRequestHandler):

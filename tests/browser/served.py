@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import os
 import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
@@ -12,10 +11,11 @@ from typing import Any
 from roboglot.model.clock import LockstepClock
 from roboglot.model.robot import Robot
 from roboglot.runtime import Runtime
+from roboglot.testing.addresses import free_addresses
 
-ADDRESS = f"127.0.91.{1 + int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0')[2:])}"  # one per process
+ADDRESS = free_addresses(1)
 PATIENCE = 60.0  # s of the machine's time
-PAGE_PATIENCE = 15_000  # ms of the machine's time until a page shows a change
+PAGE_PATIENCE = 60_000  # ms of the machine's time until a page shows a change
 STRANGER, FRIEND, REBOUND = "evil.example", "studio.example", "rebound.example"
 
 

@@ -7,6 +7,7 @@ import json
 import os
 from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass, replace
+from ipaddress import IPv4Address
 from pathlib import Path
 from typing import Any
 
@@ -21,14 +22,15 @@ from roboglot.model.components.system.lease import Lease
 from roboglot.model.geometry import Pose
 from roboglot.operations import Right
 from roboglot.runtime import Runtime
+from roboglot.testing.addresses import free_addresses
 from roboglot.transport.limiter import Limiter
-from tests.browser.served import ADDRESS
 from tests.narrowing import known
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 PASSWORD, LOGINS = "a long password", 3
-PATIENCE = 15_000  # ms
-HOSTS = {"a": ADDRESS.replace(".91.", ".94."), "b": ADDRESS.replace(".91.", ".95.")}
+PATIENCE = 60_000  # ms
+FIRST = IPv4Address(free_addresses(2))
+HOSTS = {"a": str(FIRST), "b": str(FIRST + 1)}
 WHO = ("none", "see", "drive", "program", "edit", "admin")
 MAY = {  # what each right allows: stop and drive, draw on the map, break the world
     "see": set[str](),

@@ -34,6 +34,8 @@ pytestmark = pytest.mark.timeout(380)
 ATTACKS = sorted((Path(__file__).parent / "attacks").rglob("*.py"))
 LIMITS = Limits(memory=32 * 1024 * 1024, cpu=1, output=300_000)
 AT_ONCE = 8
+# These use up a second of processor time. The rules find nothing in them, so they are played with the rules off alone.
+ENDLESS = {"dict_collisions", "endless_c", "endless_caught", "huge_number", "int_text_bomb", "str_bomb"}
 
 # Their ends with the rules off, besides "somehow": the host has to name the reason.
 REASONS = {
@@ -63,6 +65,9 @@ REASONS = {
     "other_descriptors": ExitReason.FINISHED,
     "lock_down_again": ExitReason.FINISHED,
 }
+
+
+Results = tuple[bool, dict[str, Played | None]]  # whether the rules are on, and what each attack came to
 
 
 @dataclass
@@ -109,7 +114,7 @@ def world() -> Iterator[World]:
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module", params=[True, False], ids=["rules", "jail-only"])
-async def played(request: pytest.FixtureRequest, world: World) -> AsyncIterator[tuple[bool, dict[str, Played]]]:
+async def played(request: pytest.FixtureRequest, world: World) -> AsyncIterator[Results]:
     """Run all attacks, a few at a time; then the engine still works, and no trace of them is left."""
     before = open_descriptors()
     with pytest.MonkeyPatch.context() as patch:
@@ -120,12 +125,15 @@ async def played(request: pytest.FixtureRequest, world: World) -> AsyncIterator[
     yield request.param, {path.stem: result for path, result in zip(ATTACKS, results, strict=True)}
 
 
-async def attack_all(world: World, *, policy: bool) -> list[Played]:
+async def attack_all(world: World, *, policy: bool) -> list[Played | None]:
     slots = asyncio.Semaphore(AT_ONCE)
     async with Engine(policy=policy) as engine:
 
-        async def attack(path: Path) -> Played:
+        async def attack(path: Path) -> Played | None:
             async with slots:
+                if policy and path.stem in ENDLESS:
+                    assert await engine.check(world.arm(path), PRELUDE) == []
+                    return None
                 return await play(engine, world.arm(path), limits=LIMITS)
 
         results = await asyncio.gather(*(attack(path) for path in ATTACKS))
@@ -136,9 +144,13 @@ async def attack_all(world: World, *, policy: bool) -> list[Played]:
 
 @pytest.mark.parametrize("name", [path.stem for path in ATTACKS])
 @pytest.mark.asyncio(loop_scope="module")
-async def test_nothing_gets_out(name: str, world: World, played: tuple[bool, dict[str, Played]]) -> None:
+async def test_nothing_gets_out(name: str, world: World, played: Results) -> None:
     rules, results = played
     result = results[name]
+    if result is None:
+        assert rules
+        assert name in ENDLESS
+        return
     assert isinstance(result.ending, (Finished, Failed))
     shown = result.output + (result.ending.message if isinstance(result.ending, Failed) else "")
     assert world.secret not in shown
@@ -157,12 +169,14 @@ async def test_nothing_gets_out(name: str, world: World, played: tuple[bool, dic
 
 
 @pytest.mark.asyncio(loop_scope="module")
-async def test_the_rules_stop_reflection_before_it_runs(played: tuple[bool, dict[str, Played]]) -> None:
+async def test_the_rules_stop_reflection_before_it_runs(played: Results) -> None:
     rules, results = played
     refused = {
         name
         for name, result in results.items()
-        if isinstance(result.ending, Failed) and result.ending.type in {"PolicyError", "NameError", "SyntaxError"}
+        if result
+        and isinstance(result.ending, Failed)
+        and result.ending.type in {"PolicyError", "NameError", "SyntaxError"}
     }
     reflective = {
         "subclasses",
@@ -174,7 +188,9 @@ async def test_the_rules_stop_reflection_before_it_runs(played: tuple[bool, dict
     }
     reflective |= {"metatype_match_args", "metaclass", "code_object", "dunder_import", "evaluate", "open_file"}
     assert (reflective <= refused) is rules
-    assert ("LANGUAGE" in results["super_format"].output) is not rules
+    shown = results["super_format"]
+    assert shown
+    assert ("LANGUAGE" in shown.output) is not rules
 
 
 @pytest.mark.parametrize(
