@@ -38,10 +38,10 @@ async def test_every_sentence_is_shown_in_chinese(open_console: OpenConsole) -> 
     twice = "The current operation(run) is illegal: 7 is in 8. Recover it to go on, or shut it down first."
     nested = "not stopped: the robot is off"
     long = "x" * 200_000 + " is not a name"
-    assert await page.evaluate(TRANSLATED, [twice, nested, "what is unknown", long]) == [
+    assert await page.evaluate(TRANSLATED, [twice, nested, "a line without its Chinese", long]) == [
         "现在不能进行操作（run）：7 处于 8。先恢复它再继续，或先结束它。",
         "没有停下：机器人已关机",
-        "what is unknown",
+        "a line without its Chinese",
         "x" * 200_000 + " 不能作名称",
     ]
     english = await open_console(language="en")
