@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from roboglot.console.verbs import maps, robots
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.driving import Driving
@@ -28,6 +29,12 @@ def test_declared_needs_are_what_handlers_use(door: DoorType) -> None:
         if not (operation.needs >= used if door.name == "visual" else operation.needs == used):
             wrong[operation.key] = [kind.__name__ for kind in used]
     assert wrong == {}
+
+
+def test_verbs_need_what_their_handlers_use() -> None:
+    wrong = {verb.key: used_by(verb.handler) for verb in robots.VERBS if verb.needs != used_by(verb.handler)}
+    assert wrong == {}
+    assert robots.VERBS.get("add_line") is not None, maps  # whose import brings the verbs of maps
 
 
 def test_use_follows_the_functions_a_handler_calls() -> None:

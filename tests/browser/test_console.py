@@ -36,6 +36,9 @@ SHOWS_PICTURES = """() => document.querySelector('.screen video')?.videoWidth > 
     || document.querySelector('.screen img')?.naturalWidth > 0"""
 
 
+LABELS = "found => found.map((one) => one.getAttribute('aria-label') ?? one.innerText)"
+
+
 async def until(condition: Callable[[], bool]) -> None:
     """Wait, in the machine's time, for what a page sent."""
     async with asyncio.timeout(PATIENCE / 1000):
@@ -308,6 +311,30 @@ async def test_the_floor_that_is_shown_is_chosen(tmp_path: Path, browser: Any) -
     here = await page.evaluate(picture)
     await page.select_option("select.floors", "2")
     await until_page(page, f"{picture} !== {here!r}")
+    await page.close()
+    await runtime.close()
+
+
+async def test_robot_without_a_map_offers_nothing_of_one(tmp_path: Path, browser: Any) -> None:
+    base = load_config(None, {"data": str(tmp_path), "world": "empty", "lockstep": True})
+    robots = with_addresses((RobotConfig("a", "robomaster_ep"),))
+    runtime = Runtime(replace(base, robots=robots, doors={}, console=ConsoleConfig(port=0)))
+    assert runtime.console is not None
+    await runtime.start()
+    await runtime.console.ready()
+    page = await browser.new_page(locale="en-GB")
+    await page.goto(runtime.console.address)
+    await page.wait_for_selector("text=Take control")
+    buttons = await page.locator(".tools button, .panel button").evaluate_all(LABELS)
+    assert buttons[:2] == ["Move the map", "Ruler"]
+    assert not {"Go", "To the dock"} & set(buttons)
+    assert "send the robot" not in await page.locator(".hint").inner_text()
+    assert await page.evaluate("import('/base.js').then(({ fixed }) => [fixed(-0.001), fixed(-1.26, 1)])") == [
+        "0.00",
+        "-1.3",
+    ]
+    await page.click("nav a[href='#/world']")
+    assert await page.locator("aside [role=tab]").evaluate_all(LABELS) == ["World", "Faults", "Time"]
     await page.close()
     await runtime.close()
 

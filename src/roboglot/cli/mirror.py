@@ -103,7 +103,7 @@ def rows(robot: Robot) -> list[tuple[str, str]]:
 
 
 def _pose(pose: Pose) -> str:
-    return f"x {pose.x:+.2f} m  y {pose.y:+.2f} m  yaw {math.degrees(pose.yaw):+.0f}°"
+    return f"x {pose.x:+z.2f} m  y {pose.y:+z.2f} m  yaw {math.degrees(pose.yaw):+z.0f}°"
 
 
 def _battery(robot: Robot) -> str:
@@ -114,7 +114,7 @@ def _battery(robot: Robot) -> str:
 
 def _twist(robot: Robot) -> str:
     twist = robot[Odometry].reading.twist
-    return f"{twist.x:+.2f} m/s ahead  {twist.y:+.2f} m/s left  {math.degrees(twist.yaw):+.0f}°/s"
+    return f"{twist.x:+z.2f} m/s ahead  {twist.y:+z.2f} m/s left  {math.degrees(twist.yaw):+z.0f}°/s"
 
 
 def _map(robot: Robot) -> str:
@@ -129,12 +129,12 @@ def _scan(robot: Robot) -> str:
 
 def _attitude(robot: Robot) -> str:
     tilt = robot[Imu].reading.orientation
-    return f"roll {math.degrees(tilt.roll):+.0f}°  pitch {math.degrees(tilt.pitch):+.0f}°"
+    return f"roll {math.degrees(tilt.roll):+z.0f}°  pitch {math.degrees(tilt.pitch):+z.0f}°"
 
 
 def _gimbal(robot: Robot) -> str:
     angles = robot[Gimbal].angles
-    return f"pitch {-math.degrees(angles.pitch):+.0f}° up  yaw {math.degrees(angles.yaw):+.0f}° left"
+    return f"pitch {-math.degrees(angles.pitch):+z.0f}° up  yaw {math.degrees(angles.yaw):+z.0f}° left"
 
 
 VALUES: tuple[tuple[str, type[Component], Callable[[Robot], str]], ...] = (

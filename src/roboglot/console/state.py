@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from roboglot.console import words
+from roboglot.console.verbs.robots import VERBS
 from roboglot.model.components.energy.battery import Battery, DockContact
 from roboglot.model.components.energy.power import Power
 from roboglot.model.components.interaction.blaster import Blaster
@@ -55,6 +56,9 @@ def state_of(robot: Robot) -> dict[str, object]:
     return {
         "about": _about(robot),
         "parts": [name for name, interface in PARTS.items() if interface in robot],
+        "absent": [
+            verb.key for verb in VERBS if any(part not in robot for part in verb.needs)
+        ],  # what it has no part for
         "actions": [words.action(action, robot.clock.time()) for action in robot.actions.running()],
         "history": [words.action(action, robot.clock.time()) for action in reversed(robot.actions.history)],
         "control": _control(robot),

@@ -23,24 +23,24 @@ class Report:
 
 def from_slamware(x: float, y: float, yaw: float) -> Report:
     """m and rad, counter-clockwise."""
-    return Report("Slamware", f"x {x:.3f} m, y {y:.3f} m, yaw {yaw:.3f} rad", Pose(x, y, yaw))
+    return Report("Slamware", f"x {x:z.3f} m, y {y:z.3f} m, yaw {yaw:z.3f} rad", Pose(x, y, yaw))
 
 
 def from_robomaster(x: float, y: float, z: float) -> Report:
     """m with y to the right, degrees clockwise."""
-    words = f"x {x:.3f} m, y {y:.3f} m to the right, z {z:.1f}° clockwise"
+    words = f"x {x:z.3f} m, y {y:z.3f} m to the right, z {z:.1f}° clockwise"
     return Report("RoboMaster", words, Pose(x, -y, wrap_angle(-math.radians(z))))
 
 
 def from_cyberdog(x: float, y: float, yaw: float) -> Report:
     """m, and a quaternion that is shown here as its angle."""
-    return Report("CyberDog", f"px {x:.3f} m, py {y:.3f} m, qz {math.sin(yaw / 2):.3f}", Pose(x, y, yaw))
+    return Report("CyberDog", f"px {x:z.3f} m, py {y:z.3f} m, qz {math.sin(yaw / 2):z.3f}", Pose(x, y, yaw))
 
 
 def from_program(blocks: list[str]) -> Report:
     """The text of the program's last block: "x y qz qw" of its odometer."""
     x, y, qz, qw = map(float, blocks[-1].split())
-    words = f"position.x {x:.3f}, position.y {y:.3f}, orientation.z {qz:.3f}"
+    words = f"position.x {x:z.3f}, position.y {y:z.3f}, orientation.z {qz:.3f}"
     return Report("block program", words, Pose(x, y, 2 * math.atan2(qz, qw)))
 
 

@@ -83,7 +83,7 @@ class Task:
         for number, goal in enumerate(self.goals, start=1):
             leg = driven.get((start, goal))
             if leg is None:
-                leg = self._leg(cost, start, goal, f"goal {number} at ({goal.x:.2f}, {goal.y:.2f})")
+                leg = self._leg(cost, start, goal, f"goal {number} at ({goal.x:z.2f}, {goal.y:z.2f})")
                 if legs:
                     driven[start, goal] = leg
                 else:
@@ -116,7 +116,7 @@ class Task:
         for goal in self.goals:
             off = math.hypot(max(west - goal.x, 0.0, goal.x - east), max(south - goal.y, 0.0, goal.y - north))
             if off > OFF_MAP:
-                raise Unreachable(f"({goal.x:.2f}, {goal.y:.2f}) lies {off:.0f} m off the map")
+                raise Unreachable(f"({goal.x:z.2f}, {goal.y:z.2f}) lies {off:.0f} m off the map")
 
     def lengths(self) -> NDArray[np.float64]:
         """Metres between each two of start and goals (n + 1, n + 1), roughly; inf where no way leads.

@@ -49,31 +49,31 @@ class Placed(msgspec.Struct):
 HalfWidth = Annotated[float, msgspec.Meta(gt=0, le=1000)]
 
 
-@VERBS.on("set_pose", right=Right.EDIT)
+@VERBS.on("set_pose", right=Right.EDIT, needs=(Localization,))
 async def set_pose(robot: Robot, *, x: Meters, y: Meters, yaw: Radians = 0.0) -> None:
     """Say that the robot stands there in its map."""
     robot[Localization].set_pose(Pose(x, y, yaw))
 
 
-@VERBS.on("relocalize", right=Right.EDIT)
+@VERBS.on("relocalize", right=Right.EDIT, needs=(Localization,))
 async def relocalize(robot: Robot, *, may_move: bool = False) -> Started:
     """Find the robot anywhere in its map; if it may move, it drives around to tell places that look alike."""
     return started(robot[Localization].relocalize(may_move=may_move, source=SOURCE))
 
 
-@VERBS.on("mapping", right=Right.EDIT)
+@VERBS.on("mapping", right=Right.EDIT, needs=(Mapping,))
 async def mapping(robot: Robot, *, on: bool) -> None:
     """Go on or stop adding scans to the map."""
     robot[Mapping].enable(on)
 
 
-@VERBS.on("clear_map", right=Right.EDIT)
+@VERBS.on("clear_map", right=Right.EDIT, needs=(Mapping,))
 async def clear_map(robot: Robot) -> None:
     """Forget the map; where the robot stands becomes the new origin."""
     robot[Mapping].clear()
 
 
-@VERBS.on("add_place", right=Right.EDIT)
+@VERBS.on("add_place", right=Right.EDIT, needs=(Places,))
 async def add_place(robot: Robot, *, name: Name, x: Meters, y: Meters, yaw: Radians = 0.0) -> str:
     """Put a named place on the map; the answer is its id."""
     id = str(uuid.uuid4())
@@ -81,45 +81,45 @@ async def add_place(robot: Robot, *, name: Name, x: Meters, y: Meters, yaw: Radi
     return id
 
 
-@VERBS.on("remove_place", right=Right.EDIT)
+@VERBS.on("remove_place", right=Right.EDIT, needs=(Places,))
 async def remove_place(robot: Robot, *, id: Name) -> None:
     """Take a place off the map."""
     await robot[Places].remove(id)
 
 
-@VERBS.on("add_line", right=Right.EDIT)
+@VERBS.on("add_line", right=Right.EDIT, needs=(MapAnnotations,))
 async def add_line(robot: Robot, *, kind: LineKind, start: Spot, end: Spot) -> None:
     """Draw a virtual wall or a track."""
     line = Line(0, kind, Point(*start), Point(*end))
     await robot[MapAnnotations].change(lambda now: now.with_new(line))
 
 
-@VERBS.on("add_area", right=Right.EDIT)
+@VERBS.on("add_area", right=Right.EDIT, needs=(MapAnnotations,))
 async def add_area(robot: Robot, *, kind: AreaKind, start: Spot, end: Spot, half_width: HalfWidth) -> None:
     """Draw an area: ``half_width`` m to both sides of the line from ``start`` to ``end``."""
     area = Area(0, kind, Point(*start), Point(*end), half_width)
     await robot[MapAnnotations].change(lambda now: now.with_new(area))
 
 
-@VERBS.on("remove_drawing", right=Right.EDIT)
+@VERBS.on("remove_drawing", right=Right.EDIT, needs=(MapAnnotations,))
 async def remove_drawing(robot: Robot, *, id: int) -> None:
     """Take a line or an area off the map."""
     await robot[MapAnnotations].change(_without(id))
 
 
-@VERBS.on("set_home", right=Right.EDIT)
+@VERBS.on("set_home", right=Right.EDIT, needs=(Docking, Localization))
 async def set_home(robot: Robot) -> None:
     """Say that the dock is where the robot stands now."""
     robot[Docking].set_home(robot[Localization].pose)
 
 
-@VERBS.on("maps", right=Right.SEE)
+@VERBS.on("maps", right=Right.SEE, needs=(MapLibrary,))
 async def maps(robot: Robot) -> list[str]:
     """List the maps that the robot keeps by name, oldest first."""
     return list(await robot[MapLibrary].names())
 
 
-@VERBS.on("save_map", right=Right.EDIT)
+@VERBS.on("save_map", right=Right.EDIT, needs=(MapLibrary, Mapping))
 async def save_map(robot: Robot, *, map: Name) -> None:
     """Keep the map in use under a name, with the dock; it replaces the one of that name."""
     grid = robot[Mapping].grid
@@ -128,14 +128,14 @@ async def save_map(robot: Robot, *, map: Name) -> None:
     await robot[MapLibrary].put(StoredMap(map, grid, robot.clock.epoch(), dock=known_dock(robot)))
 
 
-@VERBS.on("load_map", right=Right.EDIT)
+@VERBS.on("load_map", right=Right.EDIT, needs=(MapLibrary, Localization))
 async def load_map(robot: Robot, *, map: Name, x: Meters = 0.0, y: Meters = 0.0, yaw: Radians = 0.0) -> Started:
     """Use a kept map from now on; the robot stands near the given pose in it, or looks for itself everywhere."""
     take_into_use(robot, await robot[MapLibrary].get(map), Pose(x, y, yaw))
     return started(robot[Localization].relocalize(source=SOURCE))
 
 
-@VERBS.on("merge_map", right=Right.EDIT)
+@VERBS.on("merge_map", right=Right.EDIT, needs=(MapLibrary, Mapping, Localization))
 async def merge_map(robot: Robot, *, map: Name, x: Meters = 0.0, y: Meters = 0.0, yaw: Radians = 0.0) -> Placed:
     """Add a kept map to the map in use; its origin lies near the given pose, and exactly where walls fit.
 
@@ -155,7 +155,7 @@ def _both(here: OccupancyGrid, other: OccupancyGrid, guess: Pose) -> tuple[Pose,
     return place, merged(here, other, place)
 
 
-@VERBS.on("remove_map", right=Right.EDIT)
+@VERBS.on("remove_map", right=Right.EDIT, needs=(MapLibrary,))
 async def remove_map(robot: Robot, *, map: Name) -> None:
     """Forget a kept map; the map in use stays."""
     await robot[MapLibrary].remove(map)

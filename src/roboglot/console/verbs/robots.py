@@ -1,5 +1,4 @@
-"""Verbs of a robot for pages and scripts. Each goes through the model like any client's request. Each verb goes through
-the model like any client's wish.
+"""Verbs of a robot for pages and scripts. Each goes through the model like any client's request.
 
 The handlers' first parameter is the robot; the others come from JSON by name, in SI units and the map frame.
 """
@@ -55,26 +54,26 @@ def started(action: Action) -> Started:
     return Started(action.id)
 
 
-@VERBS.on("go_to")
+@VERBS.on("go_to", needs=(Navigation,))
 async def go_to(robot: Robot, *, points: Spots, yaw: Radians | None = None) -> Started:
     """Drive through ``points`` (map, m) in turn; ``yaw``: final heading, rad."""
     goals = [Point(x, y) for x, y in points]
     return started(robot[Navigation].navigate_to(goals, NavigationOptions(yaw=yaw), source=SOURCE))
 
 
-@VERBS.on("drive")
+@VERBS.on("drive", needs=(Driving,))
 async def drive(robot: Robot, *, x: Speed = 0.0, y: Speed = 0.0, yaw: Speed = 0.0, seconds: Moment = 1.0) -> Started:
     """Drive with this velocity (base_link, m/s, rad/s) for at most two seconds, then brake."""
     return started(robot[Driving].drive(Twist(x, y, yaw), lifetime=seconds, source=SOURCE))
 
 
-@VERBS.on("dock")
+@VERBS.on("dock", needs=(Docking,))
 async def dock(robot: Robot) -> Started:
     """Drive home and onto the charging contacts."""
     return started(robot[Docking].dock(source=SOURCE))
 
 
-@VERBS.on("undock")
+@VERBS.on("undock", needs=(Docking,))
 async def undock(robot: Robot) -> Started:
     """Leave the charging contacts."""
     return started(robot[Docking].undock(source=SOURCE))
@@ -108,7 +107,7 @@ async def resume(robot: Robot, *, action: int) -> None:
     robot.actions.get(action).resume()
 
 
-@VERBS.on("emergency_stop")
+@VERBS.on("emergency_stop", needs=(EmergencyStop,))
 async def emergency_stop(robot: Robot, *, engage: bool) -> None:
     """Engage or release the emergency stop."""
     if engage:
@@ -117,74 +116,74 @@ async def emergency_stop(robot: Robot, *, engage: bool) -> None:
         robot[EmergencyStop].release()
 
 
-@VERBS.on("give_control")
+@VERBS.on("give_control", needs=(Lease,))
 async def give_control(robot: Robot, *, to: Name) -> None:
     """Let only ``to`` (a client's name, such as "robomaster 10.0.0.7") move the robot."""
     await robot[Lease].take(to)
 
 
-@VERBS.on("release_control")
+@VERBS.on("release_control", needs=(Lease,))
 async def release_control(robot: Robot) -> None:
     """Let every client move the robot again; the newest command counts."""
     await robot[Lease].release()
 
 
-@VERBS.on("dismiss_fault")
+@VERBS.on("dismiss_fault", needs=(Health,))
 async def dismiss_fault(robot: Robot, *, fault: int) -> None:
     """Hide a fault; it comes back if its cause lasts."""
     robot[Health].dismiss(fault)
 
 
-@VERBS.on("stand")
+@VERBS.on("stand", needs=(Legs,))
 async def stand(robot: Robot) -> Started:
     """Stand up."""
     return started(robot[Legs].stand(source=SOURCE))
 
 
-@VERBS.on("lie_down")
+@VERBS.on("lie_down", needs=(Legs,))
 async def lie_down(robot: Robot) -> Started:
     """Brake and lie down."""
     return started(robot[Legs].lie_down(source=SOURCE))
 
 
-@VERBS.on("aim")
+@VERBS.on("aim", needs=(Gimbal,))
 async def aim(robot: Robot, *, pitch: Radians | None = None, yaw: Radians | None = None) -> Started:
     """Turn the gimbal to these angles against the body, rad."""
     return started(robot[Gimbal].move_to(pitch=pitch, yaw=yaw, source=SOURCE))
 
 
-@VERBS.on("recenter_gimbal")
+@VERBS.on("recenter_gimbal", needs=(Gimbal,))
 async def recenter_gimbal(robot: Robot) -> Started:
     """Turn the gimbal to the body's front."""
     return started(robot[Gimbal].recenter(source=SOURCE))
 
 
-@VERBS.on("move_arm")
+@VERBS.on("move_arm", needs=(Arm,))
 async def move_arm(robot: Robot, *, x: Meters = 0.0, z: Meters = 0.0) -> Started:
     """Move the arm's end point by so much, m."""
     return started(robot[Arm].move_by(ArmPosition(x, z), source=SOURCE))
 
 
-@VERBS.on("recenter_arm")
+@VERBS.on("recenter_arm", needs=(Arm,))
 async def recenter_arm(robot: Robot) -> Started:
     """Fold the arm."""
     return started(robot[Arm].recenter(source=SOURCE))
 
 
-@VERBS.on("grip")
+@VERBS.on("grip", needs=(Gripper,))
 async def grip(robot: Robot, *, close: bool) -> Started:
     """Close or open the gripper's jaws."""
     gripper = robot[Gripper]
     return started(gripper.close(source=SOURCE) if close else gripper.open(source=SOURCE))
 
 
-@VERBS.on("fire")
+@VERBS.on("fire", needs=(Blaster,))
 async def fire(robot: Robot) -> int:
     """Fire one shot; the answer is how many beads leave."""
     return robot[Blaster].fire()
 
 
-@VERBS.on("shine")
+@VERBS.on("shine", needs=(Light,))
 async def shine(
     robot: Robot,
     *,
@@ -200,13 +199,13 @@ async def shine(
         light.shine(each, colour, effect if any(astuple(colour)) else LightEffect.OFF)
 
 
-@VERBS.on("say")
+@VERBS.on("say", needs=(Speaker,))
 async def say(robot: Robot, *, text: Text) -> Started:
     """Speak a text."""
     return started(robot[Speaker].say(text, source=SOURCE))
 
 
-@VERBS.on("volume")
+@VERBS.on("volume", needs=(Speaker,))
 async def volume(robot: Robot, *, to: Annotated[float, msgspec.Meta(ge=0, le=1)]) -> None:
     """Set the loudspeaker, 0 silent to 1 loudest."""
     robot[Speaker].set_volume(to)

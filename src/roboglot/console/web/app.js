@@ -19,7 +19,7 @@ const view = signal(named());
 addEventListener("hashchange", () => { view.value = named(); });
 
 function Stop() {
-  return html`<button type="button" class="stop" verb="stop" onClick=${() => command("stop")} title=${lacks("stop") || t("stop.hint")} aria-disabled=${lacks("stop") ? "true" : undefined}>
+  return html`<button type="button" class="stop" onClick=${() => command("stop")} title=${lacks("stop") || t("stop.hint")} aria-disabled=${lacks("stop") ? "true" : undefined}>
     <${Icon} name="stop" size=${18} /><span>${t("stop")}</span><kbd>Esc</kbd></button>`;
 }
 

@@ -27,7 +27,7 @@ export function elsewhere(given) {
   there.search = String(new URLSearchParams({ class: given.code, name: given.name, language: language.value, theme: theme.value }));
   return there.href;
 }
-const sent = new URLSearchParams(location.search); // by it
+export const sent = new URLSearchParams(location.search); // by it
 if (/^(en|zh)$/.test(sent.get("language") ?? "")) language.value = String(sent.get("language"));
 if (/^(light|dark)$/.test(sent.get("theme") ?? "")) theme.value = String(sent.get("theme"));
 
@@ -112,7 +112,8 @@ effect(() => {
   document.documentElement.dataset.theme = theme.value;
 });
 
-const PATHS = {
+/** @type {Record<string, string>} */
+export const PATHS = {
   map: "M3 6l6-2 6 2 6-2v14l-6 2-6-2-6 2zM9 4v14M15 6v14",
   wire: "M4 7h13l-3-3M20 17H7l3 3",
   world: "M12 3a9 9 0 100 18 9 9 0 000-18M3 12h18M12 3c3 3 3 15 0 18M12 3c-3 3-3 15 0 18",
@@ -131,20 +132,20 @@ const PATHS = {
   dock: "M5 20V9l7-5 7 5v11M9 20v-6h6v6", copy: "M9 9h11v11H9zM5 15H4V4h11v1", pause: "M8 5v14M16 5v14",
   play: "M7 4l12 8-12 8z", box: "M4 8l8-4 8 4v8l-8 4-8-4zM4 8l8 4 8-4M12 12v8", person: "M12 11a4 4 0 100-8 4 4 0 000 8M4 21c0-5 3-8 8-8s8 3 8 8",
   place: "M6 21V4M6 4h12l-3 4 3 4H6", wall: "M4 20L20 4", stop: "M6 6h12v12H6z", alert: "M12 3l10 18H2zM12 10v5M12 18v.5",
-  step: "M5 5v14l9-7zM18 5v14", over: "M4 12a8 8 0 0115-4M20 3v5h-5M12 18h.01", out: "M12 15V4M8 8l4-4 4 4M5 20h14", undo: "M9 7L4 12l5 5M4 12h11a5 5 0 010 10h-3", redo: "M15 7l5 5-5 5M20 12H9a5 5 0 000 10h3", folder: "M3 6h7l2 3h9v10H3z",
   clock: "M12 3a9 9 0 100 18 9 9 0 000-18M12 7v5l4 2", keys: "M3 6h18v12H3zM7 10h.5M11 10h.5M15 10h.5M7 14h10", dot: "M12 6a6 6 0 100 12 6 6 0 000-12", blocks: "M4 4h7v3h3V4h6v7h-3v3h3v6H4z",
-  star: "M12 3l2.8 5.8 6.2.9-4.5 4.4 1 6.2-5.5-3-5.5 3 1-6.2L3 9.7l6.2-.9z", school: "M3 9l9-5 9 5-9 5zM7 11v5c3 2 7 2 10 0v-5",
+  school: "M3 9l9-5 9 5-9 5zM7 11v5c3 2 7 2 10 0v-5",
   leave: "M14 4h6v16h-6M15 12H4M8 8l-4 4 4 4",
   move: "M12 3a9 9 0 100 18 9 9 0 000-18M12 12l4-4",
 };
 
-/** @param {{name: keyof typeof PATHS, size?: number}} props */
+/** @param {{name: string, size?: number}} props */
 export function Icon({ name, size = 20 }) {
   return html`<svg class="icon" width=${size} height=${size} viewBox="0 0 24 24" aria-hidden="true"><path d=${PATHS[name]} /></svg>`;
 }
 
-/** What the person at the page may do with the robot that is shown, and which right each verb needs; set by link.js. */
-export const rights = signal(/** @type {{mine: string[] | null, needs: Record<string, string>}} */ ({ mine: null, needs: {} }));
+/** What the person at the page may do with the robot that is shown, which right each verb needs, which it has no part for. */
+export const rights = signal(/** @type {{mine: string[] | null, needs: Record<string, string>, absent: string[]}} */ ({ mine: null, needs: {}, absent: [] }));
+export const can = (/** @type {string} */ verb) => !rights.value.absent.includes(verb);
 
 /** Why a verb is not for this person, in words; empty: it is. @param {string} [verb] */
 export function lacks(verb) {
@@ -153,9 +154,10 @@ export function lacks(verb) {
   return !right || !mine || mine.includes(right) ? "" : t("right.missing", { right: t(`right.${right}`) });
 }
 
-/** A button; `on` shows that it is chosen; `verb` is what it has done: without the right to that it is off, and says why.
- * @param {any} props */
+/** A button; `on` shows that it is chosen; `verb` is what it has done: it is off without the right to that, and says why;
+ * not there without the part. @param {any} props */
 export function Button({ label, icon, on, verb, kind = "", compact = false, children, ...rest }) {
+  if (!can(verb)) return null;
   const toggles = on === undefined ? {} : { "aria-pressed": String(Boolean(on)) };
   const why = lacks(verb);
   const name = compact ? { "aria-label": label, title: label } : {};
@@ -174,6 +176,9 @@ export function say(text, bad = false) {
   clearTimeout(fading);
   fading = window.setTimeout(() => { notice.value = { text: "", bad: false }; }, bad ? 8000 : 3500);
 }
+
+/** A number of so many digits, which is never -0. @param {number} n */
+export const fixed = (n, digits = 2) => (Number(n.toFixed(digits)) || 0).toFixed(digits);
 
 /** Seconds as people say them. @param {number} seconds */
 export function duration(seconds) {

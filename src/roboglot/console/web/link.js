@@ -30,7 +30,7 @@ export const state = computed(() => states.value[current.value] ?? null);
 export const simulated = computed(() => Boolean(hello.value?.robots.find((r) => r.name === current.value)?.simulated));
 effect(() => {
   const robot = hello.value?.robots.find((r) => r.name === current.value);
-  rights.value = { mine: robot ? [...robot.rights, ...(hello.value.all ? ["all"] : [])] : null, needs: hello.value?.needs ?? {} };
+  rights.value = { mine: robot ? [...robot.rights, ...(hello.value.all ? ["all"] : [])] : null, needs: hello.value?.needs ?? {}, absent: state.value?.absent ?? [] };
 });
 export const wanted = signal({ wire: false, truth: false, seen: false, moving: true }); // moving: at the rate of a map that is drawn
 
@@ -114,16 +114,13 @@ export function ask(robot, verb, values = {}) {
 }
 
 /** The same for the robot that is shown; what is refused is said. @param {string} verb @param {object} [values] */
-export async function command(verb, values = {}) {
+export async function command(verb, values = {}, robot = current.value) {
   if (lacks(verb)) return void say(lacks(verb), true);
-  try { return await ask(current.value, verb, values); } catch (error) { say(t("refused", { why: error.message }), true); return undefined; }
+  try { return await ask(robot, verb, values); } catch (error) { say(t("refused", { why: error.message }), true); return undefined; }
 }
 
 /** @param {string} verb @param {object} [values] */
-export async function changeWorld(verb, values = {}) {
-  if (lacks(verb)) return void say(lacks(verb), true);
-  try { return await ask("", verb, values); } catch (error) { say(t("refused", { why: error.message }), true); return undefined; }
-}
+export const changeWorld = (verb, values) => command(verb, values, "");
 
 /** Drive by hand: shares of the top speeds. The server brakes when this falls silent.
  * @param {number} x @param {number} y @param {number} yaw */

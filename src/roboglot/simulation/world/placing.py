@@ -59,7 +59,7 @@ class Places:
             raise ValueError(f"there is no floor {floor}; the world has {len(self.world.floors)}")
         if wanted is not None and not self.free(wanted, floor, radius):
             free = self._near(wanted, floor, radius)
-            instead = f"; it can at {free.x:.2f},{free.y:.2f}" if free is not None else ""
+            instead = f"; it can at {free.x:z.2f},{free.y:z.2f}" if free is not None else ""
             raise ValueError(f"a robot cannot stand at ({wanted.x:g}, {wanted.y:g}) on floor {floor}{instead}")
         for pose, number in [(wanted, floor)] if wanted is not None else self._candidates(floor, radius):
             if self.free(pose, number, radius) and (wanted is not None or not self._reserved(pose, number, radius)):

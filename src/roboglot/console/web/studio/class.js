@@ -1,7 +1,7 @@
 // The class: join by a code, hand in; the teacher's grid of what each pupil's program does. Where several worlds share
 // the class, a pupil's page goes on to the console of the world that is theirs.
 import { effect, signal } from "@preact/signals";
-import { Button, elsewhere, html, kept, person, say, t } from "../base.js";
+import { Button, elsewhere, html, kept, person, say, sent, t } from "../base.js";
 import { choose, hello } from "../link.js";
 import { ask, listen, online, open, send } from "./link.js";
 import { results } from "./missions.js";
@@ -51,7 +51,6 @@ listen((message) => {
     case "refused": if (!message.id) say(t("refused", { why: message.why }), true);
   }
 });
-const sent = new URLSearchParams(location.search);
 let carry = Boolean(sent.get("class") && sent.get("name")); // from the page of another world, or from the log-in page
 if (carry) {
   code.value = String(sent.get("class")).slice(0, 12); person.value = String(sent.get("name")).slice(0, 40); role.value = "pupil";

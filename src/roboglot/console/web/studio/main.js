@@ -2,7 +2,7 @@
 import { render } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 import { computed, effect, signal } from "@preact/signals";
-import { Button, Icon, html, kept, language, loadWords, notice, say, t, theme } from "../base.js";
+import { Button, Icon, PATHS, html, kept, language, loadWords, notice, say, t, theme } from "../base.js";
 import { choose, command, connect as connectRobot, current, hello, status, want } from "../link.js";
 import { loadTable } from "./blocks.js";
 import { Group } from "./class.js";
@@ -15,6 +15,15 @@ import { Output, Python, RobotPanel, TextEditor, Values } from "./panels.js";
 import { body, changed, handOver, list, program, rename, restore, stored } from "./program.js";
 import * as runner from "./runner.js";
 
+Object.assign(PATHS, { // the studio's own icons
+  step: "M5 5v14l9-7zM18 5v14",
+  over: "M4 12a8 8 0 0115-4M20 3v5h-5M12 18h.01",
+  out: "M12 15V4M8 8l4-4 4 4M5 20h14",
+  undo: "M9 7L4 12l5 5M4 12h11a5 5 0 010 10h-3",
+  redo: "M15 7l5 5-5 5M20 12H9a5 5 0 000 10h3",
+  folder: "M3 6h7l2 3h9v10H3z",
+  star: "M12 3l2.8 5.8 6.2.9-4.5 4.4 1 6.2-5.5-3-5.5 3 1-6.2L3 9.7l6.2-.9z",
+});
 const TABS = { python: Python, output: Output, values: Values, robot: RobotPanel, missions: Missions, group: Group };
 export const tab = kept("studio.tab", "python");
 const whole = signal(matchMedia("(min-width: 900px)").matches ? "both" : "blocks"); // on a phone one at a time

@@ -1,7 +1,7 @@
 // Driving by hand: a pad that must be held, keys, a gamepad; and panels for what else this body has.
 import { useEffect, useRef } from "preact/hooks";
 import { signal } from "@preact/signals";
-import { Button, html, lacks, robotWord, t, translated } from "../base.js";
+import { Button, fixed, html, lacks, robotWord, t, translated } from "../base.js";
 import { command, drive, padRefused, state } from "../link.js";
 import { Camera } from "./camera.js";
 
@@ -104,7 +104,7 @@ const PANELS = {
     <${Slider} name=${t("pitch")} unit="°" min=${degrees(body.gimbal_reach[0])} max=${degrees(body.gimbal_reach[1])} step="1" value=${degrees(body.gimbal.pitch)} verb="aim" onChange=${(v) => command("aim", { pitch: radians(v) })} />
     <${Slider} name=${t("yaw")} unit="°" min=${degrees(body.gimbal_reach[2])} max=${degrees(body.gimbal_reach[3])} step="1" value=${degrees(body.gimbal.yaw)} verb="aim" onChange=${(v) => command("aim", { yaw: radians(v) })} />
     <div class="buttons"><${Button} label=${t("recenter")} verb="recenter_gimbal" onClick=${() => command("recenter_gimbal")} /></div></div>`,
-  arm: (body) => html`<div class="card"><h3>${t("arm")}</h3><p>x ${body.arm.x.toFixed(2)} · z ${body.arm.z.toFixed(2)} m</p><div class="buttons">
+  arm: (body) => html`<div class="card"><h3>${t("arm")}</h3><p>x ${fixed(body.arm.x)} · z ${fixed(body.arm.z)} m</p><div class="buttons">
     ${/** @type {[string, number, number][]} */ ([["arm.out", 0.02, 0], ["arm.in", -0.02, 0], ["arm.up", 0, 0.02], ["arm.down", 0, -0.02]]).map(([key, x, z]) => html`<${Button} label=${t(key)} verb="move_arm" onClick=${() => command("move_arm", { x, z })} />`)}
     <${Button} label=${t("recenter")} verb="recenter_arm" onClick=${() => command("recenter_arm")} /></div></div>`,
   gripper: (body) => html`<div class="card"><h3>${t("gripper")}</h3><p>${robotWord(body.gripper)}</p><div class="buttons">

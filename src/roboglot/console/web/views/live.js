@@ -1,6 +1,6 @@
 // The live view: map, tools to send the robot somewhere, and beside it what it is, does and has done.
 import { signal } from "@preact/signals";
-import { Button, Icon, duration, html, person, robotWord, say, t } from "../base.js";
+import { Button, Icon, can, duration, fixed, html, person, robotWord, say, t } from "../base.js";
 import { MapView } from "../map.js";
 import { command, current, introduce, poses, simulated, state, wanted, you } from "../link.js";
 import { Drive } from "./drive.js";
@@ -31,16 +31,17 @@ const TOOLS = {
   ruler: { drag: (from, to) => { measure.value = [from, to]; }, done: () => {}, drop: () => {} },
 };
 const NEEDS = { go: "go_to", route: "go_to" };
+const used = () => (can(NEEDS[tool.value]) ? tool.value : "pan");
 const ICONS = { go: "goal", route: "route", pan: "hand", ruler: "ruler" };
 
 function Tools() {
   return html`<div class="tools" role="toolbar" aria-label=${t("tools")}>
-    ${Object.keys(TOOLS).map((name) => html`<${Button} compact icon=${ICONS[name]} label=${t(`tool.${name}`)} verb=${NEEDS[name]} on=${tool.value === name}
+    ${Object.keys(TOOLS).map((name) => html`<${Button} compact icon=${ICONS[name]} label=${t(`tool.${name}`)} verb=${NEEDS[name]} on=${used() === name}
       onClick=${() => { tool.value = name; measure.value = null; route.value = []; }} />`)}
-    ${tool.value === "route" && route.value.length > 0 && html`<${Button} kind="main" icon="play" label=${t("route.go", { n: route.value.length })} verb="go_to"
+    ${used() === "route" && route.value.length > 0 && html`<${Button} kind="main" icon="play" label=${t("route.go", { n: route.value.length })} verb="go_to"
       onClick=${() => { go(route.value); route.value = []; }} />`}
   </div>
-  <p class="hint">${t(`tool.${tool.value}.hint`)}</p>`;
+  <p class="hint">${t(`tool.${used()}.hint`)}</p>`;
 }
 
 function Row({ name, children, kind = "" }) {
@@ -74,7 +75,7 @@ function State() {
     <div class="card"><h3>${t("condition")}</h3><${Faults} /><dl>
       ${battery && html`<${Row} name=${t("battery")} kind=${battery.low ? "bad" : ""}>${Math.round(battery.charge * 100)} %${battery.charging ? ` · ${t("charging")}` : ""}
         <small>${battery.volts} V · ${battery.amperes} A${battery.remaining ? ` · ${t("battery.left", { time: duration(battery.remaining) })}` : ""}</small><//>`}
-      ${pose && html`<${Row} name=${t("pose")}>x ${pose[0].toFixed(2)} · y ${pose[1].toFixed(2)} m · ${Math.round(pose[2] * 180 / Math.PI)}°<//>
+      ${pose && html`<${Row} name=${t("pose")}>x ${fixed(pose[0])} · y ${fixed(pose[1])} m · ${Math.round(pose[2] * 180 / Math.PI)}°<//>
       <${Row} name=${t("speed")}>${Math.hypot(pose[3], pose[4]).toFixed(2)} m/s · ${Math.round(pose[5] * 180 / Math.PI)}°/s<//>`}
       ${place.quality !== null && html`<${Row} name=${t("place.fit")} kind=${place.lost ? "bad" : ""}>${place.lost ? t("place.lost", { why: robotWord(place.lost) }) : `${Math.round(place.quality * 100)} %`}<//>`}
       ${place.floor !== null && html`<${Row} name=${t("floor")}>${place.floor}<//>`}
@@ -82,17 +83,17 @@ function State() {
       <${Row} name=${t("model")}>${about.maker} ${about.model}<small>${about.serial} · ${t("firmware")} ${about.firmware}</small><//>
     </dl>
     <div class="buttons">
-      ${state.value.parts.includes("docking") && html`<${Button} icon="dock" label=${safety.docked ? t("undock") : t("dock.go")} verb="dock" onClick=${() => command(safety.docked ? "undock" : "dock")} />`}
-      ${state.value.parts.includes("emergency_stop") && !safety.emergency_stop && html`<${Button} kind="danger" icon="alert" label=${t("estop")} verb="emergency_stop" onClick=${() => command("emergency_stop", { engage: true })} />`}
+      <${Button} icon="dock" label=${safety.docked ? t("undock") : t("dock.go")} verb="dock" onClick=${() => command(safety.docked ? "undock" : "dock")} />
+      ${!safety.emergency_stop && html`<${Button} kind="danger" icon="alert" label=${t("estop")} verb="emergency_stop" onClick=${() => command("emergency_stop", { engage: true })} />`}
     </div></div>
     <details class="card"><summary>${t("list")}</summary>
-      <p>${pose && t("list.robot", { name: current.value, x: pose[0].toFixed(1), y: pose[1].toFixed(1), yaw: Math.round(pose[2] * 180 / Math.PI) })}</p>
-      <ul class="list">${drawings.places.map((p) => html`<li><span>${p.name}</span><small>${p.pose[0].toFixed(1)}, ${p.pose[1].toFixed(1)}</small>
+      <p>${pose && t("list.robot", { name: current.value, x: fixed(pose[0], 1), y: fixed(pose[1], 1), yaw: Math.round(pose[2] * 180 / Math.PI) })}</p>
+      <ul class="list">${drawings.places.map((p) => html`<li><span>${p.name}</span><small>${fixed(p.pose[0], 1)}, ${fixed(p.pose[1], 1)}</small>
         <${Button} label=${t("go")} verb="go_to" onClick=${() => go([[p.pose[0], p.pose[1]]], p.pose[2])} /></li>`)}</ul>
       <p>${t("list.drawn", { lines: drawings.lines.length, areas: drawings.areas.length, docks: drawings.docks.length })}</p>
-      <form class="inline" onSubmit=${(e) => { e.preventDefault(); const f = new FormData(e.target); go([[Number(f.get("x")), Number(f.get("y"))]]); }}>
+      ${can("go_to") && html`<form class="inline" onSubmit=${(e) => { e.preventDefault(); const f = new FormData(e.target); go([[Number(f.get("x")), Number(f.get("y"))]]); }}>
         <label>x <input name="x" type="number" step="0.1" required /></label><label>y <input name="y" type="number" step="0.1" required /></label>
-        <${Button} type="submit" label=${t("go")} verb="go_to" /></form>
+        <${Button} type="submit" label=${t("go")} verb="go_to" /></form>`}
     </details>`;
 }
 
@@ -137,7 +138,7 @@ export function Live() {
   const overlay = { arrow: drag.value, spots: route.value, measure: measure.value };
   const Shown = TABS[tab.value];
   return html`<div class="split">
-    <${MapView} tool=${TOOLS[tool.value]} overlay=${overlay}><${Tools} />
+    <${MapView} tool=${TOOLS[used()]} overlay=${overlay}><${Tools} />
       ${simulated.value && wanted.value.truth && html`<p class="legend">${t("truth.legend")}</p>`}<//>
     <aside><${Tabs} tabs=${TABS} chosen=${tab} label=${t("panels")} />
       <div id="panel" class="panel" role="tabpanel" aria-labelledby=${`tab-${tab.value}`} tabindex="0">${state.value ? html`<${Shown} />` : html`<p class="muted">${t("link.opening")}</p>`}</div></aside>

@@ -1,7 +1,7 @@
 // Plots of the last ten minutes of robot time: noted while the page is open, drawn by uPlot once they are looked at.
 import { useEffect, useRef } from "preact/hooks";
 import { effect, signal } from "@preact/signals";
-import { html, language, t, theme } from "../base.js";
+import { fixed, html, language, t, theme } from "../base.js";
 import { palette } from "../chart.js";
 import { age, clock, current, poses, state } from "../link.js";
 
@@ -79,7 +79,7 @@ function Plot({ name, unit, range }) {
     return () => { gone = true; stop(); watcher.disconnect(); plot?.destroy(); };
   }, [theme.value, language.value]);
   void drawn.value;
-  const newest = columns(name)[1].at(-1), said = newest === null || newest === undefined ? "–" : `${newest.toFixed(name === "speed" ? 2 : 0)} ${unit}`;
+  const newest = columns(name)[1].at(-1), said = newest === null || newest === undefined ? "–" : `${fixed(newest, name === "speed" ? 2 : 0)} ${unit}`;
   return html`<div class="card plot" data-plot=${name}><h3>${t(`plot.${name}`)}<b>${said}</b></h3><div ref=${place} role="img" aria-label=${`${t(`plot.${name}`)}: ${said}`}></div></div>`;
 }
 

@@ -1,6 +1,6 @@
 // All robots at a glance: charge, task, trouble, who has them; one click into one, one to stop them all.
 import { useEffect, useState } from "preact/hooks";
-import { Button, Icon, html, robotWord, say, t } from "../base.js";
+import { Button, Icon, fixed, html, robotWord, say, t } from "../base.js";
 import { ask, choose, hello, poses, states } from "../link.js";
 
 async function stopAll() {
@@ -32,7 +32,7 @@ function Tile({ robot }) {
     <dl><div class="row"><dt>${t("battery")}</dt><dd class=${battery?.low ? "bad" : ""}>${battery ? `${Math.round(battery.charge * 100)} %` : "–"}${battery?.charging ? ` · ${t("charging")}` : ""}</dd></div>
       <div class="row"><dt>${t("task")}</dt><dd>${task ? robotWord(task.name) : safety.docked ? t("docked") : t("task.none")}</dd></div>
       <div class="row"><dt>${t("control")}</dt><dd>${control.taken_by || control.holder || t("control.nobody")}</dd></div>
-      <div class="row"><dt>${t("pose")}</dt><dd>${pose ? `${pose[0].toFixed(1)}, ${pose[1].toFixed(1)} m` : "–"}</dd></div></dl>
+      <div class="row"><dt>${t("pose")}</dt><dd>${pose ? `${fixed(pose[0], 1)}, ${fixed(pose[1], 1)} m` : "–"}</dd></div></dl>
     ${safety.emergency_stop ? html`<p class="warned"><${Icon} name="alert" size=${16} />${t("estop.on")}</p>` : faults.length ? html`<p class="warned"><${Icon} name="alert" size=${16} />${robotWord(faults[0].name)}${faults.length > 1 ? ` +${faults.length - 1}` : ""}</p>` : html`<p class="allwell">${t("faults.none")}</p>`}
     <div class="buttons"><${Button} kind="main" label=${t("show")} onClick=${open} /><${Button} icon="stop" label=${t("stop")} disabled=${!robot.rights.includes("drive")} title=${robot.rights.includes("drive") ? "" : t("right.missing", { right: t("right.drive") })} onClick=${() => ask(robot.name, "stop").catch((e) => say(e.message, true))} /></div></li>`;
 }

@@ -1,11 +1,11 @@
 // The log-in page: a name and a password, a token, or a name and the code of a class.
 import { useEffect } from "preact/hooks";
 import { signal } from "@preact/signals";
-import { Button, elsewhere, html, person, t, translated } from "../base.js";
+import { Button, elsewhere, html, person, sent as asked, t, translated } from "../base.js";
 import { chosen, connect, hello, me, status } from "../link.js";
 
 const WAYS = { password: ["name", "password"], token: ["token"], code: ["name", "code"] };
-const asked = new URLSearchParams(location.search), shown = { code: asked.get("code") ?? asked.get("class") ?? "", name: asked.get("name") ?? "" };
+const shown = { code: asked.get("code") ?? asked.get("class") ?? "", name: asked.get("name") ?? "" };
 const way = signal(/** @type {keyof typeof WAYS} */ (shown.code ? "code" : "password"));
 const wrong = signal("");
 const busy = signal(false);

@@ -1,7 +1,7 @@
 // The workshop: change a simulated world, and draw on the robot's map.
 import { useEffect } from "preact/hooks";
 import { signal } from "@preact/signals";
-import { Button, html, robotWord, say, t } from "../base.js";
+import { Button, can, html, robotWord, say, t } from "../base.js";
 import { MapView, floorShown as floor, toWorld } from "../map.js";
 import { changeWorld, command, current, hello, poses, simulated, state, truth, want } from "../link.js";
 import { Clock } from "./clock.js";
@@ -128,10 +128,10 @@ function Drawn() {
 
 export function World() {
   useEffect(() => { want({ truth: simulated.value }); return () => want({ truth: false }); }, [simulated.value]);
-  const tabs = simulated.value ? { people: People, faults: Faults, drawn: Drawn, clock: Clock } : { drawn: Drawn };
-  const tools = tab.value === "drawn" || !simulated.value ? MAP_TOOLS : WORLD_TOOLS;
+  const drawn = can("mapping") && { drawn: Drawn }, tabs = simulated.value ? { people: People, faults: Faults, ...drawn, clock: Clock } : { drawn: Drawn };
+  const Shown = tabs[tab.value] ?? Object.values(tabs)[0];
+  const tools = Shown === Drawn ? MAP_TOOLS : WORLD_TOOLS;
   const used = tool.value in tools ? tool.value : Object.keys(tools)[0];
-  const Shown = tabs[tab.value] ?? Drawn;
   return html`<div class="split">
     <${MapView} tool=${tools[used]} overlay=${shape.value}>
       <div class="tools" role="toolbar" aria-label=${t("tools")}>${Object.keys(tools).map((name) => html`

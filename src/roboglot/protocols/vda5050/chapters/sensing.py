@@ -41,7 +41,7 @@ _WORDS: dict[Thing, Callable[[Any], str]] = {
     Thing.PERSON: lambda seen: f"{seen.distance:.2f} m away",
     Thing.FACE: lambda seen: f"{seen.name or 'unknown'}, {seen.distance:.2f} m away",
     Thing.ROBOT: lambda seen: f"{seen.distance:.2f} m away",
-    Thing.TAG: lambda seen: f"{seen.text} at {seen.pose.x:.2f} {seen.pose.y:.2f}",
+    Thing.TAG: lambda seen: f"{seen.text} at {seen.pose.x:z.2f} {seen.pose.y:z.2f}",
     Thing.MARKER: lambda seen: f"{seen.symbol}, {seen.distance:.2f} m away",
 }
 
@@ -85,7 +85,7 @@ async def fine_positioning(
     goal = MarkGoal(mark=stationType, start=robot[Localization].pose, texts=texts)
     await ended(robot[TagDocking].dock_at(goal, source=SOURCE))
     pose = robot[Localization].pose
-    return f"at {pose.x:.3f} {pose.y:.3f} {pose.yaw:.3f}"
+    return f"at {pose.x:z.3f} {pose.y:z.3f} {pose.yaw:z.3f}"
 
 
 @TABLE.on("logReport", right=Right.EDIT, needs=(SystemLog, FileStore))
