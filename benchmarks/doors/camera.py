@@ -1,4 +1,4 @@
-"""Claims: a 720p picture of the office is drawn in <= 5 ms; camera and H.264 at 720p30 take <= 0.35 of a core.
+"""Claims: a 720p picture of the office is drawn in <= 5 ms; camera and H.264 at 720p30 take <= 0.25 of a core.
 
 ``--pictures FOLDER`` also writes what was drawn as PNG.
 """
@@ -23,7 +23,7 @@ from roboglot.simulation.world.world_files import load_world
 
 SECONDS = 10.0
 PICTURE_LIMIT = 5.0  # ms
-SHARE_LIMIT = 0.35  # of a core
+SHARE_LIMIT = 0.25  # of a core
 VIEWS = {
     "corridor": Pose(21.5, 9.6, 3.14),
     "reception": Pose(7.0, 7.5, -2.2),

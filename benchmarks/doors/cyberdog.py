@@ -1,6 +1,6 @@
-"""Claim: >= 3000 short sendMsg/s; WebRTC >= 25 pictures/s, first in 2 s, <= 0.5 core.
+"""Claims: >= 3000 short sendMsg/s of a core, >= 0.9 of a bare echo; WebRTC >= 25 pictures/s, first in 2 s, <= 0.5 core.
 
-The bare grpc.aio echo of the same run stands beside the first: same messages and TLS, a handler that does nothing.
+The bare grpc.aio echo is asked in turns with the robot: same messages and TLS, a handler that does nothing.
 The video part needs Chromium and is left out, with a word, where there is none. Processor time, not the clock, counts.
 """
 
@@ -10,6 +10,7 @@ import asyncio
 import importlib.util
 import multiprocessing
 import shutil
+import statistics
 import tempfile
 import time
 from pathlib import Path
@@ -17,6 +18,7 @@ from typing import Any
 
 import grpc
 from _claim import Claims
+from _serving import ROUNDS, cpu_seconds, idle_share
 
 from roboglot.clients.cyberdog import Certificates, CyberDogClient
 from roboglot.protocols.cyberdog.certificates import ensure_certificates
@@ -30,6 +32,7 @@ ADDRESS, ECHO = "127.0.0.176", "127.0.0.177:50052"
 APP_PORT = 18983  # not the default, which another robot's app may use
 WAIT_MAX, RUN_MAX = 60.0, 300.0  # s: for one step, for all
 SECONDS = 6.0
+TURN = 2.5  # s of one turn
 AT_ONCE = 64  # requests under way
 GEAR = 8013  # a request that reads one value
 EXAMPLE = Path(__file__).parents[2] / "examples" / "cyberdog_video.py"
@@ -58,12 +61,6 @@ def echo(folder: str) -> None:
     uvloop.run(run())
 
 
-def cpu_of(pid: int) -> float:
-    """Processor seconds of a process, all threads."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / 100
-
-
 def wait_until_idle(robot: ServedRobot) -> None:
     """Wait until the kernels are loaded."""
     for _ in range(40):
@@ -73,12 +70,12 @@ def wait_until_idle(robot: ServedRobot) -> None:
             return
 
 
-async def rate(target: str, proof: Certificates, pid: int) -> tuple[float, float]:
-    """Requests a second with AT_ONCE under way, and what the server could do with a core of its own."""
+async def rate(target: str, proof: Certificates, pid: int, idle: float = 0.0) -> float:
+    """What the server could do with a core of its own (requests/s) with AT_ONCE under way."""
     credentials = grpc.ssl_channel_credentials(proof.ca, proof.key, proof.certificate)
     async with grpc.aio.secure_channel(target, credentials, options=client_options(ROBOT_NAME)) as channel:
         stub = service.GrpcAppStub(channel)
-        count, end = 0, 0.0
+        count = 0
 
         async def ask() -> None:
             nonlocal count
@@ -88,11 +85,11 @@ async def rate(target: str, proof: Certificates, pid: int) -> tuple[float, float
 
         async with asyncio.timeout(WAIT_MAX):
             await ask_once(stub)
-        began, spent = time.perf_counter(), cpu_of(pid)
-        end = began + SECONDS
+        began, spent = time.perf_counter(), cpu_seconds(pid)
+        end = began + TURN
         async with asyncio.timeout(WAIT_MAX):
             await asyncio.gather(*(ask() for _ in range(AT_ONCE)))
-        return count / (time.perf_counter() - began), count / (cpu_of(pid) - spent)
+        return count / (cpu_seconds(pid) - spent - idle * (time.perf_counter() - began))
 
 
 async def ask_once(stub: Any) -> None:
@@ -116,9 +113,9 @@ async def video(robot: ServedRobot, proof: Certificates, claims: Claims) -> None
         await dog.found()
         await dog.stand()
         page = example.serve(dog, 0, seen)
-        before = cpu_of(robot.process.pid)
+        before = cpu_seconds(robot.process.pid)
         await asyncio.sleep(SECONDS)
-        idle = (cpu_of(robot.process.pid) - before) / SECONDS
+        idle = (cpu_seconds(robot.process.pid) - before) / SECONDS
         with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
             command = [CHROMIUM, *OPTIONS, f"--user-data-dir={profile}", f"http://127.0.0.1:{page.server_port}/"]
             quiet = asyncio.subprocess.DEVNULL
@@ -129,9 +126,9 @@ async def video(robot: ServedRobot, proof: Certificates, claims: Claims) -> None
                     async with asyncio.timeout(WAIT_MAX):
                         while not (seen and seen[-1]["frames"] > 60):  # noqa: ASYNC110
                             await asyncio.sleep(0.2)
-                    first, began, spent = seen[-1], time.perf_counter(), cpu_of(robot.process.pid)
+                    first, began, spent = seen[-1], time.perf_counter(), cpu_seconds(robot.process.pid)
                     await asyncio.sleep(2 * SECONDS)
-                    used = (cpu_of(robot.process.pid) - spent) / (time.perf_counter() - began)
+                    used = (cpu_seconds(robot.process.pid) - spent) / (time.perf_counter() - began)
             finally:
                 browser.kill()
                 await asyncio.wait_for(browser.wait(), WAIT_MAX)
@@ -148,15 +145,17 @@ async def run(robot: ServedRobot, folder: Path, claims: Claims) -> None:
     proof = Certificates.load(folder / "cyberdog" / "tls")
     process = multiprocessing.get_context("spawn").Process(target=echo, args=(str(folder / "cyberdog"),), daemon=True)
     process.start()
+    own, idle, pairs = robot.process.pid, await asyncio.to_thread(idle_share, robot.process.pid), []
     try:
-        bare, bare_core = await rate(ECHO, proof, process.pid or 0)
+        for _ in range(ROUNDS):
+            bare = await rate(ECHO, proof, process.pid or 0)
+            pairs.append((bare, await rate(f"{ADDRESS}:50052", proof, own, idle)))
     finally:
         process.kill()
         process.join(WAIT_MAX)
-    ours, ours_core = await rate(f"{ADDRESS}:50052", proof, robot.process.pid)
-    print(f"bare grpc.aio echo {bare:.0f}/s, {bare_core:.0f} a core second; ours {ours:.0f}/s, {ours_core:.0f}")
-    claims.at_least("short sendMsg a core second", ours_core, 3000, "/s")
-    claims.at_least("share of the bare echo", ours_core / bare_core, 0.5, "")
+    print("a core second, bare and ours:", ", ".join(f"{bare:.0f} {ours:.0f}" for bare, ours in pairs))
+    claims.at_least("short sendMsg a core second", statistics.median(ours for _, ours in pairs), 3000, "/s")
+    claims.at_least("share of the bare echo", statistics.median(ours / bare for bare, ours in pairs), 0.9, "")
     await video(robot, proof, claims)
 
 

@@ -1,7 +1,8 @@
-"""Claim: 8000 poses/s and 2000 scans/s of one core, p99 <= 10 ms on 32 connections, half of what bare uvicorn does.
+"""Claim: 8000 poses/s and 2000 scans/s of one core, p99 <= 10 ms on 32 connections, 0.75 of what bare uvicorn does.
 
 The load comes from a process of its own. "Of one core" is what the server did per second of its own processor time,
-all its threads and the simulated world counted; p99 is under that same load.
+all its threads counted, less what its world takes while nobody asks; bare uvicorn is asked in turns with it. p99 is
+under that same load.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import contextlib
 import json
 import multiprocessing
 import socket
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -22,11 +24,12 @@ from pathlib import Path
 
 import uvloop
 from _claim import Claims
+from _serving import cpu_seconds, idle_share, in_turns
 
 from roboglot.testing.process import served
 
 CONNECTIONS = 32
-SECONDS = 5.0
+SECONDS = 3.0
 ADDRESS = "127.0.0.71"
 PORT = 1448
 POSE = "/api/core/slam/v1/localization/pose"
@@ -111,21 +114,15 @@ def _ask(*arguments: object) -> Load:
         return runner.run(ask(*arguments))  # type: ignore[arg-type]
 
 
-def cpu_seconds(pid: int) -> float:
-    """Processor time of a process so far."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / 100
-
-
-def full_load(pid: int, address: str, port: int, path: str) -> tuple[float, float]:
-    """Requests per second of the server's processor time, and ms that 99 of 100 of them took at most."""
-    load(address, port, path, 1.0)
-    before = cpu_seconds(pid)
-    done = load(address, port, path, SECONDS)
-    rate = done.answers / (cpu_seconds(pid) - before)
-    print(f"  {path}: {done.answers / done.seconds:.0f}/s by the clock, {rate:.0f} per processor second", end=", ")
+def full_load(pid: int, idle: float, where: tuple[str, int, str], waits: list[float]) -> float:
+    """Requests per second of the server's processor time; notes the ms that 99 of 100 of them took at most."""
+    before, began = cpu_seconds(pid), time.perf_counter()
+    done = load(*where, SECONDS)
+    rate = done.answers / (cpu_seconds(pid) - before - idle * (time.perf_counter() - began))
+    print(f"  {where[2]}: {done.answers / done.seconds:.0f}/s by the clock, {rate:.0f} per processor second", end=", ")
     print(f"bodies of {done.body} bytes, p50 {done.p50:.1f} ms, p99 {done.p99:.1f} ms", flush=True)
-    return rate, done.p99
+    waits.append(done.p99)
+    return rate
 
 
 @contextlib.contextmanager
@@ -146,19 +143,26 @@ def hello() -> Iterator[tuple[int, int]]:
 
 
 def main() -> None:
-    claims = Claims()
-    with hello() as (pid, port):
-        bare, _ = full_load(pid, "127.0.0.1", port, "/")
-    with tempfile.TemporaryDirectory() as folder, served(Path(folder) / "data", address=ADDRESS) as robot:
+    claims, waits, others = Claims(), list[float](), list[float]()
+    with (
+        hello() as (pid, port),
+        tempfile.TemporaryDirectory() as folder,
+        served(Path(folder) / "data", address=ADDRESS) as robot,
+    ):
         time.sleep(5)  # kernels are loaded
         with urllib.request.urlopen(f"http://{ADDRESS}:{PORT}{SCAN}") as answer:
             points = len(json.load(answer)["laser_points"])
-        pose, waiting = full_load(robot.process.pid, ADDRESS, PORT, POSE)
-        scan, _ = full_load(robot.process.pid, ADDRESS, PORT, SCAN)
+        own = robot.process.pid
+        idle = idle_share(own)
+        pose, share = in_turns(
+            lambda: full_load(pid, 0.0, ("127.0.0.1", port, "/"), others),
+            lambda: full_load(own, idle, (ADDRESS, PORT, POSE), waits),
+        )
+        scan = full_load(own, idle, (ADDRESS, PORT, SCAN), others)
     claims.at_least("pose, of one core", pose, 8000, "requests/s")
     claims.at_least(f"laserscan, {points} points", scan, 2000, "requests/s")
-    claims.at_least("pose / bare uvicorn's hello", pose / bare, 0.5, "")
-    claims.at_most(f"pose, {CONNECTIONS} connections, p99", waiting, 10, "ms")
+    claims.at_least("pose / bare uvicorn's hello", share, 0.75, "")
+    claims.at_most(f"pose, {CONNECTIONS} connections, p99", statistics.median(waits), 10, "ms")
     claims.finish()
 
 

@@ -1,4 +1,8 @@
-"""Claims with all doors up: ready in <= 2 s (warm), <= 0.15 core idle, <= 300 MB also after drives, stops in 1 s."""
+"""Claims with all doors up: ready in <= 0.5 s, <= 0.05 core idle, <= 130 MB also after drives, ends in 1 s.
+
+The start is measured by the clock and by processor time, which other work on the machine lengthens less.
+Forked starts are in shards.py.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +14,7 @@ import urllib.request
 from pathlib import Path
 
 from _claim import Claims
+from _serving import cpu_seconds
 
 from roboglot.testing.process import ServedRobot, served
 
@@ -34,13 +39,13 @@ def drive(x: float, y: float) -> None:
 def measure(claims: Claims, robot: ServedRobot) -> None:
     """Idle, then driven, then stopped."""
     time.sleep(5)
-    used, began = robot.cpu_seconds, time.monotonic()
+    used, began = cpu_seconds(robot.process.pid), time.monotonic()
     time.sleep(SECONDS)
-    claims.at_most("idle", (robot.cpu_seconds - used) / (time.monotonic() - began), 0.15, "core")
-    claims.at_most("memory, idle", robot.resident_megabytes, 300, "MB")
+    claims.at_most("idle", (cpu_seconds(robot.process.pid) - used) / (time.monotonic() - began), 0.05, "core")
+    claims.at_most("memory, idle", robot.resident_megabytes, 130, "MB")
     for goal in GOALS:
         drive(*goal)
-    claims.at_most("memory, after drives", robot.resident_megabytes, 300, "MB")
+    claims.at_most("memory, after drives", robot.resident_megabytes, 130, "MB")
     began = time.monotonic()
     robot.process.terminate()
     robot.process.wait()
@@ -53,9 +58,11 @@ def main() -> None:
         data = Path(folder) / "data"
         for _ in range(4):  # the first run makes certificates and caches
             with served(data, *sys.argv[1:], address=ADDRESS) as robot:
-                starts.append(robot.ready_after)
-        claims.at_most("warm start to ready", sorted(starts[1:])[1], 2.0, "s")
-        with served(data, "--speed", "2", *sys.argv[1:], address=ADDRESS) as robot:
+                starts.append((robot.ready_after, cpu_seconds(robot.process.pid)))
+        waited, spent = (sorted(column)[1] for column in zip(*starts[1:], strict=True))
+        print(f"processor time until then: {spent:.2f} s")
+        claims.at_most("start to ready", waited, 0.5, "s")
+        with served(data, *sys.argv[1:], address=ADDRESS) as robot:
             measure(claims, robot)
     claims.finish()
 

@@ -25,6 +25,7 @@ from roboglot.protocols.robomaster.limits import (
 )
 from roboglot.protocols.robomaster.liveness import Driver
 from roboglot.protocols.robomaster.strangers import Greeting, turn_away_strangers
+from roboglot.transport.eager import begin
 from roboglot.wire.robomaster.lines import LineSplitter
 
 log = logging.getLogger(__name__)
@@ -131,15 +132,19 @@ class ControlConnection(asyncio.Protocol):
             self._resting = asyncio.get_running_loop().call_later(LEFT_PERIOD, self._look)
 
     def _go_on(self, finished: asyncio.Task[None] | None = None) -> None:
-        """Keep a worker task alive while there are commands."""
+        """Do what waits; a task goes on with commands that have to wait for something."""
         if finished is not None:
             self._worker = None
-        if self._commands and self._worker is None and not self.transport.is_closing():
-            self._worker = asyncio.get_running_loop().create_task(self._work(), name=f"robomaster {self.host}")
+        if not self._commands or self._worker is not None or self.transport.is_closing():
+            return
+        self._worker = begin(self._work(), f"robomaster {self.host}")
+        if self._worker is not None:
             self._worker.add_done_callback(self._go_on)
+        elif self._commands:
+            asyncio.get_running_loop().call_soon(self._go_on)
 
     async def _work(self) -> None:
-        """Answer waiting commands, a bounded number at a stretch; the next task continues."""
+        """Answer waiting commands, a bounded number at a stretch; then others have their turn."""
         speak_as(self._name, self._context.robot.admission.known(self._name) or "")
         for _ in range(BATCH_MAX):
             if not self._commands:

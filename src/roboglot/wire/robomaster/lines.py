@@ -45,6 +45,8 @@ class LineSplitter:
         return None if overlong else whole.decode(errors="replace").strip()
 
     def _keep(self, part: bytes) -> None:
+        if not part:
+            return
         if self._overlong or len(self._tail) + len(part) > LINE_MAX:
             self._tail, self._overlong = b"", True
         else:

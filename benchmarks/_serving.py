@@ -1,0 +1,44 @@
+"""A server's processor time beside that of a reference which does nothing, asked in turns in the same run.
+
+What a robot's world takes while nobody asks is measured first and subtracted: on a busy machine the same number of
+requests lasts longer, and the world's share would grow with that.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+ROUNDS = 5
+QUIET = 4.0  # s in which nobody asks
+
+
+def cpu_seconds(pid: int) -> float:
+    """Processor time of a process so far, all its threads, to the microsecond."""
+    return sum(int((task / "schedstat").read_text().split()[0]) for task in Path(f"/proc/{pid}/task").iterdir()) / 1e9
+
+
+def idle_share(pid: int) -> float:
+    """Processor time per second while nobody asks."""
+    before, began = cpu_seconds(pid), time.perf_counter()
+    time.sleep(QUIET)
+    return (cpu_seconds(pid) - before) / (time.perf_counter() - began)
+
+
+def per_core_second(pid: int, idle: float, ask: Callable[[], int]) -> float:
+    """Requests that ``ask`` counts, per second of the processor time that they took."""
+    before, began = cpu_seconds(pid), time.perf_counter()
+    count = ask()
+    return count / (cpu_seconds(pid) - before - idle * (time.perf_counter() - began))
+
+
+def in_turns(bare: Callable[[], float], ours: Callable[[], float], rounds: int = ROUNDS) -> tuple[float, float]:
+    """Return the median rate of ours and the median share that it is of the bare one's, round by round; prints them."""
+    pairs = [(bare(), ours()) for _ in range(rounds)]
+    shares = [mine / reference for reference, mine in pairs]
+    print(f"  bare {min(b for b, _ in pairs):.0f} to {max(b for b, _ in pairs):.0f} a core second, ours", end=" ")
+    print(f"{min(o for _, o in pairs):.0f} to {max(o for _, o in pairs):.0f}; shares", end=" ")
+    print(" ".join(f"{share:.2f}" for share in sorted(shares)), flush=True)
+    return statistics.median(ours_ for _, ours_ in pairs), statistics.median(shares)

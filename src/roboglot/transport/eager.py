@@ -1,0 +1,53 @@
+"""Work that is begun at once, and becomes a task only when it has to wait: most requests never do.
+
+A task that does not wait costs two turns of the event loop. Until it waits, work has no current task: it may not begin
+with ``asyncio.timeout``. Knows no clock.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Coroutine, Generator
+from contextvars import copy_context
+from types import TracebackType
+
+
+def begin(work: Coroutine[object, object, None], name: str) -> asyncio.Task[None] | None:
+    """Run ``work`` until it waits for something; return the task that goes on with it, None if it has ended.
+
+    Raises what it raises before that. It has a context of its own, as in a task.
+    """
+    context = copy_context()
+    try:
+        awaited = context.run(work.send, None)
+    except StopIteration:
+        return None
+    return asyncio.get_running_loop().create_task(_Rest(work, awaited), name=name, context=context)
+
+
+class _Rest(Coroutine[object, object, None]):
+    """The rest of some work, for a task; one that is cancelled at once cancels the work where it waits."""
+
+    __slots__ = ("_awaited", "_fresh", "_work")
+
+    def __init__(self, work: Coroutine[object, object, None], awaited: object) -> None:
+        self._work, self._awaited = work, awaited
+        self._fresh = True  # whether the task has still to learn what the work waits for
+
+    def send(self, value: object) -> object:
+        if not self._fresh:
+            return self._work.send(value)
+        self._fresh = False
+        return self._awaited
+
+    def throw(
+        self, error: BaseException | type[BaseException], _value: object = None, _at: TracebackType | None = None, /
+    ) -> object:
+        self._fresh = False
+        return self._work.throw(error if isinstance(error, BaseException) else error())
+
+    def close(self) -> None:
+        self._work.close()
+
+    def __await__(self) -> Generator[object, object, None]:
+        raise TypeError("only a task goes on with it")
