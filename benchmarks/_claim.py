@@ -17,7 +17,7 @@ class Claims:
 
     def at_least(self, name: str, value: float, limit: float, unit: str) -> None:
         """A figure that should be large."""
-        self._tell(name, value, limit, unit, value / limit, ">=")
+        self._tell(name, value, limit, unit, value / limit if limit > 0 else float("inf"), ">=")
 
     def _tell(self, name: str, value: float, limit: float, unit: str, ratio: float, sign: str) -> None:
         verdict = "holds" if ratio >= 1 else "MISSED"
