@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import time
+from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import pytest
 
 from roboglot.programs.engine import calls as calls_module
 from roboglot.programs.engine import engine as engine_module
+from roboglot.programs.engine import run as run_module
 from roboglot.programs.engine import share as share_module
 from roboglot.programs.engine.calls import Calls
 from roboglot.programs.engine.engine import Engine
@@ -21,11 +24,13 @@ from roboglot.programs.engine.events import (
     Limits,
     Output,
 )
-from roboglot.programs.engine.run import SHORT_COST, Run
+from roboglot.programs.engine.messages import Message, OutputMessage
+from roboglot.programs.engine.run import OUTPUT_COST, SHORT_COST, Run
 from roboglot.programs.engine.share import BURST, LIGHT_BURST, SHARE_MAX, Share
 from tests.programs.playing import BUSY, PRELUDE, last, play, process_state, started, until
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
+SPANS = 8  # of a second each
 
 
 async def test_limits_name_themselves(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -125,20 +130,64 @@ async def test_greedy_programs_get_turns_one_by_one() -> None:
     assert loop.time() - began >= (0.03 + 7 * 0.005) / SHARE_MAX - BURST - 0.01
 
 
-async def test_hostile_programs_together_keep_to_the_share(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
-    """No message takes most of the server's thread from others.
+@dataclass
+class Cost:
+    """Thread time, s."""
 
-    The charge is compared with the cost: both hold on a busy machine, too.
+    spent: float = 0.0
+    charged: float = 0.0
+
+
+class Ledger:
+    """What the loop's thread does for programs, and what they are charged for it."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.charges: list[float] = []
+        self.due = 0.0  # for the frames, whatever it takes to read those that are long
+        self.first, self.more = Cost(), Cost()  # of the callbacks that read the first part of long calls, and more
+        self._reading: Cost | None = None
+        charge, read, run, decode = Share.charge, Calls._read, asyncio.Handle._run, run_module.decode
+
+        def charged(share: Share, seconds: float, now: float) -> None:
+            self.charges.append(seconds)
+            charge(share, seconds, now)
+
+        def reading(*arguments: Any, **named: Any) -> None:
+            self._reading = self.more if named.get("in_turn") else self.first
+            read(*arguments, **named)
+
+        def measured(handle: asyncio.Handle) -> None:
+            self._reading, count, began = None, len(self.charges), time.thread_time()
+            run(handle)
+            if self._reading is not None:
+                self._reading.spent += time.thread_time() - began
+                self._reading.charged += sum(self.charges[count:])
+
+        def decoded(body: bytes) -> Message:
+            message = decode(body)
+            self.due += OUTPUT_COST if isinstance(message, OutputMessage) else SHORT_COST
+            return message
+
+        monkeypatch.setattr(Share, "charge", charged)
+        monkeypatch.setattr(Calls, "_read", reading)
+        monkeypatch.setattr(asyncio.Handle, "_run", measured)
+        monkeypatch.setattr(run_module, "decode", decoded)
+
+    def clear(self) -> None:
+        self.charges.clear()
+        self.due = 0.0
+        self.first, self.more = Cost(), Cost()
+
+
+async def test_hostile_programs_together_keep_to_the_share(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever they send, the server's thread has most of its time for others.
+
+    That each frame is charged, and the time that it takes to read a long one, holds exactly. What is spent in all is
+    compared over several spans: other work on the machine makes some of them dearer.
     """
     light = SHARE_MAX / 100  # each uses more than that, however little a busy machine gives
     monkeypatch.setattr(share_module, "LIGHT", light)
-    charges, charge = list[float](), Share.charge
-
-    def counted(share: Share, seconds: float, now: float) -> None:
-        charges.append(seconds)
-        charge(share, seconds, now)
-
-    monkeypatch.setattr(Share, "charge", counted)
+    ledger = Ledger(monkeypatch)
     sources = (
         "x = [[] for i in range(20000)]\nwhile True: cyberdog.echo(x)",
         "while True: print('x' * 100)",
@@ -153,23 +202,29 @@ async def test_hostile_programs_together_keep_to_the_share(engine: Engine, monke
 
     serving = [asyncio.create_task(serve(run)) for run in runs]
     await asyncio.sleep(1.0)  # the burst of each
-    charges.clear()
-    loop = asyncio.get_running_loop()
-    before, spent = loop.time(), time.thread_time()
-    await asyncio.sleep(1.0)
-    passed, spent = loop.time() - before, time.thread_time() - spent
-    charged, longest = sum(charges), max(charges)
+    loop, excess = asyncio.get_running_loop(), list[float]()
+    while len(excess) < SPANS and min(excess, default=1.0) >= 0.0:
+        await until(lambda: ledger.first.spent > 0.0)
+        ledger.clear()
+        before, spent = loop.time(), time.thread_time()
+        await asyncio.sleep(1.0)
+        passed, spent = loop.time() - before, time.thread_time() - spent
+        charged, longest = sum(ledger.charges), max(ledger.charges)
+        free = len(runs) * (light * (passed + LIGHT_BURST) + longest)  # without a turn, and beyond a turn's end
+        assert charged <= SHARE_MAX * (passed + BURST) + free
+        assert charged >= ledger.due
+        assert ledger.first.spent <= 1.7 * ledger.first.charged
+        assert ledger.more.spent <= 1.7 * ledger.more.charged
+        excess.append(spent - 1.7 * charged - 0.05 * passed)
     await asyncio.gather(*(run.kill() for run in runs))
     await asyncio.gather(*serving)
-    free = len(runs) * (light * (passed + LIGHT_BURST) + longest)  # without a turn, and beyond a program's end
-    assert charged <= SHARE_MAX * (passed + BURST) + free
-    assert spent < 1.7 * charged + 0.05 * passed  # large work is always charged
+    assert min(excess) < 0.0
 
 
 async def test_a_long_call_is_read_in_turns(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
     reads = []
     read = Calls._read
-    monkeypatch.setattr(Calls, "_read", lambda *args: reads.append(read(*args)))
+    monkeypatch.setattr(Calls, "_read", lambda *args, **named: reads.append(read(*args, **named)))
     monkeypatch.setattr(calls_module, "STEP", 0.0001)
     run = await engine.start("cyberdog.echo([[i] for i in range(24000)])", PRELUDE)
     event = await anext(run)

@@ -131,21 +131,28 @@ class Calls:
         else:
             self._read(call, size, values)
 
-    def _read(self, call: CallMessage, size: int, values: Generator[None, None, Values]) -> None:
-        """Read the values of a long call, with turns for other programs in between."""
+    def _read(
+        self, call: CallMessage, size: int, values: Generator[None, None, Values], *, in_turn: bool = False
+    ) -> None:
+        """Read the values of a long call, with turns for others in between; its first part is charged by the run."""
         if self._host.over:
             return
         began, until = time.thread_time(), time.perf_counter() + STEP
+        read: Values | None = None
         try:
             while time.perf_counter() < until:
                 next(values)
         except StopIteration as done:
-            self._deliver(call, size, done.value)
+            read = done.value
         except ProtocolViolation as error:
             self._host.abort(error)
-        else:
+            return
+        if in_turn:
             self._account.charge(time.thread_time() - began)
-            self._account.queue(partial(self._read, call, size, values))
+        if read is None:
+            self._account.queue(partial(self._read, call, size, values, in_turn=True))
+        else:
+            self._deliver(call, size, read)
 
     def _deliver(self, call: CallMessage, size: int, values: Values) -> None:
         """Hand a call to the reader once the call rate allows it."""
