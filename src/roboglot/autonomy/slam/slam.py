@@ -84,7 +84,7 @@ class Slam:
         self.odometry = OdometryLearner(belief.odometry.noise)
         self._witness = WheelWitness(self.odometry)
         self.whereabouts = Whereabouts(belief, robot.events)
-        self._looked_at, self._looking = -math.inf, False
+        self._looked_at, self._looking, self._given_at = -math.inf, False, -math.inf
         self._mapped_from = 0.0  # m driven from which scans are added to the map again
         self._search: asyncio.Task[None] | None = None
         self._slip, self._displacement = SlipWatch(robot.description.radius), DisplacementWatch()
@@ -144,6 +144,8 @@ class Slam:
         """The next scans show whether a pose that someone gave is right."""
         self._displacement.forget(event.stamp)
         if event.given:
+            self._turns.forget()
+            self._given_at = event.stamp
             self._witness.forget()
             self.whereabouts.be_given(event.stamp)
 
@@ -296,7 +298,7 @@ class Slam:
 
         def then(found: list[Match]) -> None:
             self._looking = False
-            if not found or belief.map is not grid or not belief.localizing:
+            if not found or belief.map is not grid or not belief.localizing or self._given_at > stamp:
                 return
             near = found[0].pose.distance_to(belief.map_to_odom.compose(odometry)) < NEAR
             if belief.lost is None:

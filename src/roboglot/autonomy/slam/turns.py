@@ -26,6 +26,10 @@ class Turns:
             self._queued = True
             self._clock.in_turn(self._have_turn)
 
+    def forget(self) -> None:
+        """Leave out the scan that waits: the robot has been put elsewhere since it was taken."""
+        self._waiting = None
+
     def close(self) -> None:
         """Take no more."""
         self._waiting = None
