@@ -105,7 +105,7 @@ async def test_a_pilot_drives_again(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-async def test_a_serial_line_is_played_on_one_of_its_own(tmp_path: Path) -> None:
+async def test_a_serial_line_of_its_own_is_played(tmp_path: Path) -> None:
     """The recorded path belongs to a robot that may live: a rerun leaves it alone."""
     link = tmp_path / "ep-a"
     async with begun(tmp_path, robomaster={"uart": str(tmp_path / "ep")}) as session:

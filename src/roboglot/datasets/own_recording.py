@@ -6,7 +6,6 @@ Of several robots the one with most scans is read. The lidar's limits are not in
 from __future__ import annotations
 
 import math
-import struct
 from collections import Counter
 from collections.abc import Iterator
 from importlib import import_module
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
 MAGIC = b"\x89MCAP0"
 SCAN, TRANSFORMS = "foxglove.LaserScan", "foxglove.FrameTransforms"
 RANGE_MIN = 0.05  # m
-RECORD_MAX = 1 << 30  # bytes
 
 
 def read_own_recording(path: Path) -> DriveLog:
@@ -73,10 +71,10 @@ def read_own_recording(path: Path) -> DriveLog:
 def _messages(path: Path) -> Iterator[tuple[str, bytes]]:
     """Schema and bytes of the scans and transforms."""
     with explaining("reading recordings", "recording"):
-        from mcap.exceptions import McapError
         from mcap.records import Channel, Message, Schema
         from mcap.stream_reader import StreamReader
-        from zstandard import ZstdError
+
+        from roboglot.wire.mcap_damage import DAMAGE, RECORD_MAX
     schemas: dict[int, str] = {}
     channels: dict[int, str] = {}
     with path.open("rb") as file:
@@ -88,7 +86,7 @@ def _messages(path: Path) -> Iterator[tuple[str, bytes]]:
                     channels[record.id] = schemas.get(record.schema_id, "")
                 elif isinstance(record, Message) and (kind := channels.get(record.channel_id)) in (SCAN, TRANSFORMS):
                     yield str(kind), record.data
-        except (McapError, ZstdError, struct.error, ValueError, EOFError, KeyError, OverflowError, MemoryError):
+        except DAMAGE:
             return  # the program was killed; the complete records count
 
 

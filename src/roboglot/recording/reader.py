@@ -5,13 +5,11 @@ from __future__ import annotations
 import json
 import logging
 import re
-import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
 
-import zstandard
 from mcap.exceptions import McapError
 from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
@@ -20,12 +18,10 @@ from roboglot.model.inputs.outside import Input
 from roboglot.model.tap import DRIVER, Direction, Exchange
 from roboglot.recording.messages import decode_exchange, decode_input
 from roboglot.recording.standing import REPEATED
+from roboglot.wire.mcap_damage import DAMAGE, RECORD_MAX
 
 log = logging.getLogger(__name__)
-RECORD_MAX = 1 << 30  # bytes per record
 EXCHANGES_MAX = 2_000_000
-# What reading a damaged file raises.
-DAMAGE = (struct.error, zstandard.ZstdError, ValueError, KeyError, EOFError, MemoryError, OverflowError)
 
 
 class BadRecording(ValueError):
@@ -159,12 +155,10 @@ def stream(path: Path, file: IO[bytes], *, chunks: bool = False) -> Iterator[Mca
     """
     try:
         yield from StreamReader(file, emit_chunks=chunks, record_size_limit=RECORD_MAX).records
-    except McapError as error:
-        if file.tell() <= 16:
-            raise BadRecording(f"{path} is no MCAP file") from None
-        log.info("%s: cut off: %s", path, error)
     except DAMAGE as error:
-        log.info("%s: damaged: %s", path, error)
+        if isinstance(error, McapError) and file.tell() <= 16:
+            raise BadRecording(f"{path} is no MCAP file") from None
+        log.info("%s: cut off or damaged: %s", path, error)
 
 
 def read_recording(path: Path) -> Recording:

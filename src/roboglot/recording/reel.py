@@ -14,13 +14,13 @@ from pathlib import Path
 from typing import IO, NamedTuple
 
 from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
 from mcap.records import Channel, Chunk, Message, Schema
 from mcap.stream_reader import breakup_chunk
 from mcap.summary import Summary
 
-from roboglot.recording.reader import DAMAGE, RECORD_MAX, BadRecording, parts, stream
+from roboglot.recording.reader import BadRecording, parts, stream
+from roboglot.wire.mcap_damage import DAMAGE, RECORD_MAX
 
 UNPACKED_MAX = 256 << 20  # bytes per chunk
 TOPICS_MAX = 4096
@@ -164,7 +164,7 @@ class Reel:
             with path.open("rb") as file:
                 file.seek(chunk.offset + RECORD_HEAD)
                 inside = _unpacked(path, Chunk.read(ReadDataStream(file)))
-        except (McapError, *DAMAGE) as error:
+        except DAMAGE as error:
             raise BadRecording(f"{path} is damaged: {error}") from None
         return [
             Shot(message.log_time, places[message.channel_id], message.data)
@@ -186,7 +186,7 @@ def _summary(file: IO[bytes]) -> Summary | None:
     """Return the index of a whole file."""
     try:
         summary = SeekingReader(file, record_size_limit=RECORD_MAX).get_summary()
-    except (McapError, OSError, *DAMAGE):
+    except (OSError, *DAMAGE):
         return None
     return summary if summary is not None and summary.chunk_indexes else None
 
@@ -197,5 +197,5 @@ def _unpacked(path: Path, chunk: Chunk) -> Sequence[object]:
         raise BadRecording(f"{path}: a chunk of more than {UNPACKED_MAX} bytes")
     try:
         return breakup_chunk(chunk, validate_crc=True)
-    except (McapError, *DAMAGE) as error:
+    except DAMAGE as error:
         raise BadRecording(f"{path} is damaged: {error}") from None

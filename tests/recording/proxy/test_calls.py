@@ -20,7 +20,7 @@ from roboglot.recording.proxy.dog import DogRelay, Proof
 from roboglot.recording.proxy.relay import Book
 from roboglot.testing.addresses import free_port
 from roboglot.wire.cyberdog.channel import ROBOT_NAME
-from tests.recording.test_proxy import BETWEEN
+from tests.recording.proxy.test_relay import BETWEEN
 
 ASKED = [b"", b"one", bytes(range(256)) * 200]
 ANSWERED = [b"yes", b"no" * 30_000]

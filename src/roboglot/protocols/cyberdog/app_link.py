@@ -170,14 +170,18 @@ class AppLink:
             own = await self._outside.ask("route", lambda: _route_to(target))
         last = self._clock.time()
         while self._target == target:
-            began, asked = self._clock.time(), len(self._asking)
-            if not await self._got_through(line, self._noted(self._ticks(own))):
+            began, asked, ticks = self._clock.time(), len(self._asking), self._ticks(own)
+            if known := self.connected:
+                self._note(ticks)
+            if not await self._got_through(line, ticks):
                 if self._clock.time() - last >= LOST_AFTER:
                     break
             else:
                 if not heard:
                     began -= HEARTBEAT_PERIOD * early_share(self._address)
                 heard, last = True, self._clock.time()
+                if not known:  # it found the app, which has heard it
+                    self._note(ticks)
                 self._set_connected(True)
                 self._answer(self._asking[:asked], True)
                 del self._asking[:asked]
@@ -192,13 +196,12 @@ class AppLink:
             log.debug("no heartbeat within %s s", HEARTBEAT_DEADLINE)
             return False
 
-    def _noted(self, ticks: pb.Ticks) -> pb.Ticks:
-        """Report a heartbeat to the tap if a connected app gets it."""
-        if self._tap is None or not self._tap.watched or not self.connected:
+    def _note(self, ticks: pb.Ticks) -> None:
+        """Report a heartbeat that an app gets to the tap."""
+        if self._tap is None or not self._tap.watched:
             self._beats.forget()
         elif news := self._beats.news(ticks):
             self._tap.push("cyberdog", self._target, HEARTBEAT, news)
-        return ticks
 
     def _answer(self, asking: list[asyncio.Future[bool]], alive: bool) -> None:
         for answer in asking:
@@ -214,6 +217,7 @@ class AppLink:
         if connected:
             self._remember(self._target.rpartition(":")[0])
         else:
+            self._beats.forget()
             for outbox in self._outboxes.values():
                 outbox.clear()
             asking, self._asking = self._asking, []
