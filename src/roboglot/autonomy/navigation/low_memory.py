@@ -5,6 +5,8 @@ Needs the kernels.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,6 +17,7 @@ from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
 from roboglot.kernels.depth import remember_low
 from roboglot.model.geometry import Pose
 
+SPARE = 0.1  # s: cells round their time
 EXPLAINED = 0.1  # m around an echo within which depth adds nothing
 
 Points = NDArray[np.float64]
@@ -25,6 +28,7 @@ class LowMemory:
 
     def __init__(self) -> None:
         self._seen = Cells(np.float32)
+        self._latest = -math.inf  # s: time of the last sighting of all
 
     def observe(self, grid: EvidenceGrid, view: LowView, echoes: Points, pose: Pose, now: float) -> Points:
         """Note what stands where neither map nor ``echoes`` (map) have anything; returns it in map (n, 2).
@@ -34,9 +38,12 @@ class LowMemory:
         corner = grid.corner
         at, first = np.array((pose.x, pose.y, pose.yaw)), np.array((corner.x, corner.y))
         seen, stamp = self.seen(grid), max(now, 1e-3)
-        return remember_low(
+        found: Points = remember_low(
             grid.evidence, seen, view.floor, view.obstacles, echoes, at, first, stamp, EXPLAINED, RESOLUTION
         )
+        if len(found):
+            self._latest = stamp
+        return found
 
     def seen(self, grid: EvidenceGrid) -> NDArray[np.float32]:
         """Return the time (s) of the last sighting in each of the map's cells; 0: never."""
@@ -47,6 +54,8 @@ class LowMemory:
 
         Most of these sensors see little: what a robot passes, or stands beside, is out of their sight.
         """
+        if self._latest < since - SPARE:
+            return NONE  # most robots see nothing low for most of the time
         seen, frame = self.seen(grid), Frame(grid.corner, grid.evidence.shape)
         rows, columns = frame.around((pose.point,), reach)
         row, column = np.nonzero(seen[rows, columns] >= max(since, 1e-3))
