@@ -1,4 +1,4 @@
-"""The page of the configuration file has all settings, with their defaults."""
+"""Both pages of the configuration file have all settings, with their defaults."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import pytest
 from roboglot.config import Config, RobotConfig, StartConfig, load_config
 from roboglot.protocols import DOORS, sections
 
-PAGE = Path(__file__).parents[2] / "docs" / "settings.md"
+DOCS = Path(__file__).parents[2] / "docs"
 
 
-@pytest.fixture
-def shown() -> str:
-    found = re.search(r"```toml\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
+@pytest.fixture(params=["settings.md", "settings.zh.md"])
+def shown(request: pytest.FixtureRequest) -> str:
+    found = re.search(r"```toml\n(.*?)```", (DOCS / request.param).read_text("utf-8"), re.DOTALL)
     assert found
     return found[1]
 
