@@ -43,19 +43,21 @@ COVERED_OR_CUT = """() => {
 }"""
 
 
-@pytest.mark.parametrize("view", ["live", "wire", "world", "robots", "class"])
-async def test_phone_shows_and_can_touch_everything(served: Served, open_console: OpenConsole, view: str) -> None:
-    page = await open_console(view=view, viewport={"width": 360, "height": 740}, has_touch=True, is_mobile=True)
-    await page.wait_for_selector("main > :not(.empty)")
-    assert await page.evaluate("document.documentElement.scrollWidth <= innerWidth")
-    for language in ("EN", "中文"):
-        if await (other := page.locator(f"header >> text={language}")).count():
-            await other.click()
-        await page.wait_for_selector(f"html[lang={'en' if language == 'EN' else 'zh-CN'}]")
-        assert await page.evaluate(COVERED_OR_CUT) == []
-    stop = await page.locator(".stop").bounding_box()
-    assert stop["x"] + stop["width"] <= 360
-    assert await page.evaluate(SMALL_TARGETS) == []
+async def test_phone_shows_and_can_touch_everything(served: Served, open_console: OpenConsole) -> None:
+    page = await open_console(viewport={"width": 360, "height": 740}, has_touch=True, is_mobile=True)
+    for view in ("live", "wire", "world", "robots", "class"):
+        await page.evaluate(f"location.hash = '#/{view}'")
+        await page.wait_for_selector(f"nav a[href='#/{view}'][aria-current=page]")
+        await page.wait_for_selector("main > :not(.empty)")
+        assert await page.evaluate("document.documentElement.scrollWidth <= innerWidth"), view
+        for language in ("EN", "中文"):
+            if await (other := page.locator(f"header >> text={language}")).count():
+                await other.click()
+            await page.wait_for_selector(f"html[lang={'en' if language == 'EN' else 'zh-CN'}]")
+            assert await page.evaluate(COVERED_OR_CUT) == [], view
+        stop = await page.locator(".stop").bounding_box()
+        assert stop["x"] + stop["width"] <= 360
+        assert await page.evaluate(SMALL_TARGETS) == [], view
 
 
 @pytest.mark.parametrize("theme", ["dark", pytest.param("light", marks=pytest.mark.slow)])

@@ -31,7 +31,6 @@ PASSWORD, LOGINS = "a long password", 3
 PATIENCE = 60_000  # ms
 FIRST = IPv4Address(free_addresses(2))
 HOSTS = {"a": str(FIRST), "b": str(FIRST + 1)}
-WHO = ("none", "see", "drive", "program", "edit", "admin")
 MAY = {  # what each right allows: stop and drive, draw on the map, break the world
     "see": set[str](),
     "drive": {"stop", "drive"},
@@ -137,8 +136,12 @@ async def offered(page: Page, what: str) -> bool:
     return not off
 
 
-async def test_buttons_are_on_for_those_who_may(guarded: Guarded, open_page: Open) -> None:
-    for who in WHO:
+SLOW = [pytest.param((who,), marks=pytest.mark.slow) for who in ("see", "program")]  # the others have these buttons
+
+
+@pytest.mark.parametrize("people", [("none", "drive", "edit", "admin"), *SLOW])
+async def test_buttons_are_on_for_those_who_may(guarded: Guarded, open_page: Open, people: tuple[str, ...]) -> None:
+    for who in people:
         guarded.add(who, who)
         page = await open_page()
         await sign_in(page, who)

@@ -49,7 +49,11 @@ async def test_every_sentence_is_shown_in_chinese(open_console: OpenConsole) -> 
 
 
 @pytest.mark.parametrize(
-    ("language", "said"), [("zh", "被拒绝：没有课堂 'NO'"), ("en", "Refused: there is no class 'NO'")]
+    ("language", "said"),
+    [
+        ("zh", "被拒绝：没有课堂 'NO'"),
+        pytest.param("en", "Refused: there is no class 'NO'", marks=pytest.mark.slow),  # as it comes
+    ],
 )
 async def test_refusals_are_in_the_language_of_the_page(studio: Open, language: str, said: str) -> None:
     page = await studio(language=language)

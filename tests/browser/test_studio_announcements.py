@@ -73,7 +73,7 @@ async def test_messages_of_a_window_are_told_in_it(studio: Open) -> None:
 
 
 @pytest.mark.parametrize(
-    ("language", "width"), [("zh", 360), ("en", 820), pytest.param("en", 360, marks=pytest.mark.slow)]
+    ("language", "width"), [("zh", 360), *(pytest.param("en", width, marks=pytest.mark.slow) for width in (360, 820))]
 )
 async def test_small_screens_show_names_and_panels_whole(studio: Open, language: str, width: int) -> None:
     page = await studio(language=language)

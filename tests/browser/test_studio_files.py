@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.browser.served import until
+from tests.browser.served import Page, until
 from tests.browser.test_studio import COUNTING, Open, loaded, studio
 from tests.programs.language.test_language_guide import shown
 
@@ -36,10 +36,16 @@ async def test_examples_and_guides_programs_open_as_text_unchanged(studio: Open)
     assert page.errors == []
 
 
-@pytest.mark.parametrize("wanted", ["For the app (style)", "Program"])
-async def test_program_of_blocks_comes_back_from_its_file(studio: Open, wanted: str) -> None:
+async def test_program_of_blocks_comes_back_from_its_file(studio: Open) -> None:
     page = await loaded(await studio(), COUNTING)
     await until(page, "studio.editor.code.value.includes('print')")
+    for wanted in ("For the app (style)", "Program"):
+        await comes_back(page, wanted)
+    assert page.errors == []
+
+
+async def comes_back(page: Page, wanted: str) -> None:
+    """Save the program by the button ``wanted``, and open its file, and its frame."""
     code, state = await page.evaluate("[studio.editor.code.value, JSON.stringify(studio.editor.save())]")
     await page.click("text=Programs")
     async with page.expect_download() as saved:
@@ -51,17 +57,17 @@ async def test_program_of_blocks_comes_back_from_its_file(studio: Open, wanted: 
     assert await page.evaluate("[studio.editor.code.value, JSON.stringify(studio.editor.save())]") == [code, state]
     assert await page.evaluate("studio.program.value.kind") == "blocks"
     style = json.dumps(json.loads(state))  # as frames carry it: as text in a field
-    frame = json.dumps({"describe": "from a frame", "style": style, "body": code}).encode()
+    frame = json.dumps({"describe": f"from a frame: {wanted}", "style": style, "body": code}).encode()
     await page.click("text=Programs")
     await page.set_input_files("input[type=file]", {"name": "h.json", "mimeType": "", "buffer": frame})
-    await until(page, "studio.program.value.name === 'from a frame'")
+    await until(page, f"studio.program.value.name === 'from a frame: {wanted}'")
     assert await page.evaluate("[studio.editor.code.value, JSON.stringify(studio.editor.save())]") == [code, state]
-    assert page.errors == []
 
 
-@pytest.mark.parametrize(
-    ("name", "held", "why"),
-    [
+async def test_files_without_a_program_are_refused(studio: Open) -> None:
+    page = await loaded(await studio(), COUNTING)
+    before = await page.evaluate("[studio.program.value.id, studio.editor.code.value]")
+    for name, held, why in (
         ("a.py", b"#" * 262_145, "it is too large"),
         ("b.json", b" " * 4_000_001, "it is too large"),
         ("c.json", json.dumps({"blocks": {"blocks": [{"type": "forever"}] * 6001}}).encode(), "it is too large"),
@@ -69,13 +75,12 @@ async def test_program_of_blocks_comes_back_from_its_file(studio: Open, wanted: 
         ("e.json", b'{"style": "{"}', "it is no program"),
         ("f.json", b"[1, 2", "it is no program"),
         ("g.txt", b"\x89PNG\x00\x00", "it is no program"),
-    ],
-)
-async def test_file_without_a_program_is_refused(studio: Open, name: str, held: bytes, why: str) -> None:
-    page = await loaded(await studio(), COUNTING)
-    before = await page.evaluate("[studio.program.value.id, studio.editor.code.value]")
-    await page.click("text=Programs")
-    await page.set_input_files("input[type=file]", {"name": name, "mimeType": "", "buffer": held})
-    await until(page, f"document.querySelector('dialog .notice').textContent.includes({why!r})")
-    assert await page.evaluate("[studio.program.value.id, studio.editor.code.value]") == before
+    ):
+        await page.click("text=Programs")
+        await until(page, "!document.querySelector('dialog .notice')?.textContent")
+        await page.set_input_files("input[type=file]", {"name": name, "mimeType": "", "buffer": held})
+        await until(page, f"document.querySelector('dialog .notice')?.textContent.includes({why!r})")
+        assert await page.evaluate("[studio.program.value.id, studio.editor.code.value]") == before, name
+        await page.keyboard.press("Escape")
+        await until(page, "!document.querySelector('dialog')")
     assert page.errors == []
