@@ -179,12 +179,19 @@ export function blame(wrong) {
   }
 }
 
-/** @param {string} text */
+/** Show what has these words in the toolbox; how many blocks that are. @param {string} text */
 export function search(text) {
   wanted.text = text;
   const box = workspace.getToolbox(), item = box?.getToolboxItemById("found");
-  if (!item) return;
+  if (!item) return 0;
   if (text) { item.show?.(); box.setSelectedItem(item); box.refreshSelection(); } else { box.clearSelection(); item.hide?.(); }
+  return found().filter((one) => one.kind === "block").length;
+}
+
+/** Bring the keyboard to the first block that is found, or to the toolbox. @param {boolean} [first] */
+export function toToolbox(first = false) {
+  const box = workspace.getToolbox(), manager = Blockly.getFocusManager();
+  if (first) manager.focusNode(box.getFlyout().getContents()[0].getElement()); else manager.focusTree(box);
 }
 
 export function focus(id) { workspace.centerOnBlock(id); workspace.getBlockById(id)?.select?.(); }

@@ -27,7 +27,7 @@ Object.assign(PATHS, { // the studio's own icons
 const TABS = { python: Python, output: Output, values: Values, robot: RobotPanel, missions: Missions, group: Group };
 export const tab = kept("studio.tab", "python");
 const whole = signal(matchMedia("(min-width: 900px)").matches ? "both" : "blocks"); // on a phone one at a time
-const sought = signal("");
+const sought = signal(""), hits = signal(0);
 
 function Stop() {
   return html`<button type="button" class="stop" onClick=${() => { runner.stop(); command("stop"); }} title=${t("studio.halt.hint")}>
@@ -37,7 +37,8 @@ function Stop() {
 function Header() {
   const robots = hello.value?.robots ?? [];
   const looks = ["plain", "contrast", "dyslexia"];
-  return html`<header>
+  const skip = (e) => { e.preventDefault(); editor.toToolbox(); };
+  return html`<header>${program.value.kind === "blocks" && html`<a class="unseen skip" href="#blocks" onClick=${skip}>${t("studio.skip")}</a>`}
     <a class="brand" href="/" title=${t("studio.console")}><img src="/icon.svg" alt="" width="28" height="28" /><b>${t("studio")}</b></a>
     <label class="robot"><span>${t("robot")}</span>
       <select value=${current.value} onChange=${(e) => { choose(e.target.value); open(); }}>${robots.map((r) => html`<option>${r.name}</option>`)}</select></label>
@@ -73,7 +74,8 @@ function Bar() {
     <span class=${`phase ${phase} ${runner.failure.value ? "failed" : ""}`} role="status" aria-live="polite" title=${word + held()}>${word}${held()}</span>
     <span class="unseen" role="status" aria-live="polite">${others > 0 && t("studio.others", { n: others })}</span>
     <span class="grow"></span>
-    ${program.value.kind === "blocks" && html`<label class="search"><span class="unseen">${t("studio.search")}</span><input type="search" placeholder=${t("studio.search")} value=${sought.value} onInput=${(e) => { sought.value = e.target.value; editor.search(e.target.value); }} /></label>`}
+    ${program.value.kind === "blocks" && html`<label class="search"><span class="unseen">${t("studio.search")}</span><input type="search" placeholder=${t("studio.search")} value=${sought.value} onInput=${(e) => { sought.value = e.target.value; hits.value = editor.search(e.target.value); }} onKeyDown=${(e) => { if (/^(Enter|ArrowDown)$/.test(e.key) && sought.value && hits.value) { e.preventDefault(); e.stopPropagation(); editor.toToolbox(true); } }} /></label>
+      <span class="unseen" role="status" aria-live="polite">${sought.value && t("studio.search.count", { n: hits.value })}</span>`}
     <${Button} compact icon="undo" label=${t("studio.undo")} onClick=${() => editor.undo(false)} /><${Button} compact icon="redo" label=${t("studio.redo")} onClick=${() => editor.undo(true)} />
     <${Button} icon="folder" label=${t("studio.programs")} title=${others ? t("studio.others", { n: others }) : t("studio.programs")} aria-label=${others ? `${t("studio.programs")}. ${t("studio.others", { n: others })}` : t("studio.programs")} onClick=${() => { shown.value = "library"; }}>${others > 0 && html`<b class="count">${others}</b>`}<//>
     <${Button} compact icon="clock" label=${t("studio.schedule")} onClick=${() => { shown.value = "schedule"; }} />

@@ -47,10 +47,10 @@ Field.prototype.updateSize_ = function (/** @type {number | undefined} */ margin
   if (canvas?.isConnected) canvas.remove(); // it measures outside of the page, too, and there asks for no styles
 };
 
-for (const { prototype: made } of /** @type {any[]} */ ([Field, Blockly.BlockSvg, Blockly.RenderedConnection])) {
+for (const { prototype: made } of /** @type {any[]} */ ([Field, Blockly.BlockSvg])) {
   const now = made.recomputeAriaContext;
-  made.recomputeAriaContext = function () {
-    if (!deferring || making === this) return now.call(this);
+  made.recomputeAriaContext = function (/** @type {any[]} */ ...given) {
+    if (!deferring || making === this) return now.apply(this, given);
     waiting.add(this);
     return false; // "it has no words yet", as before it is drawn
   };

@@ -95,7 +95,8 @@ export function found() {
   const wishes = wanted.text.toLowerCase().split(/\s+/).filter(Boolean);
   if (!wishes.length) return [{ kind: "label", text: t("studio.search.none") }];
   const hits = table.functions.filter((f) => { const all = `${f.key} ${f.en} ${f.zh} ${f.about.en} ${f.about.zh}`.toLowerCase(); return wishes.every((wish) => all.includes(wish)); });
-  hits.sort((a, b) => Number(!a.en.includes(wishes[0]) && !a.zh.includes(wishes[0])) - Number(!b.en.includes(wishes[0]) && !b.zh.includes(wishes[0])));
+  const rank = (f) => Math.min(...[f.en, f.zh].map((name) => (name.startsWith(wishes[0]) ? 0 : name.includes(wishes[0]) ? 1 : 2))); // named so, called so
+  hits.sort((a, b) => rank(a) - rank(b));
   const own = Object.values(languageCategories()).flatMap(([, blocks]) => blocks).filter((item) => {
     const made = `${item.type} ${t(`block.${item.type}`)}`.toLowerCase();
     return wishes.every((wish) => made.includes(wish));

@@ -1,0 +1,103 @@
+"""Building in Chromium: blocks are joined by keyboard alone, from the first key of the page, and by mouse."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from tests.browser.served import until
+from tests.browser.test_studio import Open, Page, loaded, phase, studio
+
+__all__ = ["studio"]  # the fixture
+pytestmark = pytest.mark.asyncio(loop_scope="session")
+TOOLBOX = "document.activeElement.classList.contains('blocklyToolboxCategoryContainer')"
+MOVING = "studio.editor.workspace.isDragging()"
+STACKS = "studio.editor.workspace.getTopBlocks().length"
+
+
+def says(id: str, y: int) -> dict[str, object]:
+    text = {"shadow": {"type": "text", "fields": {"TEXT": id}}}
+    return {"type": "text_print", "id": id, "x": 40, "y": y, "inputs": {"TEXT": text}}
+
+
+APART = {"blocks": {"languageVersion": 0, "blocks": [says("first", 40), says("second", 240)]}}
+WRONG = {
+    "blocks": {
+        "languageVersion": 0,
+        "blocks": [
+            {"type": "text_print", "id": "bad", "inputs": {"TEXT": {"block": {
+                "type": "math_modulo", "inputs": {
+                    "DIVIDEND": {"shadow": {"type": "math_number", "fields": {"NUM": 64}}},
+                    "DIVISOR": {"shadow": {"type": "math_number", "id": "zero", "fields": {"NUM": 0}}}}}}}}
+        ],
+    }
+}  # fmt: skip
+
+
+async def take_found(page: Page, words: str) -> None:
+    """Search by keyboard, take what is found first and put it where it would go."""
+    while not await page.evaluate("document.activeElement.type === 'search'"):
+        await page.keyboard.press("Shift+Tab")
+    await page.keyboard.press("Control+a")
+    await page.keyboard.type(words)
+    await until(page, "/^Blocks found: [1-9]/.test(document.querySelector('.search + [role=status]').textContent)")
+    await page.keyboard.press("Enter")
+    await until(page, "document.activeElement.closest('.blocklyFlyout')")
+    await page.keyboard.press("Enter")
+    await until(page, MOVING)
+    while await page.evaluate(MOVING):
+        await page.keyboard.press("Enter")  # the first may arrive before it listens
+        await asyncio.sleep(0.3)
+
+
+async def test_blocks_are_found_and_joined_by_keyboard(studio: Open) -> None:
+    page = await studio()
+    await page.keyboard.press("Tab")
+    assert await page.evaluate("document.activeElement.textContent") == "To the blocks"
+    await page.keyboard.press("Enter")
+    await until(page, TOOLBOX)
+    await take_found(page, "print")
+    await take_found(page, "print")
+    await until(page, f"{STACKS} === 1 && studio.editor.code.value.split('print(').length === 3")
+    assert page.errors == []
+
+
+async def test_error_is_mended_by_keyboard(studio: Open) -> None:
+    page = await loaded(await studio(), WRONG)
+    await page.evaluate("document.querySelector('.skip').focus()")
+    await page.keyboard.press("F5")
+    await until(page, "studio.runner.failureWords.value === 'Something is divided by zero.'")
+    await phase(page, "idle")
+    await page.keyboard.press("Enter")
+    await until(page, TOOLBOX)
+    while not await page.evaluate("document.activeElement.classList.contains('blocklyWorkspaceSelectionRing')"):
+        await page.keyboard.press("Tab")
+    await page.keyboard.press("ArrowDown")
+    await until(page, "document.activeElement.closest('.blocklyBlock')")
+    for _ in range(12):
+        if await page.evaluate("document.activeElement.getAttribute('aria-label') === 'Edit number: 0'"):
+            break
+        await page.keyboard.press("ArrowRight")
+    await page.keyboard.press("Enter")
+    await until(page, "document.activeElement.classList.contains('blocklyHtmlInput')")
+    await page.keyboard.press("Control+a")
+    await page.keyboard.type("10")
+    await page.keyboard.press("Enter")
+    await until(page, "studio.editor.code.value.includes('64 % 10')")
+    await page.keyboard.press("F5")
+    await until(page, "studio.runner.printed.value.at(-1)?.text === '4'")
+    assert page.errors == []
+
+
+async def test_block_is_joined_by_mouse(studio: Open) -> None:
+    page = await loaded(await studio(), APART)
+    path = "document.querySelector('[data-id={}] > .blocklyPath').getBoundingClientRect().toJSON()"
+    below, moved = [await page.evaluate(path.format(id)) for id in ("first", "second")]
+    await page.mouse.move(moved["x"] + 12, moved["y"] + 12)
+    await page.mouse.down()
+    await page.mouse.move(below["x"] + 24, below["bottom"] + 24, steps=8)
+    await page.mouse.move(below["x"] + 16, below["bottom"] + 12, steps=4)
+    await page.mouse.up()
+    await until(page, f"{STACKS} === 1")
+    assert page.errors == []
