@@ -9,15 +9,15 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 ROUNDS = 5
+CPU_CLOCK = 2  # Linux: the scheduler's clock of a process, whose number is in the bits before
 QUIET = 4.0  # s in which nobody asks
 
 
 def cpu_seconds(pid: int) -> float:
-    """Processor time of a process so far, all its threads, to the microsecond."""
-    return sum(int((task / "schedstat").read_text().split()[0]) for task in Path(f"/proc/{pid}/task").iterdir()) / 1e9
+    """Processor time of a process so far, all its threads that are and were, to the microsecond."""
+    return time.clock_gettime((~pid << 3) | CPU_CLOCK)
 
 
 def idle_share(pid: int) -> float:
