@@ -26,6 +26,7 @@ from roboglot.testing import Forward
 from tests.drivers import bad_link
 from tests.drivers.bad_link import Connect
 from tests.drivers.chain import EP_ADDRESS, Drive, Open, OpenRest, TextClient, Until, ep_config, url_of
+from tests.drivers.pace import settle
 from tests.drivers.rig import Rig, rig, time_passes
 
 
@@ -38,7 +39,7 @@ def until(forward: Forward) -> Until:
             if condition():
                 return
             await forward(seconds=step)
-            await asyncio.sleep(0.001)
+            await settle()
         raise AssertionError("it did not happen")
 
     return wait

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import math
 
 import numpy as np
@@ -26,6 +25,7 @@ from roboglot.model.sound import claps, tone
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
 from tests.drivers.chain import Open, Until
+from tests.drivers.pace import settle
 
 pytestmark = pytest.mark.world("empty", body="robomaster_ep")
 
@@ -63,7 +63,7 @@ async def test_sensor_adapters_tell_volts_levels_and_periods(
     for voltage in (0.5, 2.0, 1.0, 2.5):
         world.hands.apply_voltage("a", 5, 2, voltage)
         await forward(seconds=0.1)
-        await asyncio.sleep(0.005)
+        await settle()
     await until(lambda: adapters.voltage(5, 2) == pytest.approx(2.5, abs=0.01), patience=2)
     assert adapters.level(5, 2)
     assert not adapters.level(5, 1)
@@ -86,7 +86,7 @@ async def test_its_microphone_and_applause_reach_the_next_robot(
         world.hands.make_sound(tone(1000.0, 0.4), beside)
         for _ in range(40):
             await forward(seconds=0.02)
-            await asyncio.sleep(0.001)
+            await settle()
             heard += blocks.drain()
     loudest = max(heard, key=lambda block: float(np.square(block.samples.astype(float)).mean()))
     spectrum = np.abs(np.fft.rfft(loudest.samples))
@@ -99,7 +99,7 @@ async def test_its_microphone_and_applause_reach_the_next_robot(
         reported = runs.drain()
         for _ in range(30):
             await forward(seconds=0.1)
-            await asyncio.sleep(0.001)
+            await settle()
             reported += runs.drain()
         assert [run.count for run in reported] == [3]
 

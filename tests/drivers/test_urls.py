@@ -1,6 +1,5 @@
 """URLs of real robots, and the refusals of others."""
 
-import asyncio
 from collections.abc import Collection
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.testing import Forward
+from tests.drivers.pace import settle
 
 
 def test_a_robot_is_given_by_body_or_url() -> None:
@@ -76,7 +76,7 @@ async def test_every_door_opens_for_an_absent_robot(
         await door.start()
     for _ in range(20):
         await forward(seconds=0.1)
-        await asyncio.sleep(0.002)
+        await settle()
     assert robot[Link].state is LinkState.CONNECTING
     for door in doors:
         await door.close()

@@ -34,7 +34,7 @@ async def identical(folder: Path) -> Recording:
 
 
 async def until_gone(session: Session, door: str, count: int = 1) -> None:
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(120):  # a busy machine
         while session.gone.count(door) < count:  # noqa: ASYNC110 - robots call back in the loop
             await asyncio.sleep(0.0005)
 

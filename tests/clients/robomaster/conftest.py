@@ -10,6 +10,7 @@ from roboglot.clients.robomaster.client import Ports, RoboMasterClient
 from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.testing.addresses import free_port
+from tests.drivers.pace import settle
 
 ADDRESS = "127.0.0.9"
 Run = Callable[[Awaitable[Any]], Awaitable[Any]]
@@ -52,7 +53,7 @@ def run(robot) -> Run:
     async def pass_time(awaitable: Awaitable[Any]) -> Any:
         task = asyncio.ensure_future(awaitable)
         for _ in range(400):
-            await asyncio.sleep(0.001)
+            await settle()
             if task.done():
                 break
             await robot.clock.advance(0.02)

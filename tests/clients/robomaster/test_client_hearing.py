@@ -23,6 +23,7 @@ from roboglot.wire.robomaster.telemetry import (
     LinesSeen,
     TargetsSeen,
 )
+from tests.drivers.pace import settle
 
 ADDRESS = "127.0.0.9"
 BUILDS = pytest.mark.parametrize("profile", ["spec", "fw60", "fw70"], indirect=True)
@@ -43,7 +44,7 @@ async def test_pushes_of_every_kind(client, run, forward, robot) -> None:
         robot[InputDevice].click(MouseButton.LEFT)
         for _ in range(20):
             await forward(seconds=0.05)
-            await asyncio.sleep(0.002)
+            await settle()
         reported = everything.drain()
         stop()
     kinds = [type(each) for each in reported]

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 import pytest
 
 from roboglot.wire.contracts import contract
+from tests.drivers.pace import settle
 
 PARSE_ERROR = "command format error: command parse error;"
 OK, FAIL = "ok;", "fail;"
@@ -137,7 +138,7 @@ async def play(client, robot, text: str) -> str:
     client.send(f"{text};")
     answer = asyncio.ensure_future(client.reply())
     for _ in range(400):
-        await asyncio.sleep(0.0003)
+        await settle()
         if answer.done():
             break
         await robot.clock.advance(0.05)

@@ -17,6 +17,7 @@ from roboglot.model.components.sensing.range_sensor import RangeSensors
 from roboglot.model.components.system.pwm import PwmPorts
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.sound import claps
+from tests.drivers.pace import settle
 
 OK, FAIL = "ok;", "fail;"
 FW70 = pytest.mark.parametrize("door", [{"profile": "fw70"}], indirect=True)
@@ -58,7 +59,7 @@ async def answered(client, forward, text: str, seconds: float = 20.0) -> str:
     client.send(text)
     waiting = asyncio.ensure_future(client.reply())
     for _ in range(int(seconds / 0.25)):
-        await asyncio.sleep(0.002)
+        await settle()
         if waiting.done():
             break
         await forward(seconds=0.25)
@@ -264,7 +265,7 @@ async def test_video_for_several_who_come_when_they_like(client, robot, forward,
     data = [b"", b""]
     for beat in range(30):
         await forward(seconds=1 / 30)
-        await asyncio.sleep(0.005)
+        await settle()
         if beat == 10:
             late = await listen("video")
         for number, reader in enumerate((early, late)):
@@ -291,7 +292,7 @@ async def test_audio_is_a_packet_a_write(client, forward, listen) -> None:
     packets = []
     for _ in range(30):
         await forward(seconds=0.02)
-        await asyncio.sleep(0.003)
+        await settle()
         if reader._buffer:
             packets.append(await reader.read(4096))
     assert len(packets) >= 20

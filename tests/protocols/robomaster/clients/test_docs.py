@@ -13,6 +13,7 @@ from roboglot.model.geometry import Point, Pose
 from roboglot.model.sound import claps
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.wire.contracts import contract
+from tests.drivers.pace import settle
 
 DOCS = Path(__file__).parents[4] / "docs/protocols"
 PAGES = {page.stem: page for page in (DOCS / "robomaster.md", DOCS / "robomaster.zh.md")}
@@ -75,7 +76,7 @@ async def test_the_transcripts_are_true(
         client.send(text)
         answer = asyncio.ensure_future(client.reply())
         for _ in range(1000):
-            await asyncio.sleep(0.0005)
+            await settle()
             if answer.done():
                 break
             await forward(seconds=0.05)
@@ -86,7 +87,7 @@ async def test_the_transcripts_are_true(
         broadcasts.drain()
         causes[cause]()
         await forward(seconds=seconds)
-        await asyncio.sleep(0.02)
+        await settle()
         said = re.findall(r"[^;]+;", bytes(events._buffer).decode())
         events._buffer.clear()
         return [*said, *pushes.texts(), *(text.replace("127.0.0.9", "127.0.0.1") for text in broadcasts.texts())]
