@@ -44,9 +44,12 @@ def test_many_robots_start_in_all_rooms(count: int) -> None:
     assert min(crowds) >= 1
     assert max(crowds) <= max(TOGETHER, 1.6 * count / len(crowds))
     before = Places(load_world("office"), _taken=[(pose, 0, radius) for pose, radius in placed[:TOGETHER]])
+    stand = [person.path[0] for person in load_world("office").floors[0].people]
     for pose, radius in placed[TOGETHER:]:
         assert before.free(pose, 0, radius + 0.4 * BESIDE)
-        assert before.free(pose.compose(Pose(AHEAD)), 0, radius)
+        assert all(before.free(pose.compose(Pose(AHEAD * n / 4)), 0, radius + 0.1) for n in range(1, 5))
+        assert all(pose.distance_to(other.compose(Pose(AHEAD))) >= radius + r for other, _, r in before._taken)
+        assert all(math.dist((pose.x, pose.y), at) > radius + 0.4 for at in stand)
         assert all(math.dist((pose.x, pose.y), door) >= DOOR + radius for door in rooms.doors)
         before = replace(before, _taken=[*before._taken, (pose, 0, radius)])
 

@@ -1,7 +1,8 @@
 """Start places of robots: as configured, at the world's start, on docks (facing away), or beside the first one.
 
 Beside it means side by side in the same room with room ahead, so that each can drive off. More robots than TOGETHER
-are spread over the floor's rooms, the emptiest first, away from doors; where rooms are full they have to do without.
+are spread over the floor's rooms, the emptiest first, away from doors and people. Where rooms are full, robots have to
+do without room.
 """
 
 from __future__ import annotations
@@ -9,11 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise, product
 
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.simulation.building.blueprint import Solid, solids_of
 from roboglot.simulation.building.rooms import Rooms, rooms_of
-from roboglot.simulation.world.description import WorldDescription
+from roboglot.simulation.world.description import Spot, WorldDescription
 
 CONTACT_GAP = 0.005  # m between hull and dock at start
 BESIDE = 0.3  # m between robots that start side by side
@@ -21,7 +23,8 @@ SEARCH = 40.0  # m around the first robot
 SAME_ROOM = 5.0  # m around it that are searched for a good place
 TOGETHER = 6  # robots that start side by side
 DOOR = 0.9  # m around a door's middle that a spread robot leaves free
-TURNS = (0.0, math.pi, math.pi / 2, -math.pi / 2)  # from the first robot's yaw, until there is room ahead
+ROOM = 0.29, 0.15  # m around a spread robot, while such places exist
+TURNS = (0.0, math.pi, math.pi / 2, -math.pi / 2)  # from the first robot's yaw, while there is room
 CLEAR = 0.3, 0.05  # m around a robot in a crowd, while such places exist
 AHEAD = 0.6  # m that must be free in front of a good place
 NEAR, NEAR_STEP = 3.0, 0.1  # m around an occupied place that are searched for an alternative to suggest, and the step
@@ -51,7 +54,7 @@ class Places:
     _solids: dict[int, list[Solid]] = field(default_factory=dict)
     _searches: dict[tuple[int, float, Pose], _Search] = field(default_factory=dict)
     _rooms: dict[int, Rooms] = field(default_factory=dict)
-    _spots: dict[tuple[int, float, int], Iterator[Pose]] = field(default_factory=dict)  # by floor, radius and room
+    _spots: dict[tuple[int, float, int, float], Iterator[Pose]] = field(default_factory=dict)
 
     def next(self, wanted: Pose | None, floor: int, radius: float) -> tuple[Pose, int]:
         """Pose and floor for one more robot. Raises ValueError if it cannot stand where it should, or anywhere."""
@@ -100,23 +103,26 @@ class Places:
             return
         cells = [rooms.cell_at(pose.x, pose.y) for pose in here]
         crowds = [sum(cell in room for cell in cells) / rooms.area(n) for n, room in enumerate(rooms.rooms)]
-        for number in sorted(range(len(crowds)), key=lambda n: (crowds[n], n)):
-            spots = self._spots.get((floor, radius, number))
-            if spots is None:
-                spots = self._spots[floor, radius, number] = self._roomy(rooms, number, floor, radius, here[0].yaw)
-            for pose in spots:  # `yield from` would close it together with this generator
+        order = sorted(range(len(crowds)), key=lambda n: (crowds[n], n))
+        for room, number in ((room, number) for room in ROOM for number in order):
+            key = floor, radius, number, room
+            if key not in self._spots:
+                self._spots[key] = self._roomy(rooms, key, here[0].yaw)
+            for pose in self._spots[key]:  # `yield from` would close it together with this generator
                 yield pose, floor
 
-    def _roomy(self, rooms: Rooms, number: int, floor: int, radius: float, yaw: float) -> Iterator[Pose]:
-        """Yield places in a room that are clear of all, and of doors, with room ahead in some direction."""
-        for x, y in rooms.spots(number, 2 * radius + BESIDE):
+    def _roomy(self, rooms: Rooms, key: tuple[int, float, int, float], yaw: float) -> Iterator[Pose]:
+        """Yield places in a room that are clear of all, and of doors, with room ahead; most face the same way."""
+        floor, radius, number, room = key
+        people = self.world.floors[floor].people
+        for turn, (x, y) in product(TURNS, tuple(rooms.spots(number, 2 * radius + BESIDE))):
+            pose = Pose(x, y, wrap_angle(yaw + turn))
             if any(math.dist((x, y), door) < DOOR + radius for door in rooms.doors):
                 continue
-            poses = [Pose(x, y, wrap_angle(yaw + turn)) for turn in TURNS]
-            if not self.free(poses[0], floor, radius + CLEAR[0] / 2):
+            if any(_away(x, y, person.path) < radius + person.radius + room for person in people):
                 continue
-            ahead = (pose for pose in poses if self.free(pose.compose(Pose(AHEAD)), floor, radius))
-            if (pose := next(ahead, None)) is not None:
+            way = (pose.compose(Pose(AHEAD * n / 3)) for n in (0, 3, 1, 2))
+            if all(self.free(at, floor, radius + room) for at in way) and not self._in_front(pose, floor, radius):
                 yield pose
 
     def _near(self, wanted: Pose, floor: int, radius: float) -> Pose | None:
@@ -154,13 +160,17 @@ class Places:
         """True if a robot there and all others can drive off, and nothing solid is between it and the first one."""
         if not (self.free(place, floor, radius) and self.free(place.compose(Pose(AHEAD)), floor, radius)):
             return False
-        fronts = [(other.compose(Pose(AHEAD)), r) for other, number, r in self._taken if number == floor]
-        if any(place.distance_to(front) < radius + r for front, r in fronts):
+        if self._in_front(place, floor, radius):
             return False
         steps = max(1, math.ceil(around.distance_to(place) / radius))
         way_x, way_y = (place.x - around.x) / steps, (place.y - around.y) / steps
         between = (Pose(around.x + n * way_x, around.y + n * way_y) for n in range(steps))
         return all(_distance(at, solid) > 0.0 for at in between for solid in self._solids[floor])
+
+    def _in_front(self, place: Pose, floor: int, radius: float) -> bool:
+        """True if a robot there would stand in the way of one that drives off."""
+        fronts = ((other.compose(Pose(AHEAD)), r) for other, number, r in self._taken if number == floor)
+        return any(place.distance_to(front) < radius + r for front, r in fronts)
 
     def inside(self, pose: Pose, floor: int) -> bool:
         """True if there is such a floor, and the place lies on it; whatever stands there."""
@@ -180,6 +190,16 @@ class Places:
         if floor not in self._solids:
             self._solids[floor] = list(solids_of(storey, self.world.lift, lift_here=False))
         return all(_distance(pose, solid) >= radius for solid in self._solids[floor])
+
+
+def _away(x: float, y: float, path: Sequence[Spot]) -> float:
+    """Return the distance from a place to the nearest point of a path, m."""
+    nearest = math.dist((x, y), path[0])
+    for (x0, y0), (x1, y1) in pairwise(path):
+        along = ((x - x0) * (x1 - x0) + (y - y0) * (y1 - y0)) / max(math.dist((x0, y0), (x1, y1)) ** 2, 1e-9)
+        share = min(max(along, 0.0), 1.0)
+        nearest = min(nearest, math.dist((x, y), (x0 + share * (x1 - x0), y0 + share * (y1 - y0))))
+    return nearest
 
 
 def _distance(pose: Pose, solid: Solid) -> float:
