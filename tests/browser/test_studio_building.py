@@ -101,3 +101,33 @@ async def test_block_is_joined_by_mouse(studio: Open) -> None:
     await page.mouse.up()
     await until(page, f"{STACKS} === 1")
     assert page.errors == []
+
+
+async def test_schedule_is_put_into_plain_words(studio: Open) -> None:
+    page = await loaded(await studio(), APART)
+    written = {
+        "cycle": ["*/5 * * * *", "*/1 * * * *", "*/90 * * * *", "0 8 * * 1-5", "0 25 * * *", "15 * * * 1", "7 * * * *"],
+        "single": ["8:05", "99:99", "tomorrow", "now + 1 hours", ""],
+    }
+    said = "wish => import('/studio/dialogs.js').then(({ plainly }) => wish[1].map((text) => plainly(wish[0], text)))"
+    assert await page.evaluate(said, ["cycle", written["cycle"]]) == [
+        "every 5 minutes",
+        "every 1 minute",
+        "as written: */90 * * * *",
+        "Monday-Friday at 08:00",
+        "as written: 0 25 * * *",
+        "as written: 15 * * * 1",
+        "every hour, at minute 7",
+    ]
+    assert await page.evaluate(said, ["single", written["single"]]) == [
+        "at 8:05",
+        "as written: 99:99",
+        "as written: tomorrow",
+        "in 1 hour",
+        "",
+    ]
+    await page.click("button[aria-label='When it runs']")
+    await page.fill("dialog .field input", "99:99")
+    await page.click("dialog .button.main")
+    await page.wait_for_selector("dialog .notice.bad:has-text('Refused')")
+    assert await page.inner_text(".phase") == "Ready"  # nothing ran, so nothing ended with an error

@@ -65,25 +65,37 @@ export function Library() {
 
 const mode = signal("single"), condition = signal("now");
 
-/** A condition in words. @param {string} how @param {string} text */
+const upTo = (/** @type {string | undefined} */ text, /** @type {number} */ most) => /^\d{1,2}$/.test(text ?? "") && Number(text) <= most;
+const clockTime = (/** @type {string} */ hour, /** @type {string} */ minute) => `${hour.padStart(2, "0")}:${minute.padStart(2, "0")}`;
+
+/** What comes again and again, in words; "" for what has none. @param {string} when */
+function again(when) {
+  if (when === "@reboot") return t("studio.when.reboot");
+  const [minute, hour, day, month, week, ...more] = when.split(/\s+/), [, step] = /^\*\/(\d+)$/.exec(minute) ?? [];
+  if (more.length || day !== "*" || month !== "*" || !/^(\*|[0-7]([-,][0-7])*)$/.test(week ?? "")) return "";
+  if (hour === "*" && week === "*") {
+    if (minute === "*") return t("studio.when.minute");
+    if (step && 60 % Number(step) === 0) return t("studio.when.minutes", { n: step }).replace(/\b1 (\w+)s\b/, "1 $1");
+    return upTo(minute, 59) ? t("studio.when.hour", { minute }) : "";
+  }
+  if (!upTo(minute, 59) || !upTo(hour, 23)) return "";
+  const at = clockTime(hour, minute);
+  return week === "*" ? t("studio.when.daily", { at }) : t("studio.when.weekly", { at, days: week.replace(/\d/g, (d) => t(`studio.day.${Number(d) % 7}`)) });
+}
+
+/** What comes once, in words; "" for what has none. @param {string} when */
+function once(when) {
+  if (when === "now") return t("studio.when.now");
+  const [, n, unit] = /^now\s*\+\s*(\d+)\s*(minutes|hours|days|weeks|months|years)$/.exec(when) ?? [];
+  if (n) return t("studio.when.later", { n, unit: t(`studio.unit.${unit}`) }).replace(/\b(1 \w+)s\b/, "$1");
+  const [hour, minute] = when.split(":");
+  return /^\d{1,2}:\d\d$/.test(when) && upTo(hour, 23) && upTo(minute, 59) ? t("studio.when.at", { at: when }) : "";
+}
+
+/** A condition in words; what is none that we know stands as it is written. @param {string} how @param {string} text */
 export function plainly(how, text) {
   const when = text.trim();
-  if (how === "cycle") {
-    if (when === "@reboot") return t("studio.when.reboot");
-    const [minute, hour, day, month, week] = when.split(/\s+/);
-    if (minute === "*" && hour === "*") return t("studio.when.minute");
-    if (/^\*\/\d+$/.test(minute) && hour === "*") return t("studio.when.minutes", { n: minute.slice(2) });
-    if (/^\d+$/.test(minute) && hour === "*") return t("studio.when.hour", { minute });
-    if (/^\d+$/.test(minute) && /^\d+$/.test(hour ?? "")) {
-      const at = `${hour.padStart(2, "0")}:${minute.padStart(2, "0")}`;
-      if (day === "*" && month === "*") return week === "*" ? t("studio.when.daily", { at }) : t("studio.when.weekly", { at, days: week.replace(/\d/g, (d) => t(`studio.day.${Number(d) % 7}`)) });
-    }
-    return when;
-  }
-  const later = /^now\s*\+\s*(\d+)\s*(minutes|hours|days|weeks|months|years)$/.exec(when);
-  if (when === "now") return t("studio.when.now");
-  if (later) return t("studio.when.later", { n: later[1], unit: t(`studio.unit.${later[2]}`) }).replace(/\b(1 \w+)s\b/, "$1");
-  return t("studio.when.at", { at: when });
+  return (how === "cycle" ? again(when) : once(when)) || (when && t("studio.when.other", { when }));
 }
 
 async function plan(run) {

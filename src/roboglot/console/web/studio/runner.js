@@ -231,5 +231,4 @@ function report({ feedback, block }) {
     if (/is suspend/.test(feedback.describe)) { if (phase.value === "idle") rejoin().catch(() => undefined); else { phase.value = "paused"; look(); } } else if (/is run$/.test(feedback.describe)) phase.value = "running"; else settle("idle");
   } else if (feedback.operate === "start") phase.value = feedback.state ? "idle" : "running";
   else if (feedback.operate === "stop") settle("idle");
-  else if (feedback.operate === "run" && feedback.state && phase.value !== "starting") failure.value ??= { text: feedback.describe, en: "", zh: "", block: lit.value };
 }
