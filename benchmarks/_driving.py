@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.errors import Collided
 from roboglot.model.events import ScanTaken
 from roboglot.model.geometry import Twist
 from roboglot.model.robot import Robot
@@ -36,6 +37,14 @@ class Crowd:
         self.scans += 1
 
 
+def drive(base: Base, twist: Twist) -> None:
+    """Drive so, or backwards where something is touched ahead: crowds start close to each other."""
+    try:
+        base.set_velocity(twist)
+    except Collided:
+        base.set_velocity(Twist(-twist.x, 0.0, twist.yaw))
+
+
 async def crowd(count: int, body: str, seed: int, *, driving: bool) -> Crowd:
     """Return ``count`` robots of a body, which drive circles from now on or stand."""
     clock = LockstepClock()
@@ -52,7 +61,7 @@ async def crowd(count: int, body: str, seed: int, *, driving: bool) -> Crowd:
     gc.freeze()  # as the runtime does
     for twist in (AHEAD, CIRCLE) if driving else ():
         for robot in robots:
-            robot[Base].set_velocity(twist)
+            drive(robot[Base], twist)
         await clock.advance(1.0)
     made.scans = 0
     return made
