@@ -141,7 +141,7 @@ def pytest_collection_finish() -> None:
 
 
 VENDOR_PORTS = (40924, 40926)  # UDP
-PATIENCE = 10.0  # real s
+PATIENCE = 60.0  # real s
 
 
 @pytest.fixture

@@ -67,7 +67,7 @@ def core(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def run(core: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
     return subprocess.run(
-        [core, "-I", *arguments], capture_output=True, text=True, timeout=60, env=environment, cwd=core.parent
+        [core, "-I", *arguments], capture_output=True, text=True, timeout=180, env=environment, cwd=core.parent
     )
 
 

@@ -50,7 +50,7 @@ async def test_a_default_start_is_reached_by_loopback_alone(tmp_path: Path, monk
 
 def test_a_network_is_not_opened_without_a_word(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "roboglot", "up", "--data", str(tmp_path / "data"), "--address", "0.0.0.0"]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=180, check=False)
     assert ended.returncode == 1
     assert "--insecure" in ended.stderr
     assert "Traceback" not in ended.stderr

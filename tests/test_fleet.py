@@ -29,7 +29,7 @@ async def test_deliveries_end_with_the_fleet(fleet: Fleet, robot: Robot, forward
     await robot[Delivery].accept(*(OrderRequest(OrderKind.RETURN, "room") for _ in range(2)))
     await forward(seconds=seconds)
     assert asyncio.all_tasks() > before
-    async with asyncio.timeout(10):
+    async with asyncio.timeout(60):
         await fleet.close()
         for _ in range(TURNS):
             await asyncio.sleep(0)

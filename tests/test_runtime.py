@@ -34,14 +34,14 @@ def config(data: Path) -> Config:
 
 def answers(port: int) -> bool:
     try:
-        socket.create_connection((ADDRESS, port), timeout=2).close()
+        socket.create_connection((ADDRESS, port), timeout=60).close()
     except OSError:
         return False
     return True
 
 
 async def until(condition: Callable[[], bool]) -> None:
-    async with asyncio.timeout(10):
+    async with asyncio.timeout(60):
         while not await asyncio.to_thread(condition):  # noqa: ASYNC110 - sockets have no event
             await asyncio.sleep(0.05)
 

@@ -43,7 +43,7 @@ def environment(root: Path, **variables: str) -> subprocess.CompletedProcess[str
         env={"PATH": os.environ["PATH"], **variables},
         capture_output=True,
         text=True,
-        timeout=30,
+        timeout=180,
     )
 
 

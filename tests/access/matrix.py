@@ -86,7 +86,7 @@ async def dog_answers(folder: Path, name: str, codes: list[int]) -> dict[int, li
     async with grpc.aio.secure_channel(f"{ADDRESS}:50052", credentials, options=options) as channel:
         stub = GrpcAppStub(channel)
         for code in codes:
-            stream = stub.sendMsg(pb.SendRequest(nameCode=code, params="{}"), timeout=5.0)
+            stream = stub.sendMsg(pb.SendRequest(nameCode=code, params="{}"), timeout=60.0)
             answers[code] = [json.loads(message.data) async for message in stream if message.data.startswith("{")]
     return answers
 
@@ -100,7 +100,7 @@ async def dog_file_errors(folder: Path, name: str, asked: list[tuple[int, dict[s
         stub = GrpcAppStub(channel)
         errors = []
         for code, params in asked:
-            stream = stub.getFile(pb.SendRequest(nameCode=code, params=json.dumps(params)), timeout=5.0)
+            stream = stub.getFile(pb.SendRequest(nameCode=code, params=json.dumps(params)), timeout=60.0)
             errors.append([chunk.error_code async for chunk in stream][-1])
     return errors
 

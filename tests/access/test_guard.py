@@ -157,7 +157,7 @@ async def test_another_program_revokes_within_a_second(runtime: Runtime, data: P
     other = open_store(data)
     other.revoke(CALLERS[1].address)
     other.close()
-    async with asyncio.timeout(10.0):
+    async with asyncio.timeout(60):
         async for _ in link:
             pass
     await link.close()
@@ -262,7 +262,7 @@ async def test_control_goes_with_the_right(runtime: Runtime, store: AccessStore,
 
 
 async def until(condition) -> None:
-    async with asyncio.timeout(10.0):
+    async with asyncio.timeout(60):
         while not condition():  # noqa: ASYNC110 - a thread looks at the clock
             await asyncio.sleep(0.02)
 
@@ -276,7 +276,7 @@ def test_the_audit_survives_a_kill_and_shows_changes(tmp_path: Path) -> None:
         "while len(list(trail.rows())) < 50: time.sleep(0.01)\n"
         "os.kill(os.getpid(), 9)"
     )
-    assert subprocess.run([sys.executable, "-c", code, str(tmp_path)], timeout=60, check=False).returncode == -9
+    assert subprocess.run([sys.executable, "-c", code, str(tmp_path)], timeout=180, check=False).returncode == -9
     with open_trail(tmp_path) as trail:
         assert trail.verify().number == 50
         with closing(sqlite3.connect(tmp_path / FILE, isolation_level=None)) as connection:

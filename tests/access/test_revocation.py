@@ -68,7 +68,7 @@ async def by_gait(runtime: Runtime, data: Path) -> AsyncIterator[tuple[str, Gone
         stub = GrpcAppStub(channel)
 
         async def ask(code: int, params: object) -> list[dict[str, object]]:
-            stream = stub.sendMsg(pb.SendRequest(nameCode=code, params=json.dumps(params)), timeout=20.0)
+            stream = stub.sendMsg(pb.SendRequest(nameCode=code, params=json.dumps(params)), timeout=60.0)
             return [json.loads(message.data) async for message in stream if message.data.startswith("{")]
 
         walk = {"motion_id": 303, "cmd_source": 0, "vel_des": [0.2, 0.0, 0.0], "duration": 8000}

@@ -40,10 +40,10 @@ def test_secrets_are_nowhere(tmp_path: Path) -> None:
         connect = [sys.executable, "-m", "roboglot", "connect", "127.0.0.1:9", "--once", "--robot", "a"]
         connecting = subprocess.Popen(connect, env=environment, stderr=subprocess.PIPE)
         listed = [path.read_bytes() for path in Path("/proc").glob("[0-9]*/cmdline") if readable(path)]
-        said = connecting.communicate(timeout=60)[1]
+        said = connecting.communicate(timeout=180)[1]
     finally:
         server.terminate()
-        server.communicate(timeout=60)
+        server.communicate(timeout=180)
     kept = [
         path.read_bytes() for folder in (data, tmp_path / "settings") for path in folder.rglob("*") if path.is_file()
     ]

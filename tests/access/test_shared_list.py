@@ -220,7 +220,7 @@ async def test_programs_of_fleet_share_list_and_audit(server: PostgreSQLServer, 
 
 def access(*arguments: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "roboglot", "access", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    return subprocess.run(command, capture_output=True, text=True, timeout=180, check=False)
 
 
 @needs_postgresql

@@ -132,6 +132,7 @@ async def test_held_before_the_mark(tour):
     assert isinstance(action.error, Blocked)
 
 
+@pytest.mark.slow  # long; in short: test_a_shelf_is_lifted_and_set_down
 @pytest.mark.world(WORLD, body="hermes")
 async def test_a_lifted_shelf_is_carried_elsewhere(tour):
     (shelf,) = tour.world.building.shelves

@@ -19,7 +19,7 @@ from roboglot.operations import Right
 
 def call(*arguments: str, text: str = "") -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "roboglot", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, input=text)
+    return subprocess.run(command, capture_output=True, text=True, timeout=180, check=False, input=text)
 
 
 def test_a_machine_is_let_in_and_revoked(tmp_path: Path) -> None:

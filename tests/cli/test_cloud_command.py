@@ -12,7 +12,7 @@ from roboglot.storage.database import Database
 
 def call(*arguments: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "roboglot", "cloud", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+    return subprocess.run(command, capture_output=True, text=True, timeout=180, check=False)
 
 
 async def test_account_is_opened_and_its_token_reported_once(tmp_path: Path) -> None:

@@ -39,7 +39,7 @@ def test_robots_of_gateway_are_on_addresses_of_range(tmp_path: Path) -> None:
             "--config",
             str(config),
         ]
-        seen = subprocess.run(doctor, capture_output=True, text=True, timeout=60, check=False).stdout
+        seen = subprocess.run(doctor, capture_output=True, text=True, timeout=180, check=False).stdout
         [shown] = [line.split()[-1] for line in seen.splitlines() if "gateway certificate" in line]
         assert "open now, by" in seen
         command = [sys.executable, "-m", "roboglot", "connect", f"{ROBOTS}:50090", "--robot", "a", "--robot", "b"]
@@ -58,7 +58,7 @@ def test_robots_of_gateway_are_on_addresses_of_range(tmp_path: Path) -> None:
                 said = [connect.stderr.readline() for _ in range(2)]
                 assert all(line.startswith(f"gateway {shown}") for line in said)
                 assert sum("seen for the first time" in line for line in said) == 1
-                with urllib.request.urlopen(f"http://127.0.97.33:1448/{POSE}", timeout=20) as reply:
+                with urllib.request.urlopen(f"http://127.0.97.33:1448/{POSE}", timeout=60) as reply:
                     assert reply.status == 200
                 with socket.create_connection(("127.0.97.34", 40923), 20) as line:
                     line.sendall(b"command;chassis speed x 0.1;")
@@ -70,7 +70,9 @@ def test_robots_of_gateway_are_on_addresses_of_range(tmp_path: Path) -> None:
                 connect.terminate()
         assert (known / "roboglot" / "gateways.json").exists()
         wrong = {**environment, "ROBOGLOT_TOKEN": "wrong"}
-        ended = subprocess.run([*command, "--once"], env=wrong, capture_output=True, text=True, timeout=60, check=False)
+        ended = subprocess.run(
+            [*command, "--once"], env=wrong, capture_output=True, text=True, timeout=180, check=False
+        )
         assert (ended.returncode, ended.stderr.count("Traceback")) == (1, 0)
         assert "is not valid" in ended.stderr
 
@@ -95,6 +97,6 @@ def test_how_to_have_address_of_others_is_explained(tmp_path: Path) -> None:
     with served(data, "--world", "empty", "--no-console", "--config", str(config), address="127.0.97.4"):
         command = [sys.executable, "-m", "roboglot", "connect", "127.0.97.1:50091", "--address-range", "192.0.2.0/24"]
         environment = {**os.environ, "ROBOGLOT_TOKEN": token, "XDG_CONFIG_HOME": str(tmp_path)}
-        ended = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
+        ended = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=180, check=False)
     assert ended.returncode == 1
     assert "ip route add local 192.0.2.0/24 dev lo" in ended.stderr

@@ -27,7 +27,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Run]:
     def command(*words: str, **more: str) -> subprocess.CompletedProcess[str]:
         line = [sys.executable, "-m", "roboglot", "cyberdog", *words, "--app-port", port, "--robot", ADDRESS]
         environment = {**os.environ, "ROBOGLOT_DATA": str(data)}
-        return subprocess.run(line, capture_output=True, text=True, timeout=60, env=environment, **more)  # type: ignore[call-overload]
+        return subprocess.run(line, capture_output=True, text=True, timeout=180, env=environment, **more)  # type: ignore[call-overload]
 
     with served(data, *arguments, address=ADDRESS):
         yield command

@@ -51,7 +51,7 @@ def test_every_tcp_port_is_examined(listener: int) -> None:
 
 def demo(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "roboglot", "demo", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, env=os.environ | environment)
+    return subprocess.run(command, capture_output=True, text=True, timeout=180, env=os.environ | environment)
 
 
 def test_a_demo_that_cannot_write_says_so_first() -> None:
@@ -76,7 +76,7 @@ def test_demo_beside_a_running_robot_says_so_first(tmp_path: Path) -> None:
 def test_a_terminal_without_utf8_gets_its_text() -> None:
     command = [sys.executable, "-m", "roboglot", "up", "--help"]
     ended = subprocess.run(
-        command, capture_output=True, timeout=60, env=os.environ | {"PYTHONIOENCODING": "ascii", "LC_ALL": "C"}
+        command, capture_output=True, timeout=180, env=os.environ | {"PYTHONIOENCODING": "ascii", "LC_ALL": "C"}
     )
     assert ended.returncode == 0, ended.stderr
 
@@ -84,7 +84,7 @@ def test_a_terminal_without_utf8_gets_its_text() -> None:
 def test_exported_certificates_are_ignored_by_git(tmp_path: Path) -> None:
     folder = tmp_path / "certs"
     command = [sys.executable, "-m", "roboglot", "certs", "--export", str(folder), "--data", str(tmp_path / "data")]
-    subprocess.run(command, check=True, capture_output=True, timeout=60)
+    subprocess.run(command, check=True, capture_output=True, timeout=180)
     assert (folder / "client-key.pem").exists()
     subprocess.run(["git", "init", "-q", str(tmp_path)], check=True)
     status = ["git", "-C", str(tmp_path), "status", "--porcelain", "--untracked-files=all"]

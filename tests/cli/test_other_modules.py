@@ -15,6 +15,6 @@ def test_command_runs_beside_modules_of_the_same_names(tmp_path: Path) -> None:
         capture_output=True,
         text=True,
         check=False,
-        timeout=60,
+        timeout=180,
     )
     assert done.returncode == 0, done.stderr

@@ -14,7 +14,7 @@ from roboglot.cli import COMMANDS, loaded
 def ended(*arguments: str, reader: str = "cat") -> "subprocess.CompletedProcess[str]":
     """Run ``python -m roboglot`` with its output going to ``reader``; its own status comes last."""
     line = f"{sys.executable} -m roboglot {' '.join(arguments)} | {reader}; exit ${{PIPESTATUS[0]}}"
-    return subprocess.run(["bash", "-c", line], capture_output=True, text=True, check=False, timeout=60)
+    return subprocess.run(["bash", "-c", line], capture_output=True, text=True, check=False, timeout=180)
 
 
 @pytest.mark.parametrize("name", ["up", "access"])

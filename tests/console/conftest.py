@@ -50,14 +50,14 @@ class Shown:
 
 
 def _read(url: str) -> bytes:
-    with urlopen(url, timeout=20) as reply:
+    with urlopen(url, timeout=60) as reply:
         data: bytes = reply.read()
     return data
 
 
 def _fetch(request: Request) -> tuple[int, Any]:
     try:
-        with urlopen(request, timeout=20) as reply:
+        with urlopen(request, timeout=60) as reply:
             status, text = reply.status, reply.read().decode()
     except HTTPError as error:
         status, text = error.code, error.read().decode()

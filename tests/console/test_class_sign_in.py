@@ -29,7 +29,7 @@ PASSWORD = "a long enough secret"
 def post(url: str, shows: dict[str, str]) -> tuple[int, dict[str, Any], str]:
     """Return the answer to a log-in page, and the cookie."""
     try:
-        with urlopen(Request(f"{url}/api/sign_in", data=json.dumps(shows).encode()), timeout=30) as reply:
+        with urlopen(Request(f"{url}/api/sign_in", data=json.dumps(shows).encode()), timeout=60) as reply:
             return reply.status, json.loads(reply.read()), str(reply.headers["set-cookie"] or "").partition(";")[0]
     except HTTPError as error:
         return error.code, json.loads(error.read()), ""

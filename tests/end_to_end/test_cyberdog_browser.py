@@ -48,7 +48,7 @@ async def test_the_page_refuses_what_is_no_offer(length: str | None, body: bytes
     page = _example().serve(no_one, 0, [])
 
     def post() -> int:
-        link = http.client.HTTPConnection("127.0.0.1", page.server_port, timeout=5.0)
+        link = http.client.HTTPConnection("127.0.0.1", page.server_port, timeout=60)
         link.request("POST", "/offer", body, {"Content-Length": length} if length else {})
         with link.getresponse() as answer:
             link.close()

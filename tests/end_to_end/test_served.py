@@ -24,7 +24,7 @@ TCP_PORTS = (1448, 40923, 40925, 50052)
 
 
 def get(path: str, address: str = FIRST) -> Any:
-    with urllib.request.urlopen(f"http://{address}:1448{path}", timeout=10) as answer:
+    with urllib.request.urlopen(f"http://{address}:1448{path}", timeout=60) as answer:
         return json.load(answer)
 
 
@@ -32,14 +32,14 @@ def post(path: str, body: object, address: str = FIRST) -> None:
     request = urllib.request.Request(
         f"http://{address}:1448{path}", json.dumps(body).encode(), {"Content-Type": "application/json"}
     )
-    urllib.request.urlopen(request, timeout=10).close()
+    urllib.request.urlopen(request, timeout=60).close()
 
 
 class Line:
     """A text client; the robot stops what it commanded when it hangs up."""
 
     def __init__(self, address: str) -> None:
-        self._socket = socket.create_connection((address, 40923), timeout=10)
+        self._socket = socket.create_connection((address, 40923), timeout=60)
 
     def __enter__(self) -> Line:
         return self
@@ -67,7 +67,7 @@ def pair(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServedRobot]:
 def test_second_robot_has_same_ports_on_next_address(pair: ServedRobot) -> None:
     for address in (FIRST, SECOND):
         for port in TCP_PORTS:
-            socket.create_connection((address, port), timeout=5).close()
+            socket.create_connection((address, port), timeout=60).close()
     with Line(SECOND) as line:
         assert line.say("command;chassis move x 0.3") == ["ok;", "ok;"]
         assert wait_for(lambda: float(get(POSE, SECOND)["x"]) > 0.2)
@@ -93,13 +93,13 @@ def test_garbage_at_every_door_harms_no_one(pair: ServedRobot) -> None:
     half_open = []
     for port in TCP_PORTS:
         for junk in garbage:
-            with socket.create_connection((FIRST, port), timeout=5) as connection:
+            with socket.create_connection((FIRST, port), timeout=60) as connection:
                 connection.settimeout(5)
                 try:
                     connection.sendall(junk)
                 except OSError:
                     continue  # it may hang up half-way
-        half_open.append(socket.create_connection((FIRST, port), timeout=5))
+        half_open.append(socket.create_connection((FIRST, port), timeout=60))
     assert isinstance(get(POSE), dict)
     with Line(FIRST) as line:
         assert line.say("command;quit") == ["ok;", "ok;"]
@@ -204,7 +204,7 @@ for arguments in json.loads(sys.argv[1]):
 def refused(*starts: tuple[str, ...]) -> list[str]:
     """Start robots that must fail, one after the other in one process; what each says."""
     command = [sys.executable, "-c", SEVERAL, json.dumps(starts)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=180, check=False)
     ends = [json.loads(line) for line in done.stdout.splitlines()]
     assert (done.returncode, len(ends)) == (0, len(starts)), done.stderr
     for status, said in ends:
@@ -233,7 +233,7 @@ def test_mistakes_are_reported_in_plain_words(pair: ServedRobot, tmp_path: Path)
 
 def test_a_mistake_ends_the_command(pair: ServedRobot, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "roboglot", "up", "--data", str(tmp_path / "other"), "--address", FIRST]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=180, check=False)
     assert done.returncode == 1
     assert "1448" in done.stderr
     assert "Traceback" not in done.stderr

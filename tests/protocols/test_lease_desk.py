@@ -52,7 +52,7 @@ async def desk(robot: Robot, world: World, tmp_path: Path) -> AsyncIterator[Path
 
 async def say(folder: Path, line: bytes) -> Any:
     answer = b""
-    async with asyncio.timeout(5):
+    async with asyncio.timeout(60):
         reader, writer = await asyncio.open_unix_connection(folder / NAME)
         with contextlib.suppress(ConnectionError):
             writer.write(line)
@@ -138,7 +138,7 @@ async def test_doors_refuse_in_their_words_and_name_clients(robot: Robot, forwar
 
     async def ask(command: str) -> str:
         writer.write(f"{command};".encode())
-        async with asyncio.timeout(5):
+        async with asyncio.timeout(60):
             return (await reader.readuntil(b";")).decode()
 
     async with SlamwareClient(ADDRESS, rest.port, clock=robot.clock) as client:

@@ -130,7 +130,7 @@ class Session:
 
 def _post(url: str, values: object) -> None:
     request = Request(url, json.dumps(values).encode(), {"content-type": "application/json"})
-    with urlopen(request, timeout=20) as answer:
+    with urlopen(request, timeout=60) as answer:
         assert answer.status == 200
 
 

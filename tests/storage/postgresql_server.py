@@ -45,7 +45,7 @@ class PostgreSQLServer:
         data = ("-D", str(self._folder / "data"))
         settings = ("-U", "robots", "--auth=trust", "--no-sync", "--locale=C.UTF-8", "--encoding=UTF8")
         subprocess.run(
-            self._command("initdb", *data, *settings), check=True, capture_output=True, timeout=60, **self._as
+            self._command("initdb", *data, *settings), check=True, capture_output=True, timeout=180, **self._as
         )
         if self._address:
             with (self._folder / "data/pg_hba.conf").open("a") as rules:
@@ -65,7 +65,7 @@ class PostgreSQLServer:
         self._server = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, **self._as)
         ready = self._command("pg_isready", "-h", str(self._folder), "-t", "1")
         for _ in range(200):
-            if subprocess.run(ready, capture_output=True, timeout=10, check=False).returncode == 0:
+            if subprocess.run(ready, capture_output=True, timeout=180, check=False).returncode == 0:
                 return
             if self._server.poll() is not None:
                 break

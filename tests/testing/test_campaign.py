@@ -87,7 +87,7 @@ def test_interrupted_campaign_leaves_a_table_and_no_process(folder: Path) -> Non
     process = begin(folder, "--seeds", "1")
     wait_until(lambda: rows(folder) and still_sleeping())
     process.send_signal(signal.SIGINT)
-    said, _ = process.communicate(timeout=60)
+    said, _ = process.communicate(timeout=180)
     assert process.returncode == 130, said
     assert "1 of 2 trials were played" in said
     assert (folder / "campaign/report.md").exists()
@@ -99,7 +99,7 @@ def test_a_killed_campaign_leaves_no_process(folder: Path) -> None:
     process = begin(folder, "--seeds", "1")
     wait_until(still_sleeping)
     process.kill()
-    process.communicate(timeout=60)
+    process.communicate(timeout=180)
     wait_until(lambda: not still_sleeping())
 
 

@@ -33,7 +33,7 @@ def test_job_starts_and_drives_a_robot_keeping_events(tmp_path: Path) -> None:
     try:
         assert address == ADDRESS
         app = [sys.executable, str(ROOT / "examples/ci/courier.py"), f"http://{address}:1448", "0.4", "0.0"]
-        assert subprocess.run(app, capture_output=True, text=True, timeout=60, check=True).stdout.startswith("arrived")
+        assert subprocess.run(app, capture_output=True, text=True, timeout=180, check=True).stdout.startswith("arrived")
     finally:
         robot(tmp_path, "down")
     [recording] = (tmp_path / "ci/artifacts").glob("*.mcap")
@@ -63,7 +63,7 @@ def test_gitlabs_job_goes_on_only_with_a_robot(tmp_path: Path, world: str, statu
             cwd=tmp_path,
             capture_output=True,
             text=True,
-            timeout=60,
+            timeout=180,
             check=False,
         )
     finally:
@@ -72,7 +72,7 @@ def test_gitlabs_job_goes_on_only_with_a_robot(tmp_path: Path, world: str, statu
             env=os.environ | given,
             cwd=tmp_path,
             capture_output=True,
-            timeout=60,
+            timeout=180,
             check=False,
         )
     assert (done.returncode, ended.returncode) == (status, 0), done.stderr

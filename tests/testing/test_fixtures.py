@@ -20,7 +20,7 @@ def test_start_pages_example_passes_in_an_empty_folder(tmp_path: Path) -> None:
     [example] = [block for block in re.findall(r"```python\n(.*?)```", START.read_text(), re.S) if "def test_" in block]
     (tmp_path / "test_example.py").write_text(example)
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(tmp_path)]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=180, check=False)
     assert "1 passed" in done.stdout, done.stdout + done.stderr
 
 

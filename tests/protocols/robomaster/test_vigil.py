@@ -36,7 +36,7 @@ def network() -> None:
 )
 def test_the_robot_stops_when_the_cable_is_cut(network: None, groups: str, ordered: float, stopped: float) -> None:
     """0.5 s is the claim; standing still takes the brakes a moment more."""
-    ended = subprocess.run([*ALONE, sys.executable, str(LAB), groups], capture_output=True, text=True, timeout=60)
+    ended = subprocess.run([*ALONE, sys.executable, str(LAB), groups], capture_output=True, text=True, timeout=180)
     assert ended.returncode == 0, ended.stderr
     reported = json.loads(ended.stdout)
     assert reported["alive"] > 0.35, "a client that only listens is alive"

@@ -79,7 +79,7 @@ async def door(robot: Robot) -> AsyncIterator[SlamwareDoor]:
 @pytest.fixture
 async def client(door: SlamwareDoor) -> AsyncIterator[httpx.AsyncClient]:
     """A client of the simulated robot."""
-    async with httpx.AsyncClient(base_url=door.endpoints[0].address, timeout=30.0, verify=False) as client:
+    async with httpx.AsyncClient(base_url=door.endpoints[0].address, timeout=60, verify=False) as client:
         yield client
 
 

@@ -306,7 +306,7 @@ def main() -> None:
     options = parser.parse_args()
     statuses: Counter[int] = Counter()
     failures = 0
-    with httpx.Client(base_url=options.url, timeout=10.0) as client:
+    with httpx.Client(base_url=options.url, timeout=60) as client:
         generator = Generator(client.get("/openapi.json").json(), options.seed)
         generator.binaries.append(client.get("/api/core/slam/v1/maps/stcm").content)
         began = time.monotonic()

@@ -83,7 +83,7 @@ class Client:
     """One with one connection: ``client(method, path, body)`` answers JSON, or None for an empty answer."""
 
     def __init__(self, port: int) -> None:
-        self._connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
+        self._connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
         self.close = self._connection.close
 
     def __call__(self, method: str, path: str, body: object = None) -> Any:

@@ -14,7 +14,7 @@ from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols.visual.server import VisualDoor
 
 Frame = dict[str, Any]
-PATIENCE = 10.0  # s of the machine's time for work of a worker process
+PATIENCE = 60.0  # s of the machine's time for work of a worker process
 
 
 class FrontEnd:
