@@ -71,7 +71,7 @@ def wait_until_idle(robot: ServedRobot) -> None:
 
 
 async def rate(target: str, proof: Certificates, pid: int, idle: float = 0.0) -> float:
-    """What the server could do with a core of its own (requests/s) with AT_ONCE under way."""
+    """Requests a second of the server's processor time, with AT_ONCE under way."""
     credentials = grpc.ssl_channel_credentials(proof.ca, proof.key, proof.certificate)
     async with grpc.aio.secure_channel(target, credentials, options=client_options(ROBOT_NAME)) as channel:
         stub = service.GrpcAppStub(channel)

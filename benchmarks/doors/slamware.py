@@ -1,7 +1,7 @@
 """Claim: 8000 poses/s and 2000 scans/s of one core, p99 <= 10 ms on 32 connections, 0.75 of what bare uvicorn does.
 
 The load comes from a process of its own. "Of one core" is what the server did per second of its own processor time,
-all its threads counted, less what its world takes while nobody asks; bare uvicorn is asked in turns with it. p99 is
+all its threads counted, less what its world takes without requests; bare uvicorn is asked in turns with it. p99 is
 under that same load.
 """
 
