@@ -62,10 +62,10 @@ def test_robots_of_gateway_are_on_addresses_of_range(tmp_path: Path) -> None:
                     assert reply.status == 200
                 with socket.create_connection(("127.0.97.34", 40923), 20) as line:
                     line.sendall(b"command;chassis speed x 0.1;")
-                    said = b""  # type: ignore[assignment]
-                    while said.count(b";") < 2:  # type: ignore[arg-type]
-                        said += line.recv(64)  # type: ignore[arg-type]
-                    assert said == b"ok;fail;"  # it may see but not drive
+                    got = b""
+                    while got.count(b";") < 2:
+                        got += line.recv(64)
+                    assert got == b"ok;fail;"  # it may see but not drive
             finally:
                 connect.terminate()
         assert (known / "roboglot" / "gateways.json").exists()

@@ -9,6 +9,8 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 
 from roboglot.clients.cyberdog import Certificates, CyberDogClient
+from roboglot.drivers.robomaster.chapters.chassis import RoboMasterBase
+from roboglot.model.components.motion.base import Base
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.certificates import export_client
 from roboglot.protocols.cyberdog.config import CyberDogConfig
@@ -21,6 +23,7 @@ from roboglot.testing.addresses import free_port
 from tests.drivers.chain import EP_ADDRESS
 from tests.drivers.link_proxy import Fault, Proxy, UdpProxy
 from tests.drivers.pace import settle
+from tests.narrowing import known, of_kind
 
 Door = SlamwareDoor | RoboMasterDoor | CyberDogDoor
 HOST = "127.0.0.1"
@@ -139,3 +142,8 @@ async def time_passes(forward: object, *, step: float = 0.02, threads: bool = Tr
     finally:
         over = True
         await task
+
+
+def cut_session(base: Base) -> None:
+    """Break the driver's connection to an EP, as a lost Wi-Fi does."""
+    known(known(of_kind(base, RoboMasterBase)._client._link)._transport).abort()

@@ -29,6 +29,7 @@ from roboglot.simulation.components.interaction.armor import SimulatedArmor
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
 from tests.drivers.chain import Open, Script
+from tests.drivers.rig import cut_session
 from tests.narrowing import of_kind
 
 pytestmark = pytest.mark.world("empty", body="robomaster_ep")
@@ -138,7 +139,7 @@ async def test_what_follows_a_setting_knows_it(script: Script, robot: Robot) -> 
 async def test_a_session_ends_whole_without_its_robot(script: Script, driven_ep: Robot) -> None:
     for text in ("blaster bead 3;", "gimbal suspend;", "chassis push position on;", "ir_distance_sensor measure on;"):
         assert await script.client.ask(text) == "ok"
-    driven_ep[Base]._client._link._transport.abort()  # type: ignore[attr-defined]
+    cut_session(driven_ep[Base])
     await script.forward(seconds=0.1)
     assert driven_ep[Link].state is LinkState.LOST
     assert await script.client.ask("quit;") == "ok"
@@ -181,7 +182,7 @@ async def test_lamps_shine_again_after_a_lost_link(driven_ep: Robot, robot: Robo
     driven_ep[Light].shine("rear", Colour(7, 8, 9))
     await forward(seconds=0.2)
     robot[Light].shine("rear", Colour())  # another client
-    driven_ep[Base]._client._link._transport.abort()  # type: ignore[attr-defined]
+    cut_session(driven_ep[Base])
     await forward(seconds=2)
     assert driven_ep[Link].state is LinkState.UP
     assert robot[Light].state("rear").colour == Colour(7, 8, 9)

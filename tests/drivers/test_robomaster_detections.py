@@ -1,6 +1,7 @@
 """Places from boxes in an EP's picture, and the numbers of people."""
 
 import math
+from typing import cast
 
 import pytest
 
@@ -13,7 +14,7 @@ from roboglot.drivers.robomaster.chapters.ai.detections import (
     line_of,
 )
 from roboglot.drivers.robomaster.chapters.camera import FOV, HEIGHT, WIDTH
-from roboglot.model.components.sensing.camera import Mount
+from roboglot.model.components.sensing.camera import Camera, Mount
 from roboglot.model.perception import Box, Colour, Gesture
 from roboglot.wire.robomaster.telemetry import LinePoint, Target
 
@@ -28,7 +29,7 @@ class _Camera:
 
 @pytest.fixture
 def where() -> Locator:
-    return Locator(_Camera())  # type: ignore[arg-type]
+    return Locator(cast(Camera, _Camera()))
 
 
 def test_distance_of_a_whole_person_follows_box_bottom(where: Locator) -> None:

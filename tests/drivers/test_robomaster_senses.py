@@ -26,6 +26,7 @@ from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
 from tests.drivers.chain import Open, Until
 from tests.drivers.pace import settle
+from tests.drivers.rig import cut_session
 
 pytestmark = pytest.mark.world("empty", body="robomaster_ep")
 
@@ -46,7 +47,7 @@ async def test_pwm_outputs_hold_also_after_a_lost_link(
     assert pwm.signal(2) == PwmSignal(0.4, 1000.0)
     with pytest.raises(NotFound):
         pwm.set_duty(7, 0.5)
-    driven_ep[Base]._client._link._transport.abort()  # type: ignore[attr-defined]
+    cut_session(driven_ep[Base])
     await until(lambda: driven_ep[Link].state is LinkState.LOST)
     with pytest.raises(Unconnected):
         pwm.set_duty(2, 0.5)

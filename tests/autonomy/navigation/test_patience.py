@@ -71,7 +71,8 @@ async def test_going_around_is_bounded() -> None:
     )
     goal: Any = SimpleNamespace(points=(None,))
     lookout: Any = SimpleNamespace(blocked=True, blocked_at=-100.0)
-    replanner = Replanner(course, None, goal, Journey(), lookout)  # type: ignore[arg-type]
+    options: Any = None
+    replanner = Replanner(course, options, goal, Journey(), lookout)
     follower: Any = SimpleNamespace(left=5.0, passed=0, along=0.0, take=lambda _: None, stop_at=0.0)
     plan: Any = SimpleNamespace(result=lambda: SimpleNamespace(length=6.0, goals=(None,)))
     for _ in range(3):

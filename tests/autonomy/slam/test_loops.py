@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from roboglot.model.clock import LockstepClock
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
+from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.events import LoopClosed
 from roboglot.model.geometry import Point, Pose
 from roboglot.simulation.bodies.files import BODIES
@@ -95,25 +97,26 @@ def corridor_scan(pose: Pose, walls: NDArray[np.float64]) -> ScanPoints:
 
 
 def test_given_map_stays_and_additions_are_straightened() -> None:
-    rings = [[(0, 0), (14, 0), (14, 10), (0, 10)], [(2, 2), (12, 2), (12, 8), (2, 8)], [(3, 0), (3, 0.5), (3.6, 0.5)],
+    rings: list[list[tuple[float, float]]] = [
+             [(0, 0), (14, 0), (14, 10), (0, 10)], [(2, 2), (12, 2), (12, 8), (2, 8)], [(3, 0), (3, 0.5), (3.6, 0.5)],
              [(0, 4), (0.6, 4.4), (0, 5)], [(14, 3), (13.3, 3.4), (14, 4)], [(8, 10), (8, 9.4), (8.8, 9.4)],
              [(6, 2), (6, 1.6), (6.4, 1.6)], [(9, 0), (9.3, 0.6), (9.6, 0)]]  # fmt: skip
-    walls = np.array([(*a, *b) for ring in rings for a, b in zip(ring, ring[1:] + ring[:1], strict=True)], float)  # type: ignore[call-overload, index, type-var]
+    walls = np.array([(*a, *b) for ring in rings for a, b in zip(ring, ring[1:] + ring[:1], strict=True)], float)
     stops = [(1.0, 1.0), (13.0, 1.0), (13.0, 9.0), (1.0, 9.0), (1.0, 1.0), (7.0, 1.0)]
     true: list[Pose] = []
     for (ax, ay), (bx, by) in itertools.pairwise(stops):
         length, yaw = math.hypot(bx - ax, by - ay), math.atan2(by - ay, bx - ax)
         true += [Pose(ax, ay, yaw).compose(Pose(step * 0.4)) for step in range(round(length / 0.4))]
-    belief = Belief(odometry=None)  # type: ignore[arg-type]
+    belief = Belief(odometry=cast(Odometry, None))
     for pose in true[:25]:
-        paint(belief.map, corridor_scan(pose, walls), pose, fill=True)  # type: ignore[arg-type]
+        paint(belief.map, corridor_scan(pose, walls), pose, fill=True)
     given, loops, straight = belief.map.copy(), LoopCloser(belief), []
     believed, last = true[0], true[0]
     for number, pose in enumerate(true):
         step = pose.relative_to(last)
         drift = 0.0 if number < 20 or straight else math.radians(0.12)  # a constant drift to one side
         believed, last = believed.compose(Pose(step.x, step.y, step.yaw + drift)), pose
-        scan = corridor_scan(pose, walls)  # type: ignore[arg-type]
+        scan = corridor_scan(pose, walls)
         paint(belief.map, scan, believed, fill=False)
         loops.note(scan, believed, 0.4 * number)
         corrected = next((done for _ in range(40) if (done := loops.advance(believed)) is not None), None)

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+from functools import partial
 
 import av
 import pytest
@@ -94,8 +95,12 @@ async def test_two_robots_share_push_port_and_are_distinguished() -> None:
     import socket
 
     number = free_port()
-    port, heard = PushPort("127.0.0.1", number), []
-    stops = [port.attach(f"127.0.0.{n}", lambda data, n=n: heard.append((n, data))) for n in (31, 32)]  # type: ignore[misc]
+    port, heard = PushPort("127.0.0.1", number), list[tuple[int, bytes]]()
+
+    def note(n: int, data: bytes) -> None:
+        heard.append((n, data))
+
+    stops = [port.attach(f"127.0.0.{n}", partial(note, n)) for n in (31, 32)]
     with contextlib.ExitStack() as stack:
         for n in (31, 32, 33):
             robot = stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
@@ -104,10 +109,10 @@ async def test_two_robots_share_push_port_and_are_distinguished() -> None:
         await asyncio.sleep(0.02)
         assert heard == [(31, b"x31"), (32, b"x32")]
         with pytest.raises(LinkLost, match="share one PushPort"):
-            PushPort("127.0.0.1", number).attach("127.0.0.31", heard.append)  # type: ignore[arg-type]
+            PushPort("127.0.0.1", number).attach("127.0.0.31", partial(note, 31))
     for stop in stops:
         stop()
-    PushPort("127.0.0.1", number).attach("127.0.0.31", heard.append)()  # type: ignore[arg-type]
+    PushPort("127.0.0.1", number).attach("127.0.0.31", partial(note, 31))()
 
 
 async def test_pictures(client, run, robot) -> None:

@@ -19,6 +19,7 @@ from roboglot.programs.tasks.service import ProgramService
 from roboglot.storage.database import Database
 from roboglot.storage.journals import DatabaseJournalStore
 from roboglot.storage.programs import program_stores
+from tests.narrowing import of_kind
 from tests.programs.playing import PRELUDE, until
 
 TEXTS = dict.fromkeys(("maker", "model", "serial", "hardware_version", "software_version"), "")
@@ -52,7 +53,7 @@ async def service(engine: Engine, stores: Stores) -> AsyncIterator[ProgramServic
     made.start()
     await made.save(StoredProgram("t", "", "", "single", "now", PROGRAM, ""))
     yield made
-    stores.journals.ready.set()  # type: ignore[attr-defined]
+    of_kind(stores.journals, SlowJournals).ready.set()
     await made.close()
 
 
@@ -64,7 +65,7 @@ async def test_a_halt_is_written_before_it_is_reported(service: ProgramService, 
     waiting = asyncio.ensure_future(suspended.wait())
     await asyncio.wait([waiting], timeout=0.2)
     assert not waiting.done()
-    stores.journals.ready.set()  # type: ignore[attr-defined]
+    of_kind(stores.journals, SlowJournals).ready.set()
     await waiting
     assert [entry.name for entry in await stores.journals.entries("t")][:1] == ["cyberdog.task.block"]
 
@@ -73,7 +74,7 @@ async def test_the_log_holds_lines_of_this_moment(
     service: ProgramService, stores: Stores, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Pushed lines are in the log that a client fetches, so that it does not lose them again."""
-    stores.journals.ready.set()  # type: ignore[attr-defined]
+    of_kind(stores.journals, SlowJournals).ready.set()
     await service.run("t")
     run = service._runs["t"]
     await until(lambda: run.state == "suspend")

@@ -9,7 +9,6 @@ from roboglot.model.clock import LockstepClock
 from roboglot.model.robot import Robot
 from roboglot.programs.functions.session import Session
 from roboglot.programs.functions.table import call
-from roboglot.programs.worker.values import Record
 
 
 class Caller:
@@ -45,7 +44,7 @@ class Caller:
         raise AssertionError(f"{name} did not return")
 
 
-def field(record: Record, path: str) -> Any:
+def field(record: object, path: str) -> Any:
     """``field(odometry, "pose.pose.position.x")``."""
     value: Any = record
     for name in path.split("."):

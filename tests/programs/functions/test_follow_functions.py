@@ -33,7 +33,7 @@ async def anna(caller: Caller, world: World) -> Actor:
 
 
 def code(state: object) -> int:
-    return int(field(state, "code"))  # type: ignore[arg-type]
+    return int(field(state, "code"))
 
 
 async def test_it_walks_after_member_and_keeps_its_distance(caller: Caller, world: World, anna: Actor) -> None:

@@ -93,7 +93,7 @@ async def test_motions_keep_their_number(caller: Caller) -> None:
     for reported in (result, usual):
         assert isinstance(reported, Record)
         assert field(reported, "response.motion_id") == field(usual, "response.motion_id") != 0
-    assert (field(result, "response.result"), field(result, "response.code")) == (False, 3029)  # type: ignore[arg-type]
+    assert (field(result, "response.result"), field(result, "response.code")) == (False, 3029)
 
 
 async def test_the_robots_own_calls_are_not_touched(caller: Caller) -> None:

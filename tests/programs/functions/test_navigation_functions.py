@@ -21,13 +21,14 @@ from roboglot.model.maps import OccupancyGrid
 from roboglot.programs.functions.moving.navigating import HELP_SECONDS, REQUEST, same_origin
 from roboglot.simulation.world.world import World
 from roboglot.testing import passed_in_order
+from tests.narrowing import of_kind
 from tests.programs.functions.calling import Caller, field
 
 pytestmark = pytest.mark.world("office")
 
 
 def result_of(record: object) -> tuple[int, int]:
-    return field(record, "state.code"), field(record, "response.result")  # type: ignore[arg-type]
+    return field(record, "state.code"), field(record, "response.result")
 
 
 @pytest.fixture
@@ -43,7 +44,7 @@ async def home(caller: Caller) -> Caller:
 
 
 def driven(world: World, start: object) -> tuple[float, float]:
-    pose = world.truth.pose_of("a").relative_to(start)  # type: ignore[arg-type]
+    pose = world.truth.pose_of("a").relative_to(of_kind(start, Pose))
     return pose.x, pose.y
 
 

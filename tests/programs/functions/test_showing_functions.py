@@ -28,7 +28,7 @@ LED = ENUMS["LedConstraint"]
 
 
 def code(result: object) -> int:
-    return int(field(result, "response.code"))  # type: ignore[arg-type]
+    return int(field(result, "response.code"))
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,7 @@ from roboglot.protocols.websocket_opening import MESSAGE_MAX, OPENING_MAX
 from roboglot.protocols.websocket_writer import UNSENT_MAX
 from roboglot.storage.database import Database
 from roboglot.storage.programs import program_stores
+from tests.narrowing import of_kind
 
 HOST = "127.0.0.77"
 LOOKS_MAX = 3000  # each takes 10 ms, and longer where the machine is busy
@@ -314,7 +315,7 @@ async def test_where_a_program_is(address: str) -> None:
 
 async def test_clients_that_do_not_read_are_cut_off(door: VisualDoor, address: str) -> None:
     reading, (_, asleep) = await TextLink.open(address, "/programs"), await opened(address)
-    asleep.transport.pause_reading()  # type: ignore[attr-defined]
+    of_kind(asleep.transport, asyncio.Transport).pause_reading()
     text = "x" * (UNSENT_MAX + 1)
     door._front_ends.publish(text)
     assert await anext(reading) == text
@@ -367,7 +368,7 @@ async def test_a_program_waits_only_for_readers_that_read(
 ) -> None:
     monkeypatch.setattr(websocket_writer, "STALLED_SECONDS_MAX", 0.2)
     _, asleep = await opened(address, "/log")
-    asleep.transport.pause_reading()  # type: ignore[attr-defined]
+    of_kind(asleep.transport, asyncio.Transport).pause_reading()
     link = await started_printing(address)
     async for text in link:
         if json.loads(text)["feedback"]["operate"] == "stop":
@@ -381,7 +382,7 @@ async def test_who_waits_for_a_reader_can_be_ended(
 ) -> None:
     monkeypatch.setattr(websocket_writer, "STALLED_SECONDS_MAX", 600.0)
     _, asleep = await opened(address, "/log")
-    asleep.transport.pause_reading()  # type: ignore[attr-defined]
+    of_kind(asleep.transport, asyncio.Transport).pause_reading()
     link = await started_printing(address)
     assert door._socket is not None
     async with asyncio.timeout(60):
