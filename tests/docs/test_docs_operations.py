@@ -25,7 +25,7 @@ def test_every_operation_was_answered_in_its_example() -> None:
         assert re.search(r"^20[04]$", block, re.MULTILINE), row.key
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # the whole tour of 167 operations; tests/protocols/slamware has each
 def test_the_example_is_answered_as_the_reference_says() -> None:
     spec = importlib.util.spec_from_file_location("operations", ROOT / "scripts/operations.py")
     assert spec is not None

@@ -66,7 +66,7 @@ async def test_the_page_refuses_what_is_no_offer(length: str | None, body: bytes
     reason="Chromium makes no calls where there is only loopback",
 )
 @pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine (Debian: apt-get install chromium)")
-@pytest.mark.slow
+@pytest.mark.slow  # starts Chromium and waits for WebRTC; tests/protocols/cyberdog/images has the video
 async def test_a_browser_shows_moving_pictures(tmp_path: Path) -> None:
     example = _example()
     seen: list[Any] = []

@@ -45,7 +45,7 @@ def kill(robot: ServedRobot) -> None:
     robot.process.wait()
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # kills and restarts programs in real time; tests/storage has what survives
 async def test_the_robot_is_killed_in_the_middle(tmp_path: Path) -> None:
     data = tmp_path / "data"
     async with talking(data) as (robot, dog):

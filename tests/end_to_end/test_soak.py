@@ -17,7 +17,7 @@ CONNECTIONS, PROGRAMS = 12, 3  # a round
 GROWTH_MAX = 1.002  # of 200,000 objects: a round may keep 200, about ten per connection and program
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # many rounds in real time; benchmarks/robots/soak.py has the long run
 async def test_connections_and_programs_keep_nothing(tmp_path: Path) -> None:
     objects, descriptors = [], []
     async with soak.born(tmp_path) as life:

@@ -43,7 +43,7 @@ asyncio.run(main())
 """
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # three whole programs; tests/simulation/test_world_trace.py has the world's trace
 def test_the_same_seed_gives_the_same_trace() -> None:
     with child(SCENARIO, "5") as one, child(SCENARIO, "5") as again, child(SCENARIO, "6") as another:
         first, second, other = (run.communicate()[0] for run in (one, again, another))

@@ -104,7 +104,7 @@ async def test_a_pilot_drives_again(tmp_path: Path) -> None:
     assert len(set(pushed)) >= 4
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # the test above repeats a pilot on a side port
 async def test_a_serial_line_of_its_own_is_played(tmp_path: Path) -> None:
     """The recorded path belongs to a robot that may live: a rerun leaves it alone."""
     link = tmp_path / "ep-a"

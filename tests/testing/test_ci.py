@@ -93,7 +93,7 @@ def test_action_and_template_call_what_is_there() -> None:
     assert workflow["jobs"]["action"]["steps"][-1]["with"] == {"do": "down"}
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # runs a test suite of its own; test_scenarios.py plays the sample
 def test_the_sample_apps_tests_pass_side_by_side(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "examples/ci", tmp_path / "app")
     command = [sys.executable, "-m", "pytest", "-q", "-n", "2", "-p", "no:cacheprovider"]

@@ -38,7 +38,7 @@ async def test_ten_robots_leave_one_corridor() -> None:
     assert outcome.arrived >= 4
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # ten robots, 40 s each; the tests below have the rule in short
 @pytest.mark.parametrize("seed", [2, 3, 4, 5, 6, 7, 8, 20, 21])
 async def test_no_robot_of_a_convoy_believes_to_stand(seed: int) -> None:
     outcome = await leave(seed, seconds=40.0)

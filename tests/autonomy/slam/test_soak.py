@@ -45,7 +45,7 @@ def _alive() -> list[object]:
     return [kept for kept in gc.get_objects() if isinstance(kept, (Pilot, Task))]
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # hundreds of actions; benchmarks/robots/soak.py has the long run
 async def test_ended_actions_keep_nothing(tour: Tour) -> None:
     sizes: list[int] = []
     starts = kinds(tour)

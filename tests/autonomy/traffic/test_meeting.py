@@ -41,7 +41,7 @@ async def test_who_stands_in_a_door_lets_others_out(building: OccupancyGrid) -> 
     assert outcome.failures == []
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # minutes of ten robots; two robots meet in the test above
 @pytest.mark.parametrize("seed", [11, 17, 23])
 @pytest.mark.asyncio(loop_scope="module")
 async def test_ten_mixed_robots_meet_without_touching(building: OccupancyGrid, seed: int) -> None:

@@ -290,4 +290,4 @@ class LongMachine(Machine):
 
 
 LongMachine.TestCase.settings = settings(Machine.TestCase.settings, max_examples=60)
-TestLongMachine = pytest.mark.slow(LongMachine.TestCase)
+TestLongMachine = pytest.mark.slow(LongMachine.TestCase)  # longer sessions of the same machine

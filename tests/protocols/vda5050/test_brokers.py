@@ -52,7 +52,7 @@ def any_broker(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPath
         process.terminate()
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # ten thousand orders; test_order_book.py reads fewer
 @pytest.mark.timeout(600)
 async def test_ten_thousand_valid_orders_each_get_their_answer(any_broker: int, yard: Opened) -> None:
     orders = _orders(ORDERS)  # before the robot connects: brokers drop silent clients after a while

@@ -123,7 +123,7 @@ def test_any_valid_order_is_read(made: dict[str, Any]) -> None:
     assert parsed(made).order_id == made["orderId"]
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # ten thousand orders; the test above reads fewer
 @settings(max_examples=10_000)
 @given(valid_orders())
 def test_ten_thousand_valid_orders_are_read(made: dict[str, Any]) -> None:

@@ -162,7 +162,7 @@ async def restart(day: Day) -> None:
 
 
 @pytest.mark.world(str(Path(__file__).parents[1] / "data" / "tower.toml"), body="hermes")
-@pytest.mark.slow
+@pytest.mark.slow  # a long story; test_delivery.py has its parts
 async def test_a_day(day: Day, robot: Robot, world: World) -> None:  # noqa: PLR0915 - one day
     await day.forward(seconds=2)
     await day.prepare()

@@ -248,7 +248,7 @@ async def test_into_car_that_others_command_and_out_again(
     ]
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a long story; the rides above have its parts
 async def test_orders_on_two_floors_and_the_dock_below(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward, origin: Pose
 ) -> None:
@@ -289,7 +289,7 @@ async def test_orders_on_two_floors_and_the_dock_below(
     assert (await client.get(f"{MULTI}/floors/:current")).json()["floor"] == "ground"
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a long story; the rides above have its parts
 async def test_home_from_the_other_floor_after_an_order(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward, origin: Pose
 ) -> None:
