@@ -57,7 +57,7 @@ async def test_one_robot_is_driven_mapped_and_refused(shown: Shown) -> None:
     for path, values, expected, words in (
         ("/api/robots/b/stop", {}, 404, "there is no robot 'b'"),
         ("/api/robots/a/dance", {}, 404, "no verb 'dance'"),
-        ("/api/robots/a/go_to", {"points": []}, 400, "length"),
+        ("/api/robots/a/go_to", {"points": []}, 400, "points must have at least 1 entries"),
         ("/api/robots/a/go_to", [1], 400, "not a JSON object"),
         ("/api/robots/a/cancel", {"action": 999}, 404, "no action 999"),
         ("/api/world/inject_fault", {"kind": "low_batery"}, 400, "low_battery"),

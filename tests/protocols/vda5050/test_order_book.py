@@ -99,9 +99,9 @@ def test_the_horizon_takes_its_actions_along() -> None:
         (lambda o: o["edges"][0].update(endNodeId="x"), "names node x"),
         (lambda o: o["nodes"][0].update(released=False), "first"),
         (lambda o: o["nodes"][0].update(actions=[action("a", "1"), action("b", "1")]), "twice"),
-        (lambda o: o["nodes"][0]["nodePosition"].update(x="far"), "float"),
+        (lambda o: o["nodes"][0]["nodePosition"].update(x="far"), "x must be a number, not text"),
         (lambda o: o.pop("orderId"), "orderId"),
-        (lambda o: o["nodes"].clear(), "length"),
+        (lambda o: o["nodes"].clear(), "nodes must have at least 1 entries"),
     ],
 )
 def test_malformed_orders_say_where(change: Any, words: str) -> None:
