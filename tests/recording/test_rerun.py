@@ -76,7 +76,7 @@ def rerun(file: Path, *options: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
 
 
-@pytest.mark.slow  # a session of REST, text, dog and programs, in test_rerun_everything, is run again in the suite
+@pytest.mark.slow  # text clients, dogs and programs are run again in test_rerun_clients.py
 @pytest.mark.parametrize("seconds", [15.0, 600.0])
 async def test_the_same_inputs_give_the_same_bytes(tmp_path: Path, seconds: float) -> None:
     file = await session(tmp_path, seconds)
@@ -148,7 +148,7 @@ async def read_all(socket: ClientConnection) -> None:
         pass
 
 
-@pytest.mark.slow  # test_rerun_everything runs programs again in the suite
+@pytest.mark.slow  # a program is run again in test_rerun_clients.py
 @pytest.mark.parametrize("turns", [2, 90])  # 13 s and ten minutes
 async def test_programs_do_the_same_again(tmp_path: Path, turns: int) -> None:
     file = await with_programs(tmp_path, turns)

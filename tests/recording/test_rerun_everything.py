@@ -12,7 +12,7 @@ from tests.recording.everything import hold
 from tests.recording.test_rerun import rerun
 
 
-@pytest.mark.slow  # in short: tests/recording/test_rerun.py
+@pytest.mark.slow  # in short, one protocol each: test_rerun_clients.py
 @pytest.mark.parametrize("rounds", [1, 30])  # 20 s and ten minutes
 async def test_everything_happens_again(tmp_path: Path, rounds: int) -> None:
     session = await hold(tmp_path, rounds)
