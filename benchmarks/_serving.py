@@ -1,6 +1,6 @@
 """A server's processor time beside that of a reference which does nothing, asked in turns in the same run.
 
-What a robot's world takes while nobody asks is measured first and subtracted: on a busy machine the same number of
+The share of an idle robot's world is measured first and subtracted: on a busy machine the same number of
 requests lasts longer, and the world's share would grow with that.
 """
 
@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 ROUNDS = 5
 CPU_CLOCK = 2  # Linux: the scheduler's clock of a process, whose number is in the bits before
-QUIET = 4.0  # s in which nobody asks
+QUIET = 4.0  # s without requests
 
 
 def cpu_seconds(pid: int) -> float:
@@ -21,7 +21,7 @@ def cpu_seconds(pid: int) -> float:
 
 
 def idle_share(pid: int) -> float:
-    """Processor time per second while nobody asks."""
+    """Processor time per second without requests."""
     before, began = cpu_seconds(pid), time.perf_counter()
     time.sleep(QUIET)
     return (cpu_seconds(pid) - before) / (time.perf_counter() - began)

@@ -13,7 +13,7 @@ WORDS_MAX = 60  # characters of a licence's name; some packages put its whole te
 HEAD = """# Third parties
 
 What `pip install 'roboglot[demo]'` fetches beside roboglot, by `scripts/third_parties.py`. None of it is part of
-roboglot's own wheel. PyAV (`av`) and OpenCV bundle FFmpeg, PyAV with x264 and x265 (GPL): see docs/licences.md.
+roboglot's own wheel. PyAV (`av`) and OpenCV bundle FFmpeg, PyAV with x264 and x265 (GPL): docs/reference/licences.md.
 
 | package | version | licence |
 |---|---|---|

@@ -15,7 +15,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 FILES_MAX = 25  # modules in a folder of src, pages, benchmarks
 LINES_MAX = 400  # of a module
-ANY_MAX = 224  # lines; may only shrink
+ANY_MAX = 221  # lines; may only shrink
 NAME_MAX = 8  # words of a test's name after "test"
 HOPS_MAX = 8  # files that a request enters
 FUNCTION_MAX = 50  # lines, without the docstring

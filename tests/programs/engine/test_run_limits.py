@@ -139,7 +139,7 @@ class Cost:
 
 
 class Ledger:
-    """What the loop's thread does for programs, and what they are charged for it."""
+    """Work of the loop's thread for programs, and their charges for it."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.charges: list[float] = []
