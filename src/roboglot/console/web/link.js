@@ -44,8 +44,10 @@ const waiting = /** @type {Map<number, {resolve: (v: any) => void, reject: (e: E
 /** Whether this browser may open the socket: it needs no name here, or has one. Fails without a connection. */
 async function admitted() {
   const reply = await fetch("/api/me");
-  if (reply.ok) me.value = await reply.json();
-  return reply.ok;
+  if (reply.status === 401) return false;
+  if (!reply.ok) throw new Error();
+  me.value = await reply.json();
+  return true;
 }
 
 /** Open the socket, and again whenever it is lost. */
