@@ -16,6 +16,7 @@ __all__ = ["studio"]  # the fixture
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 EXAMPLES = Path(__file__).parents[2] / "examples" / "programs"
 FILE = {"name": "f.py", "mimeType": "text/x-python"}
+FADE = "import('/base.js').then(base => { base.notice.value = { text: '', bad: false }; })"  # it stands for 8 s
 
 
 @pytest.mark.slow  # long; test_program_of_blocks_comes_back_from_its_file is near
@@ -77,6 +78,7 @@ async def test_files_without_a_program_are_refused(studio: Open) -> None:
         ("g.txt", b"\x89PNG\x00\x00", "it is no program"),
     ):
         await page.click("text=Programs")
+        await page.evaluate(FADE)
         await until(page, "!document.querySelector('dialog .notice')?.textContent")
         await page.set_input_files("input[type=file]", {"name": name, "mimeType": "", "buffer": held})
         await until(page, f"document.querySelector('dialog .notice')?.textContent.includes({why!r})")

@@ -81,7 +81,7 @@ async def test_lidar_sees_only_what_rises_above_its_plane(simulate):
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("terrain = [{ at = [1, 1], profile = [[0, 0]] }]", "length >= 2"),
+        ("terrain = [{ at = [1, 1], profile = [[0, 0]] }]", "must have at least 2 entries"),
         ("terrain = [{ at = [1, 1], profile = [[0, 0], [0, 0.1]] }]", r"terrain\[0\].profile must go on"),
         ("terrain = [{ at = [19, 1], profile = [[0, 0], [1, 1]] }]", r"terrain\[0\].at = .* outside the floor"),
         ('things = [{ name = "a", at = [1, 1] }, { name = "a", at = [2, 1] }]', "two things have the same name"),
