@@ -334,6 +334,7 @@ async def test_robot_without_a_map_offers_nothing_of_one(tmp_path: Path, browser
         "-1.3",
     ]
     await page.click("nav a[href='#/world']")
+    await page.wait_for_selector("aside [role=tab] >> text=World")
     assert await page.locator("aside [role=tab]").evaluate_all(LABELS) == ["World", "Faults", "Time"]
     await page.close()
     await runtime.close()

@@ -94,6 +94,21 @@ async def test_error_is_mended_by_keyboard(studio: Open) -> None:
     assert page.errors == []
 
 
+async def test_the_focus_stays_when_blocks_move(studio: Open) -> None:
+    page = await loaded(await studio(), APART)
+    stays = """async () => {
+        const { getFocusManager } = await import("/studio/vendor/blockly.mjs");
+        const [first, second] = ["first", "second"].map((id) => studio.editor.workspace.getBlockById(id));
+        const field = second.getInputTargetBlock("TEXT").getField("TEXT");
+        first.bringToFront(); // which moves its neighbours a frame later
+        getFocusManager().focusNode(field);
+        for (let frame = 0; frame < 2; frame += 1) await new Promise(requestAnimationFrame);
+        return document.activeElement === field.getFocusableElement();
+    }"""
+    assert await page.evaluate(stays)
+    assert page.errors == []
+
+
 async def test_block_is_joined_by_mouse(studio: Open) -> None:
     page = await loaded(await studio(), APART)
     path = "document.querySelector('[data-id={}] > .blocklyPath').getBoundingClientRect().toJSON()"

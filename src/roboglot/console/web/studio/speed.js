@@ -61,6 +61,15 @@ const { queueRender } = Blockly.BlockSvg.prototype;
 let drawn = null;
 Blockly.BlockSvg.prototype.queueRender = function () { if (!drawn) return queueRender.call(this); drawn.add(this); return Promise.resolve(); };
 
+const { moveSvgRootToFront } = Blockly.BlockSvg.prototype;
+// A frame later it moves the neighbours: one of them that has the focus by then would lose it.
+Blockly.BlockSvg.prototype.moveSvgRootToFront = function (/** @type {boolean} */ only) {
+  let held = /** @type {any} */ (null);
+  requestAnimationFrame(() => { held = document.activeElement; });
+  moveSvgRootToFront.call(this, only);
+  requestAnimationFrame(() => { if (document.activeElement !== held) held.focus(); });
+};
+
 /** Ask once for each stack what Blockly asks for each block, and each time of all that it hangs from. */
 function queueAll() {
   const asked = new Set(), blocks = [...drawn].reverse();
