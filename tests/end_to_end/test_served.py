@@ -83,9 +83,9 @@ def test_task_begun_at_one_door_ends_at_another(pair: ServedRobot) -> None:
     action = get("/api/core/motion/v1/actions/:current")
     with Line(FIRST) as line:
         assert line.say("command;chassis speed x 0 y 0 z 0")[1] == "ok;"
-    ended = get(f"/api/core/motion/v1/actions/{action['action_id']}")
-    assert ended["state"]["status"] == 4
-    assert ended["state"]["result"] == -2
+    path = f"/api/core/motion/v1/actions/{action['action_id']}"
+    assert wait_for(lambda: get(path)["state"]["status"] == 4)  # it has braked
+    assert get(path)["state"]["result"] == -2
 
 
 def test_garbage_at_every_door_harms_no_one(pair: ServedRobot) -> None:

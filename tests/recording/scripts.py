@@ -102,32 +102,33 @@ SCRIPTS = {
     "start-rest": Script(
         REST, lines_of("start.md", "MoveToAction", "/dev/tcp", "certs"), needs="curl", random=PROGRESS
     ),
-    "start-text": Script(TEXT, [line for line in lines_of("start.md", "MoveToAction") if "/dev/tcp" in line]),
+    "start-text": Script(TEXT, [line for line in lines_of("start.md", "MoveToAction") if "/dev/tcp" in line]).later,
     "start-program": Script(
         FRAMES,
         [".venv/bin/roboglot program run my_program.py"],
         {"my_program.py": block("start.md", "go_straight", "python")},
     ),
     **{
-        f"first-{door}-{language}": first(door, language) for door in (REST, TEXT, DOG) for language in ("sh", "python")
+        f"first-{door}-{tool}": first(door, tool).later
+        for door in (REST, TEXT, DOG)
+        for tool in ("sh", "python", "js", "go")
     },
-    **{f"first-{door}-{tool}": first(door, tool).later for door in (REST, TEXT, DOG) for tool in ("js", "go")},
     "first-visual-sh": first(FRAMES, "sh").later,
-    "first-visual-python": first(FRAMES, "python"),
+    "first-visual-python": first(FRAMES, "python").later,
     "first-visual-js": first(FRAMES, "js").later,
     "rest-page": Script(
         REST, lines_of("protocols/slamware.md", "action-factories"), needs="curl", body="hermes", random=PROGRESS
     ).later,
-    "rest-client": Script(REST, code=block("clients.md", "SlamwareClient(", "python")),
+    "rest-client": Script(REST, code=block("clients.md", "SlamwareClient(", "python")).later,
     "text-page": Script(
         TEXT, [next(blocks(DOCS / "protocols/robomaster.md", "")).splitlines()[0][2:]], body="robomaster_ep"
-    ),
+    ).later,
     "text-client": Script(TEXT, code=block("clients.md", "RoboMasterClient(", "python"), printed=6),
     "text-gimbal": Script(
         TEXT,
         [f"bash -c \"exec 3<>/dev/tcp/127.0.0.1/40923\nprintf 'command;{TALK}' >&3; timeout 5 cat <&3\""],
         body="robomaster_ep",
-    ),
+    ).later,
     "dog-goes": asks("10001", "6004 '{\"type\": 7}'", '6004 \'{"type": 1, "goalX": 0.6, "goalY": 0.1}\'').later,
     "dog-answers": asks("1012 '{\"volume\": 30}'", "5006", "99999"),
     "dog-client": Script(
@@ -149,10 +150,10 @@ SCRIPTS = {
     "courier-refused": Script(REST, [f"{APP} {PYTHON} low.py"], {"low.py": LOW}, random=r"line \d+|/\S+").later,
     "courier-arm": Script(TEXT, [f"{APP} {PYTHON} arm.py"], {"arm.py": ARM}).later,
     "courier-both": Script(TEXT, [f"{APP} {PYTHON} both.py"], {"both.py": BOTH}).later,
-    **{f"program-{name}": program(name) for name in ("battery_watch",)},
     **{
         f"program-{name}": program(name).later
         for name in (
+            "battery_watch",
             "measure_room",
             "compass",
             "dance",
@@ -173,7 +174,7 @@ SCRIPTS = {
         {"hello.py": "cyberdog.task.block('one')\nprint('hello')\n"},
         body="cyberdog2",
         random=r"\d+:\d+:\d+|\d{4}-\S+",
-    ),
+    ).later,
     "program-wrong": Script(
         FRAMES,
         [".venv/bin/roboglot program run wrong.py; test $? = 1"],

@@ -8,12 +8,14 @@ from pathlib import Path
 PROJECT = Path(__file__).parents[2]
 
 
-async def digest(seed: int, hash_seed: str) -> bytes:
+async def digests(seed: int, hash_seed: str, seconds: int) -> list[bytes]:
+    """What the robots sensed until each second."""
     process = await asyncio.create_subprocess_exec(
         sys.executable,
         "-m",
         "tests.simulation.trace",
         str(seed),
+        str(seconds),
         stdout=asyncio.subprocess.PIPE,
         cwd=PROJECT,
         env={**os.environ, "PYTHONHASHSEED": hash_seed},
@@ -25,11 +27,11 @@ async def digest(seed: int, hash_seed: str) -> bytes:
         if process.returncode is None:
             process.kill()
     assert process.returncode == 0
-    return output.strip()
+    return output.split()
 
 
 async def test_processes_sense_the_same_other_seeds_differ():
-    first, second, other = await asyncio.gather(digest(7, "1"), digest(7, "2"), digest(8, "1"))
-    assert len(first) == 64
+    first, second, other = await asyncio.gather(digests(7, "1", 20), digests(7, "2", 20), digests(8, "1", 1))
+    assert [len(digest) for digest in first] == [64] * 20
     assert first == second
-    assert first != other
+    assert first[0] != other[0]

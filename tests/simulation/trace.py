@@ -21,8 +21,8 @@ from roboglot.simulation.world.world_files import load_world
 from tests.narrowing import known
 
 
-async def trace(seed: int) -> str:
-    """The digest of 20 s with three robots that drive, collide, lie down, get lost and call the lift, among people."""
+async def trace(seed: int, seconds: int) -> list[str]:
+    """Digests, one a second, of three robots that drive, collide, lie down, get lost, call the lift, among people."""
     clock, digest = LockstepClock(), hashlib.sha256()
     world = World(
         load_world("office"),
@@ -42,7 +42,8 @@ async def trace(seed: int) -> str:
         robot.events.listen(BumperPressed, lambda event: digest.update(repr(event).encode()))
     world.start()
     robots["a"][Base].set_velocity(Twist(0.6, 0.1, 0.3))
-    for second in range(20):
+    digests = list[str]()
+    for second in range(seconds):
         await clock.advance(1.0)
         if second == 5:
             robots["b"][Legs].lie_down()
@@ -54,8 +55,9 @@ async def trace(seed: int) -> str:
         for name, robot in robots.items():
             digest.update(struct.pack("3d", *pose(world.truth.pose_of(name))))
             digest.update(repr((robot[Imu].reading, robot[Battery].state, robot[Network].signal)).encode())
+        digests.append(digest.hexdigest())
     world.close()
-    return digest.hexdigest()
+    return digests
 
 
 def pose(value: Pose) -> tuple[float, float, float]:
@@ -63,4 +65,4 @@ def pose(value: Pose) -> tuple[float, float, float]:
 
 
 if __name__ == "__main__":
-    print(asyncio.run(trace(int(sys.argv[1]))))
+    print("\n".join(asyncio.run(trace(int(sys.argv[1]), int(sys.argv[2])))))

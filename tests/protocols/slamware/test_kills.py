@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from tests.protocols.slamware.kills import Places, run
 
-KILLS = 6
 
-
-def test_nothing_acknowledged_is_lost(tmp_path: Path) -> None:
-    assert run(KILLS, 7, tmp_path) == []
+@pytest.mark.parametrize("kills", [2, pytest.param(10, marks=pytest.mark.slow)])
+def test_nothing_acknowledged_is_lost(tmp_path: Path, kills: int) -> None:
+    assert run(kills, 7, tmp_path) == []
 
 
 def test_the_judge_notices_what_is_lost() -> None:

@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 from roboglot.cli.recordings import record
 from roboglot.clients.robomaster.datagrams import BROADCAST_PORT
 from roboglot.demo.clients.phone import Phone
+from roboglot.demo.clients.slamware import SlamwareClient
 from roboglot.model.tap import Direction
 from roboglot.protocols.cyberdog.certificates import ensure_certificates, export_client
 from roboglot.protocols.robomaster.datagrams import Datagrams
@@ -26,7 +27,7 @@ from roboglot.recording.proxy.sniffers import RestSniffer, TextSniffer, rest_ope
 from roboglot.recording.reader import pair, read_recording
 from roboglot.testing.addresses import free_port
 from roboglot.wire.cyberdog.chapters.system import HEARTBEAT
-from tests.recording.test_playback import ADDRESS, PROGRAM, by_frames, by_rest, run, whole_closing
+from tests.recording.test_playback import ADDRESS, PROGRAM, by_frames, run, whole_closing
 
 assert whole_closing  # a fixture for these tests, too
 BETWEEN = ADDRESS.replace("127.0.193.", "127.0.195.")
@@ -42,6 +43,16 @@ async def between(url: str, path: Path, script: Any) -> Any:
     finally:
         await relay.close()
         book.close()
+
+
+async def reading(address: str) -> list[tuple[float, ...]]:
+    """Ask by REST, without a drive."""
+    client = SlamwareClient(address)
+    try:
+        await client.wait_for_map()
+        return [await client.pose() for _ in range(3)]
+    finally:
+        await client.close()
 
 
 async def by_text(address: str) -> list[bytes]:
@@ -60,7 +71,7 @@ async def by_text(address: str) -> list[bytes]:
 @pytest.mark.parametrize(
     ("url", "script"),
     [
-        (f"slamware://{ADDRESS}", by_rest),
+        (f"slamware://{ADDRESS}", reading),
         (f"robomaster://{ADDRESS}", by_text),
         (f"visual://{ADDRESS}", by_frames),
     ],
