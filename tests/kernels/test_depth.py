@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboglot.kernels.depth import FLOOR, LOW, NEAR, STEEP, remember_low, sort_out
+from roboglot.kernels.depth import FLOOR, LOW, NEAR, STEEP, remember_low, seen_since, sort_out, sort_out_all
 
 HEIGHT, INNER = 0.6, 0.2
 
@@ -56,3 +56,23 @@ def test_only_what_nothing_explains_is_remembered(seed: int, yaw: float) -> None
     found = remember_low(evidence, seen, floor, obstacles, echoes, pose, corner, 7.0, 0.1, 0.05)
     assert found == pytest.approx(np.array(new).reshape(-1, 2))
     assert (seen == expected).all()
+
+
+def test_sensors_are_sorted_one_after_the_other() -> None:
+    random = np.random.default_rng(5)
+    rays, ways = random.uniform(-1, 1, (3, 8, 8, 3)), random.uniform(0.1, 3.0, (3, 8, 8))
+    eyes = random.uniform(0.0, 0.4, (3, 3))
+    each = [sort_out(*of, HEIGHT, INNER) for of in zip(rays, ways, eyes, strict=True)]
+    for part, found in enumerate(sort_out_all(rays, ways, eyes, HEIGHT, INNER)):
+        assert len(found)
+        assert (found == np.concatenate([one[part] for one in each])).all()
+
+
+def test_recent_cells_are_found_row_by_row() -> None:
+    random = np.random.default_rng(6)
+    seen = np.where(random.random((30, 40)) < 0.1, random.uniform(0.0, 9.0, (30, 40)), 0.0).astype(np.float32)
+    row, column = np.nonzero(seen[5:25, 10:40] >= 4.0)
+    expected = np.stack((-1.0 + (column + 10 + 0.5) * 0.05, 2.0 + (row + 5 + 0.5) * 0.05), axis=1)
+    assert len(row)
+    assert (seen_since(seen, 5, 25, 10, 40, 4.0, -1.0, 2.0, 0.05) == expected).all()
+    assert seen_since(seen, 5, 25, 10, 40, 9.5, -1.0, 2.0, 0.05).shape == (0, 2)

@@ -9,8 +9,10 @@ from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.perception import Gesture, Sport
 from roboglot.model.sports import SportCounter
-from roboglot.simulation.people.routine import Say, Show, Walk
+from roboglot.simulation.people.people import Walker
+from roboglot.simulation.people.routine import Say, Show, Wait, Walk
 from roboglot.simulation.world.declarations import BadFile
+from roboglot.simulation.world.description import Person
 from tests.simulation.perceiving import lab
 
 ANNA = {"name": "anna", "path": [[6.0, 5.0]], "facing": 180, "height": 1.75, "speed": 1.0}
@@ -224,3 +226,21 @@ async def test_people_step_back_without_room_aside():
         await room.clock.advance(6.0)
         assert anna.pose.x > 5.5
         assert anna.pose.y == pytest.approx(5.0)
+
+
+def test_a_wait_ends_in_its_tick():
+    anna = Walker(Person(path=((6.0, 5.0),), script=(Wait(1.0), Walk((6.0, 9.0)))), 0)
+    changed = []
+    for tick in range(1, 61):
+        if tick == 20:
+            anna.place(Pose(5.0, 5.0))
+        if anna.walk(0.02, (), lambda _walker, _spot: True):
+            changed.append(tick)
+    last = next(tick for tick in range(1, 100) if sum([0.02] * tick) >= 1.0)
+    assert changed == [20, *range(last + 1, 61)]
+    anna.resume()  # in the midst of a step
+    assert [anna.walk(0.02, (), lambda _walker, _spot: True) for _ in range(3)] == [False] * 3  # the wait again
+    again = Walker(Person(path=((6.0, 5.0),), script=(Wait(9.0),)), 0)
+    again.walk(0.02, (), lambda _walker, _spot: True)
+    again.order(Walk((6.0, 9.0)))  # leaves a wait at once
+    assert again.walk(0.02, (), lambda _walker, _spot: True)

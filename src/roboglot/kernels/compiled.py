@@ -9,9 +9,12 @@ divides only by what cannot be 0, or asks for CHECKED.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeVar
+from typing import TypeVar, cast
 
-from numba import njit
+import numpy as np
+from numba import njit, types
+from numba.extending import typeof_impl
+from numba.np.numpy_support import from_dtype, map_layout
 
 F = TypeVar("F", bound=Callable[..., object])
 CHECKED = "python"  # error model of kernels that raise ZeroDivisionError
@@ -22,3 +25,10 @@ def kernel(signature: str | None = None, **options: object) -> Callable[[F], F]:
     chosen = {"error_model": "numpy"} | options
     compiled: Callable[[F], F] = njit(signature, cache=True, nogil=True, no_cfunc_wrapper=True, **chosen)
     return compiled
+
+
+@typeof_impl.register(np.ndarray)
+def _typeof_array(array: np.ndarray[tuple[int, ...], np.dtype[np.generic]], _context: object) -> types.Array:
+    """Return an array's type as Numba does, but for masked arrays: to look for those takes 30 ms and 1.2 MB."""
+    dtype = from_dtype(cast("np.dtype[np.bool]", array.dtype))  # of any kind: Numba's annotation is narrower than it is
+    return types.Array(dtype, array.ndim, map_layout(array), readonly=not array.flags.writeable)

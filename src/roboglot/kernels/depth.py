@@ -47,6 +47,26 @@ def sort_out(
 
 
 @kernel(
+    "Tuple((float64[:,::1], float64[:,::1]))(float64[:,:,:,::1], float64[:,:,::1], float64[:,::1], float64, float64)"
+)
+def sort_out_all(
+    rays: FloatArray, ways: FloatArray, eyes: FloatArray, height: float, inner: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return obstacles and floor of several equal sensors, one after the other; see ``sort_out``."""
+    obstacles, floor = np.empty((ways.size, 2)), np.empty((ways.size, 2))
+    standing = lying = 0
+    for k in range(len(ways)):
+        some, flat = sort_out(rays[k], ways[k], eyes[k], height, inner)
+        for i in range(len(some)):
+            obstacles[standing, 0], obstacles[standing, 1] = some[i, 0], some[i, 1]
+            standing += 1
+        for i in range(len(flat)):
+            floor[lying, 0], floor[lying, 1] = flat[i, 0], flat[i, 1]
+            lying += 1
+    return obstacles[:standing].copy(), floor[:lying].copy()
+
+
+@kernel(
     "float64[:,::1](int16[:,::1], float32[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[::1],"
     " float64[::1], float64, float64, float64)",
 )
@@ -93,3 +113,24 @@ def remember_low(
             seen[row, col] = now
             count += 1
     return found[:count].copy()
+
+
+@kernel("float64[:,::1](float32[:,::1], int64, int64, int64, int64, float32, float64, float64, float64)")
+def seen_since(
+    seen: SingleArray, row0: int, row1: int, col0: int, col1: int, since: float, x: float, y: float, resolution: float
+) -> FloatArray:
+    """Return the middles (n, 2; m) of cells in these rows and columns that were ``seen`` at ``since`` or later.
+
+    Row by row; (x, y) is the grid's corner.
+    """
+    count = 0
+    for row in range(row0, row1):
+        for col in range(col0, col1):
+            count += seen[row, col] >= since
+    found, at = np.empty((count, 2)), 0
+    for row in range(row0, row1 if count else row0):
+        for col in range(col0, col1):
+            if seen[row, col] >= since:
+                found[at, 0], found[at, 1] = x + (col + 0.5) * resolution, y + (row + 0.5) * resolution
+                at += 1
+    return found

@@ -322,3 +322,35 @@ def corridor(points: FloatArray, half: float, stretches: int) -> float:
     for stretch in range(stretches):
         widest = max(widest, left[stretch] + right[stretch])
     return widest
+
+
+@kernel("void(float64[:,::1], float64[:,::1], float64[:,::1], float64, float64[::1], float64[::1])")
+def sides(
+    way: FloatArray, along: FloatArray, echoes: FloatArray, clearance: float, upper: FloatArray, lower: FloatArray
+) -> None:
+    """Fill in how far a hull can go to the left (``upper``) and to the right (``lower``) of each point of ``way``.
+
+    m, to the left positive; infinite where no echo is near. ``along`` (n, 2) are unit vectors of the way.
+    """
+    low_x = low_y = np.inf
+    high_x = high_y = -np.inf
+    for i in range(way.shape[0]):
+        upper[i], lower[i] = np.inf, -np.inf
+        low_x, high_x = min(low_x, way[i, 0]), max(high_x, way[i, 0])
+        low_y, high_y = min(low_y, way[i, 1]), max(high_y, way[i, 1])
+    spare = 3.0 * clearance
+    for k in range(echoes.shape[0]):
+        echo_x, echo_y = echoes[k, 0], echoes[k, 1]
+        if not (low_x - spare < echo_x < high_x + spare and low_y - spare < echo_y < high_y + spare):
+            continue
+        for i in range(way.shape[0]):
+            x, y = echo_x - way[i, 0], echo_y - way[i, 1]
+            ahead = abs(x * along[i, 0] + y * along[i, 1])
+            left = x * -along[i, 1] + y * along[i, 0]
+            if ahead >= clearance or abs(left) >= 2.0 * clearance:
+                continue
+            reach = np.sqrt(max(0.0, clearance * clearance - ahead * ahead))
+            if left > 0.0:
+                upper[i] = min(upper[i], left - reach)
+            else:
+                lower[i] = max(lower[i], left + reach)

@@ -274,3 +274,45 @@ def verdicts(
         elif not unknown:
             said[i] = FLOATING
     return said
+
+
+@kernel(
+    "Tuple((float64[:,::1], uint8[::1], float64[:,::1]))"
+    "(float64[::1], float64[::1], float64[::1], float64, float64, float64, float64, float64, float64)"
+)
+def rays_of(
+    ranges: FloatArray,
+    cosines: FloatArray,
+    sines: FloatArray,
+    low: float,
+    high: float,
+    clear: float,
+    x: float,
+    y: float,
+    least: float,
+) -> tuple[FloatArray, ByteArray, FloatArray]:
+    """Return the rays of a scan from (x, y) that say something: ends (n, 2; m), 1 where there was an echo, the echoes.
+
+    An echo lies between ``low`` and ``high``; rays beyond end at ``clear``, others are left out. Nothing is returned
+    if less than the share ``least`` of all has an echo.
+    """
+    count = echoes = 0
+    for ray in range(len(ranges)):
+        echoes += low <= ranges[ray] <= high
+        count += ranges[ray] >= low or ranges[ray] > high
+    if echoes < least * len(ranges):
+        count = echoes = 0
+    ends, hit, points = np.empty((count, 2)), np.empty(count, np.uint8), np.empty((echoes, 2))
+    at = met = 0
+    for ray in range(len(ranges) if count else 0):
+        away = ranges[ray]
+        is_echo = low <= away <= high
+        if not (is_echo or away > high):
+            continue
+        away = away if is_echo else clear
+        ends[at, 0], ends[at, 1], hit[at] = cosines[ray] * away + x, sines[ray] * away + y, is_echo
+        if is_echo:
+            points[met, 0], points[met, 1] = ends[at, 0], ends[at, 1]
+            met += 1
+        at += 1
+    return ends, hit, points

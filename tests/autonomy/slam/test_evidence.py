@@ -90,6 +90,22 @@ def test_nonsense_among_the_ranges_is_left_out() -> None:
     assert len(ScanReader().read(scan_of([1.0] * (RAYS_MAX + 10))).points) == RAYS_MAX
 
 
+def test_kernel_reads_scans_to_the_last_bit() -> None:
+    random, (plain, compiled) = np.random.default_rng(3), (ScanReader(), ScanReader())
+    compiled.load_kernel()
+    for share in (0.0, 0.05, 0.2, 0.95):
+        ranges = random.uniform(0.0, 12.0, 360).astype(np.float32)
+        for nonsense in (math.nan, math.inf, 0.01):
+            ranges[random.random(360) < share] = nonsense
+        scan = scan_of(ranges.tolist(), Pose(0.1, -0.2, 0.3))
+        one, other = plain.read(scan), compiled.read(scan)
+        for a, b in ((one.ends, other.ends), (one.hit, other.hit), (one.points, other.points)):
+            assert a.shape == b.shape
+            assert a.tobytes() == b.tobytes()
+            assert a.dtype == b.dtype
+        assert one.sensor == other.sensor
+
+
 def route_through(*legs: list[tuple[float, float]]) -> Route:
     route = Route([np.array(leg) for leg in legs])
     route.set_speeds(np.full(len(route.points), 1.0), 2.0)

@@ -14,7 +14,7 @@ from roboglot.autonomy.navigation.low_sight import NONE, LowView
 from roboglot.autonomy.navigation.rules import Frame
 from roboglot.autonomy.navigation.scan_memory import Cells
 from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
-from roboglot.kernels.depth import remember_low
+from roboglot.kernels.depth import remember_low, seen_since
 from roboglot.model.geometry import Pose
 
 SPARE = 0.1  # s: cells round their time
@@ -56,10 +56,8 @@ class LowMemory:
         """
         if self._latest < since - SPARE:
             return NONE  # most robots see nothing low for most of the time
-        seen, frame = self.seen(grid), Frame(grid.corner, grid.evidence.shape)
-        rows, columns = frame.around((pose.point,), reach)
-        row, column = np.nonzero(seen[rows, columns] >= max(since, 1e-3))
-        if not len(row):
-            return NONE
-        x, y = frame.centres(rows, columns)
-        return np.stack((x[0, column], y[row, 0]), axis=1)
+        corner = grid.corner
+        rows, columns = Frame(corner, grid.evidence.shape).around((pose.point,), reach)
+        window, least = (rows.start, rows.stop, columns.start, columns.stop), max(since, 1e-3)
+        found: Points = seen_since(self.seen(grid), *window, least, corner.x, corner.y, RESOLUTION)
+        return found

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from roboglot.model.components.motion.gripper import Gripper, GripperStatus
 from roboglot.model.components.sensing.depth_camera import DepthCamera, DepthImage
 from roboglot.model.components.sensing.time_of_flight import TimeOfFlight, ZoneDistances
-from roboglot.model.geometry import Vector3
 from roboglot.model.robot import Robot
 
 GRASP, GRASP_SIDE = 0.6, 0.12  # m ahead and aside that an object in the gripper covers
 
 Points = NDArray[np.float64]
+Sorting = Callable[[Points, Points, Points, float, float], tuple[Points, Points]]
 NONE: Points = np.empty((0, 2))
 
 
@@ -35,12 +35,14 @@ class LowSight:
     """Looks when asked, at what the sensors measure then."""
 
     def __init__(self, robot: Robot) -> None:
-        from roboglot.kernels.depth import sort_out  # it needs Numba
+        from roboglot.kernels.depth import sort_out, sort_out_all  # it needs Numba
 
         self._robot, self._height, self._radius = robot, robot.description.height, robot.description.radius
         self._last: tuple[DepthImage, tuple[Points, Points]] | None = None  # the newest image and what it showed
-        self._zones: dict[str, tuple[NDArray[np.float32], Vector3, NDArray[np.float64], Points]] = {}  # what they see
-        self._sort_out: Callable[[Points, Points, Points, float, float], tuple[Points, Points]] = sort_out
+        self._eyes: list[tuple[object, object]] = []  # rays and places of the zones' sensors at the last look
+        self._rays, self._places = np.empty((0, 0, 0, 3)), np.empty((0, 3))  # … the same as arrays
+        self._sort_out: Sorting = sort_out
+        self._sort_out_all: Sorting = sort_out_all
 
     def look(self) -> LowView:
         """All sensors together; nothing for a robot without any."""
@@ -49,7 +51,7 @@ class LowSight:
             views.append(self._in_image(image))
         if TimeOfFlight in robot:
             eyes = robot[TimeOfFlight]
-            views += [self._in_zones(name, eyes.reading(name)) for name in eyes.names]
+            views.append(self._in_zones([eyes.reading(name) for name in eyes.names]))
         if not views:
             return LowView(NONE, NONE)
         obstacles = np.concatenate([standing for standing, _ in views])
@@ -65,12 +67,16 @@ class LowSight:
             self._last = image, self._sort_out(image.rays, depths, mount, self._height, self._radius)
         return self._last[1]
 
-    def _in_zones(self, name: str, reading: ZoneDistances) -> tuple[Points, Points]:
-        """The same in the zones of a time-of-flight sensor."""
-        known = self._zones.get(name)
-        if known is None or known[0] is not reading.rays or known[1] is not reading.eye:
-            rays = reading.rays.astype(np.float64).reshape(*reading.distances.shape, 3)
-            known = reading.rays, reading.eye, rays, np.array((reading.eye.x, reading.eye.y, reading.eye.z))
-            self._zones[name] = known
-        _, _, rays, eye = known
-        return self._sort_out(rays, reading.distances.astype(np.float64), eye, self._height, self._radius)
+    def _in_zones(self, readings: list[ZoneDistances]) -> tuple[Points, Points]:
+        """The same in the zones of all time-of-flight sensors."""
+        eyes: list[tuple[object, object]] = [(reading.rays, reading.eye) for reading in readings]
+        if len(eyes) != len(self._eyes) or not all(
+            a is c and b is d for (a, b), (c, d) in zip(eyes, self._eyes, strict=True)
+        ):
+            self._eyes, zones = eyes, readings[0].distances.shape
+            self._rays = np.array([reading.rays for reading in readings], np.float64).reshape(-1, *zones, 3)
+            self._places = np.array([(reading.eye.x, reading.eye.y, reading.eye.z) for reading in readings])
+        distances = np.empty(self._rays.shape[:3])
+        for row, reading in zip(distances, readings, strict=True):
+            row[:] = reading.distances
+        return self._sort_out_all(self._rays, distances, self._places, self._height, self._radius)

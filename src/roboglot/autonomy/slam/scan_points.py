@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,6 +73,13 @@ class ScanReader:
         self._key: object = None
         self.carried: NDArray[np.float64] | None = None  # (n, 2): the legs of the load around the robot, base_link, m
         self._directions = (np.empty(0), np.empty(0))  # x and y components of each ray
+        self._rays_of: Callable[..., tuple[NDArray[np.float64], NDArray[np.uint8], NDArray[np.float64]]] | None = None
+
+    def load_kernel(self) -> None:
+        """Sort rays by the compiled kernel from now on: the same to the last bit, in a fifth of the time."""
+        from roboglot.kernels.occupancy import rays_of
+
+        self._rays_of = rays_of
 
     def read(self, scan: LaserScan) -> ScanPoints:
         """The scan's points, computed once; none if hardly a ray returned."""
@@ -86,18 +93,22 @@ class ScanReader:
         if key != self._key:
             angles = scan.angle_min + scan.angle_increment * np.arange(len(ranges)) + scan.mount.yaw
             self._key, self._directions = key, (np.cos(angles), np.sin(angles))
+        sensor, clear = scan.mount.point, min(scan.clear_range, scan.range_max)
+        seconds = scan.time_increment * len(ranges)
+        if self._rays_of and not seconds and (self.carried is None or not len(self.carried)):
+            limits = scan.range_min, scan.range_max, clear
+            rays = self._rays_of(ranges, *self._directions, *limits, sensor.x, sensor.y, ECHO_SHARE_MIN)
+            return ScanPoints(*rays, sensor)
         with np.errstate(invalid="ignore"):
             hit = (ranges >= scan.range_min) & (ranges <= scan.range_max)
             empty = ranges > scan.range_max
-        sensor = scan.mount.point
         if np.count_nonzero(hit) < ECHO_SHARE_MIN * len(ranges):
             none = np.empty((0, 2))
             return ScanPoints(none, np.empty(0, np.uint8), none, sensor)
-        np.putmask(ranges, empty, min(scan.clear_range, scan.range_max))
+        np.putmask(ranges, empty, clear)
         ends = np.empty((len(ranges), 2))
         for axis, offset in enumerate((sensor.x, sensor.y)):  # many short rows are slower
             np.add(self._directions[axis] * ranges, offset, out=ends[:, axis])
-        seconds = scan.time_increment * len(ranges)
         velocity = self._odometry.reading.twist if seconds and self._odometry else STILL
         if max(velocity.speed, abs(velocity.yaw)) * seconds > DESKEW_FROM:
             ends = _deskewed(ends, velocity, scan.time_increment)

@@ -94,6 +94,7 @@ class Slam:
         self._excursions = Excursions(
             belief, self.odometry.noise, lambda scan, pose: self._adding.paint(scan, pose, self._way)
         )
+        belief.reader.load_kernel()
         self._turns = Turns(robot.clock, self._take)
         listen = robot.events.listen
         self._listeners = [listen(ScanTaken, self._turns.hear), listen(PoseJumped, self._jumped)]

@@ -20,33 +20,45 @@ class Sleep:
     def __init__(self, model: MjModel, data: MjData) -> None:
         self._data = data
         self._inputs = data.ctrl, data.qfrc_applied, model.actuator_gainprm, model.actuator_forcerange
-        self._kept: tuple[bytes, ...] = ()  # empty: something moved
+        self._state = data.qpos, data.qvel
+        self._kept: tuple[bytes, bytes, bytes, bytes] | None = None  # None: something moved
         self._places, self._rates = data.qpos.copy(), data.qvel.copy()
-        self._there: tuple[bytes, ...] = ()  # the bytes of these two
+        self._there = b"", b""  # the bytes of these two
 
     @property
     def lasts(self) -> bool:
         """True while nothing differs from when everything came to rest."""
-        data = self._data
-        return bool(self._kept) and (data.qpos.tobytes(), data.qvel.tobytes()) == self._there and self._same
+        if not self._kept:
+            return False
+        (qpos, qvel), (places, rates) = self._state, self._there
+        return qpos.tobytes() == places and qvel.tobytes() == rates and self._same
 
     def settle(self, velocities: list[float]) -> bool:
         """Look at a step that was done; True if all rested before and after it, and what it moved was taken back."""
         data = self._data
         if data.nefc or not (_tiny(velocities) and _tiny(data.qacc.tolist())):
-            self._kept = ()
+            self._kept = None
             return False
         if self._kept and self._same and abs(data.qpos - self._places).max() <= RESTS:
             data.qpos[:], data.qvel[:] = self._places, self._rates
             return True
         self._places, self._rates = data.qpos.copy(), data.qvel.copy()
         self._there = self._places.tobytes(), self._rates.tobytes()
-        self._kept = tuple(each.tobytes() for each in self._inputs)
+        controls, applied, gains, forces = self._inputs
+        self._kept = controls.tobytes(), applied.tobytes(), gains.tobytes(), forces.tobytes()
         return False
 
     @property
     def _same(self) -> bool:
-        return all(each.tobytes() == kept for each, kept in zip(self._inputs, self._kept, strict=True))
+        if self._kept is None:
+            return False
+        (controls, applied, gains, forces), kept = self._inputs, self._kept
+        return (
+            controls.tobytes() == kept[0]
+            and applied.tobytes() == kept[1]
+            and gains.tobytes() == kept[2]
+            and forces.tobytes() == kept[3]
+        )
 
 
 def _tiny(numbers: list[float]) -> bool:

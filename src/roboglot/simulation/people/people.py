@@ -36,6 +36,7 @@ APART = 0.45  # m from a robot's centre that they always keep
 TURN_RATE = 2.5  # rad/s
 CLAP_PAUSE = 0.35  # s between claps
 ORDERS_MAX = 100  # steps queued per person
+AHEAD_MAX = 500  # ticks of a wait that are counted ahead
 
 
 class Placed(Protocol):
@@ -67,6 +68,7 @@ class Walker:
         self._told: deque[Step] | None = None  # None: their own routine
         self.doing: Step | None = None
         self._elapsed = 0.0
+        self._idle = 0  # ticks to come in which they go on waiting; already part of what elapsed
         self._way = self._waited = 0.0
         self._dodging: Point | None = None  # their destination while they let a robot pass
         path = [Point(*spot) for spot in person.path]
@@ -122,11 +124,11 @@ class Walker:
 
     def drop(self) -> None:
         """Stop doing anything and stand."""
-        self._told, self.doing, self._dodging = deque(), None, None
+        self._told, self.doing, self._dodging, self._idle = deque(), None, None, 0
 
     def resume(self) -> None:
         """Go on with the script."""
-        self._told, self.doing = None, None
+        self._told, self.doing, self._idle = None, None, 0
 
     def place(self, pose: Pose) -> None:
         """Be there at once."""
@@ -143,6 +145,9 @@ class Walker:
     def walk(self, seconds: float, robots: Sequence[Placed], free: Free) -> bool:
         """Go on for ``seconds`` among the ``robots`` of the floor; whether the pose changed."""
         self.walking, moved, self.displaced = False, self.displaced, False
+        if self._idle:
+            self._idle -= 1
+            return moved
         if self.doing is None and ((self._told is None and not self._script) or not self._begin()):
             return moved
         self._elapsed += seconds
@@ -150,7 +155,7 @@ class Walker:
         if isinstance(doing, Walk):  # the most frequent step
             over = self._walk_on(doing, robots, seconds, free)
         elif isinstance(doing, Wait):  # and what else they do much
-            over = self._elapsed >= doing.seconds
+            over = self._wait(doing.seconds, seconds)
         else:
             over = self._do(seconds)
         if over:
@@ -176,6 +181,17 @@ class Walker:
             case Feel(emotion=emotion):
                 self.emotion = emotion
         return self.doing is not None
+
+    def _wait(self, span: float, seconds: float) -> bool:
+        """Wait for ``span`` s; True if that is over. Counts the ticks of ``seconds`` ahead in which nothing happens."""
+        elapsed, idle = self._elapsed, 0
+        if elapsed >= span:
+            return True
+        while idle < AHEAD_MAX and elapsed + seconds < span:  # summed tick by tick, to the last bit
+            elapsed += seconds
+            idle += 1
+        self._elapsed, self._idle = elapsed, idle
+        return False
 
     def _do(self, seconds: float) -> bool:
         """Do anything but walk and wait; True if the step is over."""

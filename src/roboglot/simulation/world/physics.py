@@ -61,8 +61,9 @@ class Physics:
         self._docks = {geom for geom in range(model.ngeom) if model.geom(geom).name.startswith("dock ")}
         people = [walker.body for walker in keyed([floor.people for floor in world.floors])] + visitors()
         self._persons = {int(model.body(person).geomadr[0]) for person in people}
-        self._places, self._attitudes = self._data.mocap_pos, self._data.mocap_quat
+        self._places = self._data.mocap_pos
         self._spots = self._places.data.cast("B").cast("d")  # the same numbers in one row: quicker to write
+        self._attitudes = self._data.mocap_quat.data.cast("B").cast("d")
         self._people = {person: _Standing(model, person) for person in people}
         self.props = Props(model, self._data, self._elevations)
         self.rays = Rays(model, self._data)
@@ -137,7 +138,9 @@ class Physics:
         person.x, person.y = pose.x, pose.y
         if pose.yaw != person.facing:
             person.facing = pose.yaw
-            self._attitudes[person.mocap] = math.cos(pose.yaw / 2), 0.0, 0.0, math.sin(pose.yaw / 2)
+            turns, at = self._attitudes, 4 * person.mocap  # a quaternion around the vertical axis
+            turns[at], turns[at + 3] = math.cos(pose.yaw / 2), math.sin(pose.yaw / 2)
+            turns[at + 1] = turns[at + 2] = 0.0
         if not person.there:
             person.there = True
             self._model.body_conaffinity[person.id] = person.bits
