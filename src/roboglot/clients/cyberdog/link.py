@@ -17,6 +17,7 @@ import grpc
 from roboglot.clients.errors import LinkLost, TimedOut
 from roboglot.model.clock import Clock
 from roboglot.model.tap import LOST, Line
+from roboglot.transport.wakes import prompt_wakes
 from roboglot.wire.cyberdog.channel import APP_PORT, LOST_AFTER, ROBOT_NAME, ROBOT_PORT, client_options
 from roboglot.wire.cyberdog.chapters.system import HEARTBEAT, Beats
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
@@ -119,12 +120,13 @@ class Link:
         """Serve the app's side; the robot is dialled by the first call. Raises LinkLost when the port is taken."""
         name = f"[{self._host}]" if ":" in self._host else self._host
         options = [*client_options(ROBOT_NAME), ("grpc.max_reconnect_backoff_ms", REDIAL_MAX)]
-        if self._certificates:
-            proof = self._certificates
-            credentials = grpc.ssl_channel_credentials(proof.ca, proof.key, proof.certificate)
-            self._channel = grpc.aio.secure_channel(f"{name}:{self._port}", credentials, options=options)
-        else:
-            self._channel = grpc.aio.insecure_channel(f"{name}:{self._port}", options=options)
+        where, proof = f"{name}:{self._port}", self._certificates
+        with prompt_wakes():
+            if proof:
+                credentials = grpc.ssl_channel_credentials(proof.ca, proof.key, proof.certificate)
+                self._channel = grpc.aio.secure_channel(where, credentials, options=options)
+            else:
+                self._channel = grpc.aio.insecure_channel(where, options=options)
         self._stub = GrpcAppStub(self._channel)
         if self.app_port is not None:
             await self._serve(self.app_port, self._channel)

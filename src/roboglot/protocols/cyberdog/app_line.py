@@ -9,6 +9,7 @@ from collections.abc import AsyncIterable, Callable, Coroutine
 import grpc
 
 from roboglot.protocols.cyberdog.frame_queue import Delivery
+from roboglot.transport.wakes import prompt_wakes
 from roboglot.wire.cyberdog.channel import APP_NAME, client_options
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import GrpcAppStub
@@ -45,10 +46,11 @@ class AppLine:
     def _stub(self) -> GrpcAppStub:
         if self._channel is None:
             options = client_options(APP_NAME)
-            if self._credentials is None:
-                self._channel = grpc.aio.insecure_channel(self._target, options=options)
-            else:
-                self._channel = grpc.aio.secure_channel(self._target, self._credentials(), options=options)
+            with prompt_wakes():
+                if self._credentials is None:
+                    self._channel = grpc.aio.insecure_channel(self._target, options=options)
+                else:
+                    self._channel = grpc.aio.secure_channel(self._target, self._credentials(), options=options)
         return GrpcAppStub(self._channel)
 
     async def _outcome(self, call: Coroutine[None, None, None], what: object) -> str:

@@ -53,6 +53,7 @@ from roboglot.protocols.cyberdog.requests import add_calls
 from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.protocols.door import Endpoint
 from roboglot.transport.limiter import pay
+from roboglot.transport.wakes import prompt_wakes
 from roboglot.wire.cyberdog.channel import MESSAGE_MAX, ROBOT_NAME, server_options
 from roboglot.wire.cyberdog.codes import FileError, InBandError, MachineState
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
@@ -93,7 +94,8 @@ class CyberDogDoor:
         """Bind and listen, and dial the app if its address is configured."""
         certificates = None if self._config.plaintext else CertificateStore(self._data / FOLDER)
         self._context = self._assemble(certificates)
-        self._server = server = grpc.aio.server(options=server_options(), maximum_concurrent_rpcs=CALLS_MAX)
+        with prompt_wakes():
+            self._server = server = grpc.aio.server(options=server_options(), maximum_concurrent_rpcs=CALLS_MAX)
         self._handshakes = Handshakes(self._address, self._config.port)
         self._cleanup.append(self._handshakes.close)
         add_calls(server, _Service(self._context, self._handshakes))

@@ -1,0 +1,55 @@
+"""gRPC's wake-ups of the loop are read as fast as they come."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from collections.abc import Callable
+
+import grpc
+import pytest
+
+from roboglot.transport import wakes
+from roboglot.transport.wakes import prompt_wakes
+
+ADDRESS = "127.75.1.1"
+
+
+async def test_all_bytes_are_read_in_one_turn() -> None:
+    loop, left, woken = asyncio.get_running_loop(), list[int](), asyncio.Event()
+    reads, writes = socket.socketpair()
+    reads.setblocking(False)
+
+    def wake() -> None:
+        left.append(len(reads.recv(1000)))
+        woken.set()
+
+    with reads, writes:
+        with prompt_wakes():
+            loop.add_reader(reads, wake)
+        writes.send(bytes(200))
+        await woken.wait()
+        await asyncio.sleep(0)
+        loop.remove_reader(reads)
+    assert left == [1]  # and gRPC reads one byte a turn
+
+
+async def test_server_made_within_wakes_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    loop, takes, take = asyncio.get_running_loop(), list[socket.socket](), wakes._take
+    own = loop.add_reader
+
+    def noted(reads: socket.socket, wake: Callable[[], object]) -> None:
+        takes.append(reads)
+        take(reads, wake)
+
+    monkeypatch.setattr(wakes, "_take", noted)
+    with prompt_wakes():
+        server = grpc.aio.server()
+    assert loop.add_reader == own
+    port = server.add_insecure_port(f"{ADDRESS}:0")
+    await server.start()
+    async with grpc.aio.insecure_channel(f"{ADDRESS}:{port}") as channel:
+        with pytest.raises(grpc.aio.AioRpcError, match="UNIMPLEMENTED"):
+            await channel.unary_unary("/nothing/there")(b"")
+    await server.stop(None)
+    assert takes
