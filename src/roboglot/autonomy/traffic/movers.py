@@ -9,6 +9,7 @@ import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +54,7 @@ class Mover:
     @property
     def speed(self) -> float:
         """m/s."""
-        return float(np.hypot(self.vx, self.vy))
+        return float(np.hypot(self.vx, self.vy)) if self.vx or self.vy else 0.0
 
     def take(self, x: float, y: float, stamp: float) -> None:
         """Take a new sighting."""
@@ -114,13 +115,16 @@ def _things(echoes: Points, pose: Pose) -> list[tuple[float, float]]:
     if len(echoes) < ECHOES_MIN:
         return []
     gaps = np.hypot(*(echoes - np.concatenate((echoes[-1:], echoes[:-1]))).T) > LINK
-    starts = np.flatnonzero(gaps)
-    if len(starts):
-        first = starts[0]
-        echoes, starts = np.concatenate((echoes[first:], echoes[:first])), starts - first
+    starts: list[int] = np.flatnonzero(gaps).tolist() or [0]
+    first = starts[0]
+    if first:
+        echoes = np.concatenate((echoes[first:], echoes[:first]))
     found = []
-    for thing in np.split(echoes, starts[1:]) if len(starts) else [echoes]:
-        if len(thing) < ECHOES_MIN or float(np.hypot(*np.ptp(thing, axis=0))) > WIDE_MAX:
+    for begin, end in pairwise([*(start - first for start in starts), len(echoes)]):
+        if end - begin < ECHOES_MIN:
+            continue
+        thing = echoes[begin:end]
+        if float(np.hypot(*(thing.max(axis=0) - thing.min(axis=0)))) > WIDE_MAX:
             continue
         x, y = thing.mean(axis=0).tolist()
         away = max(float(np.hypot(x - pose.x, y - pose.y)), 1e-6)

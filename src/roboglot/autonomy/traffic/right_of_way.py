@@ -68,7 +68,9 @@ class Way:
     def stopping(self) -> Points:
         """The points that it cannot help coming to."""
         reach = self.speed * REACTION + self.speed**2 / (2.0 * DECELERATION)
-        steps = np.hypot(*np.diff(self.points, axis=0, prepend=self.points[:1]).T)
+        steps = np.zeros(len(self.points))
+        ahead = self.points[1:] - self.points[:-1]
+        steps[1:] = np.hypot(ahead[:, 0], ahead[:, 1])
         return self.points[np.cumsum(steps) <= reach]
 
 
@@ -102,9 +104,13 @@ def expected_way(mover: Mover, *, lively: bool = True) -> Way:
 
 def straight_on(mover: Mover, far: float) -> Points:
     """Points up to ``far`` m ahead of where it is, the way that it moved last."""
+    if far <= STEP:
+        return np.array([(mover.x, mover.y)])
     away = np.arange(0.0, far, STEP)
-    x, y = math.cos(mover.heading), math.sin(mover.heading)
-    return np.stack([mover.x + away * x, mover.y + away * y], axis=1)
+    points = np.empty((len(away), 2))
+    points[:, 0] = mover.x + away * math.cos(mover.heading)
+    points[:, 1] = mover.y + away * math.sin(mover.heading)
+    return points
 
 
 def through_narrow(mover: Mover, points: Points, narrow: NDArray[np.bool_]) -> Way:

@@ -7,6 +7,8 @@ Roll and pitch are true: the filter that levels them leaves less error than anyb
 from __future__ import annotations
 
 import math
+import struct
+from collections.abc import Sequence
 
 import numpy as np
 from msgspec import Struct
@@ -26,6 +28,7 @@ FIELD_UNIT = 0.15e-6  # T
 FIELD_NOISE = 0.4e-6  # T, one standard deviation
 COUNTS_MAX = 32767
 HORIZONTAL, DOWN = 22e-6, 43e-6  # T: the earth's field at middle latitudes
+SIX = struct.Struct("6d")
 DRAWN = 64  # ticks for which noise is drawn at once
 
 
@@ -67,7 +70,7 @@ class SimulatedImu(Imu):
         self._reading: ImuReading | None = None
         self._raw: RawImu | None = None
         self._compass, self._field = compass, field  # random numbers, and the earth's field in the world's frame, T
-        self._noises: list[list[float]] = []  # six per tick to come, the next ones last
+        self._noises, self._at = b"", 0  # six numbers per tick, and where the next ones begin
 
     @property
     def reading(self) -> ImuReading:
@@ -100,15 +103,16 @@ class SimulatedImu(Imu):
 
     def forget_noise(self) -> None:
         """Draw anew: chance begins from another seed."""
-        self._noises.clear()
+        self._noises, self._at = b"", 0
 
     def sense(self, stamp: float, seconds: float) -> None:
         """Measure one tick."""
         hull, scale = self._hull, self._scale
-        if not self._noises:
+        if self._at == len(self._noises):
             drawn = self._random.standard_normal((DRAWN, 6)) * self._sigma + self._bias
-            self._noises = drawn[::-1].tolist()
-        noise = self._noises.pop()
+            self._noises, self._at = drawn.tobytes(), 0
+        noise = SIX.unpack_from(self._noises, self._at)  # lists of floats would crowd the caches of a hundred robots
+        self._at += SIX.size
         turned, motion = hull.turned, hull.motion
         self.rate = rate = (turned - self._turned) / seconds * scale + noise[2]
         yaw = self._yaw + rate * seconds
@@ -128,7 +132,9 @@ class SimulatedImu(Imu):
         self._level = stamp, noise[0], noise[1], turning * scale + noise[2]
         self._reading = None
 
-    def _tilted(self, stamp: float, felt: tuple[float, float, float], noise: list[float], seconds: float) -> ImuReading:
+    def _tilted(
+        self, stamp: float, felt: tuple[float, float, float], noise: Sequence[float], seconds: float
+    ) -> ImuReading:
         """Measure with a body that leans, by the ground or by its legs; ``felt``: acceleration plus gravity, world."""
         hull, held, before = self._hull, self._hull.attitude, self._held
         self._held = held
