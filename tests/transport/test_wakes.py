@@ -1,4 +1,4 @@
-"""gRPC's wake-ups of the loop are read as fast as they come."""
+"""Test that gRPC's wake-ups of the loop are read as fast as they come."""
 
 from __future__ import annotations
 
