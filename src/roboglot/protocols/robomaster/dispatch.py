@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 
 from roboglot.model.errors import NotFound, RobotError
 from roboglot.model.stand_in import StandIn
@@ -42,6 +42,7 @@ from roboglot.wire.robomaster.replies import Number, Reply
 log = logging.getLogger(__name__)
 
 DOOR = "robomaster"
+KEPT_MAX = 128  # command lines whose meaning is kept
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,15 +97,15 @@ async def _answered(context: Context, text: str | None, asked: _Asked) -> Answer
     try:
         if text is None:
             raise _Refusal(Reply.PARSE_ERROR, lambda: f"longer than {LINE_MAX} bytes")
-        command = parse(text)
-        seq = command.seq
-        operation, words = _find(context, command)
+        seq = _parsed(text).seq
+        operation, _ = _meant(text, context.active)
         asked.key = operation.key
         if context.robot.tap.watched:
             asked.began = context.robot.tap.request(DOOR, operation.key, text)
         if context.robot.admission.asks:
             context.robot.admission.check(DOOR, operation.key, operation.right)
-        result = await _run(context, operation, words)
+        values = _checked(text, context.active, context.profile.as_robots)
+        result: str | Sequence[Number | str] | None = await operation.handler(context, **values)
     except (Malformed, _Refusal) as refusal:
         if refusal.reply is Reply.PARSE_ERROR and not context.active:
             return Answer(context.profile.result(Reply.NOT_IN_SDK_MODE, seq), lambda: "send `command;` first")
@@ -155,28 +156,35 @@ async def _ask_stand_in(context: Context, stand_in: StandIn, command: Command, t
     raise _Refusal(Reply.FAIL, lambda: "the recording ends before it was answered")
 
 
-async def _run(
-    context: Context, operation: Operation[str], words: Sequence[str]
-) -> str | Sequence[Number | str] | None:
-    shape = shape_of(operation, context.profile.as_robots)
-    values = _values(operation.key, shape, words)
-    try:
-        checked = shape.check(values)
-    except BadParameters as error:
-        why = str(error)
-        raise _Refusal(Reply.FAIL, lambda: nearest_values(operation.key, shape, values) or why) from None
-    result: str | Sequence[Number | str] | None = await operation.handler(context, **checked)
-    return result
+@lru_cache(KEPT_MAX)
+def _parsed(text: str) -> Command:
+    """Take a line apart. Most clients say the same few again and again, so what they mean is kept."""
+    return parse(text)
 
 
-def _find(context: Context, command: Command) -> tuple[Operation[str], Sequence[str]]:
-    """The operation that is meant and the words left for its parameters."""
+@lru_cache(KEPT_MAX)
+def _meant(text: str, active: bool) -> tuple[Operation[str], Sequence[str]]:
+    """Return the operation that is meant, in SDK mode or outside of it, and the words left for its parameters."""
+    command = _parsed(text)
     for key, words in command.keys:
-        if not context.active and key not in OUTSIDE_SDK_MODE:
+        if not active and key not in OUTSIDE_SDK_MODE:
             continue
         if operation := TABLE.get(key):
             return operation, words
     raise _Refusal(Reply.PARSE_ERROR, partial(_unknown, command))
+
+
+@lru_cache(KEPT_MAX)
+def _checked(text: str, active: bool, as_robots: bool) -> Mapping[str, object]:
+    """Return the handler's parameters; not to be changed."""
+    operation, words = _meant(text, active)
+    shape = shape_of(operation, as_robots)
+    values = _values(operation.key, shape, words)
+    try:
+        return shape.check(values)
+    except BadParameters as error:
+        why = str(error)
+        raise _Refusal(Reply.FAIL, lambda: nearest_values(operation.key, shape, values) or why) from None
 
 
 def _unknown(command: Command) -> str:
