@@ -13,7 +13,7 @@ from roboglot.operations import OperationTable
 from roboglot.protocols.slamware import parameters
 from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.errors import reason_phrase
-from roboglot.protocols.slamware.http_connection import with_reason
+from roboglot.protocols.slamware.http_connection import JOINED_MAX, ReasonTransport, with_reason
 from roboglot.protocols.slamware.routes import BEYOND, Routes
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.protocols.slamware.table import TABLE, implemented
@@ -102,6 +102,41 @@ def test_reason_phrases_are_harmless() -> None:
     head = b"HTTP/1.1 400 Bad Request\r\na: b\r\nreason-phrase: Nope\r\nc: d\r\n\r\n"
     assert with_reason(head) == b"HTTP/1.1 400 Nope\r\na: b\r\nc: d\r\n\r\n"
     assert with_reason(b"HTTP/1.1 200 OK\r\na: b\r\n\r\n") == b"HTTP/1.1 200 OK\r\na: b\r\n\r\n"
+
+
+class Pieces(asyncio.Transport):
+    """Keep what is written, piece by piece."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.all: list[bytes] = []
+
+    def write(self, data: bytes | bytearray | memoryview) -> None:
+        self.all.append(bytes(data))
+
+    def close(self) -> None:
+        self.all.append(b"closed")
+
+
+def test_heads_go_out_with_their_bodies() -> None:
+    head, large = b"HTTP/1.1 200 OK\r\na: b\r\n\r\n", bytes(JOINED_MAX + 1)
+    transport = ReasonTransport(pieces := Pieces())
+    for data in (head, b"body", b"more", head, b"", head, large):
+        transport.write(data)
+    assert pieces.all == [head + b"body", b"more", head, head, large]
+    pieces.all.clear()
+    transport.write(head)  # the answer to a HEAD
+    transport.flush()
+    transport.write(b"HTTP/1.1 100 Continue\r\n\r\n")  # the client waits for it
+    transport.write(head)
+    transport.close()
+    assert pieces.all == [head, b"HTTP/1.1 100 Continue\r\n\r\n", head, b"closed"]
+
+
+async def test_a_head_alone_is_answered_at_once(bare_client: httpx.AsyncClient) -> None:
+    for _ in range(2):
+        reply = await bare_client.head(POIS)
+        assert (reply.status_code, reply.content) == (200, b"")
 
 
 @pytest.mark.parametrize(

@@ -96,6 +96,7 @@ class Application:
         self._pages = Pages()
         self._encode = msgspec.json.Encoder().encode
         self._parameters = Parameters(context)
+        self._admitted: tuple[str, object, Headers] = "", None, []  # the last one's method and headers, and the answer
         self.closing = False
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -132,14 +133,19 @@ class Application:
 
     def _admit(self, scope: Scope) -> Headers:
         """Return what tells the browser which page may read the answer. Raises HttpError 403 for strangers' pages."""
-        asked = of_rows(scope["headers"], scope["method"])
+        method, rows = scope["method"], scope["headers"]
+        if method == self._admitted[0] and rows == self._admitted[1]:  # a client that asks again and again
+            return self._admitted[2]
+        asked = of_rows(rows, method)
+        shared: Headers = []
         if why := self._browsers.refusal(asked):
             raise HttpError(403, "Forbidden", why)
         if self._browsers.any_origin:
-            return [(b"access-control-allow-origin", b"*")]
-        if asked.origin is None:
-            return []
-        return [(b"access-control-allow-origin", asked.origin.encode("latin-1")), (b"vary", b"Origin")]
+            shared = [(b"access-control-allow-origin", b"*")]
+        elif asked.origin is not None:
+            shared = [(b"access-control-allow-origin", asked.origin.encode("latin-1")), (b"vary", b"Origin")]
+        self._admitted = method, rows, shared
+        return shared
 
     def _log(self, client: str, scope: Scope, status: int, body: bytes, seconds: float) -> None:
         """Log a request and its outcome, for ``--verbose``."""
