@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 
 from roboglot.autonomy.slam.evidence import EvidenceGrid
 from roboglot.autonomy.slam.scan_points import ScanPoints
+from roboglot.model.components.sensing.odometry import OdometryNoise
 from roboglot.model.geometry import Point, Pose
 
 HALF, RAYS, REACH = 0.9, 720, 6.0  # m from the middle to a wall; m that the lidar sees
 ALONG = ((1.3, 0.45), (2.1, -0.45), (-1.1, -0.4), (-1.9, 0.45))  # robots driving alongside, relative to the robot
 PILLARS = ((3.1, 0.55), (-2.9, -0.55), (0.9, -0.7), (-0.5, 0.7))  # in map
 RADIUS, PILLAR = 0.25, 0.12  # m
+TIGHT = np.diag((0.02**2, 0.02**2, 0.01**2))
 
 
 def scanned(x: float, robots: tuple[tuple[float, float], ...] = ALONG) -> ScanPoints:
@@ -67,6 +69,58 @@ def test_wheels_that_slip_are_not_believed_alone(painted: EvidenceGrid) -> None:
     scan, prior = scanned(0.0), np.diag((0.02**2, 0.02**2, 0.01**2))
     best = fit(painted, scan, Pose(0.02), FREE)
     assert contested(painted, scan, Pose(0.1), best, prior, 0.5, 0.01) is None
+
+
+LEFT = 0.18  # m that the robot ahead drove on
+
+
+def seen(driven: float, far: float = 2.0) -> ScanPoints:
+    """Walls as ``far`` as it sees, two points of a pillar, and eight of a robot ahead that has ``driven`` on."""
+    walls = np.concatenate([line((-far, y), (far, y)) for y in (-HALF, HALF)])
+    robot, pillar = line((1.3, 0.2), (1.3, 0.44)), line((-1.5, 0.1), (-1.5, 0.16))
+    points = np.concatenate([walls, robot + np.array((driven, 0.0)), pillar])
+    return ScanPoints(points, np.ones(len(points), np.uint8), points, Point())
+
+
+@pytest.fixture(scope="module")
+def left() -> EvidenceGrid:
+    """A map in which the robot ahead still stands where it stood."""
+    from roboglot.autonomy.slam.painting import paint
+
+    grid = EvidenceGrid()
+    for _ in range(10):
+        paint(grid, seen(0.0, REACH), Pose(), fill=False)
+    return grid
+
+
+def test_robot_that_leaves_moves_none_that_stands(left: EvidenceGrid) -> None:
+    """Few points tell, but no noise makes those on the pillar prefer the wrong place."""
+    from roboglot.autonomy.slam.contest import contested
+    from roboglot.autonomy.slam.matcher import FREE, fit
+
+    scan = seen(LEFT)
+    misled = fit(left, scan, Pose(-LEFT), FREE, iterations=0)
+    found = contested(left, scan, Pose(), misled, TIGHT, 0.0, 0.004)
+    assert found is not None
+    assert found.pose.distance_to(Pose()) < 0.01
+
+
+def test_past_that_was_overruled_does_not_testify(left: EvidenceGrid) -> None:
+    """A standing robot that was misled for a moment returns to its place, and stays there."""
+    from roboglot.autonomy.slam.contest import WheelWitness
+    from roboglot.autonomy.slam.matcher import FREE, fit
+    from roboglot.autonomy.slam.odometry.learner import OdometryLearner
+
+    witness, scan, pose = WheelWitness(OdometryLearner(OdometryNoise())), seen(LEFT), Pose()
+    for number in range(20):
+        if number == 5:
+            pose = Pose(-LEFT)
+        best = fit(left, scan, pose, FREE, iterations=0)
+        driven = witness.contest(left, scan, pose, best, TIGHT, Pose()) if number > 5 else None
+        pose = driven.pose if driven is not None else pose
+        witness.note(0.5 * number, pose, 0.0)
+        if number > 6:
+            assert pose.distance_to(Pose()) < 0.01, number
 
 
 def line(start: tuple[float, float], end: tuple[float, float], step: float = 0.03) -> NDArray[np.float64]:

@@ -35,6 +35,7 @@ class PilotTuning:
     stray: float = 0.4  # from the route at which it is planned again
     unknown_seam: float = 1.0  # of unknown floor on a route that count as known: the map has holes along its edges
     search_after: float = 10.0  # s of waiting for an obstacle on a known route before unknown floor is searched
+    look_first: float = 2.0  # … before a much longer way, if nothing moves around
     search_share: float = 2.0  # times the first route, plus search_more: the longest drive through unknown floor
     search_more: float = 10.0
 

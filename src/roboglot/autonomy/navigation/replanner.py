@@ -93,7 +93,7 @@ class Replanner:
         return route
 
     async def _closed_for_now(self, route: Route, start: Point, goals: tuple[Point, ...]) -> bool:
-        """True while ``route`` leads through unknown floor only because something stands on a known way.
+        """True while ``route`` leads through unknown floor only because something stands on a known or shorter way.
 
         It may be another robot, or a person: for a while it is better to wait for them than to search the building.
         """
@@ -106,10 +106,18 @@ class Replanner:
                 known = await self._course.plan(start, goals, self._goal.options, obstacles=False)
             except Unreachable:
                 return False
-            if not self._is_known(known):
+            if not self._is_known(known) and not self._would_leave(route.length - known.length):
                 return False
         journey.closed_since = min(journey.closed_since, now)
         return now - journey.closed_since < self._tuning.search_after
+
+    def _would_leave(self, more: float) -> bool:
+        """True if a way that is ``more`` metres shorter may become free: others move around, or had no time to."""
+        course, journey = self._course, self._journey
+        if more <= self._tuning.detour:
+            return False
+        looked = self._clock.time() - min(journey.closed_since, self._clock.time())
+        return looked < self._tuning.look_first or course.traffic.is_among_others(course.belief.pose)
 
     def _is_known(self, route: Route) -> bool:
         return route.unknown <= self._tuning.unknown_seam and route.ends_known

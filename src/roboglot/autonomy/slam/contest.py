@@ -30,7 +30,8 @@ TELLING, GAP_MIN, GAP_MAX = 0.3, 0.01, 0.2  # share of the contradiction, m, by 
 MAD, NOISES = 1.48, 1.5  # standard deviation from a median; the number of them that a contradiction needs
 FITS = 0.04  # m from a surface within which a point votes
 ONE_VOICE = 0.9  # share of the votes that the scan's pose needs
-VOTES_MIN = 4  # votes for odometry below which it is ignored
+VOTES_MIN = 4  # votes for odometry below which it is ignored, as far as the lidar's noise explains them
+NOISE_MAX = 0.1  # m between both poses from which no noise makes a point prefer the wrong one
 SIGMAS = 1.0  # of odometry: smaller contradictions are its own errors
 WAY_MAX, TURN_MAX = 0.3, 0.3  # m, rad: longer steps of odometry are no evidence against a scan
 PASTS = (1.0, 4.0)  # s of history over which odometry is compared again
@@ -98,7 +99,14 @@ class WheelWitness:
             far = Pose(by_wheels.x, by_wheels.y, before.yaw)
             sigma = self._sigma(driven_way, last.variance - then.variance + newest)
             driven = contested(grid, scan, far, best, prior, driven_way, sigma)
+            if driven is not None:
+                self._forget_since(then)
         return driven
+
+    def _forget_since(self, then: Moment) -> None:
+        """Drop the poses believed after ``then``: they were wrong, and must not testify against a true one."""
+        while self._past[-1] is not then:
+            self._past.pop()
 
     def _sigma(self, way: float, variance: float) -> float:
         """Return the standard deviation (m) of wheels after ``way`` m, with ``variance`` (m2) by noise."""
@@ -134,7 +142,9 @@ def contested(
     least = max(GAP_MIN, TELLING * apart)
     for_wheels = np.count_nonzero((off_scan - off_wheels > least) & (off_wheels < FITS))
     for_scan = np.count_nonzero((off_wheels - off_scan > least) & (off_scan < FITS))
-    if for_wheels < VOTES_MIN or for_scan >= ONE_VOICE * (for_scan + for_wheels):
+    if for_wheels < VOTES_MIN and apart < NOISE_MAX:
+        return None
+    if for_scan >= ONE_VOICE * (for_scan + for_wheels):
         return None
     return driven
 
