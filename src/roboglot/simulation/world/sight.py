@@ -10,6 +10,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -134,17 +135,18 @@ class Sight:
         """Round things that stand still, and all that moves."""
         moving = [*self._people_at(floor, height), *self._robots_at(floor, height), *self._things_at(floor, height)]
         _, circles = self._floors[floor].at(height)
-        return np.concatenate((circles, np.array(moving))) if moving else circles
+        if not moving:
+            return circles
+        rows = np.array(list(chain.from_iterable(moving))).reshape(-1, 4)  # numpy reads a plain list twice as fast
+        return np.concatenate((circles, rows)) if len(circles) else rows
 
     def _people_at(self, floor: int, height: float) -> list[Four]:
         found = []
         for walker in self._walkers:
             person = walker.person
             if walker.floor == floor and 0.0 < height < person.height:
-                # People are capsules: narrower towards feet and crown.
-                off = max(0.0, person.radius - height, height - person.height + person.radius)
-                radius = math.sqrt(person.radius**2 - off**2)
-                found.append((walker.pose.x, walker.pose.y, radius, 0.0))
+                pose = walker.pose
+                found.append((pose.x, pose.y, _girth(person.radius, person.height, height), 0.0))
         return found
 
     def _robots_at(self, floor: int, height: float) -> list[Four]:
@@ -174,6 +176,13 @@ def _sweep(edges: Rows, circles: Rows, ways: Rows, x: float, y: float, yaw: floa
 def _ways(rays: int) -> Rows:
     """Unit vectors of a turn, x and y."""
     return directions(rays).view(np.float64).reshape(rays, 2)
+
+
+@lru_cache(maxsize=256)
+def _girth(radius: float, tall: float, height: float) -> float:
+    """Return a person's radius at a height: people are capsules, narrower towards feet and crown."""
+    off = max(0.0, radius - height, height - tall + radius)
+    return math.sqrt(radius**2 - off**2)
 
 
 def _rows(numbers: list[Four]) -> Rows:
