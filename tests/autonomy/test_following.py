@@ -18,7 +18,9 @@ if TYPE_CHECKING:
 WALKER = str(Path(__file__).parent / "worlds" / "walker.toml")
 
 
-@pytest.mark.parametrize("side", list(FollowSide))
+@pytest.mark.parametrize(
+    "side", [FollowSide.LEFT, *(pytest.param(side, marks=pytest.mark.slow) for side in FollowSide if side != "left")]
+)
 @pytest.mark.world(WALKER)
 async def test_it_keeps_near_who_walks(tour: Tour, side: FollowSide) -> None:
     action, gaps = tour.robot[Following].follow(side=side, distance=1.2), []
@@ -58,7 +60,11 @@ async def followed(tour: Tour, action: object, seconds: float) -> list[float]:
 
 
 @pytest.mark.parametrize(
-    "body", [pytest.param(body, marks=pytest.mark.world(BRACELET, body=body)) for body in ("cyberdog2", "universal")]
+    "body",
+    [
+        pytest.param("cyberdog2", marks=pytest.mark.world(BRACELET, body="cyberdog2")),
+        pytest.param("universal", marks=[pytest.mark.world(BRACELET, body="universal"), pytest.mark.slow]),
+    ],
 )
 async def test_a_bracelet_is_followed_through_doors(tour: Tour, body: str) -> None:
     link = tour.robot[Bluetooth].connect("C0:FF:EE:00:00:01")

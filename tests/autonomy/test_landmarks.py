@@ -82,6 +82,7 @@ def test_a_pose_moves_only_where_it_is_unsure():
     assert pose_fixed(believed, along, seen_from(truth, mark), twins)[0] == believed
 
 
+@pytest.mark.slow  # the arithmetic: test_a_pose_moves_only_where_it_is_unsure
 @pytest.mark.world(PASSAGE)
 async def test_they_tell_how_far_along_a_bare_passage(tour):
     await tour.robot[LaserLandmarks].set_updating(False)

@@ -81,13 +81,13 @@ async def stand() -> AsyncIterator[Make]:
 @pytest.mark.parametrize(
     ("way", "before", "degrees", "aside"),
     [
-        (UP, 0.45, 0.0, 0.0),
-        (UP, 0.7, 25.0, -0.1),
-        (UP, 0.75, -15.0, 0.1),
+        pytest.param(UP, 0.45, 0.0, 0.0, marks=pytest.mark.slow),
+        pytest.param(UP, 0.7, 25.0, -0.1, marks=pytest.mark.slow),
+        pytest.param(UP, 0.75, -15.0, 0.1, marks=pytest.mark.slow),
         (UP, 0.7, -30.0, 0.0),
-        (DOWN, 0.5, 15.0, 0.0),
-        (DOWN, 0.6, -20.0, 0.1),
-        (DOWN, 0.75, -10.0, 0.0),
+        pytest.param(DOWN, 0.5, 15.0, 0.0, marks=pytest.mark.slow),
+        pytest.param(DOWN, 0.6, -20.0, 0.1, marks=pytest.mark.slow),
+        pytest.param(DOWN, 0.75, -10.0, 0.0, marks=pytest.mark.slow),
         (DOWN, 0.7, 20.0, 0.3),
     ],
 )
@@ -220,6 +220,7 @@ async def test_a_step_that_is_lost_on_the_way(stand: Make) -> None:
     assert dog.world.truth.pose_of("a").distance_to(Pose(2.0, 2.0)) < 0.3
 
 
+@pytest.mark.slow  # in short: test_a_step_that_is_lost_on_the_way
 async def test_held_fast_it_gives_up_in_time(stand: Make) -> None:
     dog = await stand()
     await dog.put(0.75, 15.0, 0.0)

@@ -13,17 +13,13 @@ from typing import Any
 from urllib.error import HTTPError
 from urllib.request import Request, urlopen
 
-import av
-import numpy as np
 import pytest
 
 from roboglot.config import ConsoleConfig, RobotConfig, load_config, with_addresses
-from roboglot.model.components.interaction.speaker import Speaker
 from roboglot.model.components.mapping.map_library import MapLibrary
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.components.system.lease import Lease
-from roboglot.model.sound import SAMPLE_RATE, Sound
 from roboglot.recording.reader import read_recording
 from roboglot.runtime import Runtime
 from tests.browser.served import ADDRESS, OpenConsole, Page, Served
@@ -31,9 +27,6 @@ from tests.browser.served import PAGE_PATIENCE as PATIENCE
 from tests.browser.served import until as until_page
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
-PITCH = 1000  # Hz
-SHOWS_PICTURES = """() => document.querySelector('.screen video')?.videoWidth > 0
-    || document.querySelector('.screen img')?.naturalWidth > 0"""
 
 
 LABELS = "found => found.map((one) => one.getAttribute('aria-label') ?? one.innerText)"
@@ -44,20 +37,6 @@ async def until(condition: Callable[[], bool]) -> None:
     async with asyncio.timeout(PATIENCE / 1000):
         while not condition():  # noqa: ASYNC110 - a page has no event of ours
             await asyncio.sleep(0.02)
-
-
-def heard_in(film: Path) -> bool:
-    """Return whether a film has pictures, and somewhere the tone."""
-    with av.open(str(film)) as file:
-        assert next(file.decode(video=0)).width > 0
-    with av.open(str(film)) as file:
-        for frame in file.decode(audio=0):
-            samples = frame.to_ndarray().reshape(-1).astype(float)
-            spectrum = np.abs(np.fft.rfft(samples))
-            loudest = np.fft.rfftfreq(len(samples), 1 / frame.sample_rate)[spectrum.argmax()]
-            if samples.any() and abs(loudest - PITCH) < PITCH / 10:
-                return True
-    return False
 
 
 def speed_of(served: Served) -> float:
@@ -174,6 +153,7 @@ def rest(served: Served, x: float) -> tuple[int, str]:
         return error.code, error.read().decode()
 
 
+@pytest.mark.slow  # long; tests/protocols/test_lease_desk.py has the rules
 async def test_two_browsers_and_rest_client_contend_for_control(served: Served, open_console: OpenConsole) -> None:
     anna, ben = await open_console("anna"), await open_console("ben")
     await anna.click("text=Take control")
@@ -366,32 +346,3 @@ async def test_saved_map_is_seen_in_the_grid(served: Served, open_console: OpenC
     async with asyncio.timeout(PATIENCE / 1000):
         while not await page.evaluate("document.querySelector('.thumbnail')?.naturalWidth > 0"):  # noqa: ASYNC110
             await asyncio.sleep(0.05)
-
-
-async def test_camera_shows_pictures_and_what_is_in_them(served: Served, open_console: OpenConsole) -> None:
-    page = await open_console()
-    await page.click("#tab-drive")
-    wave = 8000 * np.sin(2 * np.pi * PITCH / SAMPLE_RATE * np.arange(60 * SAMPLE_RATE))
-    served.robot[Speaker].play(Sound("tone", wave.astype(np.int16)))
-    await page.click("text=Show the camera")
-    async with asyncio.timeout(2 * PATIENCE / 1000):
-        while not await page.evaluate(SHOWS_PICTURES):
-            await served.clock.advance(0.1)
-            await asyncio.sleep(0.05)
-    async with asyncio.timeout(2 * PATIENCE / 1000):
-        while not await page.locator("text=Sound").count():
-            await served.clock.advance(0.1)
-            await asyncio.sleep(0.05)
-    await page.click("text=Sound")  # by a call or by motion JPEG: browsers make no calls over loopback alone
-    await until_page(page, "!document.querySelector('.screen video, .screen audio').muted")
-    async with asyncio.timeout(2 * PATIENCE / 1000):
-        await page.click("text=Film")
-        while not await page.evaluate("document.querySelector('.film').dataset.filmed > 60_000"):
-            await served.clock.advance(0.1)
-            await asyncio.sleep(0.05)
-    async with page.expect_download() as saved:
-        await page.click("text=End the film")
-    film = await (await saved.value).path()
-    assert await asyncio.to_thread(heard_in, film)
-    await page.click("text=Close the camera")
-    await page.wait_for_selector(".screen", state="detached")

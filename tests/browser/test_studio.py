@@ -221,7 +221,8 @@ async def test_python_opens_as_text_with_the_checkers_words(studio: Open) -> Non
     assert page.errors == []
 
 
-@pytest.mark.parametrize("theme", ["dark", pytest.param("light", marks=pytest.mark.slow)])
+@pytest.mark.slow  # long; the console's: test_layout.py
+@pytest.mark.parametrize("theme", ["dark", "light"])
 async def test_no_serious_finding_of_axe(studio: Open, theme: str) -> None:
     page = await loaded(await studio(theme=theme), COUNTING)
     await page.evaluate(AXE)

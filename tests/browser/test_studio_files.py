@@ -65,6 +65,7 @@ async def comes_back(page: Page, wanted: str) -> None:
     assert await page.evaluate("[studio.editor.code.value, JSON.stringify(studio.editor.save())]") == [code, state]
 
 
+@pytest.mark.slow  # long; test_program_of_blocks_comes_back_from_its_file is near
 async def test_files_without_a_program_are_refused(studio: Open) -> None:
     page = await loaded(await studio(), COUNTING)
     before = await page.evaluate("[studio.program.value.id, studio.editor.code.value]")

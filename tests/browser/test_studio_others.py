@@ -57,6 +57,7 @@ async def test_line_of_the_lit_block_stays_marked(studio: Open) -> None:
     assert page.errors == []
 
 
+@pytest.mark.slow  # in every look; in one: test_studio.py
 async def test_values_fit_in_bubbles_in_every_look(studio: Open) -> None:
     named = json.dumps(COUNTING).replace('"name": "n"', '"name": "distance of the wall"')
     page = await loaded(await studio(), json.loads(named))

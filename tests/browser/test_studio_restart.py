@@ -76,6 +76,7 @@ async def server(tmp_path: Path) -> AsyncIterator[tuple[str, Life]]:
     give_back([address])
 
 
+@pytest.mark.slow  # starts a server cold, twice; tests/protocols/visual/test_killed_runs.py
 async def test_a_killed_server_gives_the_program_back(server: tuple[str, Life], browser: Any) -> None:
     url, start = server
     first = await start()

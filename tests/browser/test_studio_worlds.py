@@ -66,6 +66,7 @@ async def joins(page: Page, code: str, name: str) -> None:
         await asyncio.sleep(0.05)
 
 
+@pytest.mark.slow  # long; a class: test_studio_class.py
 async def test_two_pupils_in_worlds_of_their_own(browser: Any, worlds: list[Shown]) -> None:
     first, second = worlds
     async with pages(browser, first.url, first.url, first.url) as (teacher, anna, ben):

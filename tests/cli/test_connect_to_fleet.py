@@ -24,6 +24,7 @@ from roboglot.storage import whereabouts
 from roboglot.storage.homes import Homes
 from roboglot.storage.opening import open_registry, read_registry
 from tests.access.matrix import WORKER
+from tests.narrowing import known
 from tests.storage.postgresql_server import PostgreSQLServer, binary_folder, needs_postgresql, postgresql_server
 
 HERE, HOMES = f"127.0.98.{1 + WORKER}", (f"127.0.99.{1 + WORKER}", f"127.0.100.{1 + WORKER}")
@@ -107,8 +108,11 @@ async def test_client_follows_its_robot_to_the_next_program(tmp_path: Path) -> N
 async def test_client_leaves_a_program_that_lost_its_robot(tmp_path: Path) -> None:
     """The old one lives on, cut off from the registry, and its tunnel too."""
     registry, client = str(tmp_path / "registry.db"), Client()
-    async with program(tmp_path / "one", registry, HOMES[0]) as (_, token), client.connected(registry, token):
+    async with program(tmp_path / "one", registry, HOMES[0]) as (old, token), client.connected(registry, token):
         await client.readies.get()
+        renewals = known(old._residence)._keeping[0]
+        renewals.cancel()  # it would take its robot back within half a second
+        await asyncio.wait([renewals])
         same_people(tmp_path / "one", tmp_path / "two")
         database = open_registry(registry)
         homes = Homes(database)

@@ -59,10 +59,10 @@ async def fleet_of_one() -> AsyncIterator[Fleet]:
 async def test_compiled_kernels_are_remembered(cache: Path) -> None:
     assert missing() == list(MODULES)
     seen: list[tuple[str, int, int]] = []
-    compile_ahead(["smoothing", "relocation"], lambda *progress: seen.append(progress))
-    assert {name for name, _, _ in seen} == {"smoothing", "relocation"}
+    compile_ahead(["smoothing", "linear"], lambda *progress: seen.append(progress))
+    assert {name for name, _, _ in seen} == {"smoothing", "linear"}
     assert [(done, total) for _, done, total in seen] == [(1, 2), (2, 2)]
-    assert set(missing()) == set(MODULES) - {"smoothing", "relocation"}
+    assert set(missing()) == set(MODULES) - {"smoothing", "linear"}
     await compile_beside(["smoothing"], lambda *_progress: pytest.fail("it is compiled already"))
 
 

@@ -199,9 +199,9 @@ CASES = {
 
 @pytest.mark.parametrize(
     "name",
-    [  # one example in three; the others are slow
+    [  # one example in five; the others are slow
         pytest.param(
-            name, marks=[pytest.mark.world(case.world, body="cyberdog2"), *([pytest.mark.slow] if n % 3 else [])]
+            name, marks=[pytest.mark.world(case.world, body="cyberdog2"), *([pytest.mark.slow] if n % 5 else [])]
         )
         for n, (name, case) in enumerate(CASES.items())
     ],

@@ -59,6 +59,7 @@ async def test_a_text_client_hangs_up_while_it_drives(tmp_path: Path) -> None:
     assert ways(await identical(tmp_path))[:2] == ["robomaster came", "robomaster gone"]
 
 
+@pytest.mark.slow  # like test_a_text_client_hangs_up_while_it_drives
 async def test_foxglove_drives_and_hangs_up(tmp_path: Path) -> None:
     wish = {"linear": {"x": 0.3, "y": 0, "z": 0}, "angular": {"x": 0, "y": 0, "z": 0.2}}
     async with begun(tmp_path, foxglove={"enabled": True}) as session:
@@ -96,6 +97,7 @@ async def test_foxglove_drives_and_hangs_up(tmp_path: Path) -> None:
     assert len(recording.of(door="foxglove")) == 12
 
 
+@pytest.mark.slow  # like test_a_text_client_hangs_up_while_it_drives
 async def test_ros2_drives(tmp_path: Path) -> None:
     pytest.importorskip("zenoh", reason="needs roboglot[ros2]")
     rosbags = pytest.importorskip("rosbags.typesys", reason="needs roboglot[ros2]")
@@ -134,6 +136,7 @@ async def test_an_app_calls_off_what_it_asked(tmp_path: Path) -> None:
     assert "cyberdog called off" in ways(await identical(tmp_path))
 
 
+@pytest.mark.slow  # like test_a_text_client_hangs_up_while_it_drives
 async def test_a_front_end_hangs_up_and_comes_again(tmp_path: Path) -> None:
     source = "cyberdog.task.block('one')\ntime.sleep(2)\ncyberdog.task.block('two')\n"
     async with begun(tmp_path) as session:
@@ -148,6 +151,7 @@ async def test_a_front_end_hangs_up_and_comes_again(tmp_path: Path) -> None:
     assert ways(await identical(tmp_path)).count("visual gone") == 3
 
 
+@pytest.mark.slow  # like test_an_app_calls_off_what_it_asked
 async def test_a_teacher_stops_and_locks(tmp_path: Path) -> None:
     source = "for n in range(99):\n    cyberdog.task.block('b%d' % n)\n    time.sleep(0.3)\n"
     async with begun(tmp_path) as session:

@@ -64,7 +64,8 @@ def test_an_unknown_preset_is_refused_in_words() -> None:
         )
 
 
-@pytest.mark.parametrize("body", ["hermes+hard", pytest.param("universal+hard", marks=pytest.mark.slow)])
+@pytest.mark.slow  # with usual sensors: tests/autonomy/navigation/test_navigation.py
+@pytest.mark.parametrize("body", ["hermes+hard", "universal+hard"])
 async def test_goals_on_hard_days_are_reached_doubling_tolerance(body: str) -> None:
     clock, database = LockstepClock(), Database(":memory:")
     fleet = build_fleet("office", [RobotConfig(body=body)], clock=clock, seed=2, database=database)

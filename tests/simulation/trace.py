@@ -45,12 +45,12 @@ async def trace(seed: int, seconds: int) -> list[str]:
     digests = list[str]()
     for second in range(seconds):
         await clock.advance(1.0)
-        if second == 5:
+        if second == 3:
             robots["b"][Legs].lie_down()
             world.hands.add_obstacle(Pose(21.0, 10.5))
             world.faults.inject("lost_localization", "c")
             robots["c"][LiftClient].call(1)
-        if second == 15:
+        if second == 8:
             digest.update(known(robots["c"][DepthCamera].image).points.tobytes())
         for name, robot in robots.items():
             digest.update(struct.pack("3d", *pose(world.truth.pose_of(name))))

@@ -74,7 +74,7 @@ async def test_robot_whose_neighbours_move_along_believes_its_wheels() -> None:
     ("body", "other"),
     [
         ("hermes", "hermes"),
-        ("cyberdog2", "robomaster_ep"),
+        pytest.param("cyberdog2", "robomaster_ep", marks=pytest.mark.slow),
         pytest.param("hermes", "cyberdog2", marks=pytest.mark.slow),
         pytest.param("hermes", "robomaster_ep", marks=pytest.mark.slow),
     ],

@@ -30,6 +30,7 @@ async def test_where_it_got_in_it_gets_out(tour: Tour) -> None:
         assert action.status is ActionStatus.SUCCEEDED, (spot, action.reason)
 
 
+@pytest.mark.slow  # in short: test_where_it_got_in_it_gets_out
 @pytest.mark.world(NARROW, seed=2)
 async def test_it_gets_through_at_a_slant(tour: Tour) -> None:
     await tour.clock.advance(1.5)
@@ -41,6 +42,7 @@ async def test_it_gets_through_at_a_slant(tour: Tour) -> None:
     assert not tour.bumps
 
 
+@pytest.mark.slow  # half a minute; test_too_wide_robot_reports_the_door_width
 @pytest.mark.world(WIDE)
 async def test_too_narrow_gap_ends_drive_and_is_reported(tour: Tour) -> None:
     """The map has a door of 0.9 m; two boxes that stand in it when the robot is close leave 0.48 m."""

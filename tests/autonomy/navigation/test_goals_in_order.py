@@ -91,7 +91,7 @@ def _reached(now: Twist, asked: Twist, limits: BaseLimits) -> Twist:
 
 @pytest.mark.parametrize(
     "spots",
-    [THERE_AND_BACK, hard_lists(1), pytest.param(hard_lists(2), marks=pytest.mark.slow)],
+    [THERE_AND_BACK, *(pytest.param(hard_lists(seed), marks=pytest.mark.slow) for seed in (1, 2))],
     ids=["and back", "1", "2"],
 )
 @pytest.mark.parametrize(

@@ -33,6 +33,7 @@ async def test_goals_and_dock_are_met_with_bad_sensors(tour: Tour) -> None:
     assert tour.truth.distance_to(tour.start) < OFF
 
 
+@pytest.mark.slow  # with good ones: tests/autonomy/test_following.py
 @pytest.mark.world(WALKER, body=BODY)
 async def test_a_person_is_followed_with_bad_sensors(tour: Tour) -> None:
     action, gaps = tour.robot[Following].follow(distance=1.2), []

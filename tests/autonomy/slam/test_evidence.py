@@ -18,7 +18,7 @@ from roboglot.model.sensing import LaserScan
 places = st.floats(-300.0, 300.0)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(st.lists(st.tuples(places, places, places, places), min_size=1, max_size=4))
 def test_growing_keeps_cells_in_place_and_stays_bounded(rectangles: list[tuple[float, ...]]) -> None:
     grid = EvidenceGrid()

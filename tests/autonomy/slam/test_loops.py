@@ -43,7 +43,8 @@ def short_sighted(folder: Path) -> str:
     return str(path)
 
 
-@pytest.mark.parametrize("closing", [True, pytest.param(False, marks=pytest.mark.slow)])
+@pytest.mark.slow  # the loop alone: test_given_map_stays_and_additions_are_straightened
+@pytest.mark.parametrize("closing", [True, False])
 async def test_a_loop_is_closed_and_the_map_straightened(tmp_path: Path, closing: bool) -> None:
     clock, database = LockstepClock(), Database(":memory:")
     robots = [RobotConfig(body=short_sighted(tmp_path))]

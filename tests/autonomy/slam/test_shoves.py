@@ -72,7 +72,7 @@ async def test_move_with_a_shove_does_not_succeed(tour: Tour) -> None:
 
 
 @pytest.mark.world("office")
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 async def test_driving_and_turning_are_no_shoves(tour: Tour, seed: int) -> None:
     shoves = tour.robot.events.subscribe(RobotDisplaced)
     for spot in ((20.0, 10.0), (12.0, 10.0 + seed), (20.0, 10.0)):

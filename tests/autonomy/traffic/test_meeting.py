@@ -31,6 +31,7 @@ async def test_two_pass_a_corridor_for_one(building: OccupancyGrid, bodies: tupl
     assert outcome.failures == []
 
 
+@pytest.mark.slow  # in short: test_two_pass_a_corridor_for_one
 @pytest.mark.asyncio(loop_scope="module")
 async def test_who_stands_in_a_door_lets_others_out(building: OccupancyGrid) -> None:
     """Two want out of the room with one door; the third, who goes second, is on its way in."""

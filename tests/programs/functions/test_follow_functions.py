@@ -79,6 +79,7 @@ async def test_who_takes_over_ends_it(caller: Caller, anna: Actor) -> None:
     assert [action.source for action in caller.robot.actions.running()] == ["someone"]
 
 
+@pytest.mark.slow  # in short: test_it_walks_after_member_and_keeps_its_distance
 async def test_it_goes_around_what_stands_between(caller: Caller, world: World, anna: Actor) -> None:
     world.hands.add_obstacle(Pose(3.2, 6.58), (0.2, 0.2, 1.0))  # standing aside to see her, and moving on
     await caller("cyberdog.follow.add_personnel", "Anna")

@@ -38,6 +38,7 @@ WITH_PEOPLE = [
 ]
 WITH_MAP = [name for name in EXAMPLES if name.startswith("cyberdog.navigation.")]
 OTHERS = sorted(set(EXAMPLES) - set(WITH_PEOPLE) - set(WITH_MAP) - set(MOTIONS))
+HALVES = [0, pytest.param(1, marks=pytest.mark.slow)]
 HAPPENINGS: dict[str, Callable[[World], object]] = {
     "": lambda _world: None,
     "somebody holds a thumb up": lambda world: world.hands.person("anna").gesture(Gesture.THUMB_UP, seconds=3),
@@ -90,25 +91,27 @@ def test_every_function_has_an_example_that_uses_it() -> None:
 
 
 @pytest.mark.world("empty", body="cyberdog2")
-@pytest.mark.parametrize("part", [0, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("part", [0, *(pytest.param(part, marks=pytest.mark.slow) for part in (1, 2, 3))])
 async def test_examples_of_motions(player: Player, part: int, monkeypatch: pytest.MonkeyPatch) -> None:
     for motion, spec in MOTION_SPECS.items():
         if not spec.jumps:
             monkeypatch.setitem(cast(dict[Motion, MotionSpec], MOTION_SPECS), motion, replace(spec, duration=FIGURE))
-    for name in MOTIONS[part::2]:
+    for name in MOTIONS[part::4]:
         await player.stand_at(5.0, 5.0)
         await player.play(name, EXAMPLES[name])
 
 
 @pytest.mark.world("empty", body="cyberdog2")
-async def test_examples_of_what_needs_no_one(player: Player) -> None:
-    for name in sorted(OTHERS, key=lambda name: name != "cyberdog.touch.data"):  # before the first touch
+@pytest.mark.parametrize("part", HALVES)
+async def test_examples_of_what_needs_no_one(player: Player, part: int) -> None:
+    for name in sorted(OTHERS[part::2], key=lambda name: name != "cyberdog.touch.data"):  # before the first touch
         await player.stand_at(5.0, 5.0)
         await player.play(name, EXAMPLES[name])
 
 
 @pytest.mark.world("playground", body="cyberdog2")
-async def test_examples_with_people(player: Player, world: World) -> None:
+@pytest.mark.parametrize("part", HALVES)
+async def test_examples_with_people(player: Player, world: World, part: int) -> None:
     anna, ben = world.hands.person("anna"), world.hands.person("ben")
     ben.stand()
     ben.place(1.0, 7.5, 90)
@@ -117,7 +120,7 @@ async def test_examples_with_people(player: Player, world: World) -> None:
         await player.robot[Members].add(name)
         await player.robot[Members].set_face(name, person.face)
         await player.robot[Members].set_voice(name, person.voice)
-    for name in WITH_PEOPLE:
+    for name in WITH_PEOPLE[part::2]:
         anna.stand()
         anna.place(5.5, 5.0, 180)
         await player.stand_at(2.0, 5.0)

@@ -236,10 +236,10 @@ async def test_a_closed_door_is_closed(bare: Robot) -> None:
 
 async def test_many_requests_at_once_lose_none(bare_client: httpx.AsyncClient) -> None:
     replies = await asyncio.gather(
-        *(bare_client.post(POIS, json={"id": f"p{i}", "pose": {"x": i, "y": 0}}) for i in range(200))
+        *(bare_client.post(POIS, json={"id": f"p{i}", "pose": {"x": i, "y": 0}}) for i in range(100))
     )
     assert {reply.status_code for reply in replies} == {200}
-    assert len((await bare_client.get(POIS)).json()) == 200
+    assert len((await bare_client.get(POIS)).json()) == 100
 
 
 KEYS = st.sampled_from(["id", "pose", "x", "y", "yaw", "metadata", "action_name", "options", "enable"])

@@ -79,7 +79,7 @@ async def test_strict_tracks_are_kept_to(client: httpx.AsyncClient, forward: For
     await forward(seconds=2)
 
 
-@pytest.mark.parametrize("flag", [True, False])
+@pytest.mark.parametrize("flag", [True, pytest.param(False, marks=pytest.mark.slow)])
 async def test_person_in_way_is_waited_for_or_passed(
     client: httpx.AsyncClient, world: World, forward: Forward, flag: bool
 ) -> None:

@@ -38,6 +38,7 @@ def dog(simulate):
     return sim
 
 
+@pytest.mark.slow  # one each: tests/protocols/cyberdog/motion/test_figures.py
 async def test_all_jumps_and_walks_end_where_table_says(tmp_path):
     """Run all at once, a robot for each, side by side in an open field, without costly sensors."""
     text = (BODIES / "cyberdog2.toml").read_text()

@@ -60,6 +60,15 @@ async def test_faces_are_renamed_and_deleted(client, app, robot, anna, passing) 
     assert await client.ask(7001, {"command": 77}) == {"result": 5910}
 
 
+async def test_no_one_is_recognised_there(client, app, robot, anna, world, passing) -> None:
+    world.hands.place("a", Pose(1.0, 1.0, 3.14))  # facing a wall
+    await robot[Members].set_face("anna", anna.face)
+    assert await client.ask(7002, {"command": 0, "timeout": 2}) == {"result": 0}
+    await passing(lambda: app.of(7004))
+    assert app.of(7004)[0]["result"] == 5907
+
+
+@pytest.mark.slow  # minutes; in short: test_no_one_is_recognised_there
 async def test_no_one_there(client, app, robot, anna, world, passing, forward) -> None:
     world.hands.place("a", Pose(1.0, 1.0, 3.14))  # facing a wall
     assert await client.ask(7001, {"command": 1}) == {"result": 5903}

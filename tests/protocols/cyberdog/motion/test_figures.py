@@ -34,10 +34,10 @@ async def middle(world, robot, forward):
     [
         (130, Pose(0.0, 0.0, math.pi / 2), 1.5),
         (133, Pose(0.3), 1.5),
-        (134, Pose(0.0, 0.2), 1.5),
-        (121, Pose(-0.3), 8.0),
-        (143, Pose(), 2.5),
-        (141, Pose(), 7.5),
+        pytest.param(134, Pose(0.0, 0.2), 1.5, marks=pytest.mark.slow),
+        pytest.param(121, Pose(-0.3), 8.0, marks=pytest.mark.slow),
+        pytest.param(143, Pose(), 2.5, marks=pytest.mark.slow),
+        pytest.param(141, Pose(), 7.5, marks=pytest.mark.slow),
         (506, Pose(-0.45), 1.9),
     ],
 )

@@ -178,7 +178,7 @@ async def test_one_motion_at_a_time(client, robot, world, forward) -> None:
     assert (await lying)["code"] == 0
 
 
-@pytest.mark.parametrize("pause", [0.0, 0.1, 0.25])
+@pytest.mark.parametrize("pause", [0.1, *(pytest.param(pause, marks=pytest.mark.slow) for pause in (0.0, 0.25))])
 @pytest.mark.parametrize("then", [{"motion_id": 111}, {"motion_id": 101}, {"motion_id": 211, "duration": 300}])
 async def test_a_motion_follows_own_servo_at_once(client, robot, world, forward, then, pause) -> None:
     for _ in range(8):

@@ -199,7 +199,10 @@ async def test_someone_takes_the_dog_up(client, robot, world, forward) -> None:
 
 
 @pytest.mark.world(str(Path(__file__).parent / "sill.toml"), body="cyberdog2")
-@pytest.mark.parametrize(("number", "over"), [(340, False), (343, True), (344, True), (345, True)])
+@pytest.mark.parametrize(
+    ("number", "over"),
+    [(340, False), (343, True), *(pytest.param(n, True, marks=pytest.mark.slow) for n in (344, 345))],
+)
 async def test_foresighted_walks_lift_feet_over_obstacles(
     client, robot, world, forward, number: int, over: bool
 ) -> None:

@@ -153,7 +153,7 @@ async def test_order_goes_on_after_a_corrected_pose(
 @pytest.mark.parametrize(
     ("language", "word"),
     [
-        (None, "您的物品到了"),
+        pytest.param(None, "您的物品到了", marks=pytest.mark.slow),
         ("en-US", "I am here"),
         pytest.param("zh-TW", "到了", marks=pytest.mark.slow),
     ],

@@ -27,7 +27,7 @@ def crossing(seed: int) -> list[tuple[float, float]]:
     ("name", "spots"),
     [
         ("SeriesMoveToAction", THERE_AND_BACK),
-        ("FollowPathPointsAction", crossing(2)),
+        pytest.param("FollowPathPointsAction", crossing(2), marks=pytest.mark.slow),
     ],
 )
 @pytest.mark.world("empty", body="hermes")

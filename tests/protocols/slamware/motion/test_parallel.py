@@ -25,6 +25,7 @@ def sockets() -> Iterator[None]:
     resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
 
 
+@pytest.mark.slow  # a hundred: tests/protocols/slamware/test_http.py
 async def test_two_thousand_requests_at_once_lose_none(bare_door: SlamwareDoor, bare_client: httpx.AsyncClient) -> None:
     everybody = asyncio.Barrier(CLIENTS)
 

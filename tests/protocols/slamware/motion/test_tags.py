@@ -38,8 +38,15 @@ def before(tag: Pose, away: float, aside: float, origin: Pose) -> dict[str, floa
     return {"x": pose.x, "y": pose.y, "yaw": pose.yaw}
 
 
-@pytest.mark.parametrize(("kind", "tag", "more"), [(0, TAG, {"tag_ids": [4]}), (2, STRIPS, {"reflect_tag_num": 2})])
-@pytest.mark.parametrize("backwards", [False, True])
+@pytest.mark.parametrize(
+    ("kind", "tag", "more", "backwards"),
+    [
+        (0, TAG, {"tag_ids": [4]}, False),
+        (2, STRIPS, {"reflect_tag_num": 2}, True),
+        pytest.param(0, TAG, {"tag_ids": [4]}, True, marks=pytest.mark.slow),
+        pytest.param(2, STRIPS, {"reflect_tag_num": 2}, False, marks=pytest.mark.slow),
+    ],
+)
 async def test_up_to_it_and_away_again(
     client: httpx.AsyncClient, world: World, forward: Forward, kind: int, tag: Pose, more: object, backwards: bool
 ) -> None:
@@ -75,6 +82,7 @@ async def test_another_tag_is_not_taken_for_it(client: httpx.AsyncClient, world:
 MARKS = str(Path(__file__).parents[3] / "autonomy" / "worlds" / "marks.toml")
 
 
+@pytest.mark.slow  # from a place: test_from_a_place_by_its_name
 @pytest.mark.world(MARKS, body="hermes")
 async def test_board_that_the_lidar_knows_by_its_shape(
     client: httpx.AsyncClient, world: World, forward: Forward
