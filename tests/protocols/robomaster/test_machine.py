@@ -281,7 +281,7 @@ class Machine(RuleBasedStateMachine):
 
 
 PHASES = (Phase.explicit, Phase.reuse, Phase.generate)  # shrinking would take minutes
-Machine.TestCase.settings = settings(max_examples=12, stateful_step_count=50, deadline=None, phases=PHASES)
+Machine.TestCase.settings = settings(max_examples=6, stateful_step_count=50, deadline=None, phases=PHASES)
 TestMachine = Machine.TestCase
 
 

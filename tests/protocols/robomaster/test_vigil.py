@@ -29,9 +29,10 @@ def network() -> None:
         pytest.skip(f"a network of one's own is not permitted here: {trial.stderr.decode().strip()}")
 
 
+@pytest.mark.slow  # in real time, on a network of its own; the rules are below
 @pytest.mark.parametrize(
     ("groups", "ordered", "stopped"),
-    [("0 0", 0.5, 0.6), pytest.param("", 1.6, 1.7, marks=pytest.mark.slow)],
+    [("0 0", 0.5, 0.6), ("", 1.6, 1.7)],
     ids=["with echoes", "without"],
 )
 def test_the_robot_stops_when_the_cable_is_cut(network: None, groups: str, ordered: float, stopped: float) -> None:

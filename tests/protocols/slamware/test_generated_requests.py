@@ -16,7 +16,7 @@ from roboglot.testing import Forward
 from tests.protocols.slamware.generated import SILENCING, Generator, tell
 
 COUNT = 3000  # ten of each operation; run by hand, generated.py makes any number
-QUICK = 400  # one of each, and more
+QUICK = 900  # three of each
 TRIES_MAX = 200  # of 50 ms of robot time each: longer means that it hangs
 
 

@@ -94,7 +94,7 @@ class Stage:
     def _floor(self, number: int) -> tuple[Plan, Mesh, Ground]:
         if number not in self._floors:
             world, floor, elevation = self._world, self._world.floors[number], self._world.elevation(number)
-            solids = list(solids_of(floor, world.lift, lift_here=False))
+            solids = solids_of(floor, world.lift, lift_here=False)
             plan = plan_of(floor, solids)
             still = [solid for solid in solids if solid.kind in (Kind.WALL, Kind.FURNITURE)]
             mesh = joined(interior(floor, still, plan, self._masks)).placed(0.0, 0.0, elevation, 0.0)

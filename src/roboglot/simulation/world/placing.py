@@ -51,7 +51,7 @@ class Places:
     reserved: Sequence[tuple[Pose, int, float]] = ()  # for robots with a configured place; others stay away
     _taken: list[tuple[Pose, int, float]] = field(default_factory=list)  # with the robots' radii
     _crowded: set[int] = field(default_factory=set)  # floors without good places
-    _solids: dict[int, list[Solid]] = field(default_factory=dict)
+    _solids: dict[int, tuple[Solid, ...]] = field(default_factory=dict)
     _searches: dict[tuple[int, float, Pose], _Search] = field(default_factory=dict)
     _rooms: dict[int, Rooms] = field(default_factory=dict)
     _spots: dict[tuple[int, float, int, float], Iterator[Pose]] = field(default_factory=dict)
@@ -188,7 +188,7 @@ class Places:
         if any(number == floor and pose.distance_to(other) < radius + r for other, number, r in self._taken):
             return False
         if floor not in self._solids:
-            self._solids[floor] = list(solids_of(storey, self.world.lift, lift_here=False))
+            self._solids[floor] = solids_of(storey, self.world.lift, lift_here=False)
         return all(_distance(pose, solid) >= radius for solid in self._solids[floor])
 
 

@@ -62,6 +62,7 @@ async def test_faces_are_renamed_and_deleted(client, app, robot, anna, passing) 
 
 async def test_no_one_is_recognised_there(client, app, robot, anna, world, passing) -> None:
     world.hands.place("a", Pose(1.0, 1.0, 3.14))  # facing a wall
+    await robot[Members].add("anna")
     await robot[Members].set_face("anna", anna.face)
     assert await client.ask(7002, {"command": 0, "timeout": 2}) == {"result": 0}
     await passing(lambda: app.of(7004))
