@@ -9,7 +9,7 @@ PROJECT = Path(__file__).parents[2]
 
 
 async def digests(seed: int, hash_seed: str, seconds: int) -> list[bytes]:
-    """What the robots sensed until each second."""
+    """Return what the robots sensed until each second."""
     process = await asyncio.create_subprocess_exec(
         sys.executable,
         "-m",
