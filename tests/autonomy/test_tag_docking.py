@@ -87,7 +87,7 @@ async def test_a_shelf_is_lifted_and_set_down(tour):
     assert off(tour, Pose(6.3, 6.0, 0.0))[0] < 0.05
 
 
-@pytest.mark.slow  # over the wire: tests/protocols/slamware/motion/test_tags.py
+@pytest.mark.slow  # the shelf itself: test_a_shelf_is_lifted_and_set_down
 @pytest.mark.world(WORLD, body="hermes")
 async def test_a_part_of_the_hull_stays_outside(tour):
     await dock(tour, MarkGoal(mark=Mark.SHELF, start=start(tour, 5.6, 6.0, 0), outside=0.2))

@@ -108,6 +108,7 @@ def test_garbage_at_every_door_harms_no_one(pair: ServedRobot) -> None:
         kept.close()
 
 
+@pytest.mark.slow  # three thousand requests
 def test_memory_does_not_grow_with_requests(pair: ServedRobot) -> None:
     assert wait_for(lambda: get("/api/core/slam/v1/knownarea")["width"] > 0)  # everything is loaded
     for _ in range(1500):  # one-off late loading does not count

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from roboglot.model.claps import ClapCounter
@@ -22,6 +22,7 @@ def played(*parts, noise=33.0):
     return (whole + np.random.default_rng(1).standard_normal(len(whole)) * noise).astype(np.int16)
 
 
+@settings(max_examples=30)
 @given(count=st.integers(1, 4), late=st.integers(0, 2 * BLOCK), distance=st.floats(1.0, 15.0))
 def test_any_run_is_counted_wherever_blocks_are_cut(count, late, distance):
     quiet = np.zeros(SAMPLE_RATE // 2 + late)

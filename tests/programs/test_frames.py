@@ -76,7 +76,7 @@ def test_any_body_is_a_message_or_a_violation(body: bytes) -> None:
         st.sampled_from(["t", "id", "name", "args", "kwargs", "text", "x"]), JSON | st.just("call"), max_size=6
     )
 )
-@settings(max_examples=200)
+@settings(max_examples=100)
 def test_any_object_is_a_message_or_a_violation(content: dict[str, Any]) -> None:
     try:
         message = decode(json.dumps(content).encode())

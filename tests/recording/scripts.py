@@ -113,6 +113,7 @@ SCRIPTS = {
         for door in (REST, TEXT, DOG)
         for tool in ("sh", "python", "js", "go")
     },
+    f"first-{DOG}-sh": first(DOG, "sh"),
     "first-visual-sh": first(FRAMES, "sh").later,
     "first-visual-python": first(FRAMES, "python").later,
     "first-visual-js": first(FRAMES, "js").later,
@@ -130,7 +131,7 @@ SCRIPTS = {
         body="robomaster_ep",
     ).later,
     "dog-goes": asks("10001", "6004 '{\"type\": 7}'", '6004 \'{"type": 1, "goalX": 0.6, "goalY": 0.1}\'').later,
-    "dog-answers": asks("1012 '{\"volume\": 30}'", "5006", "99999"),
+    "dog-answers": asks("1012 '{\"volume\": 30}'", "5006", "99999").later,
     "dog-client": Script(
         DOG,
         [CERTIFICATES],

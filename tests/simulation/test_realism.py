@@ -42,6 +42,7 @@ async def circled(body: str) -> tuple[float, float, list[tuple[float, float]]]:
     return off, float(np.mean(unknown)), trace
 
 
+@pytest.mark.slow  # the hard one: test_black_furniture_answers_from_near_touching_lidar_unknown
 async def test_the_presets_differ_as_they_should() -> None:
     clean, usual, hard = [await circled(f"hermes{preset}") for preset in ("+clean", "+usual", "+hard")]
     assert clean[0] < 0.03

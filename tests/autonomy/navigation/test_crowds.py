@@ -46,6 +46,7 @@ async def test_no_robot_of_a_convoy_believes_to_stand(seed: int) -> None:
     assert not outcome.false_successes
 
 
+@pytest.mark.slow  # with fewer: test_nothing_that_stands_is_shoved
 async def test_robot_whose_neighbours_move_along_believes_its_wheels() -> None:
     """Between two bare walls most echoes come from robots that drive as fast, and suggest that it stands."""
     clock, database = LockstepClock(), Database(":memory:")

@@ -144,6 +144,7 @@ def test_people_who_stand_side_by_side_count_each(wide: float, count: int | None
     assert [_count(row, thing) for thing in _things(row, np.arange(100))] == ([] if count is None else [count])
 
 
+@pytest.mark.slow  # the rule: test_places_are_ruled_out_by_expected_positions
 @pytest.mark.world(LONG_CORRIDOR)
 async def test_robot_looks_around_until_one_place_is_left(tour: Tour) -> None:
     await tour.go((tour.start.x + 25.0, tour.start.y))

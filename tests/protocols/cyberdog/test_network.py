@@ -109,9 +109,8 @@ async def test_silence_while_mapping(afar: Afar, robot: Robot) -> None:
     assert list(await robot[MapLibrary].names()) == ["home"]
 
 
-@pytest.mark.parametrize(
-    "slow", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["soon", "written after the app is back"]
-)
+@pytest.mark.slow  # in short: test_silence_during_an_update
+@pytest.mark.parametrize("slow", [False, True], ids=["soon", "written after the app is back"])
 async def test_silence_while_a_file_is_sent(
     afar: Afar, robot: Robot, slow: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -131,6 +131,7 @@ async def test_the_network_goes_during_a_download(dog):
     assert "network" in firmware.progress.error
 
 
+@pytest.mark.slow  # two minutes; tests/protocols/cyberdog/test_upkeep.py has an update
 async def test_it_updates_itself_on_the_dock(dog):
     firmware = dog.robot[Firmware]
     assert firmware.available.version == "1.3.1.0"

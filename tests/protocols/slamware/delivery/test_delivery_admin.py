@@ -44,6 +44,7 @@ async def test_work_modes_decide_who_may_order_what(screen: Screen) -> None:
     assert "DELIVERY_SETTINGS_CHANGED" in await screen.events()
 
 
+@pytest.mark.slow  # two minutes; the rules: tests/autonomy/test_delivery.py
 async def test_tasks_wait_for_working_hours(screen: Screen, robot: Robot) -> None:
     await screen.prepare(R101=(1.5, 0.0, "ROOM"))
     hours = {"hours": [{"start_time": "00:01:00", "end_time": "00:02:10"}], "restdays": [0]}

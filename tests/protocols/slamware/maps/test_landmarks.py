@@ -80,7 +80,8 @@ async def clients(fleet: Fleet, forward: Forward) -> AsyncIterator[dict[str, htt
 
 
 @pytest.mark.world("empty", robots=("a", "b"))
-@pytest.mark.parametrize("changed", [True, pytest.param(False, marks=pytest.mark.slow)])
+@pytest.mark.slow  # tests/autonomy/navigation/test_restricted.py has the rule
+@pytest.mark.parametrize("changed", [True, False])
 async def test_one_robot_at_time_in_a_restricted_area(
     clients: dict[str, httpx.AsyncClient], fleet: Fleet, world: World, clock: LockstepClock, changed: bool
 ) -> None:

@@ -33,6 +33,7 @@ async def fleet(clock: LockstepClock) -> AsyncIterator[Fleet]:
     database.close()
 
 
+@pytest.mark.slow  # only after changes of the office or of its map
 def test_the_shipped_map_is_of_the_shipped_office() -> None:
     assert SHIPPED.read_bytes() == surveyed(load_world("office")), "roboglot map survey examples/maps/office.stcm"
 

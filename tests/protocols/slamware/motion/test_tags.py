@@ -41,7 +41,7 @@ def before(tag: Pose, away: float, aside: float, origin: Pose) -> dict[str, floa
 @pytest.mark.parametrize(
     ("kind", "tag", "more", "backwards"),
     [
-        (0, TAG, {"tag_ids": [4]}, False),
+        pytest.param(0, TAG, {"tag_ids": [4]}, False, marks=pytest.mark.slow),
         (2, STRIPS, {"reflect_tag_num": 2}, True),
         pytest.param(0, TAG, {"tag_ids": [4]}, True, marks=pytest.mark.slow),
         pytest.param(2, STRIPS, {"reflect_tag_num": 2}, False, marks=pytest.mark.slow),
@@ -125,9 +125,8 @@ async def test_from_a_place_by_its_name(client: httpx.AsyncClient, world: World,
 
 
 @pytest.mark.world(MARKS, body="hermes")
-@pytest.mark.parametrize(  # without tolerance: tests/autonomy/test_tag_docking.py
-    ("more", "x"), [pytest.param({}, 7.5, marks=pytest.mark.slow), ({"dock_allowance": 0.2}, 7.12)]
-)
+@pytest.mark.slow  # tests/autonomy/test_tag_docking.py has shelves
+@pytest.mark.parametrize(("more", "x"), [({}, 7.5), ({"dock_allowance": 0.2}, 7.12)])
 async def test_under_a_shelf(
     client: httpx.AsyncClient, world: World, forward: Forward, more: dict[str, float], x: float
 ) -> None:
