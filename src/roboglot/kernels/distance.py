@@ -1,4 +1,8 @@
-"""Exact Euclidean distance transform (Felzenszwalb and Huttenlocher 2012), cut off at a cap."""
+"""Exact Euclidean distance transform, cut off at a cap.
+
+Near ones are compared one by one in wide instructions, far ones by parabolas (Felzenszwalb and Huttenlocher 2012): the
+same to the last bit, since squares of whole cells are exact.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +10,8 @@ import numpy as np
 
 from roboglot.kernels.arrays import ByteArray, SingleArray
 from roboglot.kernels.compiled import kernel
+
+NEAR_MAX = 24  # cells of a cap up to which comparing one by one is quicker
 
 
 @kernel("float32[:,::1](uint8[:,::1], float64)")
@@ -31,12 +37,44 @@ def _along_columns(marked: ByteArray, cap: float) -> SingleArray:
     return away
 
 
+@kernel("void(float32[::1], float32[::1], float32[::1], float32)")
+def _lower(left: SingleArray, right: SingleArray, found: SingleArray, across: np.float32) -> None:
+    """Lower ``found`` to the lesser of the two plus ``across``: a loop of its own, which becomes wide instructions."""
+    for col in range(found.shape[0]):
+        found[col] = min(found[col], min(left[col], right[col]) + across)
+
+
+@kernel("void(float32[::1], float64, float32[::1], float32[::1])")
+def _nearest(row: SingleArray, cap: float, squares: SingleArray, found: SingleArray) -> None:
+    """Fill ``found`` with the squared distances of one row, whose cells have those of their columns.
+
+    ``squares`` has room for ``cap`` cells more at both ends.
+    """
+    width, reach, limit = len(row), int(cap), np.float32(cap * cap)
+    for col in range(len(squares)):
+        squares[np.uintp(col)] = limit
+    for col in range(width):
+        own = np.float64(row[np.uintp(col)])
+        squares[np.uintp(reach + col)] = min(limit, np.float32(own * own))
+        found[np.uintp(col)] = squares[np.uintp(reach + col)]
+    for aside in range(1, reach + 1):
+        left, right = squares[reach - aside : reach - aside + width], squares[reach + aside : reach + aside + width]
+        _lower(left, right, found, np.float32(aside * aside))
+
+
 @kernel("float32[:,::1](uint8[:,::1], float64)")
 def distances(marked: ByteArray, cap: float) -> SingleArray:
     """Distance in cells from each cell's centre to the nearest cell with ``marked`` != 0; ``cap`` where farther."""
     away = _along_columns(marked, cap)
     height, width = away.shape
     limit, column = np.float32(cap * cap), np.empty(width, np.float32)
+    if cap <= NEAR_MAX:
+        squares = np.empty(width + 2 * int(cap), np.float32)
+        for row in range(height):
+            _nearest(away[row], cap, squares, column)
+            for col in range(width):
+                away[row, col] = np.sqrt(column[col])
+        return away
     place = np.empty(width, np.int64)  # columns of the parabolas in the lower envelope
     border = np.empty(width + 1, np.float64)  # boundaries between neighbouring parabolas
     for row in range(height):
