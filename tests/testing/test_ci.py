@@ -79,6 +79,26 @@ def test_gitlabs_job_goes_on_only_with_a_robot(tmp_path: Path, world: str, statu
     assert (f"the robot is at {ADDRESS}" in done.stdout) is (status == 0)
 
 
+@pytest.mark.parametrize(
+    ("what", "wanted"),
+    [
+        ("roboglot", "{here}/roboglot[up,testing]"),  # as in GitLab's template: pip takes a bare name for a project
+        ("r.whl", "{here}/r.whl[up,testing]"),
+        ("0.3", "roboglot[up,testing]==0.3"),
+        ("git+https://host/roboglot", "roboglot[up,testing] @ git+https://host/roboglot"),
+    ],
+)
+def test_what_is_installed_is_what_was_named(tmp_path: Path, what: str, wanted: str) -> None:
+    (tmp_path / "roboglot").mkdir()
+    (tmp_path / "r.whl").touch()
+    python = tmp_path / "venv/bin/python"
+    python.parent.mkdir(parents=True)
+    python.write_text(f'#!/bin/sh\nprintf "%s\\n" "$@" >>{tmp_path}/called\n')
+    python.chmod(0o755)
+    robot(tmp_path, "install", what, ROBOGLOT_VENV=str(tmp_path / "venv"))
+    assert wanted.format(here=tmp_path) in (tmp_path / "called").read_text().splitlines()
+
+
 def test_action_and_template_call_what_is_there() -> None:
     action = yaml.safe_load((ROOT / "action.yml").read_text())
     steps = action["runs"]["steps"]
