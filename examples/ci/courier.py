@@ -29,7 +29,7 @@ class Courier:
         data = None if body is None else json.dumps(body).encode()
         request = urllib.request.Request(self.url + path, data, {"Content-Type": "application/json"}, method=method)
         try:
-            with urllib.request.urlopen(request, timeout=5) as response:
+            with urllib.request.urlopen(request, timeout=self.patience) as response:
                 text = response.read()
         except urllib.error.HTTPError as error:
             raise RobotError(f"{method} {path}: {error.code} {error.read().decode(errors='replace')}") from None
