@@ -15,12 +15,13 @@ from foxglove_schemas_protobuf.LaserScan_pb2 import LaserScan
 from mcap.reader import make_reader
 
 from roboglot import runtime
-from roboglot.cli.recordings.record import _exchange
+from roboglot.cli.recordings.record import _exchange, _show
 from roboglot.config import Config, ConsoleConfig, RecordConfig, RobotConfig, load_config
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.system.health import FaultLevel, Health
 from roboglot.model.tap import Direction
-from roboglot.protocols.record_desk import NAME, Request
+from roboglot.protocols.record_desk import NAME, Answer, Request
+from roboglot.recording.files import PartWriter
 from roboglot.recording.reader import pair, read_messages, read_recording
 from roboglot.runtime import Runtime
 
@@ -179,3 +180,36 @@ async def test_endless_stream_of_pushes_is_recorded_in_order(tmp_path: Path) -> 
     assert 19 <= len(pushes) <= 21
     assert [e.stamp for e in pushes] == sorted(e.stamp for e in pushes)
     assert json.loads(json.dumps(pushes[0].status)) == ""
+
+
+async def test_full_disk_is_the_only_reason_given(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    started = Runtime(config(tmp_path / "data", RecordConfig(to=str(tmp_path / "r.mcap"))))
+    await started.start()
+    await advance(started, 2.0)
+    recorder = started.recorder
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(PartWriter, "flush", full)
+    monkeypatch.setattr("mcap.writer.Writer.finish", full)
+    for _ in range(3):  # long enough for two warnings, if there were some
+        await asyncio.to_thread(recorder._thread.settle)  # type: ignore[union-attr]
+        await advance(started, 12.0)
+    ended = await recorder.stop()
+    await started.close()
+    assert ended.failure == "No space left on device"
+    assert ended.dropped
+    assert ended.bytes > 0
+    said = [record.getMessage() for record in caplog.records if "lost" in record.getMessage()]
+    assert said == []
+
+
+def test_status_says_that_nothing_more_is_written(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="ended: no room; 9 values since then are lost"):
+        _show(Answer(on=True, path="x.mcap", entries=5, bytes=100, dropped=9, failure="no room"))
+    said = capsys.readouterr()
+    assert said.out.startswith("recorded to x.mcap: 5 values, 100 bytes; nothing more is written")
+    assert not said.err

@@ -153,8 +153,10 @@ class Files:
         """End the last part. Raises OSError."""
         if (part := self._part) is not None:
             self._part = None
-            part.close()
-            self._closed.append((part.path, part.path.stat().st_size))
+            try:
+                part.close()
+            finally:  # a full disk has kept what was flushed
+                self._closed.append((part.path, part.path.stat().st_size))
 
     def _next(self, at: int) -> PartWriter:
         self.close()

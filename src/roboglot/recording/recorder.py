@@ -142,7 +142,8 @@ class Recorder:
             self._ring is not None,
         )
         self._files = None
-        log.info("recorded %d values in %d bytes to %s", files.written, files.size, files.path)
+        early = f", until it ended early: {thread.failure}" if thread.failure else ""
+        log.info("recorded %d values in %d bytes to %s%s", files.written, files.size, files.path, early)
         return status
 
     def mark(self, text: str) -> None:
@@ -270,7 +271,9 @@ class Recorder:
         if self._truth is not None:
             self._truth.beat(number, self._stamp()[0])
         thread = self._thread
-        if thread is not None and thread.dropped and self._clock.time() - self._warned > DROPS_PERIOD:
+        if thread is None or thread.failure or not thread.dropped:
+            return
+        if self._clock.time() - self._warned > DROPS_PERIOD:
             self._warned = self._clock.time()
             log.warning("recording: %d values are lost so far, for the disk is too slow", thread.dropped)
 

@@ -211,7 +211,9 @@ async def _exchange(path: Path, wish: Request) -> Answer:
 
 
 def _show(answer: Answer) -> None:
-    if answer.on:
+    if answer.failure:
+        print(f"recorded to {answer.path}: {answer.entries} values, {answer.bytes} bytes; nothing more is written")
+    elif answer.on:
         print(f"recording to {answer.path}: {answer.seconds:.1f} s, {answer.entries} values, {answer.bytes} bytes")
     else:
         print("nothing is recorded")
@@ -221,7 +223,7 @@ def _show(answer: Answer) -> None:
 
 
 def _complain(answer: Answer) -> None:
+    if answer.failure:
+        sys.exit(f"roboglot record: the recording ended: {answer.failure}; {answer.dropped} values since then are lost")
     if answer.dropped:
         print(f"{answer.dropped} values are lost: the disk was too slow", file=sys.stderr)
-    if answer.failure:
-        sys.exit(f"roboglot record: the recording ended: {answer.failure}")
