@@ -165,6 +165,8 @@ def origin_of(config: Config, version: str, *, remembers: bool = False) -> Origi
         "clock": "lockstep" if config.lockstep else f"x{config.speed:g}",
         "robots": json.dumps({robot.name: _without_secrets(robot.body) for robot in config.robots}),
     }
+    if config.record.redact:
+        facts["redact"] = ", ".join(config.record.redact)
     bodies = {robot.body for robot in config.robots if robot.is_simulated}
     sources = [*world_sources(config.world), *(body_source(body) for body in sorted(bodies))]
     files = [Attachment(path.name, "application/octet-stream", path.read_bytes()) for path in sources]

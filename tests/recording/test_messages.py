@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from roboglot.model.tap import Direction, Exchange
 from roboglot.recording.messages import decode_exchange, encode_exchange, encode_plain
-from roboglot.recording.redaction import Redaction
+from roboglot.recording.redaction import FIELDS, Redaction
 
 VALUES = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
@@ -68,3 +68,18 @@ def test_only_secrets_in_queries_and_numbers_are_redacted() -> None:
 def test_values_of_the_model_become_json() -> None:
     value = {"a": float("inf"), "b": b"xx", "c": (1, {2}), "d": Direction.PUSH}
     assert json.loads(encode_plain(value)) == {"a": "inf", "b": {"bytes": 2}, "c": [1, [2]], "d": "push"}
+
+
+@given(st.binary(max_size=200), st.sampled_from(FIELDS), st.booleans())
+def test_every_field_is_found(around: bytes, field: str, upper: bool) -> None:
+    name = field.upper() if upper else field
+    said = around + b' {"%s": "Xanthippe"}' % name.encode()
+    assert Redaction()(said).endswith(b'[redacted]"}')
+
+
+def test_refusals_do_not_quote_names() -> None:
+    refused = exchange(b'{"result": 5910}')._replace(
+        door="driver/cyberdog", operation="7001", refusal="no face of 'Xanthippe' is known"
+    )
+    assert Redaction().exchange(refused).refusal == "no face of [redacted] is known"
+    assert Redaction().exchange(refused._replace(operation="6004")).refusal == refused.refusal

@@ -74,6 +74,6 @@ def encoded(entry: Entry, redaction: Redaction) -> bytes:
     """Return an entry as a message, without what must stay secret."""
     kind, value = KINDS[entry.kind], entry.value
     if entry.kind == "exchange":
-        value = value._replace(payload=redaction(value.payload))
+        value = redaction.exchange(value)
     data = kind.encode(entry.at, value)
     return data if kind.is_protobuf or entry.kind == "exchange" else redaction(data)

@@ -24,6 +24,7 @@ from roboglot.model.stand_in import Recorded, StandIn, StandInReply
 from roboglot.model.tap import Exchange
 from roboglot.recording.matching import Normal, normal, rewritten, without_numbers
 from roboglot.recording.reader import Asked, BadRecording, Recording, pair, read_recording
+from roboglot.recording.redaction import FIELDS, Redaction
 from roboglot.recording.timeline import Timeline
 
 log = logging.getLogger(__name__)
@@ -57,15 +58,16 @@ class _Door:
 class Playback(StandIn):
     """One recorded robot. ``missing``: requests that were never recorded."""
 
-    def __init__(self, exchanges: Sequence[Exchange], clock: Clock, epoch: float) -> None:
-        """``epoch``: calendar time at the recording's robot time 0."""
+    def __init__(self, exchanges: Sequence[Exchange], clock: Clock, epoch: float, redact: Sequence[str] = ()) -> None:
+        """``epoch``: calendar time at the recording's robot time 0; ``redact``: further fields it was left without."""
         self._clock, self._epoch = clock, epoch
+        self._redaction = Redaction((*FIELDS, *redact))
         self._doors: dict[str, _Door] = defaultdict(lambda: _Door(Timeline(clock)))
         self.missing: list[tuple[str, str]] = []
         asked, pushes = pair(exchanges)
         for one in asked:
             door = self._doors[one.request.door]
-            found = normal(one.request.door, one.request.payload)
+            found = normal(one.request.door, self._redaction.exchange(one.request).payload)  # those of older versions
             place = len(door.asked)
             door.asked.append((one, found))
             key = f"{one.request.operation}\n{found.text}"
@@ -77,7 +79,7 @@ class Playback(StandIn):
     async def answer(self, door: str, operation: str, payload: bytes, *, reads: bool) -> AsyncIterator[StandInReply]:
         """See ``StandIn``."""
         began = self._clock.time()
-        live = normal(door, payload)
+        live = normal(door, self._redaction.of(door, operation)(payload))  # as it would stand in the recording
         kept = self._doors[door]
         used = len(kept.used)
         place = self._find(kept, operation, live, reads=reads)
@@ -234,7 +236,8 @@ def open_playback(place: str, clock: Clock) -> Playback:
     except OSError as error:
         raise ValueError(f"recording {path}: {error.strerror}") from None
     chosen = _robot(recording, name)
-    played = Playback(recording.of(chosen), clock, recording.epoch)
+    redact = tuple(filter(None, recording.facts.get("redact", "").split(", ")))
+    played = Playback(recording.of(chosen), clock, recording.epoch, redact)
     own = chosen or next(iter(recording.robots), "")
     others = tuple(other for other in recording.robots if other != own)
     played.recorded = Recorded(recording.path, own, others, recording.first, recording.last)

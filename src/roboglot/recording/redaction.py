@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from roboglot.model.tap import Direction, Exchange
+from roboglot.model.tap import DRIVER, Direction, Exchange
 
 FILES = ("4002", "4004")  # what a dog sends in chunks: photos and films
 REDACTED = b"[redacted]"
@@ -30,21 +30,43 @@ FIELDS = (
     "api_key",
     "account",
     "nickname",
+    "nick_name",
+    "current_name",
+    "wake_name",
     "username",
+    "oriname",
+    "allfaces",
+    "member",
+    "pre_name",
+    "new_name",
+    "voiceprints_data",
     "phone",
     "face_name",
     "face_image",
     "face_img",
     "host_face",
 )
+# Operations with people's or a network's name in a field that elsewhere says something else; by door and key.
+FIELDS_OF = {
+    ("cyberdog", "1001"): ("name",),  # of the Wi-Fi
+    ("cyberdog", "1021"): ("name",),  # of members
+    ("cyberdog", "1023"): ("name",),
+}
+# Operations whose refusals quote a person's name.
+QUOTING = {("cyberdog", code) for code in ("1020", "1021", "1022", "1024", "3011", "7001", "7002")}
+_quoted = re.compile(r"(['\"]).*\1", re.DOTALL)
 
 
 class Redaction:
     """Replaces the values of ``fields`` (names in JSON, queries and ``name=value``; case does not matter)."""
 
     def __init__(self, fields: Sequence[str] = FIELDS) -> None:
+        self._fields = tuple(fields)
+        self._more: dict[tuple[str, str], Redaction] = {}  # by door and operation
         names = b"|".join(re.escape(name).encode() for name in fields)
-        self._some = re.compile(names, re.IGNORECASE) if fields else None
+        # Looked for one by one: an expression with all of them takes ten times as long, and no thread runs meanwhile.
+        low = {field.lower().encode() for field in fields}
+        self._names = sorted(name for name in low if not any(other in name for other in low - {name}))
         # JSON, also inside a JSON string, where each quote is escaped once or more: \1 is the quote in that form.
         self._in_json = re.compile(
             rb'(\\*")(' + names + rb")\1(\s*:\s*)(?:\1.*?(?<!\\)\1|-?[\d.][\d.eE+-]*|\[[^\[\]{}]*\])",
@@ -54,10 +76,31 @@ class Redaction:
 
     def __call__(self, payload: bytes) -> bytes:
         """Return ``payload`` without what must stay secret."""
-        if self._some is None or not self._some.search(payload):
-            return payload
+        low = payload.lower()
+        for name in self._names:
+            if name in low:
+                return self._without(payload)
+        return payload
+
+    def _without(self, payload: bytes) -> bytes:
         payload = self._in_json.sub(rb"\1\2\1\3\1" + REDACTED + rb"\1", payload)
         return self._in_query.sub(rb"\1" + REDACTED, payload)
+
+    def of(self, door: str, operation: str) -> Redaction:
+        """Return what is used for the payloads of an operation at a door, or at the driver of such robots."""
+        key = door.removeprefix(DRIVER), operation
+        if key not in FIELDS_OF:
+            return self
+        if key not in self._more:
+            self._more[key] = Redaction((*self._fields, *FIELDS_OF[key]))
+        return self._more[key]
+
+    def exchange(self, exchange: Exchange) -> Exchange:
+        """Return an exchange without what must stay secret."""
+        payload = self.of(exchange.door, exchange.operation)(exchange.payload)
+        if exchange.refusal and (exchange.door.removeprefix(DRIVER), exchange.operation) in QUOTING:
+            return exchange._replace(payload=payload, refusal=_quoted.sub(REDACTED.decode(), exchange.refusal))
+        return exchange._replace(payload=payload)
 
 
 def without_picture(exchange: Exchange) -> Exchange:

@@ -12,15 +12,27 @@ from roboglot.model.tap import Direction, Exchange
 from roboglot.recording.comparing.trees import leaves, tree
 from roboglot.recording.lines import Line, Target
 from roboglot.recording.reader import Asked, pair
+from roboglot.recording.redaction import REDACTED
 
 IDS_MAX = 10_000
+
+
+def sendable(exchanges: Sequence[Exchange]) -> tuple[list[Exchange], int]:
+    """Return a session without the requests whose values were redacted, and their answers; and how many those are.
+
+    A robot must not be told that its Wi-Fi, or a person, is called "[redacted]".
+    """
+    asked, _ = pair(exchanges)
+    held = [one for one in asked if REDACTED in one.request.payload]
+    left = {id(exchange) for one in held for exchange in (one.request, *one.replies)}
+    return [exchange for exchange in exchanges if id(exchange) not in left], len(held)
 
 
 class Replay:
     """One replay; ``run`` returns the session as the robot at ``target`` had it."""
 
     def __init__(self, recorded: Sequence[Exchange], target: Target, clock: Clock, *, fast: bool = False) -> None:
-        self._asked = [asked for asked in pair(recorded)[0] if asked.request.door == target.door]
+        self._asked = [asked for asked in pair(sendable(recorded)[0])[0] if asked.request.door == target.door]
         self._target, self._clock, self._fast = target, clock, fast
         self._found: list[Exchange] = []
         self._ids: dict[str, str] = {}

@@ -85,6 +85,7 @@ async def _sessions(
     from roboglot.recording.lines import Target
     from roboglot.recording.probing import asked_again, probe, reads_only
     from roboglot.recording.reader import read_recording
+    from roboglot.recording.replaying import sendable
 
     targets = {name: Target(name) for name, is_live in zip(names, live, strict=True) if is_live}
     door = door or next((target.door for target in targets.values()), "")
@@ -93,6 +94,8 @@ async def _sessions(
     recorded: dict[str, Sequence[Exchange]] = {
         name: read_recording(Path(name)).session(robot, door) for name in names if name not in targets
     }
+    if targets:
+        recorded = {name: sendable(session)[0] for name, session in recorded.items()}
     if targets and not commands:
         recorded = {name: reads_only(session, reads(door)) for name, session in recorded.items()}
     clock = RealClock()

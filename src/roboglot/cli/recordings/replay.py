@@ -30,15 +30,17 @@ def command(
     from roboglot.recording.comparing.masks import Mask, read_mask
     from roboglot.recording.lines import Target
     from roboglot.recording.reader import read_recording
-    from roboglot.recording.replaying import Replay
+    from roboglot.recording.replaying import Replay, sendable
 
     try:
         target = Target(against)
-        recorded = read_recording(file).session(robot, target.door)
+        recorded, withheld = sendable(read_recording(file).session(robot, target.door))
         used = read_mask(mask) if mask else Mask()
         live = asyncio.run(Replay(recorded, target, RealClock(), fast=fast).run())
     except* (OSError, ValueError, ClientError) as errors:
         sys.exit(f"roboglot replay: {_first(errors)}")
+    if withheld:
+        print(f"{withheld} requests are not sent, for they hold [redacted]", file=sys.stderr)
     comparison = compare(answers_only(recorded), answers_only(live), used, order=not fast)
     if html:
         html.write_text(reports.page(comparison, (str(file), against)), encoding="utf-8")

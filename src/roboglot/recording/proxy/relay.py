@@ -39,6 +39,8 @@ class Book:
         Raises OSError where the file cannot be written.
         """
         facts = {"version": version, "robot": f"{target.door}://{target.host}:{target.port}", "clock": "x1"}
+        if redact:
+            facts["redact"] = ", ".join(redact)
         self.files = Files(path, Origin(facts), Redaction((*FIELDS, *redact)), Limits())
         self.clock = RealClock()
         self._door, self._photos = target.door, photos
