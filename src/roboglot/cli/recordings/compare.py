@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from roboglot.cli.recordings.reasons import in_words
+
 if TYPE_CHECKING:
     from roboglot.model.tap import Exchange
     from roboglot.recording.comparing.comparison import Comparison
@@ -54,7 +56,7 @@ def command(
         if junit:
             junit.write_bytes(reports.junit(comparison))
     except (OSError, ValueError, ClientError) as error:
-        print(f"roboglot compare: {error}", file=sys.stderr)
+        print(f"roboglot compare: {in_words(error)}", file=sys.stderr)
         raise typer.Exit(2) from None
     print(reports.table(comparison))
     sys.exit(comparison.fidelity * 100 < at_least)

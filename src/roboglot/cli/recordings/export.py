@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from roboglot.cli.recordings.reasons import in_words
 from roboglot.extras import explaining
 from roboglot.hosting.visible import visible
 
@@ -32,7 +33,7 @@ def command(
     try:
         written = export(file, rosbag2, storage.value, robot)
     except (OSError, ValueError) as error:
-        print(f"roboglot export: {visible(str(error))}", file=sys.stderr)
+        print(f"roboglot export: {visible(in_words(error))}", file=sys.stderr)
         raise typer.Exit(2) from None
     for topic, count in sorted(written.items()):
         print(f"{count:8} {visible(topic)}")

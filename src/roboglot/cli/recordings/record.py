@@ -18,6 +18,7 @@ import msgspec
 import typer
 from typer.core import TyperGroup
 
+from roboglot.cli.recordings.reasons import in_words
 from roboglot.config import default_data_folder
 from roboglot.hosting.event_loop import run
 from roboglot.hosting.local_socket import ask
@@ -127,13 +128,6 @@ def proxy(
     print(f"{book.files.written} messages are in {to}")
 
 
-def in_words(error: Exception) -> str:
-    """Return what went wrong, with the file that the system names and without its number."""
-    if isinstance(error, OSError) and error.strerror:
-        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
-    return str(error)
-
-
 def _dog_relay(target: Target, listen: str, book: Book, data: Path | None) -> DogRelay:
     """To the app it is a robot of ours, with the certificates of the data folder. Raises OSError, ValueError."""
     from roboglot.protocols.cyberdog.certificates import ensure_certificates
@@ -168,7 +162,7 @@ def info(file: Annotated[Path, typer.Argument(help="A recording.")]) -> None:
     try:
         recording = read_recording(file)
     except (OSError, BadRecording) as error:
-        sys.exit(f"roboglot record: {error}")
+        sys.exit(f"roboglot record: {in_words(error)}")
     for name, value in recording.facts.items():
         print(f"{name:10} {value}")
     print(f"{'seconds':10} {recording.seconds:.1f}{'' if recording.whole else '  (it has no end: see repair)'}")
@@ -190,7 +184,7 @@ def repair(
     try:
         count = mend(file, to)
     except (OSError, BadRecording) as error:
-        sys.exit(f"roboglot record: {error}")
+        sys.exit(f"roboglot record: {in_words(error)}")
     print(f"{count} messages are in {to}")
 
 

@@ -9,6 +9,8 @@ from typing import Annotated
 
 import typer
 
+from roboglot.cli.recordings.reasons import in_words
+
 
 def command(
     file: Annotated[Path, typer.Argument(help="A recording.")],
@@ -38,14 +40,17 @@ def command(
         used = read_mask(mask) if mask else Mask()
         live = asyncio.run(Replay(recorded, target, RealClock(), fast=fast).run())
     except* (OSError, ValueError, ClientError) as errors:
-        sys.exit(f"roboglot replay: {_first(errors)}")
+        sys.exit(f"roboglot replay: {in_words(_first(errors))}")
     if withheld:
         print(f"{withheld} requests are not sent, for they hold [redacted]", file=sys.stderr)
     comparison = compare(answers_only(recorded), answers_only(live), used, order=not fast)
-    if html:
-        html.write_text(reports.page(comparison, (str(file), against)), encoding="utf-8")
-    if junit:
-        junit.write_bytes(reports.junit(comparison))
+    try:
+        if html:
+            html.write_text(reports.page(comparison, (str(file), against)), encoding="utf-8")
+        if junit:
+            junit.write_bytes(reports.junit(comparison))
+    except OSError as error:
+        sys.exit(f"roboglot replay: {in_words(error)}")
     print(reports.table(comparison))
     sys.exit(comparison.fidelity * 100 < at_least)
 

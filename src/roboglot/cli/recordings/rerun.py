@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from roboglot.cli.recordings.reasons import in_words
 from roboglot.hosting.visible import visible
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ def command(
             unheard = asyncio.run(run(recording, config))
             verdict = difference(file, Path(folder) / NEW)
         except (OSError, ValueError) as error:
-            print(f"roboglot rerun: {visible(str(error))}", file=sys.stderr)
+            print(f"roboglot rerun: {visible(in_words(error))}", file=sys.stderr)
             raise typer.Exit(2) from None
         if keep is not None:
             shutil.copy(Path(folder) / NEW, keep)
