@@ -161,6 +161,41 @@ async def test_client_that_looks_for_ep_finds_the_proxy(tmp_path: Path) -> None:
     assert [(e.direction, e.payload) for e in heard] == [(Direction.PUSH, b"robot ip 127.0.0.89;")]
 
 
+async def test_pushes_are_noted_for_a_client_of_this_machine(tmp_path: Path, vendor_ports: None) -> None:
+    """Robot, proxy and client are all at home: the robot must not know the client's address."""
+    path, push = tmp_path / "x.mcap", b"chassis push position 1 0 0;"
+    heard: asyncio.Future[bytes] = asyncio.get_running_loop().create_future()
+
+    class Client(asyncio.DatagramProtocol):
+        def datagram_received(self, data: bytes, _addr: tuple[str, int]) -> None:
+            if not heard.done():
+                heard.set_result(data)
+
+    async def robot(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await reader.readuntil(b";")
+        datagrams = Datagrams("127.0.0.89")
+        datagrams.send(push, writer.get_extra_info("peername")[0], 40924)
+        datagrams.close()
+        await reader.read()
+        writer.close()
+
+    async def script(address: str) -> bytes:
+        loop = asyncio.get_running_loop()
+        hearing = (await loop.create_datagram_endpoint(Client, local_addr=("127.0.0.1", 40924)))[0]
+        _, writer = await asyncio.open_connection(address, 40923, local_addr=("127.0.0.1", 0))
+        writer.write(b"command;")
+        try:
+            return await asyncio.wait_for(heard, 60)
+        finally:
+            writer.close()
+            hearing.close()
+
+    async with await asyncio.start_server(robot, "127.0.0.89", 40923):
+        assert await between("robomaster://127.0.0.89", path, script) == push
+    noted = read_recording(path).of(door="robomaster")
+    assert push in [exchange.payload for exchange in noted if exchange.direction is Direction.PUSH]
+
+
 async def test_full_disk_stops_the_recording_but_no_client(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")

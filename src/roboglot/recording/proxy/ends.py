@@ -23,18 +23,20 @@ Joining = Callable[["End", "End"], Awaitable[None]]
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Address to dial. ``context``: over TLS, if the other end proves to be ``name``."""
+    """Address to dial. ``context``: over TLS, if the other end proves to be ``name``. ``own``: from this address."""
 
     host: str
     port: int
     context: ssl.SSLContext | None = None
     name: str = ""
+    own: str = ""
 
     async def dial(self, end: End) -> None:
         """Connect ``end``. Raises OSError."""
         loop, context = asyncio.get_running_loop(), self.context
         if context is None:
-            await loop.create_connection(lambda: end, self.host, self.port)
+            own = (self.own, 0) if self.own else None
+            await loop.create_connection(lambda: end, self.host, self.port, local_addr=own)
             return
         transport, call = await loop.create_connection(
             lambda: TlsCall(lambda: end, context, self.name), self.host, self.port

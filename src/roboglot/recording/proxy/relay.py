@@ -119,7 +119,9 @@ class Relay:
         if sniffer is not None:
             client.look, robot.look = sniffer.from_client, sniffer.from_robot
         joining = self._listen_for_pushes if self._target.door == "robomaster" else None
-        self._crossing.cross(client, Place(self._target.host, port), robot, joining)
+        # To a robot of this machine it calls from where it listens: with the client's address it would have its pushes.
+        own = self._address if self._target.host.startswith("127.") and self._address.startswith("127.") else ""
+        self._crossing.cross(client, Place(self._target.host, port, own=own), robot, joining)
 
     def _sniffer(self, name: str, port: int) -> Sniffer | None:
         def note(direction: Direction, operation: str, payload: bytes, status: str, began: float | None) -> float:
@@ -133,7 +135,12 @@ class Relay:
         """Take the robot's datagrams where it sends them, at our own address, and pass them to the clients' hosts."""
         own, host = robot.transport.get_extra_info("sockname")[0], client.peer[0]
         self._hosts.add(host)
-        if self._datagrams is not None or own == host:
+        if own == host:
+            log.warning(
+                "pushes of the robot pass by, and are not recorded: its client has this machine's address %s", own
+            )
+            return
+        if self._datagrams is not None:
             return
         loop = asyncio.get_running_loop()
         try:
