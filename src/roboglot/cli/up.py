@@ -52,6 +52,10 @@ def command(
         bool | None,
         typer.Option("--lockstep", help="Time passes only when a line with seconds comes on standard input."),
     ] = None,
+    patient: Annotated[
+        bool | None,
+        typer.Option("--patient", envvar="ROBOGLOT_PATIENT", help="On a slow machine, time waits for the world."),
+    ] = None,
     seed: Annotated[int | None, typer.Option(envvar="ROBOGLOT_SEED", help="Of all chance in the world.")] = None,
     data: Annotated[
         Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="Folder for programs, places, certificates.")
@@ -108,6 +112,7 @@ def command(
                 "address": address,
                 "speed": speed,
                 "lockstep": lockstep or None,
+                "patient": patient,
                 "seed": seed,
                 "data": str(data) if data else None,
                 "database": database,
