@@ -161,7 +161,7 @@ async def test_client_that_looks_for_ep_finds_the_proxy(tmp_path: Path) -> None:
     assert [(e.direction, e.payload) for e in heard] == [(Direction.PUSH, b"robot ip 127.0.0.89;")]
 
 
-async def test_pushes_are_noted_for_a_client_of_this_machine(tmp_path: Path, vendor_ports: None) -> None:
+async def test_pushes_for_client_of_this_machine_are_noted(tmp_path: Path, vendor_ports: None) -> None:
     """Robot, proxy and client are all at home: the robot must not know the client's address."""
     path, push = tmp_path / "x.mcap", b"chassis push position 1 0 0;"
     heard: asyncio.Future[bytes] = asyncio.get_running_loop().create_future()
