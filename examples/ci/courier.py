@@ -21,7 +21,7 @@ class RobotError(Exception):
 class Courier:
     """Drives to places and back, if the battery allows it."""
 
-    def __init__(self, url, patience=60.0):
+    def __init__(self, url, patience=170.0):
         self.url, self.patience = url.rstrip("/"), patience
 
     def ask(self, method, path, body=None):

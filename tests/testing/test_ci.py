@@ -23,7 +23,7 @@ ADDRESS = "127.0.0.222"
 def robot(folder: Path, *arguments: str, **more: str) -> str:
     environment = os.environ | {"ROBOGLOT_CI": str(folder / "ci"), "ROBOGLOT_VENV": sys.prefix} | more
     done = subprocess.run(
-        [ROBOT, *arguments], env=environment, cwd=folder, capture_output=True, text=True, timeout=120, check=False
+        [ROBOT, *arguments], env=environment, cwd=folder, capture_output=True, text=True, timeout=300, check=False
     )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
@@ -34,7 +34,7 @@ def test_job_starts_and_drives_a_robot_keeping_events(tmp_path: Path) -> None:
     try:
         assert address == ADDRESS
         app = [sys.executable, str(ROOT / "examples/ci/courier.py"), f"http://{address}:1448", "0.4", "0.0"]
-        assert subprocess.run(app, capture_output=True, text=True, timeout=180, check=True).stdout.startswith("arrived")
+        assert subprocess.run(app, capture_output=True, text=True, timeout=300, check=True).stdout.startswith("arrived")
     finally:
         robot(tmp_path, "down")
     [recording] = (tmp_path / "ci/artifacts").glob("*.mcap")
@@ -119,5 +119,5 @@ def test_action_and_template_call_what_is_there() -> None:
 def test_the_sample_apps_tests_pass_side_by_side(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "examples/ci", tmp_path / "app")
     command = [sys.executable, "-m", "pytest", "-q", "-n", "2", "-p", "no:cacheprovider"]
-    done = subprocess.run(command, cwd=tmp_path / "app", capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(command, cwd=tmp_path / "app", capture_output=True, text=True, timeout=300, check=False)
     assert "20 passed" in done.stdout, done.stdout + done.stderr
