@@ -12,7 +12,7 @@ import itertools
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Sized
+from collections.abc import Callable, Iterator, Sized
 from contextvars import copy_context
 from functools import partial
 
@@ -23,8 +23,7 @@ YIELD_AFTER = 0.5  # s of lockstep time
 ROUNDS_MAX = 200  # of the event loop
 LEAD = 0.1  # s by which a patient clock may be ahead of the world
 STANDING = 0.002  # real s between two checks of a patient clock that stands still
-WORK, REST = 0.003, 0.001  # real s of jobs after which the loop has so long for other things
-PATIENCE, LONG_WORK = 0.02, 0.012  # real s after which a job has waited long; in place of WORK then
+SLICE = 0.0015  # real s of jobs after which the loop sees to its sockets
 LOCKSTEP_EPOCH = 1_767_225_600.0  # 2026-01-01T00:00:00Z: lockstep traces contain no real date
 
 
@@ -71,9 +70,9 @@ class RealClock(Clock):
         self._until = math.inf  # robot time at which the clock stops
         self._timers: set[_RealTimer] = set()
         self._speed = 1.0
-        self._jobs: deque[tuple[float, Callable[[], None]]] = deque()  # with the instant since which each waits
+        self._jobs: deque[Callable[[], None]] = deque()
         self._turn: asyncio.Handle | None = None  # of the next of them, or of the one under way
-        self._worked = 0.0  # s of jobs since the last rest
+        self._slice_ends = 0.0  # real s
         self.set_speed(speed)
 
     @property
@@ -99,7 +98,7 @@ class RealClock(Clock):
         return timer
 
     def in_turn(self, job: Callable[[], None], *, first: bool = False) -> None:
-        entry = time.perf_counter(), partial(copy_context().run, job)
+        entry = partial(copy_context().run, job)
         if first:
             self._jobs.appendleft(entry)
         else:
@@ -107,25 +106,25 @@ class RealClock(Clock):
         if self._turn is None:
             self._arm()
 
+    def in_steps(self, steps: Iterator[None]) -> None:
+        for _ in steps:
+            if time.perf_counter() >= self._slice_ends:
+                self.in_turn(partial(self.in_steps, steps), first=True)
+                return
+
     def _arm(self) -> None:
-        """Have the next job done: at once, or after a rest in which requests of several steps are answered.
+        self._turn = asyncio.get_running_loop().call_soon(self._work)
 
-        Rests are fewer while a job has waited long, and there are none where time is to pass faster than outside.
+    def _work(self) -> None:
+        """Do jobs for a short while; the loop sees to its sockets before the next ones.
+
+        A request of several steps (over gRPC, five turns of the loop) waits for so many of these at most.
         """
-        loop, waited = asyncio.get_running_loop(), time.perf_counter() - min(self._jobs[0][0], self._jobs[-1][0])
-        if self._worked >= (WORK if waited < PATIENCE else LONG_WORK) and self._speed <= 1.0:
-            self._worked = 0.0
-            self._turn = loop.call_later(REST, self._next_job)
-        else:
-            self._turn = loop.call_soon(self._next_job)
-
-    def _next_job(self) -> None:
-        """Do one of them; the loop sees to its sockets before the next."""
-        began = time.perf_counter()
+        self._slice_ends = time.perf_counter() + SLICE
         try:
-            self._jobs.popleft()[1]()
+            while self._jobs and time.perf_counter() < self._slice_ends:
+                self._jobs.popleft()()
         finally:
-            self._worked += time.perf_counter() - began
             self._turn = None
             if self._jobs:
                 self._arm()

@@ -55,6 +55,11 @@ class Clock(ABC):
         """
         job()
 
+    def in_steps(self, steps: Iterator[None]) -> None:
+        """Take all steps of a piece of work, before all that wait: others have their turn in between, as above."""
+        for _ in steps:
+            pass
+
     def hold(self, work: object, seconds: float = HOLD_MAX) -> None:  # noqa: B027 - time that passes waits for nothing
         """Begin ``work`` outside of the event loop (a process, a disk); lockstep time waits until ``release``.
 

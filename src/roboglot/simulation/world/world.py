@@ -9,7 +9,7 @@ import asyncio
 import contextlib
 import logging
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
@@ -232,25 +232,35 @@ class World:
             self._pace.skip((due - 1) * TICK)
             due = 1
         self._pace.look(self._clock.time())
-        if due > 0:
-            self._tick()
+        self._clock.in_steps(self._steps(due > 0))
+
+    def _steps(self, due: bool) -> Iterator[None]:
+        """Do the steps of a tick, if it is ``due``, and wait for the next one."""
+        if due:
+            for _ in self._tick():
+                yield
+                if self._timer is None:
+                    return  # closed meanwhile
         self._clock.reached(self.time)
         self._timer = self._clock.call_at(self._due(), self._beat)
 
-    def _tick(self) -> None:
+    def _tick(self) -> Iterator[None]:
         self._ticks += 1
         stamp = self._origin + self._ticks * TICK
         robots = self._population.simulated.values()
         for robot in robots:
             robot.control()
+        yield
         self.faults.step(stamp)
         self.building.step(stamp, TICK)
         self._walk()
         self._environment.sight.moved()
         beads = self._environment.beads
         self._physics.step(TICK, beads.fly if beads.flying else None)
+        yield
         for robot in robots:  # one robot at a time: its data stay in the cache
             robot.sense(stamp)
+            yield
 
     def _walk(self) -> None:
         if not self._walkers:
