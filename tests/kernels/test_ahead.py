@@ -23,6 +23,7 @@ from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
 from roboglot.model.components.system.health import FaultLevel, Health
 from roboglot.model.errors import NotReady, Refused
+from roboglot.model.events import FaultRaised
 from roboglot.model.geometry import Point
 from roboglot.storage.database import Database
 
@@ -131,6 +132,20 @@ async def test_navigation_is_not_ready_while_compiling(
     await fleet_of_one.start(wait=True)
     assert not robot[Health].has(UNAVAILABLE)
     assert robot[Navigation].navigate_to([Point(1.0, 0.0)], NavigationOptions())
+
+
+async def test_compiling_leaves_no_trace_in_lockstep(fleet_of_one: Fleet, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A recording made right after an installation is like one that is made later."""
+
+    async def compile_at_once(*_: object, **__: object) -> None:
+        await asyncio.sleep(0)
+
+    monkeypatch.setattr(skills, "missing", lambda _: ["graph"])
+    monkeypatch.setattr(skills, "compile_beside", compile_at_once)
+    raised: list[FaultRaised] = []
+    fleet_of_one.robots["a"].events.listen(FaultRaised, raised.append)
+    await fleet_of_one.start(wait=True)
+    assert raised == []
 
 
 def test_changes_of_built_in_kernels_are_noticed(cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

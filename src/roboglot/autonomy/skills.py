@@ -167,7 +167,9 @@ class Autonomy:
         if self._course is None:
             return
         if self._loading is None:
-            self._loading = asyncio.create_task(self._load(self._course), name=f"kernels for {self._robot.id}")
+            self._loading = asyncio.create_task(
+                self._load(self._course, wait=wait), name=f"kernels for {self._robot.id}"
+            )
             if self._delivery is not None:
                 self._delivery.start()
         if wait:
@@ -196,8 +198,11 @@ class Autonomy:
             if part is not None:
                 part.close()
 
-    async def _load(self, course: Course) -> None:
-        """Load the kernels in a thread; compile them first where they are not, with progress in the log."""
+    async def _load(self, course: Course, *, wait: bool) -> None:
+        """Load the kernels in a thread; compile them first where they are not, with progress in the log.
+
+        With ``wait`` there is no fault meanwhile: no time passes, and a lockstep run is the same on every machine.
+        """
         begun = perf_counter()
         if lacking := missing(NAVIGATION):
             log.info(
@@ -207,7 +212,8 @@ class Autonomy:
                 len(lacking),
             )
             course.unavailable = NotReady("navigation is warming up: its kernels are being compiled")
-            self._report(FaultLevel.WARNING, str(course.unavailable))
+            if not wait:
+                self._report(FaultLevel.WARNING, str(course.unavailable))
         try:
             await compile_beside(NAVIGATION, _log_progress)
             slam_class, planner_class = await load(_estimator_and_planner)
