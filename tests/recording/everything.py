@@ -8,7 +8,7 @@ import dataclasses
 import itertools
 import json
 import os
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Coroutine
 from contextlib import asynccontextmanager
 from pathlib import Path
 from urllib.request import Request, urlopen
@@ -77,6 +77,7 @@ class Session:
         self.pushed: list[tuple[int, str]] = []
         self.answers: dict[int, list[str]] = {}
         self.heard: dict[tuple[str, Direction], int] = {}
+        self.photographed = 0  # bytes
         self.gone: list[str] = []  # doors whose clients hung up or cancelled
         self.tasks: set[asyncio.Task[None]] = set()
         self._numbers = itertools.count()
@@ -103,14 +104,27 @@ class Session:
 
     async def dog_asks(self, code: int, **values: object) -> None:
         """Ask and go on as soon as the dog has heard it; answers may take their time."""
-        number = self.heard.get(("cyberdog", Direction.REQUEST), 0) + 1
 
         async def listen() -> None:
             with contextlib.suppress(ClientError):
                 async for _, text in self.dog.send(code, json.dumps(values)):
                     self.answers.setdefault(code, []).append(text)
 
-        task = asyncio.ensure_future(listen())
+        await self._until_asked(listen())
+
+    async def dog_photographs(self) -> None:
+        """Fetch a photo, and go on as soon as the dog has heard it."""
+
+        async def listen() -> None:
+            with contextlib.suppress(ClientError):
+                async for chunk in self.dog.fetch(4002, '{"command": 1}'):
+                    self.photographed += len(chunk.buffer)
+
+        await self._until_asked(listen())
+
+    async def _until_asked(self, listening: Coroutine[object, object, None]) -> None:
+        number = self.heard.get(("cyberdog", Direction.REQUEST), 0) + 1
+        task = asyncio.ensure_future(listening)
         self.tasks.add(task)
         task.add_done_callback(self.tasks.discard)
         await self.until_heard("cyberdog", Direction.REQUEST, number)
@@ -179,10 +193,17 @@ async def hold(folder: Path, rounds: int) -> Session:
                 await session.console_does("world/add_box", **box)
                 await session.dog_asks(6004, type=1, map_name="", goalX=1.0, goalY=0.4, theta=0.0)
                 await clock.advance(2.021)
-                for line in (b"command;", b"chassis position ?;", b"robot battery ?;"):
+                for line in (
+                    b"command;",
+                    b"chassis position ?;",
+                    b"blaster bead 2;",
+                    b"blaster fire;",
+                    b"gimbal move y 9;",
+                ):
                     await text(line)
                 await session.console_does("world/inject_fault", kind="lidar_gone", robot="a", duration=1.5)
                 await rest.get_pose()
+                await session.dog_photographs()
                 await clock.advance(2.411)
                 await session.dog_asks(2002, **FRAME | {"operate": "inquiry", "id": f"d-{number}"})
                 await session.frame(socket, "inquiry")

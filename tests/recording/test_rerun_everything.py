@@ -17,6 +17,7 @@ from tests.recording.test_rerun import rerun
 async def test_everything_happens_again(tmp_path: Path, rounds: int) -> None:
     session = await hold(tmp_path, rounds)
     assert session.pushed
+    assert session.photographed > 10_000 * rounds
     recording = read_recording(tmp_path / "r.mcap")
     kinds = {given.kind for _, given in recording.inputs}
     assert kinds - {"called off"} == {"answer", "hands", "command", "came", "gone"}
