@@ -70,6 +70,7 @@ async def cost(robots: int, seconds: float, claims: Claims) -> None:
             assert not ended.dropped
             sizes.append(ended.bytes / ended.seconds * 60 / robots / 1e6)
         await runtime.close()
+    print("turns:", *(f"{100 * one:.2f} %" for one in differences))
     claims.at_most(f"core for {robots} robots", statistics.median(differences) * 100, 2.0, "%")
     claims.at_most("a minute and robot", statistics.median(sizes), 1.0, "MB")
 
