@@ -83,6 +83,7 @@ async def test_over_standard_input(shown: Shown) -> None:
         assert [robot["name"] for robot in await call(client, "robots")] == ["a"]
 
 
+@pytest.mark.slow  # the tools: test_over_standard_input
 async def test_over_streamable_http(shown: Shown) -> None:
     from mcp import Client
 

@@ -89,6 +89,7 @@ def test_commands_run_in_the_clone(page: Path) -> None:
         assert (ROOT / script.removeprefix(".venv/bin/python ")).exists(), script
 
 
+@pytest.mark.slow  # tests/testing/test_fixtures.py plays the start page's
 def test_examples_run_in_a_users_project(tmp_path: Path) -> None:
     """Each page's tests, in a folder with no settings of pytest at all."""
     count = 0

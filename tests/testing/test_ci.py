@@ -48,7 +48,7 @@ def test_job_fails_with_the_reason_of_its_robot(tmp_path: Path) -> None:
         robot(tmp_path, "up", ARGUMENTS="--world nowhere")
 
 
-@pytest.mark.parametrize(("world", "status"), [("nowhere", 1), ("empty", 0)])
+@pytest.mark.parametrize(("world", "status"), [("nowhere", 1), pytest.param("empty", 0, marks=pytest.mark.slow)])
 def test_gitlabs_job_goes_on_only_with_a_robot(tmp_path: Path, world: str, status: int) -> None:
     """Run the template's lines as a runner does; what is installed is there already."""
     template = yaml.safe_load((ROOT / "deploy/ci/gitlab.yml").read_text())[".roboglot"]
