@@ -27,8 +27,6 @@ except ImportError as missing:
         f"roboglot: this Python ({sys.executable}) lacks its standard library ({missing.name}). Install it whole:\n"
         "    sudo apt-get install python3"
     )
-except KeyboardInterrupt:
-    sys.exit(130)
 
 ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / ".venv"
@@ -179,6 +177,7 @@ def install(profile: str, lock_fd: int) -> None:
     lock = ROOT / f"requirements/{profile}.lock"
     total = len(package_names(lock.read_text()))
     say(f"installing {total} packages from requirements/{profile}.lock (once; later starts need no network)")
+    started = time.monotonic()
     UNFINISHED.touch()
     exact = ("--require-hashes", "--no-deps", "--only-binary=:all:", "--no-warn-script-location")
     pip("install", *exact, "-r", "requirements/pip.lock", lock_fd=lock_fd)
@@ -188,6 +187,7 @@ def install(profile: str, lock_fd: int) -> None:
     # dev contains run with the same versions, which tests/test_scripts.py asserts.
     for each in PROFILES[: PROFILES.index(profile) + 1]:
         stamp_file(each).write_bytes(stamp(ROOT, each))
+    say(f"set up in {time.monotonic() - started:.0f} s")
 
 
 def set_up(profile: str) -> None:
@@ -200,27 +200,18 @@ def set_up(profile: str) -> None:
             say("another set-up is at work here; waiting for it")
             fcntl.flock(lock_fd, fcntl.LOCK_EX)
         if not is_current(profile):
-            started = time.monotonic()
             install(profile, lock_fd)
-            say(f"set up in {time.monotonic() - started:.0f} s")
     finally:
         os.close(lock_fd)
 
 
-def main() -> int:
-    if len(sys.argv) != 2 or sys.argv[1] not in PROFILES:
-        print(f"usage: {sys.argv[0]} {'|'.join(PROFILES)}", file=sys.stderr)
-        return 2
+if __name__ == "__main__":
+    if sys.argv[1:] not in [[profile] for profile in PROFILES]:
+        sys.exit(f"usage: {sys.argv[0]} {'|'.join(PROFILES)}")
     try:
         set_up(sys.argv[1])
     except (SetupFailed, OSError) as error:
-        print(f"roboglot: the set-up failed: {error}", file=sys.stderr)
-        return 1
+        sys.exit(f"roboglot: the set-up failed: {error}")
     except KeyboardInterrupt:
-        print("\nroboglot: interrupted; the next start repairs it.", file=sys.stderr)
-        return 130
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+        say("interrupted; the next start repairs it.")
+        sys.exit(130)

@@ -63,18 +63,8 @@ def complaints(root: Path) -> list[str]:
     return found
 
 
-def main() -> int:
-    if sys.argv[1:] == ["--write"]:
-        checksum = digest((ROOT / "pyproject.toml").read_text())
-        for name in ("run", "dev"):
-            file = ROOT / f"requirements/{name}.lock"
-            file.write_text(marked(file.read_text(), checksum))
-        return 0
-    found = complaints(ROOT)
-    for line in found:
-        print(line)
-    return 1 if found else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    if sys.argv[1:] == ["--write"]:
+        for file in (ROOT / "requirements/run.lock", ROOT / "requirements/dev.lock"):
+            file.write_text(marked(file.read_text(), digest((ROOT / "pyproject.toml").read_text())))
+    sys.exit("\n".join(complaints(ROOT)) or 0)
