@@ -18,7 +18,7 @@ from roboglot.model.clock import LockstepClock
 from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.visual.config import VisualConfig
 from roboglot.runtime import Runtime
-from tests.browser.served import ADDRESS, FRIEND, PAGE_PATIENCE, REBOUND, STRANGER, OpenConsole, Page, Served
+from tests.browser.served import ADDRESS, FRIEND, PAGE_PATIENCE, REBOUND, STILL, STRANGER, OpenConsole, Page, Served
 
 # The shell is the same engine without a browser's own windows, which take as much of the processor as the pages.
 KINDS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
@@ -118,7 +118,7 @@ async def open_console(browser: Any, served: Served) -> AsyncIterator[OpenConsol
     opened, said = [], []
 
     async def open_it(person: str = "anna", view: str = "live", language: str = "en", **options: Any) -> Page:
-        context = await browser.new_context(**({"viewport": {"width": 1280, "height": 800}} | options))
+        context = await browser.new_context(**({"viewport": {"width": 1280, "height": 800}} | STILL | options))
         opened.append(context)
         await context.add_init_script(f"localStorage.person = '{person}'; localStorage.language = '{language}'")
         page = await context.new_page()

@@ -10,7 +10,7 @@ import pytest
 import pytest_asyncio
 
 from roboglot.model.events import Event
-from tests.browser.served import ADDRESS, FRIEND, REBOUND, STRANGER, Served
+from tests.browser.served import ADDRESS, FRIEND, REBOUND, STRANGER, Served, becomes
 
 REST = f"http://{ADDRESS}:1448"
 POSE, ACTIONS = "/api/core/slam/v1/localization/pose", "/api/core/motion/v1/actions"
@@ -96,19 +96,18 @@ async def test_a_stranger_can_neither_read_nor_drive(served: Served, open_page: 
 
 
 async def test_a_strangers_pictures_consume_no_events(served: Served, open_page: Open) -> None:
-    asked: list[str] = []
     routes = "/api/platform/v1/events"
     page = await open_page(STRANGER)
-    page.on("response", lambda response: asked.append(f"{response.status} {response.url}"))
-    await page.evaluate(
-        """url => new Promise(done => {
-        const picture = new Image();
-        picture.onload = picture.onerror = () => done();
-        picture.src = url;
-    })""",
-        REST + routes,
-    )
-    assert asked == [f"403 {REST}{routes}"]
+    async with page.expect_response(REST + routes) as answered:
+        await page.evaluate(
+            """url => new Promise(done => {
+            const picture = new Image();
+            picture.onload = picture.onerror = () => done();
+            picture.src = url;
+        })""",
+            REST + routes,
+        )
+    assert (await answered.value).status == 403
 
 
 async def test_forms_of_strangers_do_nothing(served: Served, open_page: Open, happened: list[Event]) -> None:
@@ -151,6 +150,11 @@ async def test_a_rebound_name_opens_no_web_socket(served: Served, browser: Any) 
     assert await page.evaluate(SOCKET, [f"ws://{REBOUND}:50053/programs", json.dumps(SAVE)]) == "refused"
 
 
+async def refusals(page: Page) -> list[bool]:
+    """Return for each frame of a page whether the robot refuses to be there."""
+    return ["forbidden: it comes from a web page" in (await frame.content()).lower() for frame in page.frames[1:]]
+
+
 async def test_strangers_pages_cannot_frame_the_robots(served: Served, open_page: Open) -> None:
     page = await open_page(STRANGER)
     await page.evaluate(
@@ -162,9 +166,7 @@ async def test_strangers_pages_cannot_frame_the_robots(served: Served, open_page
     })""",
         f"{REST}/",
     )
-    shown = [(await frame.content()).lower() for frame in page.frames[1:]]
-    assert shown
-    assert all("forbidden: it comes from a web page" in text for text in shown)
+    await becomes(lambda: refusals(page), [True])
 
 
 async def test_friends_and_pages_of_this_machine_are_served(served: Served, open_page: Open) -> None:

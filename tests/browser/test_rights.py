@@ -24,6 +24,7 @@ from roboglot.operations import Right
 from roboglot.runtime import Runtime
 from roboglot.testing.addresses import free_addresses
 from roboglot.transport.limiter import Limiter
+from tests.browser.served import drive_until
 from tests.narrowing import known
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
@@ -47,7 +48,7 @@ BUTTONS = {
 AXE = (Path(__file__).parent / "vendor" / "axe.min.js").read_text(encoding="utf-8")
 TRY = "(body) => fetch('/api/sign_in', {method: 'POST', body}).then((reply) => reply.status)"
 Page = Any
-Open = Callable[[], Awaitable[Page]]
+Open = Callable[..., Awaitable[Page]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,10 +227,7 @@ async def test_a_driver_whose_right_is_revoked_stands(guarded: Guarded, open_pag
     await page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 20)
     await page.mouse.down()
     await until(lambda: any(action.name == "drive" for action in robot.actions.running()))
-    for _ in range(8):
-        await asyncio.sleep(0.09)
-        await guarded.clock.advance(0.08)
-    assert robot[Base].velocity.speed > 0.1
+    await drive_until(robot, guarded.clock, lambda: robot[Base].velocity.speed > 0.1)
     guarded.store.revoke("carl")
     known(guarded.runtime.guard).reload()
     await guarded.clock.advance(0.5)
@@ -265,7 +263,7 @@ async def test_pupils_join_by_code_and_the_teacher_leads(guarded: Guarded, open_
     code = await teacher.inner_text("output.code")
     pupils = []
     for name in ("Emil", "Frida"):
-        page = await open_page(f"/?code={code}")  # type: ignore[call-arg]
+        page = await open_page(f"/?code={code}")
         await page.fill("input[name=name]", name)
         await page.click("form .main")
         await page.wait_for_selector("text=Scan fits map")
@@ -304,7 +302,7 @@ async def test_pupils_join_by_code_and_the_teacher_leads(guarded: Guarded, open_
 
 @pytest.mark.slow  # tests/console/test_studio_socket.py has the limits
 async def test_wrong_codes_are_limited(guarded: Guarded, open_page: Open) -> None:
-    page = await open_page("/?code=NOTONE")  # type: ignore[call-arg]
+    page = await open_page("/?code=NOTONE")
     statuses = await page.evaluate("""async () => { const found = []; for (let i = 0; i < 12; i++) {
         const body = JSON.stringify({name: 'x', code: 'WRONG' + i});
         found.push((await fetch('/api/sign_in', {method: 'POST', body})).status);

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 import pytest_asyncio
 
-from tests.browser.served import Served, until
+from tests.browser.served import STILL, Served, becomes, shows, until
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 AXE = (Path(__file__).parent / "vendor" / "axe.min.js").read_text("utf-8")
@@ -66,7 +66,7 @@ async def studio(opened: Served, browser: Any) -> AsyncIterator[Open]:
 
     async def opening(context: Any = None, **choices: str) -> Page:
         if context is None:
-            context = await browser.new_context(viewport={"width": 1400, "height": 900})
+            context = await browser.new_context(viewport={"width": 1400, "height": 900}, **STILL)
             contexts.append(context)
             kept = {"language": "en", "theme": "light", **choices}
             await context.add_init_script(
@@ -96,11 +96,19 @@ async def phase(page: Page, wanted: str) -> None:
     await until(page, f"studio.runner.phase.value === {wanted!r}")
 
 
-async def printed(page: Page) -> list[str]:
-    found: list[str] = await page.evaluate(
-        "studio.runner.printed.value.filter(e => e.level === 'print').map(e => e.text)"
-    )
-    return found
+async def prints(page: Page, *lines: str) -> None:
+    """Wait until the program has printed these lines, and no others."""
+    await shows(page, "studio.runner.printed.value.filter(e => e.level === 'print').map(e => e.text)", [*lines])
+
+
+async def put_down(page: Page) -> None:
+    """Put down the block that the keyboard moves. A key that comes before the editor listens is pressed again."""
+    while await page.evaluate("studio.editor.workspace.isDragging()"):
+        await page.keyboard.press("Enter")
+        for _ in range(40):
+            if not await page.evaluate("studio.editor.workspace.isDragging()"):
+                break
+            await asyncio.sleep(0.05)
 
 
 async def test_program_halts_at_breakpoint_steps_and_runs_on(studio: Open) -> None:
@@ -112,11 +120,11 @@ async def test_program_halts_at_breakpoint_steps_and_runs_on(studio: Open) -> No
     await until(page, "studio.runner.variables.value.n === '6'")
     await page.keyboard.press("F8")
     await until(page, "studio.runner.phase.value === 'paused' && studio.runner.lit.value !== 'say'")
-    assert await printed(page) == ["6"]
+    await prints(page, "6")
     await page.evaluate("studio.editor.toggleBreak('say')")
     await page.click("text=Go on")
     await phase(page, "idle")
-    assert await printed(page) == ["6", "9", "12"]
+    await prints(page, "6", "9", "12")
     assert page.errors == []
 
 
@@ -130,7 +138,7 @@ async def test_endless_program_is_stopped_after_a_page_crash(studio: Open) -> No
     assert await again.evaluate("studio.editor.workspace.getAllBlocks(false).length") == 3
     await again.keyboard.press("Shift+F5")
     await phase(again, "idle")
-    assert await again.locator(".lit").count() == 0
+    await becomes(again.locator(".lit").count, 0)
     assert again.errors == []
 
 
@@ -142,9 +150,9 @@ async def test_error_is_at_its_block_in_both_languages(studio: Open) -> None:
     await loaded(page, {"blocks": {"languageVersion": 0, "blocks": [block]}})
     await page.click("button.main")
     await until(page, "studio.runner.failure.value?.block === 'bad'")
-    assert await page.evaluate("studio.runner.failureWords.value") == "Something is divided by zero."
+    await shows(page, "studio.runner.failureWords.value", "Something is divided by zero.")
     await page.click("text=中文")
-    assert await page.evaluate("studio.runner.failureWords.value") == "出现了除以零。"
+    await shows(page, "studio.runner.failureWords.value", "出现了除以零。")
     assert await page.evaluate("studio.editor.workspace.getAllBlocks(false).length") == 4  # nothing was lost
     assert page.errors == []
 
@@ -157,29 +165,27 @@ async def test_program_is_built_run_and_debugged_by_keyboard(studio: Open) -> No
             break
     for _ in range(4):
         await page.keyboard.press("ArrowDown")  # into the text fields
-    assert await page.evaluate("document.activeElement.id") == "text"
+    await shows(page, "document.activeElement.id", "text")
     await page.keyboard.press("ArrowRight")
     await until(page, "document.activeElement.classList.contains('blocklyPath')")
     await page.keyboard.press("Enter")
     await until(page, "studio.editor.workspace.isDragging()")
-    for _ in range(20):
-        if not await page.evaluate("studio.editor.workspace.isDragging()"):
-            break
-        await page.keyboard.press("Enter")  # the first may arrive before it listens
-        await asyncio.sleep(0.3)
+    await put_down(page)
     await until(page, "studio.editor.code.value.includes('print(')")
     await page.keyboard.press("i")
     await until(page, "document.getElementById('blocklyAriaAnnounce').textContent.includes('print')")
     await page.keyboard.press("F9")
     await page.keyboard.press("F5")
     await phase(page, "paused")
-    assert await printed(page) == []
+    await prints(page)
     await page.keyboard.press("F8")
     await phase(page, "idle")
-    assert await printed(page) == ["hello"]
+    await prints(page, "hello")
     await page.keyboard.press("F9")  # the breakpoint is gone
+    await page.evaluate("studio.runner.printed.value = []")
     await page.keyboard.press("F5")
-    await until(page, "studio.runner.printed.value.length === 1 && studio.runner.phase.value === 'idle'")
+    await prints(page, "hello")
+    await phase(page, "idle")
     await page.keyboard.press("Delete")
     await until(page, "studio.editor.isEmpty()")
     await page.keyboard.press("Control+z")
@@ -244,7 +250,7 @@ async def test_the_program_is_simulated_first(studio: Open, opened: Served) -> N
     await page.click("text=Simulate first")
     await until(page, "document.querySelector('.failure.fine')")
     assert opened.robot.actions.running() == []
-    assert await printed(page) == []  # the robot's own log
+    await prints(page)  # the robot's own log
     assert page.errors == []
 
 
@@ -311,7 +317,7 @@ async def test_page_asks_again_until_a_robot_is_programmable(studio: Open, brows
     await page.wait_for_selector("text=This robot cannot be programmed at the moment: it starts")
     await page.keyboard.press("F5")  # kept until the robot is back
     await until(page, "studio.runner.printed.value.some(e => e.text === '12')")
-    assert await page.query_selector(".banner.warn") is None
+    await becomes(page.locator(".banner.warn").count, 0)
     assert len(asked) == 3
     await context.close()
 
@@ -338,8 +344,7 @@ async def test_a_change_of_language_and_look_loses_nothing(studio: Open) -> None
     await page.click("header >> text=中文")
     await until(page, "document.documentElement.lang === 'zh-CN'")
     await until(page, held)
-    assert await page.evaluate("studio.editor.code.value") == code
-    assert await page.evaluate("studio.editor.breaks.value.join()") == "say"
+    await shows(page, "[studio.editor.code.value, studio.editor.breaks.value.join()]", [code, "say"])
     await page.keyboard.press("F8")
     await until(page, "studio.runner.printed.value.some(e => e.text === '6')")
     assert {url for url in asked if not url.startswith(page.url.split("/studio/")[0])} == set()  # offline, too

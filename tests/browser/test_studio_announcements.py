@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import asyncio
 from typing import Any
 
 import pytest
 
-from tests.browser.served import until
+from tests.browser.served import shows, until
 from tests.browser.test_studio import COUNTING, Open, loaded, phase, studio
 from tests.browser.test_studio_class import WRONG
 
@@ -24,10 +23,11 @@ LISTEN = """() => {
     }
   }).observe(document.body, { subtree: true, childList: true, characterData: true });
 }"""
-WIDTHS = """() => Object.fromEntries(
+CUT = """() => Object.fromEntries(
   ["header .name input", ".looks select", "#tab-python", "#tab-group", ".stop", ".phase"]
   .map((each) => [each, document.querySelector(each).getBoundingClientRect()])
-  .map(([each, box]) => [each, [Math.round(box.left), Math.round(box.right)]]))"""
+  .map(([each, box]) => [each, [Math.round(box.left), Math.round(box.right)]])
+  .filter(([, [left, right]]) => !(0 <= left && left < right && right <= innerWidth)))"""
 
 
 async def announced(page: Any, words: str) -> None:
@@ -68,7 +68,7 @@ async def test_messages_of_a_window_are_told_in_it(studio: Open) -> None:
     await page.fill("dialog input", "no time at all")
     await page.click("dialog .main")
     await announced(page, "被拒绝")
-    assert await page.is_visible("dialog .notice")
+    await page.wait_for_selector("dialog .notice")
     assert page.errors == []
 
 
@@ -80,11 +80,9 @@ async def test_small_screens_show_names_and_panels_whole(studio: Open, language:
     await page.set_viewport_size({"width": width, "height": 740})
     await page.fill("header .name input", "Walk round and bark")
     await page.click(".switch button:nth-child(2)")
-    await asyncio.sleep(0.1)
-    boxes = await page.evaluate(WIDTHS)
-    assert all(0 <= left < right <= width for left, right in boxes.values()), boxes
-    assert await page.evaluate("(i => i.scrollWidth <= i.clientWidth)(document.querySelector('header .name input'))")
-    assert await page.evaluate("document.documentElement.scrollWidth") <= width
+    await shows(page, CUT, {})
+    await until(page, "(i => i.scrollWidth <= i.clientWidth)(document.querySelector('header .name input'))")
+    await until(page, f"document.documentElement.scrollWidth <= {width}")
 
 
 async def test_help_is_a_window_in_the_own_language(studio: Open) -> None:
@@ -92,11 +90,8 @@ async def test_help_is_a_window_in_the_own_language(studio: Open) -> None:
     block = {"type": "cyberdog.motion.turn", "id": "turn", "x": 40, "y": 40}
     await loaded(page, {"blocks": {"languageVersion": 0, "blocks": [block]}})
     await page.evaluate("studio.editor.workspace.getBlockById('turn').showHelp()")
-    await until(page, "document.querySelector('dialog[open]')")
-    words = await page.inner_text("dialog")
-    assert "cyberdog.motion.turn(angle, duration)" in words
-    assert "-360 … 359.9 °" in words
-    assert "秒内转" in words
+    for words in ("cyberdog.motion.turn(angle, duration)", "-360 … 359.9 °", "秒内转"):
+        await until(page, f"document.querySelector('dialog[open]')?.innerText.includes({words!r})")
     await page.keyboard.press("Escape")
     await until(page, "!document.querySelector('dialog')")
     await phase(page, "idle")

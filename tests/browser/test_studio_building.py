@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import asyncio
-
 import pytest
 
-from tests.browser.served import until
-from tests.browser.test_studio import Open, Page, loaded, phase, studio
+from tests.browser.served import shows, until
+from tests.browser.test_studio import Open, Page, loaded, phase, put_down, studio
 
 __all__ = ["studio"]  # the fixture
 pytestmark = pytest.mark.asyncio(loop_scope="session")
@@ -46,15 +44,13 @@ async def take_found(page: Page, words: str) -> None:
     await until(page, "document.activeElement.closest('.blocklyFlyout')")
     await page.keyboard.press("Enter")
     await until(page, MOVING)
-    while await page.evaluate(MOVING):
-        await page.keyboard.press("Enter")  # the first may arrive before it listens
-        await asyncio.sleep(0.3)
+    await put_down(page)
 
 
 async def test_blocks_are_found_and_joined_by_keyboard(studio: Open) -> None:
     page = await studio()
     await page.keyboard.press("Tab")
-    assert await page.evaluate("document.activeElement.textContent") == "To the blocks"
+    await shows(page, "document.activeElement.textContent", "To the blocks")
     await page.keyboard.press("Enter")
     await until(page, TOOLBOX)
     await take_found(page, "print")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.browser.served import until
+from tests.browser.served import shows, until
 from tests.browser.test_studio import FOREVER, Open, loaded, phase, studio
 
 __all__ = ["studio"]  # the fixture
@@ -56,7 +56,7 @@ async def test_a_class_from_its_code_to_its_results(studio: Open) -> None:
     await until(teacher, f"{row}.includes({words!r})")  # the block lit on the pupil's page
     await teacher.click(".pupils button")  # the pupil's screen on the projector
     await until(teacher, "studio.editor.workspace.getAllBlocks(false).length === 3")
-    assert "Anna" in await teacher.evaluate("studio.program.value.name")
+    await until(teacher, "studio.program.value.name.includes('Anna')")
     await teacher.click("#panel .button.danger")  # stop all
     await phase(anna, "idle")
 
@@ -68,7 +68,7 @@ async def test_a_class_from_its_code_to_its_results(studio: Open) -> None:
     await anna.click("#panel .button.main")
     await until(teacher, f"{row}.includes('handed in')")
     await teacher.set_viewport_size({"width": 1600, "height": 900})  # narrow cards, three in a row
-    assert await teacher.evaluate(UNDER) == []
+    await shows(teacher, UNDER, [])
     async with teacher.expect_download() as saved:
         await teacher.click("text=Results as a table")
     text = await asyncio.to_thread(Path(await (await saved.value).path()).read_text, "utf-8-sig")

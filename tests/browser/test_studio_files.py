@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.browser.served import Page, until
+from tests.browser.served import Page, shows, until
 from tests.browser.test_studio import COUNTING, Open, loaded, studio
 from tests.programs.language.test_language_guide import shown
 
@@ -31,9 +31,8 @@ async def test_examples_and_guides_programs_open_as_text_unchanged(studio: Open)
         await page.set_input_files("input[type=file]", {**FILE, "name": name, "buffer": text.encode()})
         await until(page, f"studio.program.value.name === {name[:-3]!r} && !document.querySelector('dialog')")
         assert await page.evaluate("studio.program.value.kind") == "text"
-        assert await page.inner_text(".notice") != ""  # it says so
-        held = await page.evaluate("JSON.parse(localStorage['studio.program.' + studio.program.value.id]).body")
-        assert held == text, name
+        await until(page, "document.querySelector('.notice').innerText !== ''")  # it says so
+        await shows(page, "JSON.parse(localStorage['studio.program.' + studio.program.value.id] ?? '{}').body", text)
     assert page.errors == []
 
 
@@ -55,14 +54,14 @@ async def comes_back(page: Page, wanted: str) -> None:
     assert "blocks" in text
     await page.set_input_files("input[type=file]", {"name": "g.json", "mimeType": "", "buffer": text.encode()})
     await until(page, "!document.querySelector('dialog')")
-    assert await page.evaluate("[studio.editor.code.value, JSON.stringify(studio.editor.save())]") == [code, state]
+    await shows(page, "[studio.editor.code.value, JSON.stringify(studio.editor.save())]", [code, state])
     assert await page.evaluate("studio.program.value.kind") == "blocks"
     style = json.dumps(json.loads(state))  # as frames carry it: as text in a field
     frame = json.dumps({"describe": f"from a frame: {wanted}", "style": style, "body": code}).encode()
     await page.click("text=Programs")
     await page.set_input_files("input[type=file]", {"name": "h.json", "mimeType": "", "buffer": frame})
     await until(page, f"studio.program.value.name === 'from a frame: {wanted}'")
-    assert await page.evaluate("[studio.editor.code.value, JSON.stringify(studio.editor.save())]") == [code, state]
+    await shows(page, "[studio.editor.code.value, JSON.stringify(studio.editor.save())]", [code, state])
 
 
 @pytest.mark.slow  # long; test_program_of_blocks_comes_back_from_its_file is near

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from tests.browser.served import Served, until
-from tests.browser.test_studio import Open, Page, loaded, phase, printed, studio
+from tests.browser.served import Served, shows, until
+from tests.browser.test_studio import Open, Page, loaded, phase, prints, studio
 
 __all__ = ["studio"]
 pytestmark = pytest.mark.asyncio(loop_scope="session")
@@ -55,11 +55,11 @@ async def test_function_becomes_a_module_that_is_lit_inside(studio: Open, opened
     await page.click("text=Run")
     await until(page, "studio.runner.lit.value === 'inner'")
     await until(page, "document.querySelector('.inside .lit')?.dataset.id === 'inner'")
-    assert "double" in await page.inner_text(".inside b")
+    await until(page, "document.querySelector('.inside b').innerText.includes('double')")
     await until(page, "studio.runner.phase.value === 'running'")
     await opened.clock.advance(22.0)
     await phase(page, "idle")
-    assert await printed(page) == ["42"]
+    await prints(page, "42")
     await page.wait_for_selector(".inside", state="hidden")
     assert page.errors == []
 
@@ -69,7 +69,7 @@ async def test_stepping_goes_through_the_blocks_of_a_module(studio: Open, opened
     await kept_as_module(page)
     await page.keyboard.press("F8")
     await phase(page, "paused")
-    assert await page.evaluate("studio.runner.lit.value") == "say"
+    await shows(page, "studio.runner.lit.value", "say")
     for block in ("def", "inner"):
         await page.keyboard.press("F8")
         await until(page, f"studio.runner.lit.value === '{block}' && studio.runner.phase.value === 'paused'")

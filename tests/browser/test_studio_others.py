@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from tests.browser.served import until
+from tests.browser.served import shows, until
 from tests.browser.test_studio import COUNTING, FOREVER, Open, loaded, studio
 
 __all__ = ["studio"]  # the fixture
@@ -35,7 +35,7 @@ async def test_other_programs_are_counted_listed_first_and_ended(studio: Open) -
     await first.get_by_role("button", name="End").click()
     await until(page, "!document.querySelector('.controls .count')")
     await until(other, "studio.runner.phase.value === 'idle'")
-    assert await page.evaluate("document.querySelector('.workspace').clientHeight") == before  # nothing moved
+    await shows(page, "document.querySelector('.workspace').clientHeight", before)  # nothing moved
     await until(page, "[...document.querySelectorAll('dialog .rows b')].some(name => name.textContent === 'renamed')")
     assert page.errors == other.errors == []
 
@@ -47,7 +47,7 @@ async def test_line_of_the_lit_block_stays_marked(studio: Open) -> None:
     await until(page, f"{marked} === 'count'")
     await page.evaluate("studio.editor.toggleBreak('always')")  # the lines are rendered anew
     await until(page, "document.querySelector('.python .gutter.on')")
-    assert await page.evaluate(marked) == "count"
+    await shows(page, marked, "count")
     await page.click("#tab-output")
     await page.click("#tab-python")
     await until(page, f"{marked} === 'count'")
@@ -70,7 +70,7 @@ async def test_values_fit_in_bubbles_in_every_look(studio: Open) -> None:
         await page.evaluate("studio.editor.toggleBreak('say')")
         await page.keyboard.press("F5")
         await until(page, "studio.runner.phase.value === 'paused' && document.querySelector('.value-bubble')")
-        assert max(await page.evaluate(over)) <= 0, look
+        await until(page, f"{over}.every(out => out <= 0)")
         await page.keyboard.press("Shift+F5")
         await until(page, "studio.runner.phase.value === 'idle'")
         await page.evaluate("studio.editor.toggleBreak('say')")

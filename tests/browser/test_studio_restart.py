@@ -13,7 +13,7 @@ import pytest
 import pytest_asyncio
 
 from roboglot.testing.addresses import free_addresses, free_port, give_back
-from tests.browser.served import until
+from tests.browser.served import shows, until
 from tests.browser.test_studio import READY
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
@@ -104,7 +104,7 @@ async def test_a_killed_server_gives_the_program_back(server: tuple[str, Life], 
     await page.keyboard.press("F5")
     await until(page, "studio.runner.phase.value === 'idle'")
     texts = "studio.runner.printed.value.filter(e => e.level === 'print').map(e => e.text).join()"
-    assert await page.evaluate(texts) == "7,end"
+    await shows(page, texts, "7,end")
     await context.close()
 
 
@@ -126,7 +126,7 @@ async def test_pages_open_and_keep_programs_without_the_server(server: tuple[str
     await until(page, "studio.editor.code.value.includes('end')")
     await page.reload()
     await until(page, "window.studio?.editor.workspace?.getBlockById('end')")
-    assert await page.evaluate("document.documentElement.lang") == "zh-CN"
+    await shows(page, "document.documentElement.lang", "zh-CN")
     await start()
     await until(page, "!document.querySelector('.banner.bad')")
     other = await (await browser.new_context()).new_page()  # another device holds it

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from tests.browser.served import until
-from tests.browser.test_studio import Open, Page, loaded, phase, printed, studio
+from tests.browser.served import becomes, until
+from tests.browser.test_studio import Open, Page, loaded, phase, prints, studio
 
 __all__ = ["studio"]  # the fixture
 pytestmark = pytest.mark.asyncio(loop_scope="session")
@@ -42,22 +42,22 @@ async def at(page: Page, block: str) -> None:
 async def test_steps_go_over_functions_and_out_of_them(studio: Open) -> None:
     page = await loaded(await studio(), GREETING)
     over, out = page.locator("[aria-label^='Step over']"), page.locator("[aria-label^='Step out']")
-    assert await over.is_disabled()
+    await becomes(over.is_disabled, True)
     await page.keyboard.press("F8")
     await at(page, "once")
     await page.keyboard.press("F10")
     await at(page, "twice")
-    assert await printed(page) == ["hi", "there"]
+    await prints(page, "hi", "there")
     await page.keyboard.press("F8")
     await at(page, "greet")
     await page.keyboard.press("F8")
     await at(page, "hi")
     await page.keyboard.press("Shift+F8")
     await at(page, "end")
-    assert await printed(page) == ["hi", "there", "hi", "there"]
+    await prints(page, "hi", "there", "hi", "there")
     await over.click()
     await phase(page, "idle")
-    assert await printed(page) == ["hi", "there", "hi", "there", "end"]
+    await prints(page, "hi", "there", "hi", "there", "end")
 
     await page.keyboard.press("F8")
     await at(page, "once")
@@ -82,5 +82,5 @@ async def test_text_is_stepped_by_lines(studio: Open) -> None:
         await until(page, f"({line}) === {number}")
     await page.keyboard.press("F10")
     await phase(page, "idle")
-    assert await printed(page) == ["hi", "there", "hi", "there", "end"]
+    await prints(page, "hi", "there", "hi", "there", "end")
     assert page.errors == []

@@ -14,7 +14,7 @@ import pytest
 import pytest_asyncio
 
 from roboglot.shards.classes import FleetClasses
-from tests.browser.served import Served, until
+from tests.browser.served import Served, shows, until
 from tests.browser.test_studio import FOREVER, READY, Open, loaded, phase, studio
 from tests.console.conftest import Shown
 from tests.console.test_classes import world
@@ -113,11 +113,11 @@ async def test_two_devices_show_one_program_alike(studio: Open, opened: Served) 
     await phase(desk, "running")
     await until(desk, "studio.runner.lit.value === 'count' && document.querySelector('.lit')?.dataset.id === 'count'")
     blocks = "JSON.stringify(studio.editor.save().blocks)"
-    assert await desk.evaluate(blocks) == await phone.evaluate(blocks)
+    await shows(desk, blocks, await phone.evaluate(blocks))
     await desk.keyboard.press("F6")
     for page in (desk, phone):
         await phase(page, "paused")
-        assert await page.evaluate("studio.runner.lit.value") == "count"
+        await shows(page, "studio.runner.lit.value", "count")
     await phone.keyboard.press("Shift+F5")
     await phase(desk, "idle")
     await phase(phone, "idle")
