@@ -57,10 +57,10 @@ class Walker:
         """Hear what it says of itself."""
         events = self.robot.events
         events.listen(BumperPressed, self.count)
-        events.listen(RobotDisplaced, self._tell)
-        events.listen(LocalizationLost, self._tell)
+        events.listen(RobotDisplaced, self._note_lost)
+        events.listen(LocalizationLost, self._note_lost)
 
-    def _tell(self, _: Event) -> None:
+    def _note_lost(self, _: Event) -> None:
         self.reported_lost = True
 
     def count(self, _: BumperPressed) -> None:

@@ -117,7 +117,7 @@ class Dog:
     def __init__(self, data: Path) -> None:
         self._runtime = Runtime(Config(world="empty", robots=(RobotConfig("a", "cyberdog2", DOG),), data=data))
         base = self._runtime.fleet.robots["a"][Base]
-        self._tell = base.set_velocity
+        self._command = base.set_velocity
         base.set_velocity = self._hear  # type: ignore[method-assign]
         self._wanted, self._seen = 0.0, asyncio.get_running_loop().create_future()
 
@@ -129,7 +129,7 @@ class Dog:
         await self._runtime.close()
 
     def _hear(self, twist: Twist) -> None:
-        self._tell(twist)
+        self._command(twist)
         if twist.x * self._wanted > 0 and not self._seen.done():
             self._seen.set_result(time.perf_counter())
 

@@ -12,17 +12,19 @@ from hypothesis import strategies as st
 
 from roboglot.access.tunnel import heartbeat
 from roboglot.access.tunnel.busy_poll import AWAKE, SHORT_MAX, BusyPoll
-from roboglot.access.tunnel.frames import BadFrame, Kind, encode
-from roboglot.access.tunnel.link import Link
+from roboglot.access.tunnel.frames import BadFrame, FrameKind, encode
+from roboglot.access.tunnel.link import TunnelLink
 from roboglot.access.tunnel.tunnel import Tunnel
 
-FRAMES = st.lists(st.tuples(st.sampled_from(Kind), st.integers(0, 2**32 - 1), st.binary(max_size=300)), max_size=20)
+FRAMES = st.lists(
+    st.tuples(st.sampled_from(FrameKind), st.integers(0, 2**32 - 1), st.binary(max_size=300)), max_size=20
+)
 
 
 @given(FRAMES, st.lists(st.integers(1, 200), max_size=20))
-def test_frames_arrive_whole_however_they_are_cut(frames: list[tuple[Kind, int, bytes]], cuts: list[int]) -> None:
+def test_frames_arrive_whole_however_they_are_cut(frames: list[tuple[FrameKind, int, bytes]], cuts: list[int]) -> None:
     async def check() -> None:
-        link, seen = Link(), list[tuple[Kind, int, bytes]]()
+        link, seen = TunnelLink(), list[tuple[FrameKind, int, bytes]]()
         link.follow(lambda *frame: seen.append(frame), lambda _crowded: None)
         data = b"".join(encode(*frame) for frame in frames)
         for size in cuts:
@@ -37,9 +39,9 @@ def test_frames_arrive_whole_however_they_are_cut(frames: list[tuple[Kind, int, 
 @given(st.binary(min_size=7, max_size=300))
 def test_no_frame_is_refused_at_its_first_byte(data: bytes) -> None:
     async def check() -> None:
-        link = Link()
+        link = TunnelLink()
         link.follow(lambda *_frame: None, lambda _crowded: None)
-        if data[0] not in set(Kind):
+        if data[0] not in set(FrameKind):
             with pytest.raises(BadFrame):
                 link._cut(data)
 
@@ -50,14 +52,14 @@ def test_no_frame_is_refused_at_its_first_byte(data: bytes) -> None:
 async def tunnels(port: int, drives: Callable[[], bool] = lambda: False) -> AsyncIterator[Tunnel]:
     """Two ends on a connection; what the first carries comes out as connections to ``port``."""
     loop = asyncio.get_running_loop()
-    made: asyncio.Future[Link] = loop.create_future()
+    made: asyncio.Future[TunnelLink] = loop.create_future()
 
-    def accepted() -> Link:
-        made.set_result(link := Link())
+    def accepted() -> TunnelLink:
+        made.set_result(link := TunnelLink())
         return link
 
     server = await loop.create_server(accepted, "127.0.0.1", 0)
-    _, near = await loop.create_connection(Link, *server.sockets[0].getsockname())
+    _, near = await loop.create_connection(TunnelLink, *server.sockets[0].getsockname())
 
     async def opened(_: int, protocol: object) -> object:
         return await loop.create_connection(protocol, "127.0.0.1", port)  # type: ignore[arg-type, call-overload, type-var]

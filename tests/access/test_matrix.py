@@ -32,7 +32,7 @@ from roboglot.runtime import Runtime
 from roboglot.wire.contracts import contract
 from roboglot.wire.cyberdog.codes import Code, FileError
 from roboglot.wire.vda5050.orders import Action
-from roboglot.wire.visual.requests import MODES, Kind
+from roboglot.wire.visual.requests import MODES, FrameSubject
 from roboglot.wire.visual.requests import OPERATIONS as FRAMES
 from tests.access.matrix import (
     ADDRESS,
@@ -232,16 +232,16 @@ async def test_programs_do_what_the_right_allows(runtime: Runtime) -> None:
             "type": kind,
             "operate": operate,
             "target_id": [TARGETS.get(operate, "t")],
-            "mode": "single" if kind is Kind.TASK else "common",
-            "condition": "now" if kind is Kind.TASK else "m(x)",
+            "mode": "single" if kind is FrameSubject.TASK else "common",
+            "condition": "now" if kind is FrameSubject.TASK else "m(x)",
             "body": "x = 1",
         }
-        for kind in (Kind.TASK, Kind.MODULE)
+        for kind in (FrameSubject.TASK, FrameSubject.MODULE)
         for operate in FRAMES[kind]
     ]
     frames += [
         {"type": kind, "operate": "inquiry", "target_id": [], "mode": mode}
-        for kind in (Kind.AI, Kind.SLAM)
+        for kind in (FrameSubject.AI, FrameSubject.SLAM)
         for mode in sorted(MODES[kind])
     ]
     for caller in CALLERS:

@@ -22,7 +22,7 @@ import pytest
 from roboglot.access import audit
 from roboglot.access.audit import Audit
 from roboglot.access.guard import Guard
-from roboglot.access.store import FILE, AccessStore, Grant, Kind, open_store
+from roboglot.access.store import FILE, AccessStore, Grant, IdentityKind, open_store
 from roboglot.access.trail import FILE as AUDIT
 from roboglot.access.trail import BrokenChain, Entry, Trail, open_trail
 from roboglot.config import AccessConfig, ConsoleConfig, RobotConfig, load_config
@@ -83,9 +83,9 @@ def test_everyone_who_opens_the_list_sees_each_change(tmp_path: Path, url: str) 
         changed()
         found = {identity.name: identity for identity in two.identities()}
         assert {name: entry.kind for name, entry in found.items()} == {
-            "cell": Kind.MACHINE,
-            "10.0.0.7": Kind.ADDRESS,
-            "other": Kind.GUEST,
+            "cell": IdentityKind.MACHINE,
+            "10.0.0.7": IdentityKind.ADDRESS,
+            "other": IdentityKind.GUEST,
         }
         assert found["cell"].grants == (Grant("*", SEE), Grant("a", DRIVE, 1234567890.123456))
         assert two.snapshot().version == versions[-1]

@@ -20,8 +20,8 @@ from roboglot.access.trail import open_trail
 from roboglot.access.tunnel import connector, heartbeat
 from roboglot.access.tunnel import tunnel as carrying
 from roboglot.access.tunnel.connector import Connector, KnownGateways, NotTrusted, Refused
-from roboglot.access.tunnel.frames import Kind, encode, read_frame
-from roboglot.access.tunnel.link import Link
+from roboglot.access.tunnel.frames import FrameKind, encode, read_frame
+from roboglot.access.tunnel.link import TunnelLink
 from roboglot.config import AccessConfig, RobotConfig, load_config
 from roboglot.model.clock import LockstepClock
 from roboglot.operations import Right
@@ -132,7 +132,7 @@ async def test_a_silent_end_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(heartbeat, "LOST_AFTER", 0.3)
     writers: list[asyncio.StreamWriter] = []
     server = await asyncio.start_server(lambda _reader, writer: writers.append(writer), "127.0.0.1", 0)
-    _, link = await asyncio.get_running_loop().create_connection(Link, *server.sockets[0].getsockname())
+    _, link = await asyncio.get_running_loop().create_connection(TunnelLink, *server.sockets[0].getsockname())
     quiet = asyncio.Event()
     tunnel = carrying.Tunnel(
         link,
@@ -206,13 +206,17 @@ async def test_frames_of_strangers_end_the_connection(gateway: tuple[Runtime, st
     assert runtime._gateway is not None
     context = ssl.create_default_context()
     context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
-    hello = encode(Kind.HELLO, 0, json.dumps({"robot": "a", "token": token}).encode())
-    for data in (b"GET / HTTP/1.1\r\n\r\n", encode(Kind.HELLO, 0, b"{}"), hello + encode(Kind.OPEN, 2, b"\0\1")):
+    hello = encode(FrameKind.HELLO, 0, json.dumps({"robot": "a", "token": token}).encode())
+    for data in (
+        b"GET / HTTP/1.1\r\n\r\n",
+        encode(FrameKind.HELLO, 0, b"{}"),
+        hello + encode(FrameKind.OPEN, 2, b"\0\1"),
+    ):
         reader, writer = await asyncio.open_connection("127.0.0.1", runtime._gateway.port, ssl=context)
         writer.write(data)
         async with asyncio.timeout(60):
             with contextlib.suppress(asyncio.IncompleteReadError, ConnectionError):
-                while (await read_frame(reader)).kind in (Kind.WELCOME, Kind.PING, Kind.CLOSE):
+                while (await read_frame(reader)).kind in (FrameKind.WELCOME, FrameKind.PING, FrameKind.CLOSE):
                     pass
         writer.close()
 
@@ -267,17 +271,21 @@ async def test_a_tunnel_takes_no_address_where_others_listen(
 
 @pytest.mark.parametrize(
     ("greeting", "kind"),
-    [({"beats": "0" * 32}, Kind.REFUSED), ({"beats": 7}, None), ({"robot": "a", "token": "no"}, Kind.REFUSED)],
+    [
+        ({"beats": "0" * 32}, FrameKind.REFUSED),
+        ({"beats": 7}, None),
+        ({"robot": "a", "token": "no"}, FrameKind.REFUSED),
+    ],
 )
 async def test_without_the_key_nothing_beats(
-    gateway: tuple[Runtime, str], greeting: dict[str, object], kind: Kind | None
+    gateway: tuple[Runtime, str], greeting: dict[str, object], kind: FrameKind | None
 ) -> None:
     runtime, _ = gateway
     assert runtime._gateway is not None
     context = ssl.create_default_context()
     context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
     reader, writer = await asyncio.open_connection("127.0.0.1", runtime._gateway.port, ssl=context)
-    writer.write(encode(Kind.HELLO, 0, json.dumps(greeting).encode()))
+    writer.write(encode(FrameKind.HELLO, 0, json.dumps(greeting).encode()))
     async with asyncio.timeout(60):
         if kind is None:
             assert await reader.read() == b""

@@ -11,7 +11,7 @@ import pytest
 
 from roboglot.access.rights import parse_rights, whole, write_rights
 from roboglot.access.secrets import password_fits, password_hash, token_hash
-from roboglot.access.store import FILE, Grant, Kind, open_store
+from roboglot.access.store import FILE, Grant, IdentityKind, open_store
 from roboglot.access.trail import Entry, open_trail
 from roboglot.cli.access import _end
 from roboglot.operations import Right
@@ -46,9 +46,9 @@ def test_people_apps_and_addresses(tmp_path: Path) -> None:
     found = {identity.name: identity for identity in store.identities()}
     store.close()
     assert {name: identity.kind for name, identity in found.items()} == {
-        "anna": Kind.PERSON,
-        "phone": Kind.APP,
-        "10.0.0.7": Kind.ADDRESS,
+        "anna": IdentityKind.PERSON,
+        "phone": IdentityKind.APP,
+        "10.0.0.7": IdentityKind.ADDRESS,
     }
     assert password_fits("correct horse", found["anna"].password)
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from roboglot.cli.capabilities import DRIVERS, PAGE, Kind, page
+from roboglot.cli.capabilities import DRIVERS, PAGE, RobotKind, page
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.motion.gimbal import Gimbal
@@ -24,7 +24,7 @@ def test_the_page_is_current(text: str) -> None:
 
 
 def test_verdicts() -> None:
-    kind = Kind("some", frozenset({Base, Driving}), {Base: "in pulses"})
+    kind = RobotKind("some", frozenset({Base, Driving}), {Base: "in pulses"})
     assert kind.judge(frozenset({Driving})) == "exact"
     assert kind.judge(frozenset({Driving, Base})) == "nearly"
     assert kind.judge(frozenset({Gimbal})) == "refused"

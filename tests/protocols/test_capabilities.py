@@ -17,7 +17,7 @@ import grpc
 import httpx
 import pytest
 
-from roboglot.cli.capabilities import BODIES, Kind
+from roboglot.cli.capabilities import BODIES, RobotKind
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.server import CyberDogDoor
@@ -82,7 +82,7 @@ async def meanwhile(asking: Awaitable[T], forward: Forward) -> T:
 
 @every_body
 async def test_the_doors_refuse_what_the_page_says(body: str, robot: Robot, forward: Forward, tmp_path: Path) -> None:
-    kind = Kind(body, frozenset(robot.interfaces), {})
+    kind = RobotKind(body, frozenset(robot.interfaces), {})
     wrong = await rest(kind, robot, forward) | await dog(kind, robot, forward, tmp_path)
     assert {row: answers for row, answers in wrong.items() if row not in ASK_THEMSELVES} == {}
 
@@ -91,11 +91,13 @@ async def test_the_doors_refuse_what_the_page_says(body: str, robot: Robot, forw
 @pytest.mark.world("office", body="robomaster_ep")
 @pytest.mark.parametrize("seed", [2, 4])
 async def test_no_order_of_requests_opens_what_is_refused(seed: int, robot: Robot, forward: Forward) -> None:
-    wrong = await rest(Kind("robomaster_ep", frozenset(robot.interfaces), {}), robot, forward, seed, 3 * ASKED)
+    wrong = await rest(RobotKind("robomaster_ep", frozenset(robot.interfaces), {}), robot, forward, seed, 3 * ASKED)
     assert {row: answers for row, answers in wrong.items() if row not in ASK_THEMSELVES} == {}
 
 
-async def rest(kind: Kind, robot: Robot, forward: Forward, seed: int = 1, requests: int = ASKED) -> dict[str, object]:
+async def rest(
+    kind: RobotKind, robot: Robot, forward: Forward, seed: int = 1, requests: int = ASKED
+) -> dict[str, object]:
     door = SlamwareDoor(robot, "127.0.0.1", SlamwareConfig(port=0))
     await door.start()
     seen = defaultdict[str, set[int]](set)
@@ -119,7 +121,7 @@ async def rest(kind: Kind, robot: Robot, forward: Forward, seed: int = 1, reques
     }
 
 
-async def dog(kind: Kind, robot: Robot, forward: Forward, data: Path) -> dict[str, object]:
+async def dog(kind: RobotKind, robot: Robot, forward: Forward, data: Path) -> dict[str, object]:
     door = CyberDogDoor(robot, "127.0.0.1", CyberDogConfig(port=0, app_port=1, plaintext=True), data)
     await door.start()
     wrong: dict[str, object] = {}

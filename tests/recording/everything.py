@@ -15,7 +15,7 @@ from urllib.request import Request, urlopen
 
 from websockets.asyncio.client import ClientConnection, connect
 
-from roboglot.clients.cyberdog.link import Link
+from roboglot.clients.cyberdog.link import DogLink
 from roboglot.clients.errors import ClientError
 from roboglot.clients.slamware import SlamwareClient
 from roboglot.config import Config, ConsoleConfig, RecordConfig, RobotConfig, load_config
@@ -81,15 +81,15 @@ class Session:
         self.gone: list[str] = []  # doors whose clients hung up or cancelled
         self.tasks: set[asyncio.Task[None]] = set()
         self._numbers = itertools.count()
-        self.dog: Link
+        self.dog: DogLink
 
     def hear(self, exchange: Exchange) -> None:
         key = exchange.door, exchange.direction
         self.heard[key] = self.heard.get(key, 0) + 1
 
-    def new_app(self) -> Link:
+    def new_app(self) -> DogLink:
         port = int(self.config.doors["cyberdog"].app_port)  # type: ignore[attr-defined]
-        return Link(
+        return DogLink(
             ADDRESS, 50052, None, RealClock(), app_port=port, pushed=lambda code, text: self.pushed.append((code, text))
         )
 

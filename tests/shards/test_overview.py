@@ -33,7 +33,7 @@ class Console(ConsoleClient):
 
 
 @pytest.fixture
-def keeper(tmp_path) -> Any:
+def fleet_host(tmp_path) -> Any:
     plan = plan_fleet(3, 1, {}, tmp_path, first="127.16.3.1")
     shards = {p.name: Shard(number, p, tmp_path) for number, p in enumerate(plan.shards, start=1)}
     for shard in list(shards.values())[:2]:
@@ -43,16 +43,16 @@ def keeper(tmp_path) -> Any:
     return SimpleNamespace(plan=plan, shards=shards)
 
 
-async def test_many_pages_cost_a_world_one_request(keeper) -> None:
-    glances = Glances(keeper, Console)
+async def test_many_pages_cost_a_world_one_request(fleet_host) -> None:
+    glances = Glances(fleet_host, Console)
     states = await asyncio.gather(*(glances.state("a1") for _ in range(20)))
     assert states == [{"battery": {"charge": 0.5}}] * 20  # and no history: tiles do not show it
     assert await glances.picture("a1") == await glances.picture("a1") == PICTURE
     assert Console.asked == [("robots", "a1"), ("robots", "a1", "map.png")]
 
 
-async def test_worlds_that_do_not_answer_say_why(keeper) -> None:
-    glances = Glances(keeper, Console)
+async def test_worlds_that_do_not_answer_say_why(fleet_host) -> None:
+    glances = Glances(fleet_host, Console)
     assert await glances.state("a2") == {"error": "sign in first"}
     assert await glances.state("a3") == {"error": "this world has no console"}
     with pytest.raises(Refused, match="sign in first"):
@@ -70,9 +70,9 @@ async def request(page: Overview, line: str, host: str = "127.16.3.1") -> tuple[
     return int(head.split()[1]), body
 
 
-async def test_page_lists_all_worlds_and_changes_nothing(keeper) -> None:
-    page = Overview(keeper, "127.16.3.1", 0)
-    page._glances = Glances(keeper, Console)
+async def test_page_lists_all_worlds_and_changes_nothing(fleet_host) -> None:
+    page = Overview(fleet_host, "127.16.3.1", 0)
+    page._glances = Glances(fleet_host, Console)
     page.open()
     await page.ready()
     try:
@@ -106,8 +106,8 @@ async def test_page_lists_all_worlds_and_changes_nothing(keeper) -> None:
         await page.close()
 
 
-async def test_page_is_for_this_machine_alone(keeper) -> None:
-    page = Overview(keeper, "192.0.2.1")
+async def test_page_is_for_this_machine_alone(fleet_host) -> None:
+    page = Overview(fleet_host, "192.0.2.1")
     page.open()
     assert page.address == ""
     await page.close()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from roboglot.access.rights import ALL_ROBOTS, EVERYTHING, NOTHING, whole
-from roboglot.access.store import Identity, Kind
+from roboglot.access.store import Identity, IdentityKind
 from roboglot.operations import Right
 
 LOCAL = "local"  # the identity of local programs where no credentials are needed
@@ -27,9 +27,9 @@ class Book:
     def password_of(self, name: str) -> str:
         """Return the stored form of a person's password; empty if there is no such person."""
         identity = self._identities.get(name)
-        return identity.password if identity is not None and identity.kind is Kind.PERSON else ""
+        return identity.password if identity is not None and identity.kind is IdentityKind.PERSON else ""
 
-    def has(self, name: str, kind: Kind) -> bool:
+    def has(self, name: str, kind: IdentityKind) -> bool:
         """Return whether there is one of this kind."""
         identity = self._identities.get(name)
         return identity is not None and identity.kind is kind

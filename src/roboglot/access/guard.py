@@ -22,7 +22,7 @@ from roboglot.access.book import LOCAL, Book, Rights
 from roboglot.access.callers import host_of, port_of
 from roboglot.access.proofs import Proofs
 from roboglot.access.rights import NOTHING
-from roboglot.access.store import AccessStore, Grant, Kind, Snapshot, open_store
+from roboglot.access.store import AccessStore, Grant, IdentityKind, Snapshot, open_store
 from roboglot.access.trail import Entry, Trail, open_trail
 from roboglot.config import AccessConfig, is_loopback
 from roboglot.model.admission import NO_PROOF, Admission, Forbidden, Proof, ProofKind, Right, Unknown
@@ -134,7 +134,7 @@ class Guard:
         host = host_of(address)
         if (tunnelled := self.tunnels.get(host)) is not None and port_of(address) in tunnelled.calls:
             return tunnelled.who
-        if self._book.has(host, Kind.ADDRESS):
+        if self._book.has(host, IdentityKind.ADDRESS):
             return host
         return LOCAL if self.config.local and is_loopback(host) else None
 
@@ -156,7 +156,7 @@ class Guard:
 
     async def shut_out(self, name: str) -> None:
         """See ``Admission.shut_out``."""
-        if self._book.has(name, Kind.GUEST):
+        if self._book.has(name, IdentityKind.GUEST):
             await asyncio.to_thread(self._store.revoke, name)
             self._adopt(await asyncio.to_thread(self._store.snapshot))
 

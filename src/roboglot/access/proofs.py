@@ -8,7 +8,7 @@ import time
 from roboglot.access.book import Book
 from roboglot.access.callers import basic_of
 from roboglot.access.secrets import password_fits, token_hash
-from roboglot.access.store import Kind
+from roboglot.access.store import IdentityKind
 from roboglot.model.admission import LockedOut, Proof, ProofKind, Unknown
 from roboglot.transport.limiter import Limiter
 
@@ -58,7 +58,7 @@ class Proofs:
     def _certified(self, proof: Proof) -> str | None:
         """Return the owner of the certificate, which TLS has verified."""
         certificate = proof.kind is ProofKind.CERTIFICATE
-        return proof.value if certificate and self._book.has(proof.value, Kind.APP) else None
+        return proof.value if certificate and self._book.has(proof.value, IdentityKind.APP) else None
 
     def _by_token(self, proof: Proof) -> str | None:
         """Return the owner of the certificate or token. They cannot be guessed, so earlier failures do not count."""

@@ -24,7 +24,7 @@ NAME_MAX = 64  # characters
 IDENTITIES_MAX = 10_000
 
 
-class Kind(StrEnum):
+class IdentityKind(StrEnum):
     """Kind of an identity, and so its means of authentication."""
 
     PERSON = "person"  # shows a password
@@ -48,7 +48,7 @@ class Identity:
     """An identity. ``password`` and ``token`` are their stored forms, which grant no access."""
 
     name: str
-    kind: Kind
+    kind: IdentityKind
     password: str
     token: str | None
     grants: tuple[Grant, ...]
@@ -92,25 +92,25 @@ class AccessStore:
 
     def add_person(self, name: str, password: str, grants: Iterable[Grant]) -> None:
         """Let a person in by a password, with these rights and no others."""
-        self.put(Identity(name, Kind.PERSON, password_hash(password), None, tuple(grants)))
+        self.put(Identity(name, IdentityKind.PERSON, password_hash(password), None, tuple(grants)))
 
     def add_machine(self, name: str, grants: Iterable[Grant]) -> str:
         """Let a machine in; its token, which is known this once."""
         token = new_token()
-        self.put(Identity(name, Kind.MACHINE, "", token_hash(token), tuple(grants)))
+        self.put(Identity(name, IdentityKind.MACHINE, "", token_hash(token), tuple(grants)))
         return token
 
     def add_guest(self, name: str, grants: Iterable[Grant], now: float) -> str:
         """Let a guest in, and forget those whose time is over at ``now``; the guest's token. Raises ValueError."""
         token = new_token()
-        guest = _checked(Identity(name, Kind.GUEST, "", token_hash(token), tuple(grants)))
+        guest = _checked(Identity(name, IdentityKind.GUEST, "", token_hash(token), tuple(grants)))
 
         def work(connection: Connection) -> None:
             for identity in _all(connection):
                 over = all(grant.until is not None and grant.until < now for grant in identity.grants)
-                if identity.kind is Kind.GUEST and over:
+                if identity.kind is IdentityKind.GUEST and over:
                     connection.execute("DELETE FROM identity WHERE name=?", (identity.name,))
-                elif identity.name == name and identity.kind is not Kind.GUEST:
+                elif identity.name == name and identity.kind is not IdentityKind.GUEST:
                     raise ValueError(f"there is a {identity.kind} named {name}")
             _put(connection, guest)
 
@@ -119,12 +119,12 @@ class AccessStore:
 
     def add_app(self, name: str, grants: Iterable[Grant]) -> None:
         """Let a CyberDog app in by the certificate with this common name."""
-        self.put(Identity(name, Kind.APP, "", None, tuple(grants)))
+        self.put(Identity(name, IdentityKind.APP, "", None, tuple(grants)))
 
     def allow(self, address: str, grants: Iterable[Grant]) -> str:
         """Let in whatever comes from an address; the address as it is kept."""
         name = str(ip_address(address))
-        self.put(Identity(name, Kind.ADDRESS, "", None, tuple(grants)))
+        self.put(Identity(name, IdentityKind.ADDRESS, "", None, tuple(grants)))
         return name
 
     def put(self, identity: Identity) -> None:
@@ -135,10 +135,10 @@ class AccessStore:
     def rotate(self, name: str, password: str = "") -> str:
         """Another token (returned) or this password; the old one is no longer valid. Raises LookupError."""
         kind = self._database.run_now(lambda connection: _kind(connection, name))
-        if kind is Kind.PERSON:
+        if kind is IdentityKind.PERSON:
             self._set("password", password_hash(password), name)
             return ""
-        if kind is not Kind.MACHINE:
+        if kind is not IdentityKind.MACHINE:
             raise ValueError(f"{name} is let in by its {kind}: there is nothing to rotate")
         token = new_token()
         self._set("token", token_hash(token), name)
@@ -163,7 +163,7 @@ class AccessStore:
 
 def _checked(identity: Identity) -> Identity:
     """Return it, if its name may be one. Raises ValueError."""
-    name, forbidden = identity.name, " " if identity.kind is Kind.ADDRESS else " :"
+    name, forbidden = identity.name, " " if identity.kind is IdentityKind.ADDRESS else " :"
     if not 0 < len(name) <= NAME_MAX or not name.isprintable() or set(name) & set(forbidden):
         raise ValueError(f"a name has 1 to {NAME_MAX} characters, no blanks and no colon")
     return identity
@@ -180,7 +180,7 @@ def _all(connection: Connection) -> list[Identity]:
     ):
         grants.setdefault(name, []).append(Grant(robot, parse_rights(rights), until))
     rows = connection.execute("SELECT name, kind, password, token FROM identity ORDER BY name")
-    return [Identity(row[0], Kind(row[1]), row[2], row[3], tuple(grants.get(row[0], ()))) for row in rows]
+    return [Identity(row[0], IdentityKind(row[1]), row[2], row[3], tuple(grants.get(row[0], ()))) for row in rows]
 
 
 def _put(connection: Connection, identity: Identity) -> None:
@@ -194,8 +194,8 @@ def _put(connection: Connection, identity: Identity) -> None:
     connection.executemany("INSERT INTO allowed (identity, robot, rights, until) VALUES (?, ?, ?, ?)", rows)
 
 
-def _kind(connection: Connection, name: str) -> Kind:
+def _kind(connection: Connection, name: str) -> IdentityKind:
     row = connection.execute("SELECT kind FROM identity WHERE name=?", (name,)).fetchone()
     if row is None:
         raise LookupError(f"there is no {name!r}; `roboglot access list` shows who there is")
-    return Kind(row[0])
+    return IdentityKind(row[0])

@@ -15,7 +15,7 @@ from typing import Annotated
 import typer
 
 from roboglot.access.rights import ALL_ROBOTS, parse_rights, write_rights
-from roboglot.access.store import AccessStore, Grant, Kind, open_store
+from roboglot.access.store import AccessStore, Grant, IdentityKind, open_store
 from roboglot.config import Config
 from roboglot.storage.transactions import DatabaseError
 
@@ -94,7 +94,7 @@ def revoke(name: Name, data: Data = None, database: Database = "") -> None:
 def rotate(name: Name, data: Data = None, database: Database = "") -> None:
     """Give a machine another token, or a person another password; the old one is no longer valid."""
     with _store(data, database) as store:
-        person = any(entry.name == name and entry.kind is Kind.PERSON for entry in store.identities())
+        person = any(entry.name == name and entry.kind is IdentityKind.PERSON for entry in store.identities())
         if token := store.rotate(name, _password() if person else ""):
             print(token)
 

@@ -33,7 +33,7 @@ PAGE = Path("docs/capabilities.md")
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class RobotKind:
     """A kind of robot: its components, and what of them is approximate (in plain words)."""
 
     name: str
@@ -49,14 +49,14 @@ class Kind:
 
 def command(write: Annotated[bool, typer.Option("--write", help="Write docs/capabilities.md.")] = False) -> None:
     """Show what each protocol can do on each kind of robot."""
-    text = page(_tell)
+    text = page(_show_progress)
     if write:
         PAGE.write_text(text, encoding="utf-8")
     else:
         print(text, end="")
 
 
-def _tell(done: int, name: str) -> None:
+def _show_progress(done: int, name: str) -> None:
     """Progress on a terminal: each kind of robot is built, which takes seconds."""
     if sys.stderr.isatty():
         total = len(BODIES) + len(DRIVERS)
@@ -64,31 +64,31 @@ def _tell(done: int, name: str) -> None:
         print(f"\r\x1b[K{words}", end="", file=sys.stderr, flush=True)
 
 
-def kinds(tell: Callable[[int, str], None] = lambda _done, _name: None) -> list[Kind]:
+def kinds(report: Callable[[int, str], None] = lambda _done, _name: None) -> list[RobotKind]:
     """Simulated bodies as the office world equips them, and what drivers announce, each with our skills and memory.
 
-    ``tell`` hears how many are done and which comes next, "" at the end.
+    ``report`` hears how many are done and which comes next, "" at the end.
     """
-    return asyncio.run(_kinds(tell))
+    return asyncio.run(_kinds(report))
 
 
-async def _kinds(tell: Callable[[int, str], None]) -> list[Kind]:
-    made: list[Kind] = []
+async def _kinds(report: Callable[[int, str], None]) -> list[RobotKind]:
+    made: list[RobotKind] = []
     for name in (*BODIES, *DRIVERS):
-        tell(len(made), name)
+        report(len(made), name)
         url, announced = DRIVERS.get(name, (name, {}))
         database = Database(":memory:")
         fleet = build_fleet("office", [RobotConfig("a", url)], clock=LockstepClock(), seed=1, database=database)
-        made.append(Kind(name, frozenset(fleet.robots["a"].interfaces) | announced.keys(), announced))
+        made.append(RobotKind(name, frozenset(fleet.robots["a"].interfaces) | announced.keys(), announced))
         await fleet.close()
         database.close()
-    tell(len(made), "")
+    report(len(made), "")
     return made
 
 
-def page(tell: Callable[[int, str], None] = lambda _done, _name: None) -> str:
-    """The page; ``tell`` hears of the progress."""
-    columns = kinds(tell)
+def page(report: Callable[[int, str], None] = lambda _done, _name: None) -> str:
+    """The page; ``report`` hears of the progress."""
+    columns = kinds(report)
     lines = [
         "# Capabilities",
         "",
@@ -124,7 +124,7 @@ def page(tell: Callable[[int, str], None] = lambda _done, _name: None) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _chapters(door: DoorType, columns: list[Kind]) -> list[str]:
+def _chapters(door: DoorType, columns: list[RobotKind]) -> list[str]:
     needs, rows = {str(op.key): op.needs for op in door.table()}, door.contracts[0].rows()
     lines = []
     for chapter in dict.fromkeys(row.chapter for row in rows):
@@ -134,7 +134,7 @@ def _chapters(door: DoorType, columns: list[Kind]) -> list[str]:
     return lines
 
 
-def _refusals(door: DoorType, drivers: list[Kind]) -> list[str]:
+def _refusals(door: DoorType, drivers: list[RobotKind]) -> list[str]:
     """A row for all requests that each of the drivers' robots refuses for want of the same parts."""
     needs, rows = {str(op.key): op.needs for op in door.table()}, door.contracts[0].rows()
     alike: dict[tuple[str, ...], list[str]] = {}
@@ -156,17 +156,17 @@ def _cell(verdicts: list[str]) -> str:
     return f"{len(verdicts) - refused}/{len(verdicts)}" + (f" ({nearly}≈)" if nearly else "")
 
 
-def _mark(kind: Kind, component: type[Component]) -> str:
+def _mark(kind: RobotKind, component: type[Component]) -> str:
     if component not in kind.components:
         return ""
     return "≈" if kind.nearly.get(component) else "●"
 
 
-def _head(first: str, columns: list[Kind]) -> str:
+def _head(first: str, columns: list[RobotKind]) -> str:
     return _row(first, [kind.name for kind in columns])
 
 
-def _rule(columns: list[Kind]) -> str:
+def _rule(columns: list[RobotKind]) -> str:
     return "|---" * (len(columns) + 1) + "|"
 
 

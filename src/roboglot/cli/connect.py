@@ -18,7 +18,7 @@ import typer
 
 from roboglot.access.tunnel.connector import AnnouncedGateway, KnownGateways, NotTrusted, Refused
 from roboglot.access.tunnel.dialling import Dialling, OnePlace, Place, Places, Unusable
-from roboglot.config import is_loopback
+from roboglot.config import ROBOTS_MAX, is_loopback
 from roboglot.hosting.event_loop import run
 from roboglot.hosting.logs import set_up_logging
 from roboglot.hosting.visible import visible
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from roboglot.storage.whereabouts import Whereabouts
 
 PORT = 50090
-ROBOTS_MAX = 100
 
 
 def command(

@@ -23,7 +23,7 @@ from roboglot.extras import MissingExtra
 from roboglot.hosting.visible import visible
 
 if TYPE_CHECKING:
-    from roboglot.shards.keeper import Keeper
+    from roboglot.shards.fleet_host import FleetHost
     from roboglot.shards.plan import FleetPlan
     from roboglot.shards.wishes import Answer, Row, Verb
 
@@ -69,7 +69,7 @@ def up(
         if detached and on in ("", "local"):
             raise ValueError("--detached is for a cluster: --on ray://HOST")
         with _where(on):
-            sys.exit(asyncio.run(_serve(lambda: _keeper(plan, folder, memory_max << 20, on, detached), folder)))
+            sys.exit(asyncio.run(_serve(lambda: _fleet_host(plan, folder, memory_max << 20, on, detached), folder)))
     except (ValueError, OSError, FolderInUse, NotWarm, MissingExtra) as error:
         sys.exit(f"roboglot fleet: {error}")
 
@@ -121,7 +121,7 @@ def stop(
     data: Data = None,
 ) -> None:
     """Stop one shard or all; `restart` starts them again."""
-    _tell(_ask("stop", data, shard=shard))
+    _print(_ask("stop", data, shard=shard))
 
 
 @app.command()
@@ -130,13 +130,13 @@ def restart(
     data: Data = None,
 ) -> None:
     """Stop and start one shard or all, with the same addresses and what they have stored."""
-    _tell(_ask("restart", data, shard=shard))
+    _print(_ask("restart", data, shard=shard))
 
 
 @app.command()
 def reset(shard: Annotated[str, typer.Argument(help="A shard, or one of its robots.")], data: Data = None) -> None:
     """Start a shard as on its first day: programs, maps and places of its robots are deleted."""
-    _tell(_ask("reset", data, shard=shard))
+    _print(_ask("reset", data, shard=shard))
 
 
 @app.command()
@@ -146,7 +146,7 @@ def move(
     data: Data = None,
 ) -> None:
     """Move a robot, its address and what is stored of it to another shard; both start again."""
-    _tell(_ask("move", data, robot=robot, to=to))
+    _print(_ask("move", data, robot=robot, to=to))
 
 
 @app.command()
@@ -243,7 +243,7 @@ def _where(on: str) -> AbstractContextManager[None]:
     return joined(on)
 
 
-def _keeper(plan: FleetPlan, folder: Path, memory_max: int, on: str, detached: bool) -> Keeper:
+def _fleet_host(plan: FleetPlan, folder: Path, memory_max: int, on: str, detached: bool) -> FleetHost:
     if on:
         from roboglot.shards.cluster import ClusterFleet
 
@@ -253,7 +253,7 @@ def _keeper(plan: FleetPlan, folder: Path, memory_max: int, on: str, detached: b
     return Supervisor(plan, folder, memory_max=memory_max)
 
 
-async def _serve(keeper: Callable[[], Keeper], folder: Path) -> int:
+async def _serve(fleet_host: Callable[[], FleetHost], folder: Path) -> int:
     from roboglot.shards.classes import FleetClasses
     from roboglot.shards.desk import FleetDesk
     from roboglot.shards.overview import Overview
@@ -261,7 +261,7 @@ async def _serve(keeper: Callable[[], Keeper], folder: Path) -> int:
     began, stop = time.monotonic(), asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, stop.set)
-    supervisor = keeper()
+    supervisor = fleet_host()
     desk, classes = FleetDesk(supervisor, folder), FleetClasses(folder)
     page = Overview(supervisor, _first_address(supervisor))
     ending = asyncio.ensure_future(stop.wait())
@@ -285,20 +285,20 @@ async def _serve(keeper: Callable[[], Keeper], folder: Path) -> int:
     return 0
 
 
-def _first_address(keeper: Keeper) -> str:
-    return str(keeper.plan.shards[0].settings["robots"][0]["address"])
+def _first_address(fleet_host: FleetHost) -> str:
+    return str(fleet_host.plan.shards[0].settings["robots"][0]["address"])
 
 
-def _up(keeper: Keeper, seconds: float, warm: float, page: str) -> str:
+def _up(fleet_host: FleetHost, seconds: float, warm: float, page: str) -> str:
     """Return what `fleet up` says when all worlds are up or have failed."""
     from roboglot.shards.supervisor import State
 
-    shards = list(keeper.shards.values())
+    shards = list(fleet_host.shards.values())
     ready, robots = sum(shard.state is State.READY for shard in shards), sum(len(s.plan.robots) for s in shards)
     where = f"; all on one page: {page}" if page else ""
     return (
         f"{ready} of {len(shards)} worlds with {robots} robots are up after {seconds:.1f} s"
-        f" ({warm:.1f} s of it to load); robots on {_first_address(keeper)} and up{where}."
+        f" ({warm:.1f} s of it to load); robots on {_first_address(fleet_host)} and up{where}."
         " `roboglot fleet list` shows them."
     )
 
@@ -321,7 +321,7 @@ def _ask(verb: Verb, data: Path | None, **wish: str) -> Answer:
     return answer
 
 
-def _tell(answer: Answer) -> None:
+def _print(answer: Answer) -> None:
     for row in answer.shards:
         print(f"{row.name:6} {row.state:9} {', '.join(robot.name for robot in row.robots)} {_why(row)}".rstrip())
 

@@ -28,7 +28,7 @@ from roboglot.protocols.visual.config import VisualConfig
 
 ROBOT = "ws://127.0.0.1:50053"
 FRAMES, LOG, DEBUG, RUNS = "/programs", "/log", "/debug", "/runs"
-Frame = dict[str, Any]
+TaskFrame = dict[str, Any]
 Stops = tuple[list[int], bool]  # lines, and whether to stop before the first statement
 
 
@@ -181,14 +181,14 @@ async def _link(address: str, path: str) -> AsyncIterator[TextLink]:
         await link.close()
 
 
-async def _ask(frames: TextLink, operate: str, *targets: str, **fields: str) -> Frame:
+async def _ask(frames: TextLink, operate: str, *targets: str, **fields: str) -> TaskFrame:
     """Send a frame and return its answer, of a task unless ``type`` is given. Raises Failure for a refusal."""
     id = f"program_{operate}"
     frame = {"type": "task", "id": id, "operate": operate, "target_id": targets} | fields
     await frames.send(json.dumps(frame, ensure_ascii=False))
     async for text in frames:
         answer = json.loads(text)
-        content: Frame = answer.get("feedback") or answer["response"]
+        content: TaskFrame = answer.get("feedback") or answer["response"]
         if content["id"] == id:
             if content.get("state"):
                 raise Failure(f"{operate}: {content['describe']} ({content['state']})")
@@ -253,7 +253,7 @@ async def _halted(stepper: Stepper | None) -> bool:
     return True
 
 
-def _show_block(block: Frame, feedback: Frame) -> None:
+def _show_block(block: TaskFrame, feedback: TaskFrame) -> None:
     sign = "▶" if block["type"] == "begin" else "■"
     trouble = f"  {feedback['describe']}" if feedback["state"] else ""
     print(visible(f"{sign} {block['id']}{trouble}"), file=sys.stderr, flush=True)
@@ -267,7 +267,7 @@ async def _print_log(log: TextLink, task: str, *, as_json: bool) -> int:
     """Print the stored log of a task; return the number of its entries."""
     if not as_json:
         return await _follow_log(log, task, times=True)
-    lines: list[Frame] = []
+    lines: list[TaskFrame] = []
     async for text in log:
         line = json.loads(text)
         if "entries" in line:
@@ -298,7 +298,7 @@ async def _follow_log(log: TextLink, task: str, errors: set[str] | None = None, 
 
 async def _list(address: str, frames: TextLink, kind: str, *, as_json: bool) -> None:
     """Tasks or modules; of those that run, what they take of the machine."""
-    listed: list[Frame] = (await _ask(frames, "inquiry", type=kind))["list"]
+    listed: list[TaskFrame] = (await _ask(frames, "inquiry", type=kind))["list"]
     async with _link(address, RUNS) as link:
         await link.send("")
         running = {run["target_id"]: run for run in json.loads(await anext(aiter(link)))["runs"]}
@@ -308,7 +308,7 @@ async def _list(address: str, frames: TextLink, kind: str, *, as_json: bool) -> 
     print(json.dumps(listed, ensure_ascii=False)) if as_json else _print_table(kind, listed)
 
 
-def _print_table(kind: str, listed: list[Frame]) -> None:
+def _print_table(kind: str, listed: list[TaskFrame]) -> None:
     from rich.console import Console
     from rich.table import Table
 
@@ -322,7 +322,7 @@ def _print_table(kind: str, listed: list[Frame]) -> None:
     Console(highlight=False, markup=False).print(table)
 
 
-def _figures(run: Frame | None) -> list[str]:
+def _figures(run: TaskFrame | None) -> list[str]:
     """Processor time, memory and age of a run."""
     if run is None:
         return ["", "", ""]

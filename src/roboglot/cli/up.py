@@ -259,5 +259,6 @@ async def _lines() -> AsyncIterator[str]:
             yield line.decode("utf-8", "replace").strip()
 
 
-command.__signature__ = _with_door_options()  # type: ignore[attr-defined]
-command.__annotations__ = {name: p.annotation for name, p in command.__signature__.parameters.items()}  # type: ignore[attr-defined]
+SIGNATURE = _with_door_options()
+vars(command)["__signature__"] = SIGNATURE
+command.__annotations__ = {name: parameter.annotation for name, parameter in SIGNATURE.parameters.items()}

@@ -102,12 +102,12 @@ class Page:
 
     async def run(self) -> None:
         """Send until cancelled."""
-        await self._tell({"type": "hello", **self._desk.hello(), "now": milliseconds()})
+        await self._send_message({"type": "hello", **self._desk.hello(), "now": milliseconds()})
         while True:
             await self._due.wait()
             self._due.clear()
             while not self._replies.empty():
-                await self._tell(self._replies.get_nowait())
+                await self._send_message(self._replies.get_nowait())
             if self._beat > self._shown:
                 before, self._shown = self._shown, self._beat
                 await self._show(before, self._beat)
@@ -143,7 +143,7 @@ class Page:
                 await self._show_frames(self._watched)
             if self._watch.seen and (boxes := self._watched.sightings.boxes) != self._boxes:
                 self._boxes = boxes
-                await self._tell({"type": "seen", "robot": self._watched.robot.id, "boxes": boxes})
+                await self._send_message({"type": "seen", "robot": self._watched.robot.id, "boxes": boxes})
             if self._watch.wire and due(STATE_BEATS):
                 await self._show_wire(self._watched)
 
@@ -156,14 +156,14 @@ class Page:
         whole = len(visible) == len(self._desk.views)  # the world view shows all robots
         if self._watch.truth and whole and (truth := drawings.truth_of(self._desk.stage)) != self._truth:
             self._truth = moment["truth"] = truth
-        await self._tell(moment)
+        await self._send_message(moment)
 
     async def _show_state(self, name: str, state: dict[str, object]) -> None:
         before = self._sent.get(name, {})
         changed = {key: value for key, value in state.items() if key not in before or before[key] != value}
         if changed:
             self._sent[name] = state
-            await self._tell({"type": "state", "robot": name, "state": changed})
+            await self._send_message({"type": "state", "robot": name, "state": changed})
 
     async def _show_frames(self, view: RobotView) -> None:
         for kind, frame in (("scan", view.scan), ("path", view.path), ("map", view.map)):
@@ -179,9 +179,9 @@ class Page:
                 return
             skipped = 0 if first else batch[0].number - self._wire_at - 1
             self._wire_at = batch[-1].number
-            await self._tell({"type": "wire", "robot": view.robot.id, "rows": rows(batch), "skipped": skipped})
+            await self._send_message({"type": "wire", "robot": view.robot.id, "rows": rows(batch), "skipped": skipped})
 
-    async def _tell(self, message: Mapping[str, object]) -> None:
+    async def _send_message(self, message: Mapping[str, object]) -> None:
         await self._send(msgspec.json.encode(message).decode())
 
     # -- in ------------------------------------------------------------------------------------------------------------

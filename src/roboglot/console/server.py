@@ -11,6 +11,7 @@ import math
 import socket
 import time
 from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 from typing import TYPE_CHECKING
 
 from roboglot.config import ConsoleConfig
@@ -45,7 +46,7 @@ class Console:
         self._tasks: list[asyncio.Task[None]] = []
         self._server: asyncio.Server | None = None
         self._application: Application | None = None
-        self._connections: set[asyncio.Protocol] = set()
+        self._connections: AbstractSet[asyncio.BaseProtocol] = set()
 
     @property
     def address(self) -> str:
@@ -99,7 +100,7 @@ class Console:
         )
         config.load()
         state = ServerState()
-        self._connections = state.connections  # type: ignore[assignment]
+        self._connections = state.connections
         loop = asyncio.get_running_loop()
         asking = (robot.admission for robot in self._desk.robots.values() if robot.admission.asks)
         self._gate = Gate(next(asking, Admission()), self._tls)

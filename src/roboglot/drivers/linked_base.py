@@ -9,6 +9,9 @@ from roboglot.model.components.system.link import Link
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.geometry import STILL, Twist
 
+LATENCY_SMOOTHING = 0.2  # share of a new latency in the mean
+OFF_DOCK = 0.6  # m straight ahead of a dock: off its contacts, with room to turn
+
 
 class LinkedBase(Base):
     """Takes velocities only; drivers of robots with controllable wheels override ``set_wheel_speeds``."""

@@ -171,7 +171,7 @@ class VideoCall:
         codecs = known.codecs if known else []
         transceiver.setCodecPreferences([codec for codec in codecs if codec.mimeType.lower() in (H264, RETRANSMISSION)])
         # aiortc asks its own encoder for a keyframe; we use another one.
-        sender._send_keyframe = self._track.request_keyframe  # type: ignore[method-assign]
+        vars(sender)["_send_keyframe"] = self._track.request_keyframe
         if self._sound is not None and "\nm=audio" in offer:
             peer.addTrack(self._sound)
         try:

@@ -30,7 +30,7 @@ class Entry(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class EntryKind:
     """Encoding of one kind of value."""
 
     schema: str
@@ -52,21 +52,21 @@ def _plain(_at: int, value: object) -> bytes:
 
 
 KINDS = {
-    "exchange": Kind("roboglot.Exchange", lambda _at, value: messages.encode_exchange(value)),
-    "input": Kind("roboglot.Input", lambda _at, value: messages.encode_input(value)),
-    "event": Kind("roboglot.Event", _plain),
-    "action": Kind("roboglot.Action", _plain),
-    "battery": Kind("roboglot.Battery", _plain),
-    "pressure": Kind("roboglot.Pressure", _plain),
-    "state": Kind("roboglot.State", _plain),
-    "mark": Kind("roboglot.Mark", _plain),
-    "pose": Kind("foxglove.PoseInFrame", foxglove.encode_pose),
-    "transforms": Kind("foxglove.FrameTransforms", foxglove.encode_transforms),
-    "scan": Kind("foxglove.LaserScan", foxglove.encode_scan),
-    "grid": Kind("foxglove.Grid", foxglove.encode_grid),
-    "log": Kind("foxglove.Log", foxglove.encode_log),
-    "scene": Kind("foxglove.SceneUpdate", foxglove.encode_scene),
-    "video": Kind("foxglove.CompressedVideo", foxglove.encode_video),
+    "exchange": EntryKind("roboglot.Exchange", lambda _at, value: messages.encode_exchange(value)),
+    "input": EntryKind("roboglot.Input", lambda _at, value: messages.encode_input(value)),
+    "event": EntryKind("roboglot.Event", _plain),
+    "action": EntryKind("roboglot.Action", _plain),
+    "battery": EntryKind("roboglot.Battery", _plain),
+    "pressure": EntryKind("roboglot.Pressure", _plain),
+    "state": EntryKind("roboglot.State", _plain),
+    "mark": EntryKind("roboglot.Mark", _plain),
+    "pose": EntryKind("foxglove.PoseInFrame", foxglove.encode_pose),
+    "transforms": EntryKind("foxglove.FrameTransforms", foxglove.encode_transforms),
+    "scan": EntryKind("foxglove.LaserScan", foxglove.encode_scan),
+    "grid": EntryKind("foxglove.Grid", foxglove.encode_grid),
+    "log": EntryKind("foxglove.Log", foxglove.encode_log),
+    "scene": EntryKind("foxglove.SceneUpdate", foxglove.encode_scene),
+    "video": EntryKind("foxglove.CompressedVideo", foxglove.encode_video),
 }
 
 

@@ -127,14 +127,14 @@ class DogLine(Line):
     options: dict[str, str]
 
     async def open(self) -> None:
-        from roboglot.clients.cyberdog.link import Certificates, Link
+        from roboglot.clients.cyberdog.link import Certificates, DogLink
 
         folder = self.options.get("certs", "none")
         try:
             certificates = None if folder == "none" else Certificates.load(Path(folder))
         except OSError as error:
             raise LinkLost(f"the certificates in {folder} cannot be read: {error.strerror}") from None
-        self._link = Link(
+        self._link = DogLink(
             self.host,
             self.port,
             certificates,

@@ -162,7 +162,7 @@ class _Link:
         if number not in self._seats:
             if len(self._seats) >= SEATS_MAX:
                 raise ValueError(f"more than {SEATS_MAX} pages")
-            self._seats[number] = self._room.seat(lambda news: self._tell(number, news), self._world)
+            self._seats[number] = self._room.seat(lambda news: self._send(number, news), self._world)
         return self._seats[number]
 
     def _take(self, seat: Seat, wished: Wished) -> None:
@@ -195,7 +195,7 @@ class _Link:
         """Say that a class is over."""
         self._writer.write(line(Ended(code)))
 
-    def _tell(self, number: int, message: dict[str, object]) -> None:
+    def _send(self, number: int, message: dict[str, object]) -> None:
         if number in self._seats and not self._writer.is_closing():
             self._writer.write(line(News(number, message)))
             if self._writer.transport.get_write_buffer_size() > UNREAD_MAX:

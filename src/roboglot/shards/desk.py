@@ -8,16 +8,16 @@ from pathlib import Path
 import msgspec
 
 from roboglot.hosting.local_socket import LocalServer
-from roboglot.shards.keeper import Keeper
+from roboglot.shards.fleet_host import FleetHost
 from roboglot.shards.moving import move_robot
 from roboglot.shards.supervisor import Shard
 from roboglot.shards.wishes import SOCKET, Answer, Request, RobotRow, Row
 
 
 class FleetDesk:
-    """Desk of one fleet's keeper."""
+    """Desk of one fleet."""
 
-    def __init__(self, supervisor: Keeper, folder: Path) -> None:
+    def __init__(self, supervisor: FleetHost, folder: Path) -> None:
         self._supervisor = supervisor
         self._server = LocalServer(folder / SOCKET, "roboglot fleet", self._answer)
         self._turn = asyncio.Lock()

@@ -7,7 +7,7 @@ from collections.abc import Callable, Coroutine
 from typing import Generic, TypeVar
 
 from roboglot.agents.console import ConsoleClient, Refused
-from roboglot.shards.keeper import Keeper
+from roboglot.shards.fleet_host import FleetHost
 from roboglot.shards.supervisor import Shard, State
 
 PERIOD = 1.0  # s that a glance is shown again
@@ -35,8 +35,8 @@ class _Newest(Generic[T]):
 class Glances:
     """Looks at the robots of one fleet, however many pages ask."""
 
-    def __init__(self, keeper: Keeper, client: Callable[[str], ConsoleClient] = ConsoleClient) -> None:
-        self._keeper, self._client = keeper, client
+    def __init__(self, fleet_host: FleetHost, client: Callable[[str], ConsoleClient] = ConsoleClient) -> None:
+        self._fleet_host, self._client = fleet_host, client
         self._states: _Newest[dict[str, object]] = _Newest()
         self._pictures: _Newest[bytes] = _Newest()
         self._turns = asyncio.Semaphore(AT_ONCE_MAX)
@@ -70,7 +70,7 @@ class Glances:
         return await self._pictures.get(robot, look)
 
     def _home(self, robot: str) -> Shard:
-        return self._keeper.shards[self._keeper.plan.home_of(robot).name]
+        return self._fleet_host.shards[self._fleet_host.plan.home_of(robot).name]
 
     def _console(self, shard: Shard) -> ConsoleClient | None:
         """Return the console of a world that is up and has one."""

@@ -6,7 +6,7 @@ import asyncio
 from pathlib import Path
 
 from roboglot.config import ROBOTS_MAX
-from roboglot.shards.keeper import Keeper
+from roboglot.shards.fleet_host import FleetHost
 from roboglot.shards.plan import ShardPlan, checked, save
 from roboglot.shards.supervisor import State
 from roboglot.storage.transfer import copy_robot, forget_robot
@@ -14,7 +14,7 @@ from roboglot.storage.transfer import copy_robot, forget_robot
 DATABASE = "roboglot.db"  # in a shard's data folder
 
 
-async def move_robot(supervisor: Keeper, robot: str, to: str) -> None:
+async def move_robot(supervisor: FleetHost, robot: str, to: str) -> None:
     """Move it; both shards are down meanwhile. Raises LookupError, ValueError where it cannot live there.
 
     First its rows are in the new place, then the plan says so, then they are removed from the old one: a crash at any

@@ -88,7 +88,7 @@ class Nursery:
         if pid == 0:
             self._become_shard(parent, folder, link, output)
         self._children[pid] = number
-        self._tell(Born(number, pid))
+        self._send(Born(number, pid))
 
     def _become_shard(self, parent: int, folder: str, link: int, output: int) -> None:
         """Become the shard, in the child; never returns."""
@@ -115,7 +115,7 @@ class Nursery:
 
     def _report_deaths(self) -> None:
         for number, status in self._reap():
-            self._tell(Dead(number, status))
+            self._send(Dead(number, status))
 
     def _reap(self) -> list[tuple[int, int]]:
         dead: list[tuple[int, int]] = []
@@ -125,7 +125,7 @@ class Nursery:
                     dead.append((number, os.waitstatus_to_exitcode(ended[1])))
         return dead
 
-    def _tell(self, message: Birth) -> None:
+    def _send(self, message: Birth) -> None:
         self._control.send(encode(message))
 
 

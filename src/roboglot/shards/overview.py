@@ -9,6 +9,7 @@ import asyncio
 import importlib
 import logging
 import socket
+from collections.abc import Set as AbstractSet
 from urllib.parse import parse_qs, unquote
 
 from roboglot.agents.console import Refused
@@ -18,8 +19,8 @@ from roboglot.console.http import Problem, Receive, Scope, Send, answer, answer_
 from roboglot.console.server import LIBRARIES, bound
 from roboglot.model.background import load
 from roboglot.protocols.browsers import Browsers, of_rows
+from roboglot.shards.fleet_host import FleetHost
 from roboglot.shards.glances import Glances
-from roboglot.shards.keeper import Keeper
 from roboglot.shards.supervisor import Shard
 
 log = logging.getLogger(__name__)
@@ -32,13 +33,13 @@ BACKLOG = 64
 class Overview:
     """Serves the page at ``address``: a URL, empty while it is closed."""
 
-    def __init__(self, keeper: Keeper, host: str, port: int = PORT) -> None:
-        self._keeper, self._host, self._port = keeper, host, port
-        self._glances, self._assets, self._browsers = Glances(keeper), Assets(), Browsers("")
+    def __init__(self, fleet_host: FleetHost, host: str, port: int = PORT) -> None:
+        self._fleet_host, self._host, self._port = fleet_host, host, port
+        self._glances, self._assets, self._browsers = Glances(fleet_host), Assets(), Browsers("")
         self._server: asyncio.Server | None = None
         self._socket: socket.socket | None = None
         self._serving: asyncio.Task[None] | None = None
-        self._connections: set[asyncio.Protocol] = set()
+        self._connections: AbstractSet[asyncio.BaseProtocol] = set()
 
     @property
     def address(self) -> str:
@@ -86,7 +87,7 @@ class Overview:
         )
         config.load()
         state, loop = ServerState(), asyncio.get_running_loop()
-        self._connections = state.connections  # type: ignore[assignment]
+        self._connections = state.connections
         self._server = await loop.create_server(
             lambda: HttpToolsProtocol(config, state, {}, loop), sock=listening, backlog=BACKLOG
         )
@@ -122,7 +123,7 @@ class Overview:
             states = await asyncio.gather(*map(self._glances.state, seen))
         except LookupError as error:
             raise Problem(404, str(error.args[0])) from None
-        worlds = [_world(shard) for shard in self._keeper.shards.values()]
+        worlds = [_world(shard) for shard in self._fleet_host.shards.values()]
         return {"worlds": worlds, "robots": dict(zip(seen, states, strict=True))}
 
     async def _send_picture(self, name: str, send: Send) -> None:

@@ -10,6 +10,7 @@ import asyncio
 import logging
 from collections.abc import Callable
 from contextvars import copy_context
+from typing import cast
 
 log = logging.getLogger(__name__)
 
@@ -33,7 +34,7 @@ class PipeEnd(asyncio.Transport):
 
     def __init__(self, protocol: asyncio.BaseProtocol, own: Address, peer: Address) -> None:
         super().__init__({"sockname": own, "peername": peer})
-        self._protocol = protocol
+        self.set_protocol(protocol)
         self._context = copy_context()  # each call gets a copy: no client's name is left for the next
         self._loop = asyncio.get_running_loop()
         self._other: PipeEnd
@@ -124,7 +125,7 @@ class PipeEnd(asyncio.Transport):
 
     def set_protocol(self, protocol: asyncio.BaseProtocol) -> None:
         """Have another one."""
-        self._protocol = protocol
+        self._protocol = cast(asyncio.Protocol, protocol)  # that of a stream
 
     def get_protocol(self) -> asyncio.BaseProtocol:
         """Return whose end this is."""
@@ -156,7 +157,7 @@ class PipeEnd(asyncio.Transport):
         free = self._reading and not self._taking
         if free and not self._inbox and len(data) <= PIECE:
             self._taking = True  # answers may make the other end write; those bytes wait
-            self._call(self._protocol.data_received, bytes(data))  # type: ignore[attr-defined]
+            self._call(self._protocol.data_received, bytes(data))
             self._taking = False
             if self._inbox and self._reading:
                 self._loop.call_soon(self._drain)
@@ -197,7 +198,7 @@ class PipeEnd(asyncio.Transport):
             data = bytes(self._inbox[:PIECE])
             del self._inbox[:PIECE]
             self._taking = True
-            self._call(self._protocol.data_received, data)  # type: ignore[attr-defined]
+            self._call(self._protocol.data_received, data)
             self._taking = False
         if self._lost:
             return
@@ -207,7 +208,7 @@ class PipeEnd(asyncio.Transport):
         self._other.drained()
         if self._other.ended and not self._heard_end:
             self._heard_end = True
-            if not self._call(self._protocol.eof_received):  # type: ignore[attr-defined]
+            if not self._call(self._protocol.eof_received):
                 self.close()
 
     def _call(self, method: Callable[..., object], *values: object) -> object:

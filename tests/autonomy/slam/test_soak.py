@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from roboglot.autonomy.navigation.pilot import Pilot
-from roboglot.autonomy.navigation.planner import Task
+from roboglot.autonomy.navigation.planner import PlanningTask
 from roboglot.model.actions import HISTORY_MAX, Action, ActionStatus
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
@@ -42,7 +42,7 @@ def kinds(tour: Tour) -> list[Callable[[], Action]]:
 
 
 def _alive() -> list[object]:
-    return [kept for kept in gc.get_objects() if isinstance(kept, (Pilot, Task))]
+    return [kept for kept in gc.get_objects() if isinstance(kept, (Pilot, PlanningTask))]
 
 
 @pytest.mark.slow  # hundreds of actions; benchmarks/robots/soak.py has the long run
@@ -64,7 +64,7 @@ async def test_ended_actions_keep_nothing(tour: Tour) -> None:
     outcomes = {action.status for action in tour.robot.actions.history}
     assert outcomes == {ActionStatus.SUCCEEDED, ActionStatus.ABORTED, ActionStatus.CANCELED}
     left = [kept for kept in _alive() if id(kept) not in known]
-    assert not [kept for kept in left if isinstance(kept, Task)]
+    assert not [kept for kept in left if isinstance(kept, PlanningTask)]
     assert len(left) <= 1  # the pilot of the drive that is under way
     settled = sizes[HISTORY_MAX // len(starts) + 1]  # the history is full
     assert sizes[-1] <= settled * GROWTH_MAX

@@ -151,7 +151,7 @@ async def outcome(client: CyberDogClient, name: str, arguments: tuple[Any, ...])
 
 EXAMPLES: dict[int, values.Value] = {
     1003: values.ServoResponse(303, True, 0, 0, 100, 7),
-    2001: values.Frame({"id": "1", "state": 0}),
+    2001: values.ProgramFrame({"id": "1", "state": 0}),
     3013: values.VoiceTrained(0, "p1"),
     3014: values.VoiceprintsWanted(),
     4003: values.FilesLeft(["a.jpg"]),

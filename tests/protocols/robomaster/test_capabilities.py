@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from roboglot.cli.capabilities import BODIES, Kind
+from roboglot.cli.capabilities import BODIES, RobotKind
 from roboglot.media.audio import AudioStream
 from roboglot.media.video import VideoStream
 from roboglot.model.clock import LockstepClock
@@ -62,7 +62,7 @@ def commands() -> Iterator[tuple[str, str]]:
 
 @pytest.mark.parametrize("body", [pytest.param(b, marks=pytest.mark.world("office", body=b)) for b in BODIES])
 async def test_every_command_answers_as_the_page_says(body: str, robot: Robot) -> None:
-    kind = Kind(body, frozenset(robot.interfaces), {})
+    kind = RobotKind(body, frozenset(robot.interfaces), {})
     context = Context(robot, PROFILES["spec"], Outlets(robot))  # type: ignore[arg-type]
     wrong = {}
     for key, text in commands():

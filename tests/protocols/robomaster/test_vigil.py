@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from roboglot.protocols.robomaster.limits import VIGIL_MISSES_MAX
-from roboglot.protocols.robomaster.liveness import Driver, Echoes, Vigil
+from roboglot.protocols.robomaster.liveness import DrivingClient, Echoes, Vigil
 
 LAB = Path(__file__).with_name("dead_client_lab.py")
 ALONE = ("unshare", "--user", "--map-root-user", "--net")
@@ -52,38 +52,38 @@ def driver():
     with socket.create_server(("127.0.0.1", 0)) as server, socket.create_connection(server.getsockname()) as near:
         far, _ = server.accept()
         with far:
-            yield Driver("10.0.0.1:5000", "10.0.0.1", near)
+            yield DrivingClient("10.0.0.1:5000", "10.0.0.1", near)
 
 
-def test_silence_alone_is_no_death(driver: Driver) -> None:
+def test_silence_alone_is_no_death(driver: DrivingClient) -> None:
     assert not any(driver.missing(False, 0.0) for _ in range(50)), "its host never answered an echo: it may not want to"
 
 
-def test_host_that_answered_and_stops_answering_is_gone(driver: Driver) -> None:
+def test_host_that_answered_and_stops_answering_is_gone(driver: DrivingClient) -> None:
     assert not driver.missing(True, 0.0)
     assert [driver.missing(False, 0.0) for _ in range(VIGIL_MISSES_MAX + 2)].index(True) == VIGIL_MISSES_MAX - 1
 
 
-def test_one_answer_among_many_losses_is_life(driver: Driver) -> None:
+def test_one_answer_among_many_losses_is_life(driver: DrivingClient) -> None:
     driver.missing(True, 0.0)
     for _ in range(20):
         assert not any(driver.missing(False, 0.0) for _ in range(VIGIL_MISSES_MAX - 1))
         assert not driver.missing(True, 0.0)
 
 
-def test_what_the_connection_acknowledges_is_life_too(driver: Driver) -> None:
+def test_what_the_connection_acknowledges_is_life_too(driver: DrivingClient) -> None:
     driver.missing(True, 0.0)
     assert not any(driver.missing(False, 3600.0) for _ in range(20))
 
 
 def test_hosts_of_this_machine_are_not_asked() -> None:
     with socket.socket() as unused:
-        assert not Driver("127.0.0.1:5000", "127.0.0.1", unused).askable
-    assert not Driver("/tmp/ep-a:0", "/tmp/ep-a", None).askable
-    assert not Driver("10.0.0.1:5000", "10.0.0.1", None).askable
+        assert not DrivingClient("127.0.0.1:5000", "127.0.0.1", unused).askable
+    assert not DrivingClient("/tmp/ep-a:0", "/tmp/ep-a", None).askable
+    assert not DrivingClient("10.0.0.1:5000", "10.0.0.1", None).askable
 
 
-async def test_who_drives_nothing_is_never_gone(driver: Driver) -> None:
+async def test_who_drives_nothing_is_never_gone(driver: DrivingClient) -> None:
     gone: list[str] = []
     vigil = Vigil(lambda: [driver], lambda _name: False, gone.append)
     vigil._echoes = Echoes()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from roboglot.cli.capabilities import BODIES, Kind
+from roboglot.cli.capabilities import BODIES, RobotKind
 from roboglot.model.clock import LockstepClock
 from roboglot.model.robot import Description, Robot
 from roboglot.programs.functions.results import StateCode
@@ -70,7 +70,7 @@ async def ask(caller: Caller, name: str) -> Answer:
 
 @pytest.mark.parametrize("body", [pytest.param(b, marks=pytest.mark.world("office", body=b)) for b in BODIES])
 async def test_functions_are_refused_as_the_page_says(body: str, robot: Robot, clock: LockstepClock) -> None:
-    kind = Kind(body, frozenset(robot.interfaces), {})
+    kind = RobotKind(body, frozenset(robot.interfaces), {})
     caller, wrong = Caller(robot, clock), {}
     for operation in DOOR.table():
         name = str(operation.key)

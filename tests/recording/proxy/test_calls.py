@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from roboglot.protocols.cyberdog.certificates import CLIENT_FILES, ensure_certificates, export_client
 from roboglot.recording.lines import Target
-from roboglot.recording.proxy.calls import PREFACE, Call, Flag, Frame, both
+from roboglot.recording.proxy.calls import PREFACE, Call, Flag, Http2Frame, both
 from roboglot.recording.proxy.dog import DogRelay, Proof
 from roboglot.recording.proxy.relay import Book
 from roboglot.testing.addresses import free_port
@@ -26,7 +26,7 @@ ASKED = [b"", b"one", bytes(range(256)) * 200]
 ANSWERED = [b"yes", b"no" * 30_000]
 
 
-def frame(kind: Frame, flags: int, stream: int, payload: bytes) -> bytes:
+def frame(kind: Http2Frame, flags: int, stream: int, payload: bytes) -> bytes:
     return len(payload).to_bytes(3) + bytes((kind, flags)) + stream.to_bytes(4) + payload
 
 
@@ -37,7 +37,7 @@ def data(stream: int, message: bytes, *, last: bool, packed: bool) -> bytes:
     pieces = [whole[at : at + 16_000] for at in range(0, len(whole), 16_000)]
     return b"".join(
         frame(
-            Frame.DATA,
+            Http2Frame.DATA,
             Flag.PADDED | (Flag.END_STREAM if last and piece is pieces[-1] else 0),
             stream,
             b"\x03" + piece + b"\0\0\0",
@@ -50,15 +50,15 @@ def headers(encoder: Encoder, stream: int, fields: list[tuple[str, str]], *, las
     """Headers in two frames, the first with a priority."""
     block = encoder.encode(fields)
     half = len(block) // 2
-    first = frame(Frame.HEADERS, Flag.PRIORITY | (Flag.END_STREAM if last else 0), stream, bytes(5) + block[:half])
-    return first + frame(Frame.CONTINUATION, Flag.END_HEADERS, stream, block[half:])
+    first = frame(Http2Frame.HEADERS, Flag.PRIORITY | (Flag.END_STREAM if last else 0), stream, bytes(5) + block[:half])
+    return first + frame(Http2Frame.CONTINUATION, Flag.END_HEADERS, stream, block[half:])
 
 
 def conversation(*, packed: bool) -> tuple[bytes, bytes]:
     """Bytes of a caller and of the called, of a call for each message; the robot allows a larger header table."""
     asking, answering = Encoder(), Encoder()
     table = 1 << 16
-    asks, answers = bytearray(PREFACE), bytearray(frame(Frame.SETTINGS, 0, 0, b"\0\1" + table.to_bytes(4)))
+    asks, answers = bytearray(PREFACE), bytearray(frame(Http2Frame.SETTINGS, 0, 0, b"\0\1" + table.to_bytes(4)))
     asking.header_table_size = table
     encoding = [("grpc-encoding", "gzip")] if packed else []
     for number, message in enumerate(ASKED):

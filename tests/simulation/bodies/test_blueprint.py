@@ -6,7 +6,7 @@ import pytest
 
 from roboglot.model.components.motion.base import Base
 from roboglot.model.geometry import Pose, Twist
-from roboglot.simulation.building.blueprint import Kind, slabs_of, solids_of
+from roboglot.simulation.building.blueprint import SolidKind, slabs_of, solids_of
 from roboglot.simulation.world.description import Floor, Opening, Wall
 from roboglot.simulation.world.placing import Places
 from roboglot.simulation.world.world_files import load_world
@@ -69,6 +69,6 @@ async def test_landing_door_is_shut_where_car_is_not(simulate):
     assert sim.pose.x == pytest.approx(1.75 + 0.1 + 0.25, abs=0.02)
     assert sim.world.truth.floor_of("a") == 1
     assert any(
-        s.kind is Kind.LANDING_DOOR
+        s.kind is SolidKind.LANDING_DOOR
         for s in solids_of(sim.world.description.floors[1], sim.world.description.lift, False)
     )

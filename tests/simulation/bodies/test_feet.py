@@ -26,7 +26,7 @@ from roboglot.model.components.motion.motions import Motion
 from roboglot.model.components.sensing.camera import Camera
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Pose, Twist
-from roboglot.simulation.bodies.footfalls import Order, walking
+from roboglot.simulation.bodies.footfalls import FootfallCycle, walking
 
 TICK = 0.02
 ALL = frozenset(Foot)
@@ -111,7 +111,7 @@ def test_gaits_differ_in_who_is_in_the_air(gait, most, never):
 
 
 def test_flight_goes_on_over_end_of_the_order():
-    order = Order([Footfall(0.1, DIAGONAL), Footfall(0.2, ALL), Footfall(0.1, DIAGONAL)])
+    order = FootfallCycle([Footfall(0.1, DIAGONAL), Footfall(0.2, ALL), Footfall(0.1, DIAGONAL)])
     holds = (Foothold(),) * 4
     swing = order.swings(0.3 + 1e-9, holds, 1.0)[0]
     assert swing is not None
@@ -124,7 +124,7 @@ def test_flight_goes_on_over_end_of_the_order():
 
 @pytest.mark.parametrize("landing", [0.0, 0.5, 1.0, 1.5])
 def test_landing_reports_how_fast_a_foot_comes_down(landing):
-    order = Order([Footfall(1.0, DIAGONAL), Footfall(1.0, ALL)])
+    order = FootfallCycle([Footfall(1.0, DIAGONAL), Footfall(1.0, ALL)])
     heights = [
         swing.rise for part in range(1000) if (swing := order.swings(part / 1000, (Foothold(),) * 4, landing)[0])
     ]

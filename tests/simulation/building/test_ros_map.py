@@ -8,7 +8,7 @@ from roboglot.model.components.energy.battery import DockContact
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.geometry import Pose, Twist
-from roboglot.simulation.building.blueprint import Kind, solids_of
+from roboglot.simulation.building.blueprint import SolidKind, solids_of
 from roboglot.simulation.world.declarations import BadFile
 from roboglot.simulation.world.world_files import load_world
 
@@ -42,7 +42,7 @@ async def test_occupied_cells_and_only_they_are_solid(simulate, request, name):
     pixels = np.asarray(Image.open(folder / f"{name}.pgm").convert("L"))[::-1]
     covered = np.zeros(pixels.shape, int)
     for solid in solids_of(floor, None, False):
-        if solid.kind is Kind.DOCK:
+        if solid.kind is SolidKind.DOCK:
             continue
         half = np.array(solid.size[:2]) / 2
         if abs(np.sin(solid.pose.yaw)) > 0.5:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from roboglot.model.components.logistics.jack import Jack
 from roboglot.model.components.motion.base import Base
 from roboglot.model.geometry import Pose, Twist
-from roboglot.simulation.building.blueprint import Kind, Solid
+from roboglot.simulation.building.blueprint import Solid, SolidKind
 from roboglot.simulation.world.overlap import overlap
 
 places, sizes = st.floats(-1.5, 1.5), st.floats(0.1, 2.0)
@@ -76,7 +76,7 @@ async def test_put_into_a_wall_it_can_leave_it(carrier):
 def test_overlap_is_found_as_points_find_it(x, y, yaw, width, depth, round):
     """Compared with a raster of points, where it is not a matter of a hair."""
     size = (width, width if round else depth, 1.0)
-    a, b = Solid(Kind.SHELF, Pose(), (1.0, 0.6, 1.0)), Solid(Kind.WALL, Pose(x, y, yaw), size, round=round)
+    a, b = Solid(SolidKind.SHELF, Pose(), (1.0, 0.6, 1.0)), Solid(SolidKind.WALL, Pose(x, y, yaw), size, round=round)
 
     def inside(shrunk):
         for i in range(21):
@@ -93,4 +93,4 @@ def test_overlap_is_found_as_points_find_it(x, y, yaw, width, depth, round):
         assert overlap(a, b)
     if not inside(0.1):
         assert not overlap(a, b)
-    assert not overlap(a, Solid(Kind.WALL, b.pose, size, base=1.0, round=round))
+    assert not overlap(a, Solid(SolidKind.WALL, b.pose, size, base=1.0, round=round))

@@ -8,9 +8,9 @@ from roboglot.model.actions import ActionStatus
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.gimbal import (
     FollowMode,
-    Frame,
     Gimbal,
     GimbalAngles,
+    GimbalFrame,
 )
 from roboglot.model.errors import InvalidGoal, Refused, Unreachable
 from roboglot.model.geometry import STILL, Pose, Twist
@@ -166,7 +166,7 @@ async def test_world_frame_goals_count_from_power_on(sim, gimbal):
     await sim.clock.advance(1.0)
     sim.robot[Base].set_velocity(STILL)
     await sim.clock.advance(0.5)
-    gimbal.move_to(yaw=0.3, frame=Frame.WORLD)
+    gimbal.move_to(yaw=0.3, frame=GimbalFrame.WORLD)
     await sim.clock.advance(1.0)
     assert gimbal.attitude.yaw == pytest.approx(0.3, abs=0.005)
     assert gimbal.angles.yaw + sim.pose.yaw == pytest.approx(0.3, abs=0.02)
@@ -174,7 +174,7 @@ async def test_world_frame_goals_count_from_power_on(sim, gimbal):
 
 async def test_goal_in_world_behind_limit_is_given_up(sim, gimbal):
     gimbal.set_mode(FollowMode.FREE)
-    action = gimbal.move_to(yaw=300 * DEG, frame=Frame.WORLD)
+    action = gimbal.move_to(yaw=300 * DEG, frame=GimbalFrame.WORLD)
     await sim.clock.advance(3.0)
     assert action.status is ActionStatus.ABORTED
     assert isinstance(action.error, Unreachable)

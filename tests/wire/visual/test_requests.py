@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from roboglot.wire.visual.codes import FeedbackState
 from roboglot.wire.visual.replies import feedback, responses
-from roboglot.wire.visual.requests import FRAME_MAX, BadFrame, Kind, Request, parse_request
+from roboglot.wire.visual.requests import FRAME_MAX, BadFrame, FrameSubject, Request, parse_request
 
 SAVE: dict[str, Any] = {
     "type": "task",
@@ -30,7 +30,7 @@ def test_manual_s_save_frame_has_raw_line_breaks() -> None:
         ' "condition": "now", "body": "\ncyberdog.stand_up()\ntime.sleep(60)\n"}'
     )
     assert parse_request(text) == Request(
-        Kind.TASK, "123", "save", ("678",), "", "", "single", "now", "\ncyberdog.stand_up()\ntime.sleep(60)\n"
+        FrameSubject.TASK, "123", "save", ("678",), "", "", "single", "now", "\ncyberdog.stand_up()\ntime.sleep(60)\n"
     )
 
 
@@ -39,7 +39,7 @@ def test_unused_fields_from_an_app_are_empty_strings() -> None:
     request = parse_request(
         json.dumps({"type": "task", "id": "1", "target_id": ["a", "b", "a"], "operate": "suspend"} | empty)
     )
-    assert request == Request(Kind.TASK, "1", "suspend", ("a", "b"))
+    assert request == Request(FrameSubject.TASK, "1", "suspend", ("a", "b"))
 
 
 def test_inquiry_of_everything_and_of_ai_without_operation() -> None:

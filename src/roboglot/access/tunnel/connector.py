@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import NotRequired, Protocol, TypedDict, cast
 
 from roboglot.access.tunnel.busy_poll import BusyPoll
-from roboglot.access.tunnel.frames import Kind
-from roboglot.access.tunnel.link import Link
+from roboglot.access.tunnel.frames import FrameKind
+from roboglot.access.tunnel.link import TunnelLink
 from roboglot.access.tunnel.tunnel import Tunnel
 from roboglot.transport.tls import TlsCall
 
@@ -106,7 +106,7 @@ class Connector:
 
         Raises NotTrusted, Refused, TunnelLost, OSError.
         """
-        link = await self._call(partial(Link, stir=BusyPoll().stir))
+        link = await self._call(partial(TunnelLink, stir=BusyPoll().stir))
         try:
             fingerprint, new = self._check(link)
             words = await self._greet(link)
@@ -114,15 +114,15 @@ class Connector:
         finally:
             link.end("it was closed here")
 
-    async def _call(self, made: Callable[[], Link]) -> Link:
+    async def _call(self, made: Callable[[], TunnelLink]) -> TunnelLink:
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
         context.minimum_version = ssl.TLSVersion.TLSv1_3
         context.check_hostname, context.verify_mode = False, ssl.CERT_NONE  # the fingerprint is checked instead
         loop = asyncio.get_running_loop()
         _, call = await loop.create_connection(lambda: TlsCall(made, context), self._gateway, self._port)
-        return cast(Link, await call.over)
+        return cast(TunnelLink, await call.over)
 
-    def _check(self, link: Link) -> tuple[str, bool]:
+    def _check(self, link: TunnelLink) -> tuple[str, bool]:
         """Return the gateway's fingerprint, and whether it is new here. Raises NotTrusted."""
         certificate = link.transport.get_extra_info("ssl_object").getpeercert(binary_form=True)
         return self._known.check(f"{self._gateway}:{self._port}", certificate)
@@ -131,10 +131,10 @@ class Connector:
         """Keep a second connection for beats; a tunnel without one only bears lost packets less well."""
         while True:
             try:
-                link = await self._call(Link)
+                link = await self._call(TunnelLink)
                 try:
                     self._check(link)
-                    link.send(Kind.HELLO, 0, json.dumps({"beats": key}).encode())
+                    link.send(FrameKind.HELLO, 0, json.dumps({"beats": key}).encode())
                     await tunnel.beat_over(link)
                 finally:
                     link.end("it was closed here")
@@ -142,16 +142,16 @@ class Connector:
                 log.info("no second connection for beats: %s", error)
             await asyncio.sleep(BESIDE_AGAIN)
 
-    async def _greet(self, link: Link) -> Welcome:
-        link.send(Kind.HELLO, 0, json.dumps({"robot": self._robot, "token": self._token}).encode())
+    async def _greet(self, link: TunnelLink) -> Welcome:
+        link.send(FrameKind.HELLO, 0, json.dumps({"robot": self._robot, "token": self._token}).encode())
         async with asyncio.timeout(GREETING_SECONDS_MAX):
             frame = await link.first()
-        if frame.kind is not Kind.WELCOME:
+        if frame.kind is not FrameKind.WELCOME:
             raise Refused(frame.payload.decode("utf-8", "replace"))
         words: Welcome = json.loads(frame.payload)
         return words
 
-    async def _carry(self, link: Link, words: Welcome, ready: Callable[[list[int]], None]) -> None:
+    async def _carry(self, link: TunnelLink, words: Welcome, ready: Callable[[list[int]], None]) -> None:
         loop = asyncio.get_running_loop()
         broadcasts = {int(port) for port in words["broadcasts"]}
         callbacks = {int(port) for port in words["callbacks"]}

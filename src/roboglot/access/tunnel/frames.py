@@ -13,7 +13,7 @@ PORT = struct.Struct("!H")
 CREDIT = struct.Struct("!I")
 
 
-class Kind(IntEnum):
+class FrameKind(IntEnum):
     """Kind of a frame."""
 
     HELLO = 1  # from the client: its identity and the robot that it wants; JSON
@@ -28,10 +28,10 @@ class Kind(IntEnum):
     EOF = 10  # no more data will be sent on the stream; the other end may still answer
 
 
-class Frame(NamedTuple):
+class TunnelFrame(NamedTuple):
     """One frame."""
 
-    kind: Kind
+    kind: FrameKind
     stream: int
     payload: bytes
 
@@ -40,16 +40,16 @@ class BadFrame(ValueError):
     """Bytes received are no frame; the tunnel ends."""
 
 
-def encode(kind: Kind, stream: int = 0, payload: bytes = b"") -> bytes:
+def encode(kind: FrameKind, stream: int = 0, payload: bytes = b"") -> bytes:
     """The frame's bytes; the payload has at most FRAME_MAX - 1."""
     return HEAD.pack(kind, stream, len(payload)) + payload
 
 
-async def read_frame(reader: asyncio.StreamReader) -> Frame:
+async def read_frame(reader: asyncio.StreamReader) -> TunnelFrame:
     """The next frame. Raises BadFrame, IncompleteReadError, OSError."""
     number, stream, size = HEAD.unpack(await reader.readexactly(HEAD.size))
     try:
-        kind = Kind(number)
+        kind = FrameKind(number)
     except ValueError:
         raise BadFrame(f"there is no frame of kind {number}") from None
-    return Frame(kind, stream, await reader.readexactly(size))
+    return TunnelFrame(kind, stream, await reader.readexactly(size))

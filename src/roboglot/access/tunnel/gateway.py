@@ -26,8 +26,8 @@ import msgspec
 
 from roboglot.access.guard import Guard, Tunnelled
 from roboglot.access.tunnel.busy_poll import BusyPoll
-from roboglot.access.tunnel.frames import BadFrame, Kind
-from roboglot.access.tunnel.link import Link
+from roboglot.access.tunnel.frames import BadFrame, FrameKind
+from roboglot.access.tunnel.link import TunnelLink
 from roboglot.access.tunnel.tunnel import Tunnel, TunnelLost
 from roboglot.model.actions import Action
 from roboglot.model.admission import Proof, ProofKind, Right, Unknown
@@ -100,7 +100,7 @@ class Gateway:
         stir = BusyPoll().stir
 
         def encrypted() -> asyncio.Protocol:
-            return TlsPort(lambda: Link(self._begin, stir), tls, self._guard.may_shake_hands)
+            return TlsPort(lambda: TunnelLink(self._begin, stir), tls, self._guard.may_shake_hands)
 
         loop = asyncio.get_running_loop()
         self._server = await loop.create_server(
@@ -130,19 +130,19 @@ class Gateway:
             session.cancel()
         await asyncio.gather(*self._sessions, return_exceptions=True)
 
-    def _begin(self, link: Link) -> None:
+    def _begin(self, link: TunnelLink) -> None:
         session = asyncio.get_running_loop().create_task(self._receive(link), name="tunnel")
         self._sessions.add(session)
         session.add_done_callback(self._sessions.discard)
 
-    async def _receive(self, link: Link) -> None:
+    async def _receive(self, link: TunnelLink) -> None:
         host = (link.transport.get_extra_info("peername") or ("",))[0]
         try:
             await self._serve(link)
         except (TunnelLost, BadFrame, OSError, TimeoutError) as error:
             seldom.info(host, "a tunnel of %s ended: %s", host, error or "no greeting came")
         except Unknown as unknown:
-            link.send(Kind.REFUSED, 0, str(unknown).encode())
+            link.send(FrameKind.REFUSED, 0, str(unknown).encode())
             link.transport.close()  # after the frames already queued
         except asyncio.CancelledError:
             log.info("the gateway closes")
@@ -150,11 +150,11 @@ class Gateway:
             if not link.transport.is_closing():
                 link.end("it was closed here")
 
-    async def _serve(self, link: Link) -> None:
+    async def _serve(self, link: TunnelLink) -> None:
         peer = link.transport.get_extra_info("peername") or ("", 0)
         async with asyncio.timeout(HELLO_SECONDS_MAX):
             frame = await link.first()
-        wish = _hello(frame.payload) if frame.kind is Kind.HELLO else Hello()
+        wish = _hello(frame.payload) if frame.kind is FrameKind.HELLO else Hello()
         if wish.beats:
             await self._beat(wish.beats, link)
             return
@@ -181,13 +181,13 @@ class Gateway:
             try:
                 async with _listening(tunnel, robot, ports, own):
                     words = Welcome(ports.tcp, ports.callbacks, ports.broadcasts, key)
-                    link.send(Kind.WELCOME, 0, msgspec.json.encode(words))
+                    link.send(FrameKind.WELCOME, 0, msgspec.json.encode(words))
                     await tunnel.run()
             finally:
                 del self._tunnels[key]
                 leave()
 
-    async def _beat(self, key: str, link: Link) -> None:
+    async def _beat(self, key: str, link: TunnelLink) -> None:
         """Serve the second connection of a tunnel; its key came with the greeting of the first."""
         if (tunnel := self._tunnels.get(key)) is None:
             raise Unknown("there is no such tunnel")

@@ -7,28 +7,28 @@ from collections import deque
 from collections.abc import Callable
 from typing import cast
 
-from roboglot.access.tunnel.frames import HEAD, BadFrame, Frame, Kind
+from roboglot.access.tunnel.frames import HEAD, BadFrame, FrameKind, TunnelFrame
 
 EARLY_MAX = 16  # frames kept until a reader is set
 
-Take = Callable[[Kind, int, bytes], None]
-_KINDS = {int(kind): kind for kind in Kind}
+Take = Callable[[FrameKind, int, bytes], None]
+_KINDS = {int(kind): kind for kind in FrameKind}
 
 
-class Link(asyncio.Protocol):
+class TunnelLink(asyncio.Protocol):
     """``first`` waits for a frame; after ``follow`` each is handed on.
 
     ``made`` is called when it is there, ``stir`` with the size of what streams send and receive.
     """
 
     def __init__(
-        self, made: Callable[[Link], None] = lambda _link: None, stir: Callable[[int], None] = lambda _size: None
+        self, made: Callable[[TunnelLink], None] = lambda _link: None, stir: Callable[[int], None] = lambda _size: None
     ) -> None:
         self._made, self._stir = made, stir
         self._take: Take | None = None
         self._crowded: Callable[[bool], None] = lambda _crowded: None
         self._buffer = bytearray()
-        self._early: deque[Frame] = deque()
+        self._early: deque[TunnelFrame] = deque()
         self._news = asyncio.Event()
         self.transport: asyncio.Transport
         self.lost: asyncio.Future[str] = asyncio.get_running_loop().create_future()
@@ -58,7 +58,7 @@ class Link(asyncio.Protocol):
         """Go on sending: the buffer has been sent."""
         self._crowded(False)
 
-    async def first(self) -> Frame:
+    async def first(self) -> TunnelFrame:
         """Wait for a frame. Raises ConnectionError."""
         while not self._early:
             if self.lost.done():
@@ -76,12 +76,12 @@ class Link(asyncio.Protocol):
         except BadFrame as bad:
             self.end(str(bad))
 
-    def send(self, kind: Kind, number: int = 0, payload: bytes = b"") -> None:
+    def send(self, kind: FrameKind, number: int = 0, payload: bytes = b"") -> None:
         """Send a frame; lost where there is no connection any more."""
         transport = self.transport
         if not transport.is_closing():
             transport.write(HEAD.pack(kind, number, len(payload)) + payload)
-            if kind is Kind.DATA:
+            if kind is FrameKind.DATA:
                 self._stir(len(payload))
 
     def end(self, why: str) -> None:
@@ -94,9 +94,9 @@ class Link(asyncio.Protocol):
     def _cut(self, data: bytes) -> None:
         if self._take is not None and not self._buffer and len(data) >= HEAD.size:  # usually it is one whole frame
             number, stream, length = HEAD.unpack_from(data)
-            if number == Kind.DATA and len(data) == HEAD.size + length:
+            if number == FrameKind.DATA and len(data) == HEAD.size + length:
                 self._stir(length)
-                self._take(Kind.DATA, stream, data[HEAD.size :])
+                self._take(FrameKind.DATA, stream, data[HEAD.size :])
                 return
         buffer: bytes | bytearray = data
         if self._buffer:
@@ -115,13 +115,13 @@ class Link(asyncio.Protocol):
             at = end
         self._buffer = bytearray(buffer[at:])
 
-    def _hand_on(self, kind: Kind, stream: int, payload: bytes) -> None:
-        if kind is Kind.DATA:
+    def _hand_on(self, kind: FrameKind, stream: int, payload: bytes) -> None:
+        if kind is FrameKind.DATA:
             self._stir(len(payload))
         if self._take is not None:
             self._take(kind, stream, payload)
         elif len(self._early) < EARLY_MAX:
-            self._early.append(Frame(kind, stream, payload))
+            self._early.append(TunnelFrame(kind, stream, payload))
             self._news.set()
         else:
             raise BadFrame("too much before the greeting")

@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import Callable
 from typing import cast
 
-from roboglot.access.tunnel.frames import CREDIT, Kind
-from roboglot.access.tunnel.link import Link
+from roboglot.access.tunnel.frames import CREDIT, FrameKind
+from roboglot.access.tunnel.link import TunnelLink
 
 WINDOW = 256 * 1024  # bytes of a stream in flight; data for a slow reader waits at the sender
 READ_MAX = 512 * 1024  # bytes read from a socket at once, even if the window is almost empty
@@ -19,7 +19,7 @@ CREDIT_STEP = WINDOW // 4  # bytes credited at a time
 class Stream(asyncio.Protocol):
     """``forget`` is called when it is over."""
 
-    def __init__(self, number: int, link: Link, forget: Callable[[int], None]) -> None:
+    def __init__(self, number: int, link: TunnelLink, forget: Callable[[int], None]) -> None:
         self._number, self._link, self._forget = number, link, forget
         self._transport: asyncio.Transport | None = None
         self._credit = WINDOW  # bytes for which the other end has room
@@ -50,17 +50,17 @@ class Stream(asyncio.Protocol):
     def data_received(self, data: bytes) -> None:
         """Into the tunnel."""
         if len(data) <= PIECE:
-            self._link.send(Kind.DATA, self._number, data)
+            self._link.send(FrameKind.DATA, self._number, data)
         else:
             for start in range(0, len(data), PIECE):
-                self._link.send(Kind.DATA, self._number, data[start : start + PIECE])
+                self._link.send(FrameKind.DATA, self._number, data[start : start + PIECE])
         self._credit -= len(data)
         if self._credit <= 0:
             self._throttle()
 
     def eof_received(self) -> bool:
         """The local client sends no more, and may go on reading."""
-        self._link.send(Kind.EOF, self._number)
+        self._link.send(FrameKind.EOF, self._number)
         self._ended_here = True
         return not self._ended_there
 
@@ -68,7 +68,7 @@ class Stream(asyncio.Protocol):
         """The local client is gone."""
         if not self._over:
             self._over = True
-            self._link.send(Kind.CLOSE, self._number)
+            self._link.send(FrameKind.CLOSE, self._number)
             self._forget(self._number)
 
     def pause_writing(self) -> None:
@@ -137,7 +137,7 @@ class Stream(asyncio.Protocol):
 
     def _pay(self) -> None:
         """Credit what was taken."""
-        self._link.send(Kind.CREDIT, self._number, CREDIT.pack(self._owed))
+        self._link.send(FrameKind.CREDIT, self._number, CREDIT.pack(self._owed))
         self._owed = 0
 
     def _throttle(self) -> None:

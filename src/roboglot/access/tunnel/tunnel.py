@@ -5,10 +5,11 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable
+from typing import cast
 
-from roboglot.access.tunnel.frames import CREDIT, PORT, BadFrame, Kind
+from roboglot.access.tunnel.frames import CREDIT, PORT, BadFrame, FrameKind
 from roboglot.access.tunnel.heartbeat import Heartbeat
-from roboglot.access.tunnel.link import Link
+from roboglot.access.tunnel.link import TunnelLink
 from roboglot.access.tunnel.stream import RECEIVED_MAX, WINDOW, Stream
 
 log = logging.getLogger(__name__)
@@ -35,7 +36,7 @@ class Tunnel:
 
     def __init__(
         self,
-        link: Link,
+        link: TunnelLink,
         *,
         first: int,
         opened: Opened,
@@ -44,7 +45,7 @@ class Tunnel:
         drives: Callable[[], bool] = lambda: False,
     ) -> None:
         self._link = link
-        self._beside: Link | None = None  # for heartbeats only: they arrive while the other link loses packets
+        self._beside: TunnelLink | None = None  # for heartbeats only: they arrive while the other link loses packets
         self._next = first
         self._opened, self._datagram, self._quiet, self._drives = opened, datagram, quiet, drives
         self._streams: dict[int, Stream] = {}
@@ -72,7 +73,7 @@ class Tunnel:
                 self._beside.end("its tunnel ended")
             await asyncio.gather(beat, *self._opening, return_exceptions=True)
 
-    async def beat_over(self, link: Link) -> None:
+    async def beat_over(self, link: TunnelLink) -> None:
         """Show over a second connection too that both ends are there, until it is lost or another takes its place."""
         if self._beside is not None:
             self._beside.end("another took its place")
@@ -89,7 +90,7 @@ class Tunnel:
             if self._over or len(self._streams) >= STREAMS_MAX:
                 return _Turned()
             number, self._next = self._next, self._next + 2
-            self._link.send(Kind.OPEN, number, PORT.pack(port))
+            self._link.send(FrameKind.OPEN, number, PORT.pack(port))
             return self._new(number)
 
         return connected
@@ -97,7 +98,7 @@ class Tunnel:
     def send_datagram(self, port: int, data: bytes) -> None:
         """Send to ``port`` at the other end; lost when the tunnel is full."""
         if self._link.transport.get_write_buffer_size() < UNSENT_MAX and len(data) <= DATAGRAM_MAX:
-            self._link.send(Kind.DATAGRAM, 0, PORT.pack(port) + data)
+            self._link.send(FrameKind.DATAGRAM, 0, PORT.pack(port) + data)
 
     def _new(self, number: int) -> Stream:
         stream = self._streams[number] = Stream(number, self._link, self._forget)
@@ -116,47 +117,47 @@ class Tunnel:
             look = self._heart.look(self._loop.time(), drives)
             if look.beat:
                 for link in (self._link, self._beside) if self._beside else (self._link,):
-                    link.send(Kind.PING, 0, QUICK if drives else b"")
+                    link.send(FrameKind.PING, 0, QUICK if drives else b"")
             if look.quiet:
                 self._quiet()
             if look.lost:
                 self._link.end("the other end is silent")
             await asyncio.sleep(look.pause)
 
-    def _take_beat(self, kind: Kind, _number: int, _payload: bytes) -> None:
-        if kind is not Kind.PING:
+    def _take_beat(self, kind: FrameKind, _number: int, _payload: bytes) -> None:
+        if kind is not FrameKind.PING:
             raise BadFrame("only beats come by this connection")
         self._heart.hear_beside(self._loop.time())
 
-    def _take(self, kind: Kind, number: int, payload: bytes) -> None:
+    def _take(self, kind: FrameKind, number: int, payload: bytes) -> None:
         self._heart.heard = self._loop.time()
         stream = self._streams.get(number)
-        if stream is not None and kind is Kind.DATA:
+        if stream is not None and kind is FrameKind.DATA:
             stream.deliver(payload)
             if stream.undelivered > RECEIVED_MAX:
                 raise BadFrame("more was sent than the window allows")
         elif stream is not None:
             self._feed(stream, kind, payload)
-        elif kind is Kind.OPEN:
+        elif kind is FrameKind.OPEN:
             if len(payload) != PORT.size or number % 2 == self._next % 2:
                 raise BadFrame("this is no stream of the other end's")
             if len(self._streams) >= STREAMS_MAX:
                 raise BadFrame("too many streams")
             self._open(number, PORT.unpack(payload)[0])
-        elif kind is Kind.PING and payload == QUICK:
+        elif kind is FrameKind.PING and payload == QUICK:
             self._heart.hear(self._heart.heard, quick=True)
-        elif kind is Kind.DATAGRAM and len(payload) >= PORT.size:
+        elif kind is FrameKind.DATAGRAM and len(payload) >= PORT.size:
             self._datagram(PORT.unpack_from(payload)[0], payload[PORT.size :])
 
-    def _feed(self, stream: Stream, kind: Kind, payload: bytes) -> None:
+    def _feed(self, stream: Stream, kind: FrameKind, payload: bytes) -> None:
         match kind:
-            case Kind.CREDIT if len(payload) == CREDIT.size:
+            case FrameKind.CREDIT if len(payload) == CREDIT.size:
                 stream.give(min(WINDOW, CREDIT.unpack(payload)[0]))
-            case Kind.EOF:
+            case FrameKind.EOF:
                 stream.deliver_end()
-            case Kind.CLOSE:
+            case FrameKind.CLOSE:
                 stream.close()
-            case Kind.OPEN:
+            case FrameKind.OPEN:
                 raise BadFrame("this stream is open")
 
     def _open(self, number: int, port: int) -> None:
@@ -170,11 +171,11 @@ class Tunnel:
         except OSError as error:
             log.info("port %d: %s", port, error)
             self._forget(number)
-            self._link.send(Kind.CLOSE, number)
+            self._link.send(FrameKind.CLOSE, number)
 
 
 class _Turned(asyncio.Protocol):
     """A connection too many."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        transport.abort()  # type: ignore[attr-defined]
+        cast(asyncio.Transport, transport).abort()

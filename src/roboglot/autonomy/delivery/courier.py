@@ -7,7 +7,7 @@ import logging
 from collections.abc import Coroutine
 
 from roboglot.autonomy.delivery.delivery_round import Round
-from roboglot.autonomy.delivery.drive import Driver, Failed
+from roboglot.autonomy.delivery.drive import DeliveryDrive, Failed
 from roboglot.autonomy.delivery.follow_up import follow_up
 from roboglot.autonomy.delivery.handover import Ears
 from roboglot.autonomy.delivery.order_book import OrderBook
@@ -27,7 +27,7 @@ BASE_LOOK = 1.0  # s between two checks whether another client still drives the 
 class Courier:
     """Works through the book from the first ``wake`` to ``close``. ``changing`` is held to add or call off orders."""
 
-    def __init__(self, robot: Robot, book: OrderBook, driver: Driver, ears: Ears) -> None:
+    def __init__(self, robot: Robot, book: OrderBook, driver: DeliveryDrive, ears: Ears) -> None:
         self._robot, self._book, self._driver, self._ears = robot, book, driver, ears
         self.changing = asyncio.Lock()
         self.readiness = Readiness(robot, self, driver.report)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Unpack
 
-from roboglot.autonomy.delivery.drive import Driver, Failed
+from roboglot.autonomy.delivery.drive import DeliveryDrive, Failed
 from roboglot.autonomy.delivery.handover import Ears, Handover, Signal
 from roboglot.autonomy.delivery.order_book import OrderBook, OrderChanges
 from roboglot.model.components.logistics.cargo import Cargo
@@ -23,7 +23,7 @@ from roboglot.model.robot import Robot
 class Round:
     """Carries out ``order``; what became of it goes into the book as it happens."""
 
-    def __init__(self, robot: Robot, book: OrderBook, driver: Driver, ears: Ears, order: Order) -> None:
+    def __init__(self, robot: Robot, book: OrderBook, driver: DeliveryDrive, ears: Ears, order: Order) -> None:
         self._robot, self._book, self._driver, self._ears = robot, book, driver, ears
         self._order = order
 

@@ -40,7 +40,7 @@ class Failed(Exception):
         self.failure = failure
 
 
-class Driver:
+class DeliveryDrive:
     """One drive at a time. ``hold`` stops it in its place; emergency stops interrupt it, and it goes on after."""
 
     def __init__(self, robot: Robot) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from roboglot.autonomy.delivery.drive import Driver
+from roboglot.autonomy.delivery.drive import DeliveryDrive
 from roboglot.autonomy.delivery.order_book import OrderBook
 from roboglot.autonomy.delivery.readiness import Readiness
 from roboglot.autonomy.delivery.rules import BOXED, RECEPTION, place_of_type
@@ -20,7 +20,7 @@ from roboglot.model.events import DeliveryNews
 from roboglot.model.robot import Robot
 
 
-async def follow_up(robot: Robot, book: OrderBook, driver: Driver, readiness: Readiness, order: Order) -> None:
+async def follow_up(robot: Robot, book: OrderBook, driver: DeliveryDrive, readiness: Readiness, order: Order) -> None:
     """Report that it was not collected, and have a COLLECT order return the parcels."""
     kind = order.request.kind
     if order.failure is Failure.INTERRUPTED:

@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Awaitable, Callable, Sequence
 from enum import Enum
 
+from roboglot.autonomy.delivery.drive import SOURCE
 from roboglot.model.actions import ActionStatus
 from roboglot.model.components.logistics.cargo import Cargo, DoorState, Stock
 from roboglot.model.components.logistics.delivery import BoxChoice, Failure, PickUp
@@ -13,7 +14,6 @@ from roboglot.model.errors import NotFound, Refused
 from roboglot.model.events import BoxChanged
 from roboglot.model.robot import Robot
 
-SOURCE = "delivery"
 FILLED_LOOK = 1.0  # s between two checks of the boxes
 SHUT_RETRY = 5.0  # s between two attempts to close a door that something blocks
 Note = Callable[[PickUp], Awaitable[None]]

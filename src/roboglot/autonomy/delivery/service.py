@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from roboglot.autonomy.delivery.courier import Courier
-from roboglot.autonomy.delivery.drive import Driver
+from roboglot.autonomy.delivery.drive import DeliveryDrive
 from roboglot.autonomy.delivery.handover import Ears, Signal
 from roboglot.autonomy.delivery.order_book import OrderBook
 from roboglot.autonomy.delivery.rules import BOXED, check_requests
@@ -30,7 +30,7 @@ class QueueDelivery(Delivery):
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._book = OrderBook(robot)
-        self._driver, self._ears = Driver(robot), Ears(robot)
+        self._driver, self._ears = DeliveryDrive(robot), Ears(robot)
         self._driver.hold(self._book.held)
         self._courier = Courier(robot, self._book, self._driver, self._ears)
 

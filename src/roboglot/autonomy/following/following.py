@@ -195,7 +195,7 @@ class SightFollowing(Following):
                 return
 
     def _range(self, quarry: _Quarry, tag: TagReading) -> None:
-        """Single rangings are vague: they only draw the place towards them."""
+        """Move the estimated place towards a single ranging, which is inaccurate."""
         here, quarry.ranged_at = self._robot[Odometry].reading.pose, tag.stamp
         heard = here.compose(Pose(tag.distance * math.cos(tag.azimuth), tag.distance * math.sin(tag.azimuth)))
         share = TAG_FRESH if tag.line_of_sight else TAG_FRESH / 3

@@ -32,7 +32,7 @@ def moved_thing(points: Points, place: Point) -> Point | None:
 
 
 def _cluster(points: Points, place: Point, within: float) -> Points | None:
-    """The points that hang together with the one nearest to ``place``, none of them farther away than ``within``."""
+    """Return the cluster of points around the one nearest to ``place``; none is farther away than ``within``."""
     away = np.hypot(points[:, 0] - place.x, points[:, 1] - place.y)
     near = points[away <= within]
     if not len(near) or away.min() > REACH:

@@ -113,7 +113,7 @@ class LandmarkKeeper(LaserLandmarks):
             self._writing = asyncio.ensure_future(self._robot[MapAnnotations].change(self._edit))
 
     def _edit(self, now: Annotations) -> Annotations:
-        """With what is sure and not there yet."""
+        """Add landmarks that are certain and not on the map yet."""
         marks = list(now.landmarks)
         for candidate in self._candidates:
             if candidate.sightings < SIGHTINGS:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from roboglot.autonomy.computing import computed
 from roboglot.autonomy.docking.shelf_legs import Load
 from roboglot.autonomy.navigation.pilot_tuning import PilotTuning
-from roboglot.autonomy.navigation.rules import Frame
+from roboglot.autonomy.navigation.rules import GridFrame
 from roboglot.autonomy.navigation.terms import Shunned, Terms
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.traffic.traffic import Traffic
@@ -72,7 +72,7 @@ class Course:
 
     @property
     def drawn(self) -> Annotations:
-        """Annotations that people drew on the map."""
+        """Annotations drawn on the map by people."""
         return self.robot[MapAnnotations].current if MapAnnotations in self.robot else Annotations()
 
     def top_speed(self, options: NavigationOptions) -> float:
@@ -111,18 +111,18 @@ class Course:
         return await computed(self.robot.clock, task.solve)
 
     async def waiting_place(self, here: Point, ways: Shunned) -> Point | None:
-        """The nearest place that lies farther from ``ways`` than they say; None if there is none around."""
+        """Return the nearest place that is clear of ``ways`` by their own distances; None if there is none nearby."""
         planner = await self.ready()
         task = planner.task(here, (here,), replace(self._slowly(0.0), shunned=ways))
         return await computed(self.robot.clock, task.waiting_place)
 
     async def lengths(self, stops: tuple[Point, ...], reach: float) -> NDArray[np.float64]:
-        """Metres between each two of ``stops``, roughly; inf where no way leads to within ``reach`` m."""
+        """Return rough distances (m) between all pairs of ``stops``; inf where no way leads to within ``reach`` m."""
         planner = await self.ready()
         task = planner.task(stops[0], stops[1:], self._slowly(reach))
         return await computed(self.robot.clock, task.lengths)
 
-    async def open_floor(self, around: Point) -> tuple[NDArray[np.bool_], Frame]:
+    async def open_floor(self, around: Point) -> tuple[NDArray[np.bool_], GridFrame]:
         """Return the known floor that the hull may stand on, by the map, its annotations and recent sightings."""
         planner = await self.ready()
         task = planner.task(around, (around,), self._slowly(0.0))

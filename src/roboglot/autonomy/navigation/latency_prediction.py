@@ -16,20 +16,20 @@ class Foresight:
 
     def __init__(self, base: Base, clock: Clock) -> None:
         self._base, self._clock = base, clock
-        self._told: deque[tuple[float, Twist]] = deque(maxlen=COMMANDS_MAX)
+        self._commands: deque[tuple[float, Twist]] = deque(maxlen=COMMANDS_MAX)
 
     def sent(self, twist: Twist) -> None:
         """Note a command that goes to the base now."""
         if self._base.delay > 0.0:
-            self._told.append((self._clock.time(), twist))
+            self._commands.append((self._clock.time(), twist))
 
     def ahead(self, pose: Pose) -> Pose:
         """Return the motion from the newest odometry to where the commands under way will bring it (odom)."""
         now, known = self._clock.time(), self._clock.time() - self._base.delay
-        while len(self._told) > 1 and self._told[1][0] <= known:
-            self._told.popleft()
-        ends = [*(begun for begun, _ in self._told), now][1:]
-        for (begun, twist), end in zip(self._told, ends, strict=True):
+        while len(self._commands) > 1 and self._commands[1][0] <= known:
+            self._commands.popleft()
+        ends = [*(begun for begun, _ in self._commands), now][1:]
+        for (begun, twist), end in zip(self._commands, ends, strict=True):
             if (seconds := end - max(begun, known)) > 0.0:
                 pose = pose.compose(Pose(twist.x * seconds, twist.y * seconds, twist.yaw * seconds))
         return pose

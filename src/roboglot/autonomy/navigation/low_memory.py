@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.autonomy.navigation.low_sight import NONE, LowView
-from roboglot.autonomy.navigation.rules import Frame
+from roboglot.autonomy.navigation.rules import GridFrame
 from roboglot.autonomy.navigation.scan_memory import Cells
 from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
 from roboglot.kernels.depth import remember_low, seen_since
@@ -57,7 +57,7 @@ class LowMemory:
         if self._latest < since - SPARE:
             return NONE  # most robots see nothing low for most of the time
         corner = grid.corner
-        rows, columns = Frame(corner, grid.evidence.shape).around((pose.point,), reach)
+        rows, columns = GridFrame(corner, grid.evidence.shape).around((pose.point,), reach)
         window, least = (rows.start, rows.stop, columns.start, columns.stop), max(since, 1e-3)
         found: Points = seen_since(self.seen(grid), *window, least, corner.x, corner.y, RESOLUTION)
         return found

@@ -45,7 +45,7 @@ class LowSight:
         self._sort_out_all: Sorting = sort_out_all
 
     def look(self) -> LowView:
-        """All sensors together; nothing for a robot without any."""
+        """Return what all sensors see together; nothing without sensors."""
         robot, views = self._robot, list[tuple[Points, Points]]()
         if DepthCamera in robot and (image := robot[DepthCamera].image) is not None:
             views.append(self._in_image(image))

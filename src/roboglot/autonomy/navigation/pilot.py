@@ -132,7 +132,7 @@ class Pilot:
             waiting = follower.stop_at - follower.along < self._tuning.waiting_gap and follower.speed < WAITING_SPEED
             if waiting:
                 self._journey.waits(self._robot, self._action)
-            self._tell(follower, pose, "waiting" if waiting else "driving")
+            self._report_progress(follower, pose, "waiting" if waiting else "driving")
             if self._courtesy.is_due(follower):
                 return State.GIVING_WAY
             await self._clock.sleep(PERIOD)
@@ -197,7 +197,7 @@ class Pilot:
             if self._clock.time() - begun > tuning.patience:
                 raise Blocked("cannot turn to the final yaw")
             self._base.set_velocity(self._turning(follower, pose, error))
-            self._tell(follower, pose, "turning")
+            self._report_progress(follower, pose, "turning")
             await self._clock.sleep(PERIOD)
 
     def _turning(self, follower: Follower, pose: Pose, error: float) -> Twist:
@@ -209,7 +209,7 @@ class Pilot:
         return Twist(speed * math.cos(bearing), speed * math.sin(bearing), follower.turn(error))
 
     async def _arrive(self, follower: Follower) -> State:
-        """Judge where it stands, once that is certain: well enough, once more, or Blocked."""
+        """Judge the place reached once the pose is certain: accept it, try once more, or raise Blocked."""
         await self._patience.be_certain()
         pose, goal, tolerance = self._belief.pose, self._goal.points[-1], self._goal.options.tolerance
         good = self._tuning.good
@@ -234,7 +234,7 @@ class Pilot:
 
     # -- feedback ------------------------------------------------------------------------------------------------------
 
-    def _tell(self, follower: Follower, pose: Pose, stage: str) -> None:
+    def _report_progress(self, follower: Follower, pose: Pose, stage: str) -> None:
         """Report now and then, and whenever the stage changes."""
         now = self._clock.time()
         if stage == self._stage and now - self._reported_at < self._tuning.report_period:

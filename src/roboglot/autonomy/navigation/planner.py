@@ -13,7 +13,7 @@ from roboglot.autonomy.docking.shelf_legs import Load
 from roboglot.autonomy.navigation.low_memory import LowMemory
 from roboglot.autonomy.navigation.low_sight import LowView
 from roboglot.autonomy.navigation.route import Route
-from roboglot.autonomy.navigation.rules import Frame, Layers, layers
+from roboglot.autonomy.navigation.rules import GridFrame, Layers, layers
 from roboglot.autonomy.navigation.scan_memory import Cells, ScanMemory
 from roboglot.autonomy.navigation.terms import Shunned, Terms
 from roboglot.autonomy.slam.belief import Belief
@@ -53,7 +53,7 @@ Window = tuple[NDArray[np.int16], NDArray[np.float32], NDArray[np.uint8], Point]
 
 
 @dataclass(frozen=True, slots=True)
-class Task:
+class PlanningTask:
     """Planning task on copies of the arrays, so that a thread can solve it; positions from the grid's corner."""
 
     evidence: NDArray[np.int16]
@@ -75,7 +75,7 @@ class Task:
 
     def solve(self) -> Route:
         """The route through all goals, or Unreachable."""
-        rules = layers(self.drawn, Frame(self.corner, self.evidence.shape), self.tracks, self.start, self.goals)
+        rules = layers(self.drawn, GridFrame(self.corner, self.evidence.shape), self.tracks, self.start, self.goals)
         self._check_near()
         cost = self.cost(rules)
         legs: list[NDArray[np.float64]] = []
@@ -123,7 +123,7 @@ class Task:
 
         Several cells count as one, which is open if one of them is: what stands there is thick by the hull's radius.
         """
-        frame = Frame(self.corner, self.evidence.shape)
+        frame = GridFrame(self.corner, self.evidence.shape)
         cost = self.cost(layers(self.drawn, frame, self.tracks, self.start, self.goals))
         side = max(1, math.ceil(math.sqrt(cost.size / ROUGH_CELLS)))
         rows, columns = -(-cost.shape[0] // side), -(-cost.shape[1] // side)
@@ -143,9 +143,9 @@ class Task:
         lengths: NDArray[np.float64] = np.maximum(np.minimum(found, found.T), straight)
         return lengths
 
-    def floor(self) -> tuple[NDArray[np.bool_], Frame]:
+    def floor(self) -> tuple[NDArray[np.bool_], GridFrame]:
         """The known cells where the hull may stand."""
-        frame = Frame(self.corner, self.evidence.shape)
+        frame = GridFrame(self.corner, self.evidence.shape)
         cost = self.cost(layers(self.drawn, frame, self.tracks, self.start, self.goals))
         return np.isfinite(cost) & (self.evidence < 0), frame
 
@@ -166,12 +166,12 @@ class Task:
         self._reopen(cost)
         if rules and rules.extra is not None:
             cost += rules.extra
-        shun(cost, Frame(self.corner, self.evidence.shape), self.shunned)
+        shun(cost, GridFrame(self.corner, self.evidence.shape), self.shunned)
         return cost
 
     def waiting_place(self) -> Point | None:
         """The nearest place beside what is shunned."""
-        frame = Frame(self.corner, self.evidence.shape)
+        frame = GridFrame(self.corner, self.evidence.shape)
         cost = self.cost(layers(self.drawn, frame, self.tracks, self.start, self.goals))
         return waiting_place(cost, self.evidence, frame, self.start, self.shunned)
 
@@ -281,7 +281,7 @@ class Planner:
     def forget_soon(self, places: Sequence[Point], now: float) -> None:
         """Shorten the memory of obstacles around ``places``, which are about to move."""
         grid, until = self._belief.map, max(now - OBSTACLE_SECONDS + MOVING_SECONDS, 1e-3)
-        seen, frame = self._scans.seen(grid), Frame(grid.corner, grid.evidence.shape)
+        seen, frame = self._scans.seen(grid), GridFrame(grid.corner, grid.evidence.shape)
         for place in places:
             cells = seen[frame.around((place,), MOVING_REACH)]
             cells[cells > until] = until
@@ -291,7 +291,7 @@ class Planner:
         if not places:
             return
         grid = self._belief.map
-        seen, frame = self._scans.seen(grid), Frame(grid.corner, grid.evidence.shape)
+        seen, frame = self._scans.seen(grid), GridFrame(grid.corner, grid.evidence.shape)
         for place in places:
             seen[frame.around((place,), MOVING_REACH)] = 0.0
 
@@ -332,12 +332,12 @@ class Planner:
         """Metres along ``path`` that the hull can go before one of ``points`` is within ``margin`` m; inf: all."""
         return float(free_way(path, points, pose.x, pose.y, self.radius + margin))
 
-    def task(self, start: Point, goals: Sequence[Point], terms: Terms) -> Task:
+    def task(self, start: Point, goals: Sequence[Point], terms: Terms) -> PlanningTask:
         """Return the planning task, on copies of the map and of the obstacles seen."""
         grid = self._belief.map
         shown = grid.evidence if terms.obstacles and terms.things else without_doubtful(grid)
         evidence, seen, trodden, corner = self._window(shown, start, *goals)
-        return Task(
+        return PlanningTask(
             evidence,
             seen if terms.obstacles else np.zeros_like(seen),
             trodden,

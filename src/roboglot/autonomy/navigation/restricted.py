@@ -34,7 +34,7 @@ class RestrictedAreas:
         self._stop = robot.events.listen(ScanTaken, self._look)
 
     def close(self) -> None:
-        """Look no more, and let others in."""
+        """Stop watching, and release the areas."""
         self._stop()
         self._robot[TrafficRadio].claim(())
 

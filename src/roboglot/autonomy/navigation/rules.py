@@ -38,7 +38,7 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class GridFrame:
     """Frame of a grid: ``corner`` of cell (0, 0) in map, rows and columns."""
 
     corner: Point
@@ -116,7 +116,9 @@ class Layers:
     speed: NDArray[np.float32] | None
 
 
-def layers(drawn: Annotations, frame: Frame, tracks: Tracks, start: Point, goals: tuple[Point, ...]) -> Layers | None:
+def layers(
+    drawn: Annotations, frame: GridFrame, tracks: Tracks, start: Point, goals: tuple[Point, ...]
+) -> Layers | None:
     """Return the layers that hold for one drive; None if there are none."""
     lines = drawn.lines_of(LineKind.TRACK) if tracks is not Tracks.FREE else ()
     if not (drawn.areas or drawn.lines_of(LineKind.WALL) or lines):
@@ -159,7 +161,7 @@ def _kept_out_of(drawn: Annotations) -> Iterator[Area]:
             yield area
 
 
-def _speeds(drawn: Annotations, frame: Frame) -> NDArray[np.float32] | None:
+def _speeds(drawn: Annotations, frame: GridFrame) -> NDArray[np.float32] | None:
     slow = drawn.areas_of(AreaKind.DANGEROUS)
     if not slow:
         return None

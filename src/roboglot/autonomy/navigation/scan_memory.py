@@ -15,19 +15,19 @@ from roboglot.model.geometry import Pose
 OBSTACLE_RANGE = 5.0  # m within which obstacles are remembered
 NOTED_MAX = 4000  # cells in the list; when there are more, all rays are traced
 
-Kind = TypeVar("Kind", bound=np.generic)
+Scalar = TypeVar("Scalar", bound=np.generic)
 
 
-class Cells(Generic[Kind]):
+class Cells(Generic[Scalar]):
     """A number for each cell of a map, 0 at first; grows with the map, and begins anew with another one."""
 
-    def __init__(self, kind: type[Kind]) -> None:
+    def __init__(self, kind: type[Scalar]) -> None:
         self._kind = kind
         self._grid: EvidenceGrid | None = None
         self._first = (0, 0)
-        self._cells: NDArray[Kind] = np.zeros((0, 0), kind)
+        self._cells: NDArray[Scalar] = np.zeros((0, 0), kind)
 
-    def of(self, grid: EvidenceGrid) -> NDArray[Kind]:
+    def of(self, grid: EvidenceGrid) -> NDArray[Scalar]:
         """The numbers, to be written to until the map grows or is another one: then the array is another one, too."""
         first, shape, kept = (grid.first_row, grid.first_column), grid.evidence.shape, self._cells
         if grid is self._grid and first == self._first and shape == kept.shape:

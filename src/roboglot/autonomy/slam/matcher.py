@@ -63,7 +63,7 @@ class Match:
 
     @property
     def agreement(self) -> float:
-        """Share of the points on known ground that fit."""
+        """Share of points that fit, of those on known ground."""
         return self.fit / max(self.known, POINTS_MIN)
 
     @property

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from roboglot.autonomy.navigation.rules import Frame
+from roboglot.autonomy.navigation.rules import GridFrame
 from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
 from roboglot.autonomy.slam.scan_points import ScanPoints
 from roboglot.kernels.occupancy import FROZEN, integrate
@@ -33,7 +33,7 @@ def paint(grid: EvidenceGrid, scan: ScanPoints, pose: Pose, *, fill: bool, maint
 
 def _freeze(grid: EvidenceGrid, maintained: Sequence[Area]) -> None:
     """Let scans change cells inside the areas only; everywhere if there are none."""
-    frame = Frame(grid.corner, (grid.evidence.shape[0], grid.evidence.shape[1]))
+    frame = GridFrame(grid.corner, (grid.evidence.shape[0], grid.evidence.shape[1]))
     changing = np.full(frame.shape, not maintained)
     for area in maintained:
         changing |= frame.inside(area)

@@ -327,7 +327,7 @@ class Slam:
         return search(self._belief.map, scan, before, window)
 
     def _doubted(self, best: Match, scan: ScanPoints, before: Pose, stamp: float) -> Match:
-        """``best``, or something better without trust in odometry: wheels slip, robots are pushed."""
+        """Return ``best``, or a better match found without odometry: wheels slip, robots are pushed."""
         belief = self._belief
         lost = belief.quality < LOST_QUALITY and stamp - self._searched_at >= LOST_PERIOD
         if belief.search or lost:

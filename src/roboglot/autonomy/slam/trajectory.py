@@ -1,4 +1,4 @@
-"""Poses of all scans, kept relative to keyframes: when the map is straightened, the whole way is with it."""
+"""Poses of all scans relative to keyframes, so that correcting the map corrects the whole path."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ class Whereabouts:
         self.sure = True  # whether scans may be added to the map
 
     def hear(self, stamp: float) -> bool:
-        """A scan came; whether the lidar was silent before it for so long that anything may have happened."""
+        """Note a scan; return whether the lidar was silent for so long before it that the robot may have been moved."""
         gap, self._heard_at = stamp - self._heard_at, stamp
         if not math.isfinite(gap) or gap <= 0.0:
             return False

@@ -53,7 +53,7 @@ class Courtesy:
         return self._is_due(ruled, stands and self._lookout.blocked and traffic.is_faced(self._course.belief.pose))
 
     def is_due_without_route(self) -> bool:
-        """The same for a robot that stands because it finds no route: the others may find none for it."""
+        """Return whether to give way although no route is found: the other robots may find none because of this one."""
         pose, traffic = self._course.belief.pose, self._traffic
         return self._is_due(traffic.is_in_the_way(pose), traffic.is_faced(pose))
 

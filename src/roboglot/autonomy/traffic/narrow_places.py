@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.autonomy.navigation.rules import Frame
+from roboglot.autonomy.navigation.rules import GridFrame
 from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
 from roboglot.kernels.distance import distances
 from roboglot.model.geometry import Point
@@ -55,8 +55,8 @@ class NarrowPlaces:
         return found
 
     def _look(self, grid: EvidenceGrid, here: Point) -> None:
-        """Keep the map as it is now."""
-        rows, columns = Frame(grid.corner, grid.evidence.shape).around((here,), REACH)
+        """Take a copy of the map."""
+        rows, columns = GridFrame(grid.corner, grid.evidence.shape).around((here,), REACH)
         self._evidence = grid.evidence[rows, columns].copy()
         height, width = self._evidence.shape
         self._narrow = np.zeros((height, width), bool)

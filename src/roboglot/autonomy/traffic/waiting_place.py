@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.autonomy.navigation.rules import Frame
+from roboglot.autonomy.navigation.rules import GridFrame
 from roboglot.autonomy.slam.evidence import RESOLUTION
 from roboglot.autonomy.traffic.narrow_places import narrow
 from roboglot.kernels.search import ways_from
@@ -22,7 +22,7 @@ NARROW_COST = 60.0  # extra cost of waiting in a narrow place: equal to 3 m of o
 Points = NDArray[np.float64]
 
 
-def shun(cost: NDArray[np.float32], frame: Frame, ways: Sequence[tuple[Points, float]]) -> None:
+def shun(cost: NDArray[np.float32], frame: GridFrame, ways: Sequence[tuple[Points, float]]) -> None:
     """Make the cells dearer that lie within so many metres of where others go."""
     for points, reach in ways:
         window, away = _distances(frame, points[:SHUN_POINTS], reach)
@@ -32,7 +32,7 @@ def shun(cost: NDArray[np.float32], frame: Frame, ways: Sequence[tuple[Points, f
 def waiting_place(
     cost: NDArray[np.float32],
     evidence: NDArray[np.int16],
-    frame: Frame,
+    frame: GridFrame,
     here: Point,
     ways: Sequence[tuple[Points, float]],
 ) -> Point | None:
@@ -52,7 +52,7 @@ def waiting_place(
     paid = ways_from(near, row, column)
     paid += np.where(narrow(evidence[rows, columns]), np.float32(NARROW_COST), np.float32(0.0))
     corner = Point(frame.corner.x + columns.start * RESOLUTION, frame.corner.y + rows.start * RESOLUTION)
-    part = Frame(corner, (near.shape[0], near.shape[1]))
+    part = GridFrame(corner, (near.shape[0], near.shape[1]))
     for points, reach in ways:
         window, away = _distances(part, points[:SHUN_POINTS], reach)
         paid[window] = np.where(away < reach, np.float32(math.inf), paid[window])
@@ -62,7 +62,7 @@ def waiting_place(
     return Point(corner.x + (int(best[1]) + 0.5) * RESOLUTION, corner.y + (int(best[0]) + 0.5) * RESOLUTION)
 
 
-def _distances(frame: Frame, points: Points, reach: float) -> tuple[tuple[slice, slice], Points]:
+def _distances(frame: GridFrame, points: Points, reach: float) -> tuple[tuple[slice, slice], Points]:
     """The part of a grid around ``points``, and how far each of its cells is from the nearest of them, m."""
     window = frame.around(tuple(Point(x, y) for x, y in points.tolist()), reach)
     x, y = frame.centres(*window)

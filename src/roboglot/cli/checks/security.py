@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from roboglot.access.rights import ALL_ROBOTS, BRINGS, whole, write_rights
-from roboglot.access.store import FILE, Grant, Identity, Kind, open_store
+from roboglot.access.store import FILE, Grant, Identity, IdentityKind, open_store
 from roboglot.access.trail import FILE as TRAIL
 from roboglot.access.trail import open_trail
 from roboglot.cli.checks.finding import Finding
@@ -144,9 +144,9 @@ def _weakness(identity: Identity, grants: list[Grant]) -> str:
     if not grants:
         return f"roboglot access revoke {identity.name}" if identity.grants else ""
     rights = whole(right for grant in grants for right in grant.rights)
-    if identity.kind is Kind.ADDRESS and any(grant.until is None for grant in grants) and rights > {Right.SEE}:
+    if identity.kind is IdentityKind.ADDRESS and any(grant.until is None for grant in grants) and rights > {Right.SEE}:
         return "an address proves little where others share the network: give it an end (--for 2h)"
-    if identity.kind is Kind.ADDRESS and Right.ADMIN in rights:
+    if identity.kind is IdentityKind.ADDRESS and Right.ADMIN in rights:
         return "an address proves little: administrators should have a password or a token"
     if Right.ADMIN in rights and any(grant.robot == ALL_ROBOTS and grant.until is None for grant in grants):
         return "admin on all robots for good: is drive, program or edit enough?"

@@ -8,6 +8,7 @@ import uuid
 import numpy as np
 from numpy.typing import NDArray
 
+from roboglot.autonomy.slam.evidence import RESOLUTION
 from roboglot.model.components.mapping.annotations import Annotations, Area, AreaKind
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid, PointOfInterest
@@ -17,7 +18,6 @@ from roboglot.simulation.world.description import Floor, Lift, WorldDescription
 from roboglot.simulation.world.placing import Places, docks_of
 from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap, Layer, encode_stcm
 
-RESOLUTION = 0.05  # m
 MARGIN = 0.5  # m around a floor
 LIDAR = 0.2  # m above the floor
 SURFACE = 0.075  # m of a solid that a lidar marks; the rest of it is unknown

@@ -10,6 +10,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
+import msgspec
+
 from roboglot.console import desk, program_runs, teleop
 from roboglot.model.client_context import ask_for
 from roboglot.model.errors import RobotError
@@ -125,5 +127,6 @@ class Repeater:
             case pilot_port.PILOT:
                 pilot_port.do_again(self._robots[given.robot], given)
             case lease_desk.LEASE:
-                request = lease_desk.Request(given.name, given.robot, values["who"])  # type: ignore[arg-type]
+                wish = {"do": given.name, "robot": given.robot, "who": values["who"]}
+                request = msgspec.convert(wish, lease_desk.Request)
                 await self._runtime.leases.do(request, self._robots[given.robot])

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from roboglot.clients.cyberdog.link import Link
+from roboglot.clients.cyberdog.link import DogLink
 from roboglot.clients.errors import BadAnswer, ClientError, RefusedByRobot, TimedOut
 from roboglot.model.clock import Clock
 from roboglot.wire.cyberdog.codes import Code, InBandError
@@ -38,7 +38,7 @@ class _InBand(msgspec.Struct):
 class Calls:
     """Asks over one link."""
 
-    def __init__(self, link: Link) -> None:
+    def __init__(self, link: DogLink) -> None:
         self.link = link
 
     @property

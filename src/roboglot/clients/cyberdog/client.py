@@ -34,7 +34,7 @@ from roboglot.clients.cyberdog.chapters.system.settings import Settings
 from roboglot.clients.cyberdog.chapters.system.skin import Skin
 from roboglot.clients.cyberdog.chapters.system.status import Status
 from roboglot.clients.cyberdog.chapters.system.upkeep import Upkeep
-from roboglot.clients.cyberdog.link import Certificates, Heartbeat, Link
+from roboglot.clients.cyberdog.link import Certificates, DogLink, Heartbeat
 from roboglot.clients.cyberdog.values import PUSHED, Value
 from roboglot.clients.errors import ClientError
 from roboglot.model.clock import Clock, RealClock
@@ -82,7 +82,7 @@ class CyberDogClient(
         clock: Clock | None = None,
     ) -> None:
         clock = clock or RealClock()
-        Calls.__init__(self, Link(host, port, certificates, clock, app_port=app_port, pushed=self._pushed))
+        Calls.__init__(self, DogLink(host, port, certificates, clock, app_port=app_port, pushed=self._pushed))
         self.signals = _feed()
         self._feeds: dict[int, Feed[Any]] = {int(code): _feed() for code in PUSHED}
         self.frames = self._feeds[Code.PROGRAM_TO_APP]

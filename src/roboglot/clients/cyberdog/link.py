@@ -88,7 +88,7 @@ def _heartbeat(ticks: pb.Ticks, at: float) -> Heartbeat:
     )
 
 
-class Link:
+class DogLink:
     """``certificates`` None: without TLS. ``app_port`` None: no server for the robot, so no heartbeats and pushes."""
 
     def __init__(
@@ -214,7 +214,7 @@ class Link:
 class _App(GrpcAppServicer):
     """The service of the app, which the robot calls."""
 
-    def __init__(self, link: Link) -> None:
+    def __init__(self, link: DogLink) -> None:
         self._link, self._beats = link, Beats()
 
     async def heartbeat(self, request: pb.Ticks, _context: object) -> pb.Result:
@@ -246,4 +246,4 @@ def _on_this_machine(host: str) -> bool:
         return host == "localhost"
 
 
-__all__ = ["APP_PORT", "ROBOT_PORT", "Certificates", "Heartbeat", "Link"]
+__all__ = ["APP_PORT", "ROBOT_PORT", "Certificates", "DogLink", "Heartbeat"]

@@ -219,7 +219,7 @@ class Member(Value):
     voice_state: int = 0
 
 
-class Frame(Value):
+class ProgramFrame(Value):
     """2001: a frame of visual programming as it came."""
 
     feedback: dict[str, Any] = {}
@@ -229,7 +229,7 @@ class Frame(Value):
 
 PUSHED: dict[Code, type[Value]] = {
     Code.SERVO_RESPONSE: ServoResponse,
-    Code.PROGRAM_TO_APP: Frame,
+    Code.PROGRAM_TO_APP: ProgramFrame,
     Code.VOICE_TRAINED: VoiceTrained,
     Code.VOICEPRINTS: VoiceprintsWanted,
     Code.LEFT_FILES: FilesLeft,

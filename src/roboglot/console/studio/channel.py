@@ -59,7 +59,7 @@ class Open(msgspec.Struct, tag="open", tag_field="type"):
     program: Id = ""  # in all messages
 
 
-class Frame(msgspec.Struct, tag="frame", tag_field="type"):
+class FrameMessage(msgspec.Struct, tag="frame", tag_field="type"):
     """One frame for the robot (2002)."""
 
     text: str
@@ -109,7 +109,7 @@ def _framed(text: str) -> str:
     return msgspec.json.encode({"type": "frame", "text": text}).decode()
 
 
-Message = Open | Frame | Debug | Check | Fetch | TrialWish | TrialEnd | Member
+Message = Open | FrameMessage | Debug | Check | Fetch | TrialWish | TrialEnd | Member
 _decode = msgspec.json.Decoder(Message).decode
 
 
@@ -250,7 +250,7 @@ class Session:
             raise NotFound("no robot is chosen yet")
         programs.robot.admission.check(CLIENT, "program", Right.PROGRAM)
         match message:
-            case Frame(text=text):
+            case FrameMessage(text=text):
                 self._asked.append(_id_of(text))
                 await programs.frames.receive(text)
             case Debug(id=id, text=text):

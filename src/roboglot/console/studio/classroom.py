@@ -93,9 +93,9 @@ class Class:
     def tell_teachers(self) -> None:
         """Have every teacher's page show the grid anew, soon."""
         if self._due is None:
-            self._due = asyncio.get_running_loop().call_later(GRID_EVERY, self._tell)
+            self._due = asyncio.get_running_loop().call_later(GRID_EVERY, self._send_grid)
 
-    def _tell(self) -> None:
+    def _send_grid(self) -> None:
         self._due = None
         rows = [
             {"name": p.name, "world": p.world, "robot": p.robot, "here": p.seat is not None}

@@ -42,7 +42,7 @@ class Trial:
     """One page's."""
 
     def __init__(self, tell: Tell) -> None:
-        self._tell = tell
+        self._send = tell
         self._playing: asyncio.Task[Played] | None = None
 
     async def take(self, wish: TrialWish, studio: Studio, programs: Programs) -> None:
@@ -74,7 +74,7 @@ class Trial:
             self._playing = None
 
     def _notice(self, news: dict[str, object]) -> None:
-        self._tell({"type": "trial", **news})
+        self._send({"type": "trial", **news})
 
     def _answer(
         self,
@@ -94,7 +94,7 @@ class Trial:
         elif problems:
             first = problems[0]
             answer |= {"error": first.english, "line": first.line, "why": {"en": first.english, "zh": first.chinese}}
-        self._tell(answer)
+        self._send(answer)
 
     def close(self) -> None:
         """End what is being tried."""

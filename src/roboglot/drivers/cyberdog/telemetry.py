@@ -14,11 +14,11 @@ from roboglot.model.components.motion.motors import Motors
 from roboglot.model.components.system.link import Link
 from roboglot.model.components.system.network import NetworkMode
 from roboglot.model.robot import Robot
+from roboglot.wire.cyberdog.chapters.system import LEGS
 
 UNSUPPORTED = (*ABSENT, NoAnswer)  # how dogs answer for what they lack
 PERIOD = 2.0  # s between two polls
 TOPICS = ("wifi", "bat_info", "motor_temper", "volume", "lowpower_control")
-LEGS = ("left front", "right front", "left rear", "right rear")
 JOINTS = {"hip": "hip", "thigh": "thigh", "crus": "knee"}
 
 

@@ -8,6 +8,7 @@ from collections.abc import Awaitable, Callable, Sequence
 
 from roboglot.clients.errors import LinkLost, RefusedByRobot
 from roboglot.clients.robomaster.client import RoboMasterClient
+from roboglot.drivers.linked_base import LATENCY_SMOOTHING
 from roboglot.drivers.robomaster.state import ReportedState
 from roboglot.drivers.robomaster.vocabulary import (
     HITS,
@@ -35,7 +36,6 @@ SPEED_PERIOD = 0.05  # s
 BATTERY_EVERY, HEADING_EVERY, PARTS_EVERY = 20, 10, 2  # speeds
 STEADY = 0.1  # rad/s: below this two consecutive answers report the same heading
 SILENCE_MAX = 0.4  # s without any push until the link counts as lost
-SMOOTHING = 0.2  # share of a new latency in the mean
 GRAVITY = 9.81  # m/s2
 
 
@@ -111,7 +111,7 @@ class TelemetryListener:
     async def _ask_speed(self) -> None:
         asked = self._robot.clock.time()
         speed = await self._client.chassis.get_speed()
-        self._reported.latency += SMOOTHING * (self._robot.clock.time() - asked - self._reported.latency)
+        self._reported.latency += LATENCY_SMOOTHING * (self._robot.clock.time() - asked - self._reported.latency)
         self._reported.twist, self._reported.wheels = twist_of(speed), wheels_of(speed, self._client.as_robots)
         self._link.heard("speed")
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from roboglot.clients.errors import BadAnswer
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
+from roboglot.drivers.linked_base import LATENCY_SMOOTHING
 from roboglot.drivers.slamware.state import ReportedState
 from roboglot.drivers.slamware.vocabulary import battery_of, grid_of, imu_of, pose_of, scan_of
 from roboglot.drivers.supervisor import together
@@ -27,7 +28,6 @@ else:
 
 log = logging.getLogger(__name__)
 JUMP = 0.5  # m or rad between localization and odometry from which the pose counts as set by hand
-SMOOTHING = 0.2  # share of a new latency in the mean
 ABSENT = (404, 500, 501)  # statuses for features that the robot lacks
 NO_ARRAYS = in_words("that", ["numpy"], "slamware")
 ARRAYS = frozenset({"scan", "map"})  # topics whose values are numpy arrays
@@ -109,7 +109,7 @@ class TelemetryPoller:
     async def _odometry(self) -> None:
         asked = self._clock.time()
         pose = pose_of(await self._client.get_odo_pose())
-        self._reported.latency += SMOOTHING * (self._clock.time() - asked - self._reported.latency)
+        self._reported.latency += LATENCY_SMOOTHING * (self._clock.time() - asked - self._reported.latency)
         before = self._reported.odometry
         way = before.pose.distance_to(pose) if before.stamp else 0.0
         self._reported.odometry = OdometryReading(self._clock.time(), pose, self._reported.twist, before.distance + way)

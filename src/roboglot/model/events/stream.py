@@ -6,7 +6,7 @@ import asyncio
 from collections import deque
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Generic, Protocol, TypeVar, cast
 
 QUEUE_MAX = 256  # unread events per reader, beyond which the oldest is dropped
 
@@ -19,6 +19,15 @@ class Event:
 
 
 E_ = TypeVar("E_", bound=Event)
+
+
+class _Receiver(Protocol):
+    """Anything that takes events of some types."""
+
+    @property
+    def types(self) -> tuple[type[Event], ...]: ...
+
+    def push(self, event: Event) -> None: ...
 
 
 class Subscription(Generic[E_]):
@@ -41,11 +50,11 @@ class Subscription(Generic[E_]):
         """Stop receiving."""
         self._stream._forget(self)
 
-    def push(self, event: E_) -> None:
-        """Called by the stream."""
+    def push(self, event: Event) -> None:
+        """Take an event of these types; the stream calls this."""
         if len(self._queue) == self._queue.maxlen:
             self.dropped += 1
-        self._queue.append(event)
+        self._queue.append(cast(E_, event))
         self._wakeup.set()
 
     def drain(self) -> list[E_]:
@@ -71,7 +80,7 @@ class EventStream:
     """Delivers every event to the subscribers of its type."""
 
     def __init__(self) -> None:
-        self._subscriptions: list[Subscription[Event]] = []
+        self._subscriptions: list[_Receiver] = []
         self._listeners: list[tuple[type[Event], Callable[[Event], None]]] = []
         self._receivers: dict[type[Event], tuple[Callable[[Event], None], ...]] = {}  # by the type of a published event
 
@@ -90,13 +99,13 @@ class EventStream:
     def subscribe(self, *types: type[E_], maxlen: int = QUEUE_MAX) -> Subscription[E_]:
         """A queue of all events of these types from now on; close it (or use ``with``)."""
         subscription = Subscription(self, types, maxlen)
-        self._subscriptions.append(subscription)  # type: ignore[arg-type]
+        self._subscriptions.append(subscription)
         self._receivers.clear()
         return subscription
 
     def listen(self, kind: type[E_], listener: Callable[[E_], None]) -> Callable[[], None]:
         """Call ``listener`` on every event of ``kind``, in place; returns what ends it. Listeners must be quick."""
-        entry: tuple[type[Event], Callable[[Event], None]] = (kind, listener)  # type: ignore[assignment]
+        entry = (kind, cast(Callable[[Event], None], listener))
         self._listeners.append(entry)
         self._receivers.clear()
 
@@ -109,5 +118,5 @@ class EventStream:
 
     def _forget(self, subscription: Subscription[E_]) -> None:
         if subscription in self._subscriptions:
-            self._subscriptions.remove(subscription)  # type: ignore[arg-type]
+            self._subscriptions.remove(subscription)
             self._receivers.clear()

@@ -41,7 +41,7 @@ class Checking:
         raise ProtocolViolation("an answer without a request")
 
     def broken(self, _error: Exception) -> None:
-        """No answer, then."""
+        """Record that the check got no answer."""
         self.problems = None
 
     def settle(self) -> None:

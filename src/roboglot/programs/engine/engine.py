@@ -276,7 +276,7 @@ class Engine:
             raise
 
     def _forget(self, launcher: Launcher) -> None:
-        """The zygote has ended by itself: the next program starts another."""
+        """Forget a zygote that ended by itself: the next program starts another."""
         if self._launcher is launcher:
             self._launcher = None
             reaping = asyncio.get_running_loop().create_task(launcher.close())

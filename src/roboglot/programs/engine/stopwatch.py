@@ -21,7 +21,7 @@ class Stopwatch:
             self._timer = self._loop.call_later(self._left, self._over)
 
     def stop(self) -> None:
-        """Hold."""
+        """Stop the stopwatch."""
         if self._timer is not None:
             self._left = max(0.0, self._timer.when() - self._loop.time())
             self._timer.cancel()

@@ -57,7 +57,7 @@ async def get_volume(session: Session) -> Record:
 
 @ABILITIES.on("cyberdog.audio.set_volume", needs=(Speaker,))
 async def set_volume(session: Session, volume: int = UNCHANGED) -> Record:
-    """Set it for everything that is said from now on."""
+    """Set the volume of everything that is said from now on."""
     outcome = state()
     try:
         turn_to(session.robot[Speaker], volume)

@@ -36,7 +36,7 @@ class Host(Protocol):
         """Add to the program's log."""
 
 
-class Part(Protocol):
+class SessionState(Protocol):
     """Something that a group keeps between a program's calls: lights it holds, a recogniser that is on."""
 
     def __init__(self, session: Session) -> None: ...
@@ -45,7 +45,7 @@ class Part(Protocol):
         """The program is over."""
 
 
-P = TypeVar("P", bound=Part)
+P = TypeVar("P", bound=SessionState)
 
 
 class Session:
@@ -59,7 +59,7 @@ class Session:
         self.states: dict[str, Record] = {}  # by group: the result of its last call
         self.logging: set[str] = set()  # groups whose calls go to the log
         self.last_state = state()  # of the last call, for the block's frames
-        self._parts: dict[type[Part], Part] = {}
+        self._parts: dict[type[SessionState], SessionState] = {}
         self._going_on = asyncio.Event()
         self._going_on.set()
         self._paused = asyncio.Event()

@@ -77,7 +77,7 @@ class ModuleLibrary:
             raise ModuleGone(f"the module {gone} was deleted just now") from None
 
     async def modules(self, ids: Collection[str] = ()) -> list[ListedProgram]:
-        """Return those of ``ids`` that exist, or all, by id."""
+        """Return the modules with these ``ids`` that exist, or all of them, by id."""
         self._allow(TaskOperation.INQUIRY)
         return await self._store.all(ids)
 

@@ -26,7 +26,7 @@ class BlockStops:
         self.set(stops or Stops())
 
     def set(self, stops: Stops) -> None:
-        """Halt at these and nowhere else."""
+        """Halt at these blocks and at no others."""
         self._blocks, self._next = stops.blocks, stops.first_block
 
     def step(self, step: Step) -> None:

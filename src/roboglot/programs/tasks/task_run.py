@@ -245,7 +245,7 @@ class TaskRun:
         self._halts = True
 
     async def _report_halt(self) -> None:
-        """Suspend, when a crash would leave the program here, too."""
+        """Suspend the task once the journal is written, so that a crash leaves it here, too."""
         self._halts = False
         try:
             await self._journal.written()
@@ -317,7 +317,7 @@ def in_units(stops: Stops) -> Stops:
 
 
 def _in_words(failure: Failed) -> str:
-    """The error with its place, for people."""
+    """Return the error and its place, worded for people."""
     where = f"module {failure.unit}, line {failure.line - HEADER_LINES}" if failure.unit else f"line {failure.line}"
     place = f" ({where}: {failure.source_line})" if failure.line else ""
     return f"{failure.type}: {failure.message}{place}"

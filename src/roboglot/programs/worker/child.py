@@ -14,7 +14,7 @@ from roboglot.programs.language import Problem, ProblemKind, check, compile_unit
 from roboglot.programs.language.instrument import Marks
 from roboglot.programs.language.places import Places
 from roboglot.programs.worker.environment import build_builtins
-from roboglot.programs.worker.link import EXIT_MEMORY, HALT, Link
+from roboglot.programs.worker.link import EXIT_MEMORY, HALT, HostLink
 from roboglot.programs.worker.modules import build_modules
 from roboglot.programs.worker.prelude import Prelude
 from roboglot.programs.worker.roots import build_enums, build_roots
@@ -32,7 +32,7 @@ _OWN_DEPTH = 16
 
 def main(descriptor: int, whereabouts: Whereabouts) -> int:
     """Serve the one request on the socket; the exit code. The jail is already closed."""
-    link = Link(descriptor)
+    link = HostLink(descriptor)
     reserve = bytearray(_RESERVE)  # released when memory runs out, so that the report can still be written
     try:
         request = link.receive()
@@ -80,7 +80,7 @@ def _plain(problem: Problem) -> list[object]:
     return [problem.line, problem.column, str(problem.kind), problem.english, problem.chinese]
 
 
-def _run(link: Link, request: dict[str, Any], whereabouts: Whereabouts) -> dict[str, Any]:
+def _run(link: HostLink, request: dict[str, Any], whereabouts: Whereabouts) -> dict[str, Any]:
     units: list[CodeType] = []
     whereabouts.lay_out(Places(request["units"]))
     variables = Variables(link.send)
@@ -118,7 +118,7 @@ def _run(link: Link, request: dict[str, Any], whereabouts: Whereabouts) -> dict[
     return {"t": "finished"}
 
 
-def _globals(link: Link, request: dict[str, Any], call: Callable[..., Any]) -> dict[str, Any]:
+def _globals(link: HostLink, request: dict[str, Any], call: Callable[..., Any]) -> dict[str, Any]:
     prelude = Prelude.from_wire(request["prelude"])
     link.records = type(link.records)(prelude.records)
     modules = build_modules(call, request["seed"], prelude.utc_offset)

@@ -38,7 +38,7 @@ _HEADROOM = 100
 _SMALL = 1 << 63
 
 
-class Link:
+class HostLink:
     """Sends output and calls; a call waits for its reply. When the host's end closes, the process ends."""
 
     def __init__(self, descriptor: int) -> None:

@@ -37,7 +37,7 @@ class Handshakes:
         self._watched: set[str] = set()
         self._looked = -LOOK_PERIOD
         self._asked: dict[str, None] = {}  # oldest first
-        self._told: dict[str, float] = {}  # time by host
+        self._logged_at: dict[str, float] = {}  # time by host
         self._looks: set[asyncio.TimerHandle] = set()
 
     def begun(self) -> None:
@@ -76,15 +76,15 @@ class Handshakes:
         there = {peer for peer, state in _peers(self._own, self.port).items() if state == ESTABLISHED}
         for peer in peers:
             if peer not in self._asked and peer not in there:
-                self._tell(host_of(peer))
+                self._log_refusal(host_of(peer))
 
-    def _tell(self, host: str) -> None:
+    def _log_refusal(self, host: str) -> None:
         now = self._loop.time()
-        if now - self._told.get(host, -QUIET) < QUIET:
+        if now - self._logged_at.get(host, -QUIET) < QUIET:
             return
-        if len(self._told) >= WATCHED_MAX:
-            self._told.clear()
-        self._told[host] = now
+        if len(self._logged_at) >= WATCHED_MAX:
+            self._logged_at.clear()
+        self._logged_at[host] = now
         log.warning(
             "%s was refused on port %d before any request: it needs TLS and a certificate that this robot's CA signed"
             " (roboglot certs --export DIR)",

@@ -87,7 +87,7 @@ class Context:
         self._carrier.send(data)
 
     def status(self, level: Level, text: str) -> None:
-        """Say something in words."""
+        """Report a status in words."""
         self.send(message("status", level=int(level), message=text))
 
     def follow(self, action: Action) -> None:

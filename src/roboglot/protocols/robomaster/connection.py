@@ -23,7 +23,7 @@ from roboglot.protocols.robomaster.limits import (
     OUTPUT_MAX,
     TEXT_SHOWN_MAX,
 )
-from roboglot.protocols.robomaster.liveness import Driver
+from roboglot.protocols.robomaster.liveness import DrivingClient
 from roboglot.protocols.robomaster.strangers import Greeting, turn_away_strangers
 from roboglot.transport.eager import begin
 from roboglot.wire.robomaster.lines import LineSplitter
@@ -36,7 +36,7 @@ class ControlConnection(asyncio.Protocol):
 
     transport: asyncio.Transport
     host: str
-    driver: Driver
+    driver: DrivingClient
     _name: str  # host and port of the client
     _shown: str  # in the log: its identity if known, and its host
 
@@ -74,7 +74,7 @@ class ControlConnection(asyncio.Protocol):
             log.warning("robomaster: refused %s: %d connections are open", self.host, len(self._connections))
             transport.abort()
             return
-        self.driver = Driver(self._name, self.host, transport.get_extra_info("socket"))
+        self.driver = DrivingClient(self._name, self.host, transport.get_extra_info("socket"))
         self._connections.add(self)
         transport.set_write_buffer_limits(high=OUTPUT_MAX)
         probe_for_life(transport)

@@ -28,7 +28,7 @@ from roboglot.wire.robomaster.replies import Profile
 log = logging.getLogger(__name__)
 
 
-class Part(Protocol):
+class ChapterState(Protocol):
     """State that a chapter keeps between its commands."""
 
     def __init__(self, context: Context) -> None: ...
@@ -37,7 +37,7 @@ class Part(Protocol):
         """Go back to the state before the session."""
 
 
-P = TypeVar("P", bound=Part)
+P = TypeVar("P", bound=ChapterState)
 _speaker: ContextVar[str] = ContextVar("speaker", default="nobody")
 
 
@@ -76,7 +76,7 @@ class Context:
         for module, reads in readings.PUSHED.items():
             self.pushes.offer(module, [(name, partial(read, self)) for name, read in reads.items()])
         self._mode = FollowMode.CHASSIS_LEAD
-        self._parts: dict[type[Part], Any] = {}
+        self._parts: dict[type[ChapterState], Any] = {}
         self._undo: dict[str, Callable[[], object]] = {}
         self._members: dict[Hashable, str] = {}
         self._numbers = itertools.count(1)

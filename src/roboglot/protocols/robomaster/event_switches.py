@@ -48,14 +48,14 @@ class EventSwitches:
         elif not on and name in self._stops:
             self._stops.pop(name)()
 
-    def _tell(self, text: str) -> None:
+    def _send(self, text: str) -> None:
         self._context.outlets.tell(self._context.profile.event(text))
 
     def _on_hit(self, hit: ArmorHit) -> None:
-        self._tell(f"armor event hit {ARMOR[hit.place]} {HITS[hit.kind]}")
+        self._send(f"armor event hit {ARMOR[hit.place]} {HITS[hit.kind]}")
 
     def _on_level(self, change: AdapterLevelChanged) -> None:
-        self._tell(f"sensor_adapter event io_level ({change.adapter}, {change.port}, {int(change.level)})")
+        self._send(f"sensor_adapter event io_level ({change.adapter}, {change.port}, {int(change.level)})")
 
     def _listen(self) -> Callable[[], object]:
         task = asyncio.get_running_loop().create_task(self._applaud(), name="sound event")
@@ -65,4 +65,4 @@ class EventSwitches:
         with self._robot[Hearing].claps() as runs:
             async for heard in runs:
                 if heard.count >= CLAPS_MIN:
-                    self._tell(f"sound event applause {heard.count}")
+                    self._send(f"sound event applause {heard.count}")

@@ -58,7 +58,7 @@ class Echoes:
             self._socket.close()
 
 
-class Driver:
+class DrivingClient:
     """A client at the other end of ``connection`` (None: a line that cannot be asked) and its signs of life."""
 
     def __init__(self, name: str, host: str, connection: socket.socket | None) -> None:
@@ -76,7 +76,7 @@ class Driver:
         return False
 
     def rest(self, echoed: bool) -> bool:
-        """It drives nothing; whether it should be asked all the same, to learn early if its host answers."""
+        """Note that the client drives nothing; return whether to ask it anyway, to learn early if its host answers."""
         self._misses = 0
         self._echoes = self._echoes or echoed
         self._greetings -= self._greetings > 0
@@ -107,7 +107,10 @@ class Vigil:
     """Looks after all drivers of one robot; ``drives`` says whether one has anything in motion, ``gone`` ends that."""
 
     def __init__(
-        self, drivers: Callable[[], Iterable[Driver]], drives: Callable[[str], bool], gone: Callable[[str], object]
+        self,
+        drivers: Callable[[], Iterable[DrivingClient]],
+        drives: Callable[[str], bool],
+        gone: Callable[[str], object],
     ) -> None:
         self._drivers, self._drives, self._gone = drivers, drives, gone
         self._echoes: Echoes | None = None

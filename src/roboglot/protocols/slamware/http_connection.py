@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import sys
 from collections.abc import Sequence
+from typing import cast
 
 import httptools
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
@@ -107,10 +108,11 @@ class HttpConnection(HttpToolsProtocol):
     _reading: bytes | memoryview = b""
     _unread: Sequence[bytes | memoryview] = ()  # received, to be parsed first
 
-    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        super().connection_made(ReasonTransport(transport))
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        reasoned = ReasonTransport(cast(asyncio.Transport, transport))
+        super().connection_made(reasoned)
         if len(self.connections) > CONNECTIONS_MAX:
-            transport.abort()
+            reasoned.abort()
             return
         self._guard(REQUEST_SECONDS_MAX)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.mapping.floors import RideStage
-from roboglot.model.components.motion.navigation import NavigationFeedback
+from roboglot.model.components.motion.navigation import NavigationFeedback, Tracks
 from roboglot.model.errors import Blocked, DockNotFound, NotLocalized, RobotError, Unreachable
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.maps import PointOfInterest
@@ -14,6 +14,8 @@ from roboglot.wire.slamware.chapters.motion import ActionState, Result, State
 from roboglot.wire.slamware.geometry import Pose2D, Pose3D
 
 PREFIXES = ("slamtec.agent.actions.", "agent.actions.")  # firmware up to 5, firmware 6: both are understood
+
+TRACKS = (Tracks.FREE, Tracks.STRICT, Tracks.PREFERRED)  # by move mode
 
 # Reasons that clients have received from robots; other errors have plain words.
 REASONS: dict[type[RobotError], str] = {

@@ -181,7 +181,7 @@ class Context:
         await self.clear_order()
 
     async def clear_order(self) -> None:
-        """Stop, and drop the rest of the order, if there is any."""
+        """Stop the robot, and drop the rest of the order."""
         self.book.canceling = True
         try:
             await self._route.stop()

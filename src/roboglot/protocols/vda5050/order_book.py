@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from roboglot.protocols.vda5050.errors import Rejected
-from roboglot.wire.vda5050.orders import Action, Edge, Node, Order, Part
+from roboglot.wire.vda5050.orders import Action, Edge, Node, Order, OrderPart
 from roboglot.wire.vda5050.versions import ErrorKind
 
 ACTIONS_KEPT_MAX = 1000  # action states; the oldest finished ones are dropped first
@@ -121,7 +121,7 @@ class OrderBook:
     def _extend(self, order: Order, nodes: tuple[Node, ...]) -> None:
         self.nodes += nodes
         self.edges += order.edges
-        parts: tuple[Part, ...] = (*nodes, *order.edges)
+        parts: tuple[OrderPart, ...] = (*nodes, *order.edges)
         for part in parts:
             for action in part.actions:
                 self.actions[action.action_id] = ActionState(action)
@@ -129,7 +129,7 @@ class OrderBook:
         self.decision = released[-1]
 
     def _drop_horizon(self) -> None:
-        parts: tuple[Part, ...] = (*self.nodes, *self.edges)
+        parts: tuple[OrderPart, ...] = (*self.nodes, *self.edges)
         for part in parts:
             for action in () if part.released else part.actions:
                 self.actions.pop(action.action_id, None)
@@ -138,7 +138,7 @@ class OrderBook:
 
     def _released(self, action: Action) -> bool:
         """Return whether an action is no longer part of the horizon."""
-        parts: tuple[Part, ...] = (*self.nodes, *self.edges)
+        parts: tuple[OrderPart, ...] = (*self.nodes, *self.edges)
         horizon = [part for part in parts if not part.released]
         return not any(action.action_id == other.action_id for part in horizon for other in part.actions)
 

@@ -24,7 +24,7 @@ from roboglot.protocols.visual.table import TABLE
 from roboglot.protocols.visual.vocabulary import key_of, program
 from roboglot.wire.visual.codes import FeedbackState
 from roboglot.wire.visual.replies import feedback
-from roboglot.wire.visual.requests import BadFrame, Kind, Request, parse_request
+from roboglot.wire.visual.requests import BadFrame, FrameSubject, Request, parse_request
 
 log = logging.getLogger(__name__)
 
@@ -126,15 +126,15 @@ class Dispatch:
         assert operation is not None  # parse_request rejects all other frames
         await operation.handler(Context(self._service, request, answers))
 
-    async def _fetch(self, cloud: CloudMirror, kind: Kind) -> None:
+    async def _fetch(self, cloud: CloudMirror, kind: FrameSubject) -> None:
         """Save what the account has and the robot lacks; modules before the tasks that call them."""
         service = self._service
-        if kind in (Kind.TASK, Kind.MODULE):
+        if kind in (FrameSubject.TASK, FrameSubject.MODULE):
             known = [module.id for module in await service.library.modules()]
-            await cloud.fetch(Kind.MODULE, known, lambda request: _saved(service.library.save, request))
-        if kind is Kind.TASK:
+            await cloud.fetch(FrameSubject.MODULE, known, lambda request: _saved(service.library.save, request))
+        if kind is FrameSubject.TASK:
             known = [task.id for task in await service.tasks()]
-            await cloud.fetch(Kind.TASK, known, lambda request: _saved(service.save, request))
+            await cloud.fetch(FrameSubject.TASK, known, lambda request: _saved(service.save, request))
 
 
 def _right_of(request: Request) -> Right | None:

@@ -24,7 +24,7 @@ from roboglot.protocols.websocket import WebSocketServer
 from roboglot.transport.tls import Tls
 from roboglot.wire.visual.relay import FrontEnd
 from roboglot.wire.visual.replies import feedback
-from roboglot.wire.visual.requests import Kind
+from roboglot.wire.visual.requests import FrameSubject
 
 log = logging.getLogger(__name__)
 
@@ -140,7 +140,7 @@ class VisualDoor:
     def _report(self, report: TaskReport) -> None:
         """Send what happens to a task without a request; such frames carry a time stamp as their id."""
         text = feedback(
-            kind=Kind.TASK,
+            kind=FrameSubject.TASK,
             id=f"task_{int(self._service.robot.clock.epoch() * 1e6)}",
             target=report.task,
             operate=report.operation,

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from roboglot.programs.stores import ListedProgram, StoredProgram
-from roboglot.wire.visual.requests import Kind, Request
+from roboglot.wire.visual.requests import FrameSubject, Request
 
 
 def key_of(request: Request) -> str:
     """The contract's key of a frame's wish."""
-    return f"{request.kind} {request.operate if request.kind in (Kind.TASK, Kind.MODULE) else request.mode}"
+    operates = request.kind in (FrameSubject.TASK, FrameSubject.MODULE)
+    return f"{request.kind} {request.operate if operates else request.mode}"
 
 
 def program(request: Request) -> StoredProgram:

@@ -22,7 +22,7 @@ HEADER_TABLE_SIZE = 1  # the name of a setting
 SETTING = 6  # bytes
 
 
-class Frame(IntEnum):
+class Http2Frame(IntEnum):
     """Kinds of frames that are read."""
 
     DATA = 0
@@ -105,23 +105,23 @@ class OneWay:
 
     def _frame(self, kind: int, flags: Flag, stream: int, payload: bytes) -> None:
         match kind:
-            case Frame.DATA:
+            case Http2Frame.DATA:
                 if call := self._calls.get(stream):
                     self._data(call, _unpadded(flags, payload))
                 self._end_with(flags, stream)
-            case Frame.HEADERS:
+            case Http2Frame.HEADERS:
                 payload = _unpadded(flags, payload)
                 self._headers = bytearray(payload[5:] if flags & Flag.PRIORITY else payload)
                 self._ends = bool(flags & Flag.END_STREAM)
                 self._head(flags, stream)
-            case Frame.CONTINUATION:
+            case Http2Frame.CONTINUATION:
                 self._headers += payload
                 if len(self._headers) > FRAME_MAX:
                     raise ValueError("headers without an end")
                 self._head(flags, stream)
-            case Frame.RST_STREAM:
+            case Http2Frame.RST_STREAM:
                 self._calls.pop(stream, None)
-            case Frame.SETTINGS if not flags & Flag.ACK:
+            case Http2Frame.SETTINGS if not flags & Flag.ACK:
                 self._settings(payload)
 
     def _head(self, flags: Flag, stream: int) -> None:

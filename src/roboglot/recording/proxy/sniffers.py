@@ -16,7 +16,7 @@ from roboglot.recording.lines import FRAMES, LOG, status_of
 from roboglot.wire.contracts import contract
 from roboglot.wire.robomaster.commands import Malformed, parse
 from roboglot.wire.robomaster.lines import LineSplitter
-from roboglot.wire.visual.requests import BadFrame, Kind, parse_request
+from roboglot.wire.visual.requests import BadFrame, FrameSubject, parse_request
 
 BEYOND = {"version", "version ?"}  # commands that robots know although the manual does not list them
 WAITING_MAX = 1000  # requests awaiting an answer
@@ -196,7 +196,7 @@ class FrameSniffer(Sniffer):
             return
         try:
             request = parse_request(text)
-            mode = request.operate if request.kind in (Kind.TASK, Kind.MODULE) else request.mode
+            mode = request.operate if request.kind in (FrameSubject.TASK, FrameSubject.MODULE) else request.mode
             key, id = f"{request.kind} {mode}", request.id
         except BadFrame as bad:
             key, id = "", bad.id

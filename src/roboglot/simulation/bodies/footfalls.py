@@ -80,7 +80,7 @@ def walking(gait: Gait, strides: float, lift: FootLift) -> Swings:
     return tuple(swings)
 
 
-class Order:
+class FootfallCycle:
     """Footfalls, again from the start whenever they are over."""
 
     def __init__(self, footfalls: Sequence[Footfall]) -> None:

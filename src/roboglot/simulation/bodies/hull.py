@@ -33,7 +33,7 @@ HAND_STIFFNESS, HAND_DAMPING = 60.0, 15.0  # 1/s2 and 1/s: stiffness of a hand's
 Floats = NDArray[np.float64]
 
 
-class Touch(NamedTuple):
+class HullContact(NamedTuple):
     """Place of a contact on the hull (base_link, m); ``person`` by a person, ``light`` by what gives way too easily."""
 
     x: float
@@ -114,7 +114,7 @@ class Hull:
         self.motion = (0.0, 0.0, 0.0, 0.0)  # along x, y and z (m/s, world; z of the torso), and the turn rate (rad/s)
         self.before = self.motion  # the same one step earlier
         self.gaze = LEVEL  # pitch and yaw of the gimbal, rad; zero without one
-        self.touches: list[Touch] = []  # current contacts of the hull, except docks
+        self.touches: list[HullContact] = []  # current contacts of the hull, except docks
         self.when_touched: list[Duty] = []  # start when the hull is touched
         self.edges, self.walls = Nearness(body.hull.radius), Nearness(body.hull.radius)
         self._looked = 0.0, 0.0, -1, 0.0  # where they were last looked up, on which floor; m for which it holds
@@ -295,7 +295,7 @@ class Hull:
         self.loose = True
 
     def handle(self) -> None:
-        """Apply what the hand does, before a step."""
+        """Apply the hand's force before a physics step."""
         if self.hand is None:
             return
         mass = self.mass

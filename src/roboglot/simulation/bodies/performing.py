@@ -14,7 +14,7 @@ from roboglot.model.components.motion.legs import CENTRED, FootLift, Step
 from roboglot.model.components.motion.motions import MotionSpec, Sway
 from roboglot.model.components.motion.posture import Posture
 from roboglot.model.geometry import LEVEL, STILL, Orientation, Point, Pose, Twist
-from roboglot.simulation.bodies.footfalls import Order, Swings, lifted
+from roboglot.simulation.bodies.footfalls import FootfallCycle, Swings, lifted
 from roboglot.simulation.bodies.support import GRAVITY
 
 CROUCH, PUSH, RECOVER = 0.20, 0.08, 0.25  # s: to bend before a jump, to stretch, to straighten after it
@@ -50,7 +50,7 @@ class Body:
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class MotionTick:
     """One tick: base_link's motion and the body. ``leap``: take off now, for so long (s). ``landed``: be still now."""
 
     body: Body
@@ -98,15 +98,15 @@ class Track:
 class Performance:
     """A motion under way: its frames, and whether something stopped it; ``lift`` as the last frame has it."""
 
-    def __init__(self, frames: Iterator[Frame]) -> None:
+    def __init__(self, frames: Iterator[MotionTick]) -> None:
         self.frames = frames
-        self.frame: Frame | None = None
+        self.frame: MotionTick | None = None
         self.lift: float | None = None
         self.over = False
         self.hit = False
 
 
-def motion_frames(spec: MotionSpec, begin: Body, stance: Stance) -> Iterator[Frame]:
+def motion_frames(spec: MotionSpec, begin: Body, stance: Stance) -> Iterator[MotionTick]:
     """All ticks of a motion of the table."""
     if spec.jumps:
         return _jumps(spec, begin, stance)
@@ -115,10 +115,10 @@ def motion_frames(spec: MotionSpec, begin: Body, stance: Stance) -> Iterator[Fra
 
 def dance_frames(
     steps: Sequence[Step], begin: Body, stance: Stance, footfalls: Sequence[Footfall] = ()
-) -> Iterator[Frame]:
+) -> Iterator[MotionTick]:
     """All ticks of a choreography, and standing straight again."""
     body, twist, ticks, end = begin, STILL, 0, 0.0
-    order = Order(footfalls) if footfalls else None
+    order = FootfallCycle(footfalls) if footfalls else None
     for step in steps:
         height = body.height if step.body.height is None else step.body.height
         goal = stance.at(height, step.body.attitude, step.body.shift)
@@ -130,7 +130,7 @@ def dance_frames(
             twist = _gripping(twist, step.twist, step.friction * GRAVITY * stance.tick)
             feet = order.swings(ticks * stance.tick, holds, step.landing) if order else None
             ticks += 1
-            yield Frame(body.towards(goal, ease((index + 1) / count)), twist, lift=lift, feet=feet)
+            yield MotionTick(body.towards(goal, ease((index + 1) / count)), twist, lift=lift, feet=feet)
         body = goal
     yield from straighten(body, stance)
 
@@ -143,17 +143,17 @@ def _gripping(now: Twist, wanted: Twist, most: float) -> Twist:
     return Twist(_mix(now.x, wanted.x, most / change), _mix(now.y, wanted.y, most / change), wanted.yaw)
 
 
-def straighten(begin: Body, stance: Stance, seconds: float = STRAIGHTEN) -> Iterator[Frame]:
+def straighten(begin: Body, stance: Stance, seconds: float = STRAIGHTEN) -> Iterator[MotionTick]:
     """Return the motion from wherever it is to standing straight."""
     for part in _parts(seconds, stance):
-        yield Frame(begin.towards(stance.straight, ease(part)))
+        yield MotionTick(begin.towards(stance.straight, ease(part)))
 
 
-def fall(begin: Body, stance: Stance, seconds: float) -> Iterator[Frame]:
-    """Something stopped it in the air: it comes down where it is."""
+def fall(begin: Body, stance: Stance, seconds: float) -> Iterator[MotionTick]:
+    """End a leap that was stopped in the air: the body comes down where it is."""
     for part in _parts(seconds, stance):
-        yield Frame(begin.towards(stance.straight, part), airborne=True)
-    yield Frame(stance.straight, landed=True)
+        yield MotionTick(begin.towards(stance.straight, part), airborne=True)
+    yield MotionTick(stance.straight, landed=True)
 
 
 def strayed(there: Pose, wanted: Pose) -> bool:
@@ -167,13 +167,13 @@ def ease(part: float) -> float:
     return part * part * (3.0 - 2.0 * part)
 
 
-def _figure(spec: MotionSpec, begin: Body, stance: Stance) -> Iterator[Frame]:
+def _figure(spec: MotionSpec, begin: Body, stance: Stance) -> Iterator[MotionTick]:
     """Feet on the floor: the body goes to its rest, swings about it, and goes on to its end; walking meanwhile."""
     sway, duration = spec.sway, spec.duration
     rest = stance.at(stance.straight.height - sway.rest_height, Orientation(roll=sway.rest_roll, pitch=sway.rest_pitch))
     end = rest if spec.after is Posture.SITTING else stance.straight
     ramp = min(RAMP, 0.2 * duration)
-    order = Order(spec.footfalls) if spec.footfalls else None
+    order = FootfallCycle(spec.footfalls) if spec.footfalls else None
     for part in _parts(duration, stance):
         t = part * duration
         into, out = ease(t / ramp), ease((duration - t) / ramp)
@@ -182,7 +182,7 @@ def _figure(spec: MotionSpec, begin: Body, stance: Stance) -> Iterator[Frame]:
         wave = (1.0 - math.cos(math.tau * part)) / duration
         twist = Twist(spec.way.x * wave, spec.way.y * wave, spec.way.yaw * wave) if spec.way != Pose() else STILL
         feet = order.swings(t - ramp, PAWS, 1.0) if order and ramp <= t <= duration - ramp else None
-        yield Frame(_swung(body, sway, t, into * out, stance), twist, feet=feet)
+        yield MotionTick(_swung(body, sway, t, into * out, stance), twist, feet=feet)
 
 
 def _swung(body: Body, sway: Sway, t: float, share: float, stance: Stance) -> Body:
@@ -193,12 +193,12 @@ def _swung(body: Body, sway: Sway, t: float, share: float, stance: Stance) -> Bo
     return stance.at(body.height + sway.height * sine, attitude, body.shift)
 
 
-def _jumps(spec: MotionSpec, begin: Body, stance: Stance) -> Iterator[Frame]:
+def _jumps(spec: MotionSpec, begin: Body, stance: Stance) -> Iterator[MotionTick]:
     """A run-up, if any, then one jump after the other, evenly over the time."""
     run = spec.run_up / RUN_SPEED
     for part in _parts(run, stance) if run else ():
         speed = spec.run_up / run * (1.0 - math.cos(math.tau * part))
-        yield Frame(begin.towards(stance.straight, part), Twist(speed))
+        yield MotionTick(begin.towards(stance.straight, part), Twist(speed))
     air = max(1, round(math.sqrt(8.0 * spec.peak / GRAVITY) / stance.tick)) * stance.tick
     idle = max(0.0, (spec.duration - run) / spec.jumps - (CROUCH + PUSH + air + RECOVER))
     velocity = Twist(
@@ -207,22 +207,22 @@ def _jumps(spec: MotionSpec, begin: Body, stance: Stance) -> Iterator[Frame]:
     bent = stance.at(stance.straight.height - DIP)
     for number in range(spec.jumps):
         body = begin if number == 0 and not run else stance.straight
-        yield from (Frame(body.towards(bent, 0.0)) for _ in _parts(0.6 * idle, stance))
-        yield from (Frame(body.towards(bent, ease(part))) for part in _parts(CROUCH, stance))
-        yield from (Frame(bent.towards(stance.straight, part)) for part in _parts(PUSH, stance))
+        yield from (MotionTick(body.towards(bent, 0.0)) for _ in _parts(0.6 * idle, stance))
+        yield from (MotionTick(body.towards(bent, ease(part))) for part in _parts(CROUCH, stance))
+        yield from (MotionTick(bent.towards(stance.straight, part)) for part in _parts(PUSH, stance))
         yield from _flight(spec, velocity, air, stance)
         for part in _parts(RECOVER, stance):
-            yield Frame(stance.straight.towards(bent, math.sin(math.pi * part) * 0.6))
-        yield from (Frame(stance.straight) for _ in _parts(0.4 * idle, stance))
+            yield MotionTick(stance.straight.towards(bent, math.sin(math.pi * part) * 0.6))
+        yield from (MotionTick(stance.straight) for _ in _parts(0.4 * idle, stance))
 
 
-def _flight(spec: MotionSpec, velocity: Twist, air: float, stance: Stance) -> Iterator[Frame]:
+def _flight(spec: MotionSpec, velocity: Twist, air: float, stance: Stance) -> Iterator[MotionTick]:
     """In the air, turning about the body's own axes."""
     for index, part in enumerate(_parts(air, stance)):
         turned = Orientation(math.remainder(spec.roll * part, math.tau), math.remainder(spec.pitch * part, math.tau))
         body = Body(stance.straight.height, turned)
-        yield Frame(body, velocity, leap=0.0 if index else air, airborne=True)
-    yield Frame(stance.straight, landed=True)
+        yield MotionTick(body, velocity, leap=0.0 if index else air, airborne=True)
+    yield MotionTick(stance.straight, landed=True)
 
 
 def _parts(seconds: float, stance: Stance) -> Iterator[float]:

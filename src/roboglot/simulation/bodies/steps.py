@@ -9,7 +9,7 @@ from roboglot.simulation.bodies.body import LegsSection
 from roboglot.simulation.bodies.feet import Feet
 from roboglot.simulation.bodies.footfalls import DOWN, walking
 from roboglot.simulation.bodies.hull import Hull, wheel_places
-from roboglot.simulation.bodies.performing import Frame
+from roboglot.simulation.bodies.performing import MotionTick
 from roboglot.simulation.bodies.walking_body import no_floor_under
 
 
@@ -36,7 +36,7 @@ class Steps:
         walking = min(self.lift.front, self.lift.rear) if self.gait else self._hull.body.hull.clearance
         self._hull.clearance = self._legs.step_over(walking if lowest is None or not self.gait else lowest)
 
-    def step(self, velocity: Twist, seconds: float, frame: Frame | None = None, *, standing: bool = False) -> None:
+    def step(self, velocity: Twist, seconds: float, frame: MotionTick | None = None, *, standing: bool = False) -> None:
         """The feet follow what the body does: at ``velocity``, ``standing`` on them, or in a ``frame`` of a motion."""
         if self.feet is None or self.gait is None:
             return
@@ -52,7 +52,7 @@ class Steps:
             swings = walking(self.gait, self.count, self.lift)
         self.feet.step(self._hull.pose, velocity, swings, seconds)
 
-    def hold_back(self, frame: Frame) -> bool:
+    def hold_back(self, frame: MotionTick) -> bool:
         """True if feet on the ground keep the body from moving as ``frame`` has it."""
         if not frame.feet or self.feet is None:
             return False

@@ -100,7 +100,7 @@ class Support:
         self._meet()
 
     def lifted(self, z: float) -> bool:
-        """True if something moved it off the floor, or into it."""
+        """True if the robot was moved off the floor or into it."""
         return not -LIFTED <= z - self._rest <= LIFTED
 
     def release(self) -> None:

@@ -13,7 +13,7 @@ from roboglot.model.components.motion.legs import FootLift, Posture
 from roboglot.model.errors import Refused
 from roboglot.model.geometry import Orientation, Twist
 from roboglot.simulation.bodies.hull import Hull
-from roboglot.simulation.bodies.performing import Body, Frame, Performance, Stance, Track, fall, straighten
+from roboglot.simulation.bodies.performing import Body, MotionTick, Performance, Stance, Track, fall, straighten
 from roboglot.simulation.bodies.support import GRAVITY
 
 
@@ -25,7 +25,7 @@ def swayed(body: Body, spec: GaitSpec, strides: float, velocity: Twist, stance: 
     return stance.at(body.height + spec.bounce * swing, turned, body.shift)
 
 
-def landing(hull: Hull, body: Body, stance: Stance) -> Iterator[Frame]:
+def landing(hull: Hull, body: Body, stance: Stance) -> Iterator[MotionTick]:
     """Return the frames of a fall from where ``hull`` is in the air."""
     up = max(0.0, hull.motion[2])
     drop = max(0.0, hull.rise) + up**2 / (2 * GRAVITY)
@@ -58,7 +58,7 @@ def walking_effort(hull: Hull, spec: GaitSpec, lift: FootLift) -> float:
     return hull.body.hull.mass * GRAVITY * ((lift.front + lift.rear) / 2) * spec.steps
 
 
-def no_floor_under(hull: Hull, frame: Frame | None) -> bool:
+def no_floor_under(hull: Hull, frame: MotionTick | None) -> bool:
     """Return whether the feet hang: the body is held, lies on its back or is in the air."""
     return hull.hand is not None or hull.overturned or bool(frame and frame.airborne)
 
@@ -71,7 +71,7 @@ def check_posture(posture: Posture, before: frozenset[Posture], off: str) -> Non
         raise Refused(off)
 
 
-def given_up(performance: Performance, hull: Hull, body: Body, straight: Body, stance: Stance) -> Iterator[Frame]:
+def given_up(performance: Performance, hull: Hull, body: Body, straight: Body, stance: Stance) -> Iterator[MotionTick]:
     """The frames that end a performance before its end: land if need be, then straighten."""
     if performance.frame and performance.frame.airborne:
         hull.stop()

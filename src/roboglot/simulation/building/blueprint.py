@@ -30,7 +30,7 @@ SHELF_LEG = 0.04
 FLOORS_KEPT = 16  # with their solids
 
 
-class Kind(StrEnum):
+class SolidKind(StrEnum):
     """Kind of a solid."""
 
     WALL = "wall"
@@ -48,7 +48,7 @@ class Solid:
     ``pose`` is the middle of its footprint, ``base`` the height of its underside.
     """
 
-    kind: Kind
+    kind: SolidKind
     pose: Pose
     size: tuple[float, float, float]
     base: float = 0.0
@@ -161,23 +161,23 @@ def _pieces(wall: Wall) -> Iterator[tuple[Spot, Spot]]:
 
 def _wall_between(start: Spot, end: Spot, thickness: float, height: float, material: Material = "plain") -> Solid:
     middle = Pose((start[0] + end[0]) / 2, (start[1] + end[1]) / 2, math.atan2(end[1] - start[1], end[0] - start[0]))
-    return Solid(Kind.WALL, middle, (math.dist(start, end), thickness, height), material=material)
+    return Solid(SolidKind.WALL, middle, (math.dist(start, end), thickness, height), material=material)
 
 
 def _furniture(thing: Box | Cylinder) -> Solid:
     match thing:
         case Box():
             pose = Pose(*thing.at, math.radians(thing.facing))
-            return Solid(Kind.FURNITURE, pose, thing.size, thing.base, material=thing.material)
+            return Solid(SolidKind.FURNITURE, pose, thing.size, thing.base, material=thing.material)
         case Cylinder():
             size = (2 * thing.radius, 2 * thing.radius, thing.height)
-            return Solid(Kind.FURNITURE, Pose(*thing.at), size, thing.base, round=True)
+            return Solid(SolidKind.FURNITURE, Pose(*thing.at), size, thing.base, round=True)
 
 
 def dock_solid(front: Pose) -> Solid:
     """A charging dock whose front's middle is there, +x away from it."""
     middle = front.compose(Pose(-DOCK_DEPTH / 2))
-    return Solid(Kind.DOCK, middle, (DOCK_DEPTH, DOCK_WIDTH, DOCK_HEIGHT))
+    return Solid(SolidKind.DOCK, middle, (DOCK_DEPTH, DOCK_WIDTH, DOCK_HEIGHT))
 
 
 def door_panels(lift: Lift, height: float, opening: float) -> Iterator[Solid]:
@@ -186,7 +186,7 @@ def door_panels(lift: Lift, height: float, opening: float) -> Iterator[Solid]:
     for side in (1, -1):
         y = side * (lift.door_width - left) / 2
         size = (SHAFT_WALL, left, height)
-        yield Solid(Kind.LANDING_DOOR, frame.compose(Pose((lift.size[0] + SHAFT_WALL) / 2, y)), size)
+        yield Solid(SolidKind.LANDING_DOOR, frame.compose(Pose((lift.size[0] + SHAFT_WALL) / 2, y)), size)
 
 
 def shelf_solids(shelf: Shelf, pose: Pose, lifted: float) -> Iterator[Solid]:
@@ -195,8 +195,8 @@ def shelf_solids(shelf: Shelf, pose: Pose, lifted: float) -> Iterator[Solid]:
     for x in (-1, 1):
         for y in (-1, 1):
             corner = pose.compose(Pose(x * (width - SHELF_LEG) / 2, y * (depth - SHELF_LEG) / 2))
-            yield Solid(Kind.SHELF, corner, (SHELF_LEG, SHELF_LEG, shelf.clearance), lifted)
-    yield Solid(Kind.SHELF, pose, (width, depth, shelf.height - shelf.clearance), lifted + shelf.clearance)
+            yield Solid(SolidKind.SHELF, corner, (SHELF_LEG, SHELF_LEG, shelf.clearance), lifted)
+    yield Solid(SolidKind.SHELF, pose, (width, depth, shelf.height - shelf.clearance), lifted + shelf.clearance)
 
 
 def _shaft(lift: Lift, height: float, open_door: bool) -> Iterator[Solid]:
@@ -205,7 +205,7 @@ def _shaft(lift: Lift, height: float, open_door: bool) -> Iterator[Solid]:
     deep, wide = lift.size
     t = SHAFT_WALL
 
-    def box(x: float, y: float, size_x: float, size_y: float, kind: Kind = Kind.WALL) -> Solid:
+    def box(x: float, y: float, size_x: float, size_y: float, kind: SolidKind = SolidKind.WALL) -> Solid:
         return Solid(kind, frame.compose(Pose(x, y)), (size_x, size_y, height))
 
     yield box(-deep / 2 - t / 2, 0, t, wide + 2 * t)
@@ -215,4 +215,4 @@ def _shaft(lift: Lift, height: float, open_door: bool) -> Iterator[Solid]:
     for side in (-1, 1):
         yield box(deep / 2 + t / 2, side * (lift.door_width + jamb) / 2, t, jamb)
     if not open_door:
-        yield box(deep / 2 + t / 2, 0, t, lift.door_width, Kind.LANDING_DOOR)
+        yield box(deep / 2 + t / 2, 0, t, lift.door_width, SolidKind.LANDING_DOOR)

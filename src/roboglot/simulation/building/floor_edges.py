@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from roboglot.simulation.building.blueprint import Kind, Rectangle, holes_of, shaft_of, solids_of
+from roboglot.simulation.building.blueprint import Rectangle, SolidKind, holes_of, shaft_of, solids_of
 from roboglot.simulation.world.description import WorldDescription
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ class Walls:
     def __init__(self, world: WorldDescription) -> None:
         self._floors = []
         for floor in world.floors:
-            solids = [s for s in solids_of(floor, world.lift, lift_here=True) if s.kind is not Kind.DOCK]
+            solids = [s for s in solids_of(floor, world.lift, lift_here=True) if s.kind is not SolidKind.DOCK]
             rows = [(s.pose.x, s.pose.y, math.cos(s.pose.yaw), math.sin(s.pose.yaw), *s.size[:2]) for s in solids]
             self._floors.append(np.array(rows).reshape(-1, 6).T.copy())
 

@@ -108,7 +108,7 @@ class LiftCar:
         """Switch it off: it ends its ride and takes no more calls; or on again."""
         if out and self.in_service:
             self._calls.clear()
-            self._tell(LiftFailed(stamp=self._now, reason="out of service"))
+            self._notify(LiftFailed(stamp=self._now, reason="out of service"))
         self.in_service = not out
 
     def _refuse_if_dead(self) -> None:
@@ -134,7 +134,7 @@ class LiftCar:
         target = self._calls[0]
         if target == self._floor:
             self._calls.pop(0)
-            self._tell(LiftArrived(stamp=self._now, floor=target))
+            self._notify(LiftArrived(stamp=self._now, floor=target))
             self._open_until = self._now + self.section.dwell
             if self._door is LiftDoor.CLOSED:
                 self._door = LiftDoor.OPENING
@@ -169,7 +169,7 @@ class LiftCar:
 
     def _fail(self, reason: str) -> None:
         if reason and reason != self._failure:
-            self._tell(LiftFailed(stamp=self._now, reason=reason))
+            self._notify(LiftFailed(stamp=self._now, reason=reason))
         self._failure = reason
 
     def _move_door(self, by: float) -> None:
@@ -178,10 +178,10 @@ class LiftCar:
         if self._opening == 1.0:
             self._door = LiftDoor.OPEN
             self._open_until = max(self._open_until, self._now + self.section.dwell)
-            self._tell(LiftDoorOpened(stamp=self._now, floor=self._floor))
+            self._notify(LiftDoorOpened(stamp=self._now, floor=self._floor))
         elif self._opening == 0.0:
             self._door = LiftDoor.CLOSED
-            self._tell(LiftDoorClosed(stamp=self._now, floor=self._floor))
+            self._notify(LiftDoorClosed(stamp=self._now, floor=self._floor))
 
     def _show_door(self, floor: int, opening: float) -> None:
         props, keys = self._physics.props, (f"landing door {floor} {half}" for half in range(2))
@@ -213,8 +213,8 @@ class LiftCar:
         self._floor, self._target, self._riding = floor, None, False
         self._calls = [call for call in self._calls if call != floor]
         self._door = LiftDoor.OPENING
-        self._tell(LiftArrived(stamp=self._now, floor=floor))
+        self._notify(LiftArrived(stamp=self._now, floor=floor))
 
-    def _tell(self, event: Event) -> None:
+    def _notify(self, event: Event) -> None:
         for listener in self.listeners:
             listener(event)

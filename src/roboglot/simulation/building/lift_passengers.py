@@ -7,7 +7,7 @@ from typing import Protocol
 
 from roboglot.model.geometry import Pose
 from roboglot.simulation.bodies.hull import Hull
-from roboglot.simulation.building.blueprint import SHAFT_WALL, Kind, Solid
+from roboglot.simulation.building.blueprint import SHAFT_WALL, Solid, SolidKind
 from roboglot.simulation.building.props import PASSENGERS_MAX, Props
 from roboglot.simulation.people.people import Walker
 from roboglot.simulation.world.description import Lift
@@ -60,7 +60,7 @@ class Passengers:
         above = lift.elevation - self._props.elevation(lift.floor)
         for index, (x, y) in enumerate(SPOTS[: self._count]):
             pose = lift.frame.compose(Pose(x * deep, y * wide))
-            self._props.put(f"passenger {index}", lift.floor, Solid(Kind.PERSON, pose, PERSON_SIZE, above))
+            self._props.put(f"passenger {index}", lift.floor, Solid(SolidKind.PERSON, pose, PERSON_SIZE, above))
 
     def load(self, lift: Car) -> float:
         """Return the load of the car, kg."""
@@ -93,13 +93,13 @@ class Passengers:
             if walker.floor == floor:
                 yield walker.pose, walker.person.radius
         for solid in self._props.on(floor):
-            if solid.kind in (Kind.FURNITURE, Kind.SHELF):
+            if solid.kind in (SolidKind.FURNITURE, SolidKind.SHELF):
                 yield solid.pose, max(solid.size[:2]) / 2
 
     def _standing(self, floor: int) -> Iterator[Pose]:
-        """People, and what stands about like them."""
+        """People and objects that stand there."""
         yield from (walker.pose for walker in self._walkers if walker.floor == floor)
-        yield from (s.pose for s in self._props.on(floor) if s.kind in (Kind.FURNITURE, Kind.PERSON))
+        yield from (s.pose for s in self._props.on(floor) if s.kind in (SolidKind.FURNITURE, SolidKind.PERSON))
 
     @staticmethod
     def _within(lift: Car, pose: Pose, half_x: float, half_y: float) -> bool:

@@ -30,4 +30,4 @@ class Mechanics(Protocol):
         """Height of the lift's car above where it was parked, m."""
 
     def drive_car(self, lift: float) -> None:
-        """Have the lift's car driven to this height above where it was parked, m."""
+        """Drive the lift's car to this height (m) above where it was parked."""

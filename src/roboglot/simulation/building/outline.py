@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.stage import FloorPlan
-from roboglot.simulation.building.blueprint import Kind, Solid, solids_of
+from roboglot.simulation.building.blueprint import Solid, SolidKind, solids_of
 from roboglot.simulation.world.description import WorldDescription
 
 ROUND_CORNERS = 16  # of a cylinder's outline
@@ -19,7 +19,7 @@ def plan_of(world: WorldDescription, number: int) -> FloorPlan:
     walls: list[Sequence[Point]] = []
     furniture: list[Sequence[Point]] = []
     for solid in solids_of(floor, world.lift, lift_here=True):
-        (walls if solid.kind is Kind.WALL else furniture).append(_outline(solid))
+        (walls if solid.kind is SolidKind.WALL else furniture).append(_outline(solid))
     return FloorPlan(number, floor.name, walls, furniture)
 
 

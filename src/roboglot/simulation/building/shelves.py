@@ -7,8 +7,8 @@ from collections.abc import Hashable
 
 from roboglot.model.geometry import Pose
 from roboglot.simulation.building.blueprint import (
-    Kind,
     Solid,
+    SolidKind,
     shelf_solids,
     solids_of,
 )
@@ -38,7 +38,7 @@ class ShelfStand:
         parts = list(shelf_solids(self.shelf, pose, lifted))
         if floor not in self._fixed:
             solids = solids_of(self._world.floors[floor], self._world.lift, lift_here=True)
-            self._fixed[floor] = [solid for solid in solids if solid.kind is not Kind.DOCK]  # docks can be moved
+            self._fixed[floor] = [solid for solid in solids if solid.kind is not SolidKind.DOCK]  # docks can be moved
         around: list[tuple[Hashable, Solid]] = list(enumerate(self._fixed[floor]))
         around += [
             (key, solid)

@@ -72,7 +72,7 @@ def _middle(card: Card, glance: Glance) -> Floats:
 
 
 def _spots(card: Card, glance: Glance) -> Floats:
-    """Return its corners, and a grid between them close enough for table legs."""
+    """Return the corners and a grid between them, dense enough to meet table legs."""
     aside, up = ASIDE * card.size, UP * card.size
     x = card.pose.x - math.sin(card.pose.yaw) * aside
     y = card.pose.y + math.cos(card.pose.yaw) * aside

@@ -112,7 +112,7 @@ class Target:
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class FaultRecipe:
     """``many``: may act several times at once."""
 
     begin: Callable[..., Undo]
@@ -120,14 +120,14 @@ class Kind:
     many: bool = False
 
 
-KINDS: dict[str, Kind] = {}
+KINDS: dict[str, FaultRecipe] = {}
 
 
 def _kind(*, of_robot: bool = True, many: bool = False) -> Callable[[Callable[..., Undo]], Callable[..., Undo]]:
     """Register a function under its own name."""
 
     def register(begin: Callable[..., Undo]) -> Callable[..., Undo]:
-        KINDS[begin.__name__] = Kind(begin, of_robot, many)
+        KINDS[begin.__name__] = FaultRecipe(begin, of_robot, many)
         return begin
 
     return register

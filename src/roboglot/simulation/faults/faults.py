@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from roboglot.model.client_context import concerning
 from roboglot.model.errors import ComponentMissing, NotFound, RobotError
 from roboglot.model.stage import ActiveFault, FaultKind
-from roboglot.simulation.faults.fault_kinds import KINDS, FragileWorld, Kind, Target, Undo
+from roboglot.simulation.faults.fault_kinds import KINDS, FaultRecipe, FragileWorld, Target, Undo
 from roboglot.simulation.world.spelling import nearest
 
 if TYPE_CHECKING:
@@ -127,7 +127,7 @@ class Faults:
         heapq.heappush(self._agenda, (time, next(self._order), act))
 
 
-def _options_of(kind: Kind) -> dict[str, float | int | str | None]:
+def _options_of(kind: FaultRecipe) -> dict[str, float | int | str | None]:
     """Names and defaults of the options that a kind's function takes."""
     parameters = inspect.signature(kind.begin).parameters.items()
     return {name: parameter.default for name, parameter in parameters if name != "target"}

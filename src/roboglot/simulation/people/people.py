@@ -65,7 +65,7 @@ class Walker:
         self.aloud: list[Say | Clap] = []  # what they began to say or clap since the last fetch
         self._script = person.script or tuple(_strolling(person))
         self._number = 0
-        self._told: deque[Step] | None = None  # None: their own routine
+        self._orders: deque[Step] | None = None  # None: their own routine
         self.doing: Step | None = None
         self._elapsed = 0.0
         self._idle = 0  # ticks to come in which they go on waiting; already part of what elapsed
@@ -115,20 +115,20 @@ class Walker:
 
     def order(self, step: Step) -> None:
         """Leave the script and do this, after earlier orders. Raises ValueError if that is too much."""
-        if self._told is None:
+        if self._orders is None:
             self.drop()
-        assert self._told is not None
-        if len(self._told) >= ORDERS_MAX:
+        assert self._orders is not None
+        if len(self._orders) >= ORDERS_MAX:
             raise ValueError(f"{self.key} remembers no more than {ORDERS_MAX} steps")
-        self._told.append(step)
+        self._orders.append(step)
 
     def drop(self) -> None:
         """Stop doing anything and stand."""
-        self._told, self.doing, self._dodging, self._idle = deque(), None, None, 0
+        self._orders, self.doing, self._dodging, self._idle = deque(), None, None, 0
 
     def resume(self) -> None:
         """Go on with the script."""
-        self._told, self.doing, self._idle = None, None, 0
+        self._orders, self.doing, self._idle = None, None, 0
 
     def place(self, pose: Pose) -> None:
         """Be there at once."""
@@ -138,7 +138,7 @@ class Walker:
     @property
     def follows_script(self) -> bool:
         """True while the person follows the world's file and not an order."""
-        return self._told is None
+        return self._orders is None
 
     # -- time ----------------------------------------------------------------------------------------------------------
 
@@ -148,7 +148,7 @@ class Walker:
         if self._idle:
             self._idle -= 1
             return moved
-        if self.doing is None and ((self._told is None and not self._script) or not self._begin()):
+        if self.doing is None and ((self._orders is None and not self._script) or not self._begin()):
             return moved
         self._elapsed += seconds
         doing, before = self.doing, self.pose
@@ -167,10 +167,10 @@ class Walker:
 
     def _begin(self) -> bool:
         """Take up the next step, if there is any."""
-        if self._told is not None:
-            if not self._told:
+        if self._orders is not None:
+            if not self._orders:
                 return False
-            self.doing = self._told.popleft()
+            self.doing = self._orders.popleft()
         elif self._script:
             self.doing = self._script[self._number % len(self._script)]
             self._number += 1

@@ -45,7 +45,7 @@ class Actor(StagePerson):
 
     @property
     def doing(self) -> Step | None:
-        """The step that they are at; None: they stand."""
+        """Current step of the script; None while they stand."""
         return self._walker.doing
 
     @property

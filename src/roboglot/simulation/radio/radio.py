@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from roboglot.model.components.logistics.traffic_radio import Announcement
 from roboglot.model.geometry import Point, Pose
-from roboglot.simulation.building.blueprint import Kind, solids_of
+from roboglot.simulation.building.blueprint import SolidKind, solids_of
 from roboglot.simulation.world.description import AccessPoint, Mobile, WorldDescription
 
 EXPONENT = 2.2  # indoors, with line of sight
@@ -98,7 +98,7 @@ def walls_of(world: WorldDescription) -> list[NDArray[np.float64]]:
     for floor in world.floors:
         ends = []
         for solid in solids_of(floor, world.lift, lift_here=False):
-            if solid.kind is Kind.WALL:
+            if solid.kind is SolidKind.WALL:
                 half, c, s = solid.size[0] / 2, math.cos(solid.pose.yaw), math.sin(solid.pose.yaw)
                 x, y = solid.pose.x, solid.pose.y
                 ends.append((x - c * half, y - s * half, x + c * half, y + s * half))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from roboglot.kernels.posing import darken
 from roboglot.kernels.raster_rooms import ROOMS_MAX, label, look
 from roboglot.model.geometry import Pose
-from roboglot.simulation.building.blueprint import Kind, Solid
+from roboglot.simulation.building.blueprint import Solid, SolidKind
 from roboglot.simulation.world.description import Floor, Wall
 
 CELL = 0.1  # m
@@ -74,9 +74,9 @@ def plan_of(floor: Floor, solids: Iterable[Solid]) -> Plan:
     closed = np.zeros(shape, dtype=np.uint8)
     dark = np.zeros(shape)
     for solid in solids:
-        if solid.kind is Kind.WALL:
+        if solid.kind is SolidKind.WALL:
             _stamp(blank, solid, blank.solid)
-        if solid.kind in (Kind.WALL, Kind.LANDING_DOOR):
+        if solid.kind in (SolidKind.WALL, SolidKind.LANDING_DOOR):
             _stamp(blank, solid, closed)
         if solid.base < 0.3:
             _stamp(blank, solid, dark)
@@ -93,7 +93,7 @@ def whole(wall: Wall, height: float) -> Solid:
     """The wall as if it had no doors."""
     (x0, y0), (x1, y1) = wall.start, wall.end
     pose = Pose((x0 + x1) / 2, (y0 + y1) / 2, math.atan2(y1 - y0, x1 - x0))
-    return Solid(Kind.WALL, pose, (wall.length, wall.thickness, height))
+    return Solid(SolidKind.WALL, pose, (wall.length, wall.thickness, height))
 
 
 def _stamp(plan: Plan, solid: Solid, cells: NDArray[np.uint8] | NDArray[np.float64]) -> None:

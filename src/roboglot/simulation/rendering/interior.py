@@ -10,9 +10,9 @@ from itertools import pairwise
 from roboglot.model.geometry import Pose
 from roboglot.model.perception import TagKind
 from roboglot.simulation.building.blueprint import (
-    Kind,
     Rectangle,
     Solid,
+    SolidKind,
     holes_of,
 )
 from roboglot.simulation.building.cards import PrintedTag
@@ -73,7 +73,7 @@ PAPER = 1.3  # of a printed code's size: its white margin included
 def interior(floor: Floor, solids: Sequence[Solid], plan: Plan, masks: Masks) -> Iterator[Mesh]:
     """All of it, floor and ceiling excepted."""
     for number, solid in enumerate(solids):
-        if solid.kind is Kind.WALL:
+        if solid.kind is SolidKind.WALL:
             yield from _wall(solid, plan, floor)
         else:
             yield furniture(solid, number, plan.room_at(solid.pose.x, solid.pose.y))
@@ -202,14 +202,14 @@ def furniture(solid: Solid, number: int, room: int) -> Mesh:
 def movable(solid: Solid) -> Mesh:
     """A box that can be moved, whose pose is the origin, as high above the floor as it is."""
     match solid.kind:
-        case Kind.DOCK:
+        case SolidKind.DOCK:
             return joined(_dock(solid))
-        case Kind.LANDING_DOOR:
+        case SolidKind.LANDING_DOOR:
             steel = Paint((176, 180, 186), (104, 106, 110), Texture.DRAWERS, (1.0, 3.2))
             return _block(solid, steel, Paint(GREY), EVERYWHERE)
-        case Kind.SHELF:
+        case SolidKind.SHELF:
             return _block(solid, Paint(WOOD), Paint(WOOD, WOOD_DARK, Texture.WOOD), EVERYWHERE)
-        case Kind.PERSON:
+        case SolidKind.PERSON:
             return person(len(SHIRTS) - 1, figure.UPRIGHT * figure.size(solid.size[2], max(solid.size[:2]) / 2))
         case _:
             return _carton(solid)

@@ -15,7 +15,7 @@ import numpy as np
 from roboglot.model.geometry import ORIGIN, wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.hull import Hull, rotation
-from roboglot.simulation.building.blueprint import Kind, solids_of
+from roboglot.simulation.building.blueprint import SolidKind, solids_of
 from roboglot.simulation.building.lift import LiftCar
 from roboglot.simulation.building.props import Props
 from roboglot.simulation.building.tags import moving_tags
@@ -96,7 +96,7 @@ class Stage:
             world, floor, elevation = self._world, self._world.floors[number], self._world.elevation(number)
             solids = solids_of(floor, world.lift, lift_here=False)
             plan = plan_of(floor, solids)
-            still = [solid for solid in solids if solid.kind in (Kind.WALL, Kind.FURNITURE)]
+            still = [solid for solid in solids if solid.kind in (SolidKind.WALL, SolidKind.FURNITURE)]
             mesh = joined(interior(floor, still, plan, self._masks)).placed(0.0, 0.0, elevation, 0.0)
             ground = _ground(int(plan.rooms.max()) + 1, elevation, floor.height, floor.enclosed)
             self._floors[number] = plan, mesh, ground

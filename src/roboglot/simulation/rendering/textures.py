@@ -58,7 +58,7 @@ class Masks:
         return self._spare_row(name) if known is None else known
 
     def _spare_row(self, name: str) -> int:
-        """Rows that are drawn with now stay as they are: other threads may draw."""
+        """Return a row for ``name``; rows in use are not overwritten: other threads may be drawing."""
         with self._growing:
             if name in self._spare:
                 self._spare.move_to_end(name)

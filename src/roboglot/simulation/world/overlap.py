@@ -32,7 +32,7 @@ def reach_of(solid: Solid) -> float:
 
 
 def _apart(box: Solid, seen: Pose, other: Solid) -> bool:
-    """True if one of ``box``'s sides parts it from the ``other`` box, ``seen`` from its middle."""
+    """True if one of ``box``'s sides separates it from ``other``; ``seen``: the other's place from its middle."""
     c, s = abs(math.cos(seen.yaw)), abs(math.sin(seen.yaw))
     width, depth = other.size[0] * c + other.size[1] * s, other.size[0] * s + other.size[1] * c
     return abs(seen.x) >= (box.size[0] + width) / 2 or abs(seen.y) >= (box.size[1] + depth) / 2

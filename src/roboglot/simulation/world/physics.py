@@ -14,9 +14,9 @@ from msgspec.structs import replace
 from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Pose
 from roboglot.simulation.bodies.body import Body
-from roboglot.simulation.bodies.hull import Hull, Touch
+from roboglot.simulation.bodies.hull import Hull, HullContact
 from roboglot.simulation.bodies.sleep import Sleep
-from roboglot.simulation.building.blueprint import Kind, Solid
+from roboglot.simulation.building.blueprint import Solid, SolidKind
 from roboglot.simulation.building.props import AWAY, OBSTACLES_MAX, Props
 from roboglot.simulation.building.terrain import Ground
 from roboglot.simulation.building.things import Things
@@ -165,7 +165,7 @@ class Physics:
             raise ValueError(f"no more than {OBSTACLES_MAX} obstacles at a time")
         if not all(0.0 < extent <= 20.0 for extent in size):
             raise ValueError("an obstacle is more than 0 and at most 20 m long")
-        self.obstacles[number] = floor, Solid(Kind.FURNITURE, pose, size)
+        self.obstacles[number] = floor, Solid(SolidKind.FURNITURE, pose, size)
         self.props.put(f"obstacle {number}", *self.obstacles[number])
         return number
 
@@ -173,7 +173,7 @@ class Physics:
         """Put a box elsewhere. Raises NotFound."""
         if number not in self.obstacles:
             raise NotFound(f"there is no obstacle {number}")
-        self.obstacles[number] = floor, Solid(Kind.FURNITURE, pose, self.obstacles[number][1].size)
+        self.obstacles[number] = floor, Solid(SolidKind.FURNITURE, pose, self.obstacles[number][1].size)
         self.props.put(f"obstacle {number}", *self.obstacles[number])
 
     def remove_obstacle(self, number: int) -> None:
@@ -227,7 +227,7 @@ class Physics:
         if not touched.touches:
             for duty in touched.when_touched:
                 duty.begin()
-        touched.touches.append(Touch(*touched.seen_from(*at), other in self._persons, other in self._light))
+        touched.touches.append(HullContact(*touched.seen_from(*at), other in self._persons, other in self._light))
         self._touched.add(touched)
 
 

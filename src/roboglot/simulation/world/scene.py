@@ -17,9 +17,9 @@ from roboglot.simulation.bodies.hull import DRIVE_GAIN, wheel_places
 from roboglot.simulation.bodies.hull_legs import LEG_GAIN, TORSO
 from roboglot.simulation.bodies.support import FOOT, GRAVITY, HANGS, MOVES, STANDS
 from roboglot.simulation.building.blueprint import (
-    Kind,
     Rectangle,
     Solid,
+    SolidKind,
     holes_of,
     shaft_of,
     slabs_of,
@@ -92,7 +92,7 @@ def _add_floor(spec: mujoco.MjSpec, world: WorldDescription, number: int, floor:
     _add_slabs(root, floor, world.lift, elevation)
     hanging = root.add_body(name=f"hanging {number}")
     for solid in solids_of(floor, world.lift, lift_here=True):
-        if solid.kind is not Kind.DOCK:  # docks and landing doors are props
+        if solid.kind is not SolidKind.DOCK:  # docks and landing doors are props
             above = solid.base > 0.0
             bits = HANGS | STANDS if above else STANDS
             _add_solid(hanging if above else root, solid, elevation, f"{solid.kind} {solids}", bits)
@@ -264,7 +264,7 @@ def _add_chassis(chassis: mujoco.MjsBody, name: str, body: Body, tilting: bool) 
 
 
 def _add_torso(spec: mujoco.MjSpec, chassis: mujoco.MjsBody, name: str, body: Body) -> None:
-    """Above the chassis; legs move it up and down by a servo."""
+    """Add the torso above the chassis; legs move it up and down by a servo."""
     hull = body.hull
     belly = body.legs.standing if body.legs else hull.height - hull.torso_height
     torso = chassis.add_body(name=f"{name} torso")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from roboglot.kernels import loading
 from roboglot.simulation.bodies.hull import Hull
-from roboglot.simulation.building.blueprint import Kind, Solid, solids_of
+from roboglot.simulation.building.blueprint import Solid, SolidKind, solids_of
 from roboglot.simulation.building.props import Props
 from roboglot.simulation.building.terrain import slices_of
 from roboglot.simulation.building.things import Thing
@@ -52,7 +52,7 @@ class Sight:
         self._floors, self._plain, self._glossy = [], [], []
         for floor in world.floors:
             solids = solids_of(floor, world.lift, lift_here=True)
-            still = [solid for solid in solids if solid.kind is not Kind.DOCK]
+            still = [solid for solid in solids if solid.kind is not SolidKind.DOCK]
             self._floors.append(_Still(still))
             self._plain.append(_Still([solid for solid in still if solid.material == "plain"]))
             self._glossy.append([solid for solid in still if solid.material != "plain"])
@@ -100,7 +100,7 @@ class Sight:
         kept = self._dark.get(key)
         if kept is None:
             every = max(1, round(1.0 / share))
-            solids = [solid for solid in self._floors[hull.floor].solids if solid.kind is Kind.FURNITURE][::every]
+            solids = [solid for solid in self._floors[hull.floor].solids if solid.kind is SolidKind.FURNITURE][::every]
             kept = self._dark[key] = _edges_at(solids, height), _circles_at(solids, height)
         return self._cast(*kept, _ways(rays), hull.x, hull.y, hull.turned, reach)
 
@@ -209,7 +209,7 @@ class _Still:
 def _slopes_at(terrain: Terrain, height: float) -> Iterator[Solid]:
     """Yield the parts of a ramp above ``height``, as boxes."""
     for middle, length, width in slices_of(terrain, height):
-        yield Solid(Kind.FURNITURE, middle, (length, width, math.inf))
+        yield Solid(SolidKind.FURNITURE, middle, (length, width, math.inf))
 
 
 def _edges_at(solids: Sequence[Solid], height: float) -> Rows:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from roboglot.model.geometry import Point, Pose
 from roboglot.simulation.bodies.hull import Hull
-from roboglot.simulation.building.blueprint import Kind, Solid, solids_of
+from roboglot.simulation.building.blueprint import Solid, SolidKind, solids_of
 from roboglot.simulation.building.props import Props
 from roboglot.simulation.people import figure
 from roboglot.simulation.people.people import Walker
@@ -59,7 +59,9 @@ class SightLines:
         """All that stands there."""
         if floor not in self._still:
             solids = solids_of(self._world.floors[floor], self._world.lift, lift_here=True)
-            self._still[floor] = [_row(solid) for solid in solids if solid.kind is not Kind.DOCK]  # docks are props
+            self._still[floor] = [
+                _row(solid) for solid in solids if solid.kind is not SolidKind.DOCK
+            ]  # docks are props
         rows = [*self._still[floor], *(_row(solid) for solid in self._props.on(floor))]
         movers: dict[Hull | Walker, int] = {}
         for walker in self._walkers:

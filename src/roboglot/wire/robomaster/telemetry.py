@@ -14,6 +14,8 @@ from ipaddress import IPv4Address
 TEXT_MAX = 8192  # bytes read of a datagram
 TARGETS_MAX = 128
 LINE_POINTS = 10
+KEYS_AND_MOUSE = 0  # cmd_id of a game's messages; the others carry a match's score
+RAW_MAX = 1023  # full scale of the adapters' converters
 
 
 @dataclass(frozen=True, slots=True)

@@ -83,7 +83,7 @@ class NodePosition(msgspec.Struct, frozen=True):
 Actions = Annotated[tuple[Action, ...], msgspec.Meta(max_length=ACTIONS_MAX)]
 
 
-class Part(msgspec.Struct, frozen=True, rename="camel", kw_only=True):
+class OrderPart(msgspec.Struct, frozen=True, rename="camel", kw_only=True):
     """Common fields of nodes and edges: their sequence number, and ``released``: part of the order's base."""
 
     sequence_id: Count
@@ -91,14 +91,14 @@ class Part(msgspec.Struct, frozen=True, rename="camel", kw_only=True):
     actions: Actions
 
 
-class Node(Part, frozen=True, rename="camel", kw_only=True):
+class Node(OrderPart, frozen=True, rename="camel", kw_only=True):
     """A place to pass."""
 
     node_id: Id
     node_position: NodePosition | None = None
 
 
-class Edge(Part, frozen=True, rename="camel", kw_only=True):
+class Edge(OrderPart, frozen=True, rename="camel", kw_only=True):
     """The way between two nodes; fields that no robot here can use are kept to be refused."""
 
     edge_id: Id
@@ -140,7 +140,7 @@ class Order(msgspec.Struct, frozen=True, rename="camel"):
     zone_set_id: Text = ""
 
     @property
-    def parts(self) -> tuple[Part, ...]:
+    def parts(self) -> tuple[OrderPart, ...]:
         """All nodes and edges."""
         return (*self.nodes, *self.edges)
 
@@ -204,7 +204,7 @@ def _check_edge(edge: Edge, start: Node, end: Node) -> None:
 
 def _check_ids(message: Order | InstantActions) -> None:
     """Raise Malformed for an actionId that comes twice."""
-    parts: Iterable[Part | InstantActions] = message.parts if isinstance(message, Order) else (message,)
+    parts: Iterable[OrderPart | InstantActions] = message.parts if isinstance(message, Order) else (message,)
     ids = [action.action_id for part in parts for action in part.actions]
     if len(ids) != len(set(ids)):
         raise Malformed("an actionId comes twice")

@@ -25,7 +25,7 @@ _SURROGATE = re.compile("[\ud800-\udfff]")
 DEBUG = "debug"
 
 
-class Kind(StrEnum):
+class FrameSubject(StrEnum):
     """Subject of a frame."""
 
     TASK = "task"
@@ -34,17 +34,17 @@ class Kind(StrEnum):
     SLAM = "SLAM"
 
 
-OPERATIONS: dict[Kind, frozenset[str]] = {
-    Kind.TASK: frozenset({"save", "delete", "inquiry", "debug", "run", "shutdown", "suspend", "recover"}),
-    Kind.MODULE: frozenset({"save", "delete", "inquiry"}),
-    Kind.AI: frozenset({"inquiry"}),
-    Kind.SLAM: frozenset({"inquiry"}),
+OPERATIONS: dict[FrameSubject, frozenset[str]] = {
+    FrameSubject.TASK: frozenset({"save", "delete", "inquiry", "debug", "run", "shutdown", "suspend", "recover"}),
+    FrameSubject.MODULE: frozenset({"save", "delete", "inquiry"}),
+    FrameSubject.AI: frozenset({"inquiry"}),
+    FrameSubject.SLAM: frozenset({"inquiry"}),
 }
-MODES: dict[Kind, frozenset[str]] = {
-    Kind.TASK: frozenset({"single", "cycle"}),
-    Kind.MODULE: frozenset({"common", "sequence"}),
-    Kind.AI: frozenset({"all", "personnel", "face", "voiceprint", "training_words"}),
-    Kind.SLAM: frozenset({"map", "preset"}),
+MODES: dict[FrameSubject, frozenset[str]] = {
+    FrameSubject.TASK: frozenset({"single", "cycle"}),
+    FrameSubject.MODULE: frozenset({"common", "sequence"}),
+    FrameSubject.AI: frozenset({"all", "personnel", "face", "voiceprint", "training_words"}),
+    FrameSubject.SLAM: frozenset({"map", "preset"}),
 }
 
 
@@ -52,7 +52,7 @@ MODES: dict[Kind, frozenset[str]] = {
 class Request:
     """A legal frame. Fields that its operation does not use are empty."""
 
-    kind: Kind
+    kind: FrameSubject
     id: str
     operate: str
     targets: tuple[str, ...]
@@ -137,18 +137,18 @@ class _Checker:
             self.refuse(state, f"{name} contains invalid characters")
         return value
 
-    def kind(self) -> Kind:
+    def kind(self) -> FrameSubject:
         value = self.text("type", FeedbackState.BAD_TYPE, ID_MAX)
         try:
-            return Kind(value)
+            return FrameSubject(value)
         except ValueError:
             self.refuse(FeedbackState.BAD_TYPE, "type must be task, module, AI or SLAM")
 
-    def operate(self, kind: Kind) -> str:
+    def operate(self, kind: FrameSubject) -> str:
         value = self.text("operate", FeedbackState.BAD_OPERATE, ID_MAX)
-        if not value and kind in (Kind.AI, Kind.SLAM):
+        if not value and kind in (FrameSubject.AI, FrameSubject.SLAM):
             value = "inquiry"
-        if value == "add" and kind is Kind.MODULE:  # the name in the manual's module chapter
+        if value == "add" and kind is FrameSubject.MODULE:  # the name in the manual's module chapter
             value = "save"
         if value not in OPERATIONS[kind]:
             self.refuse(
@@ -156,12 +156,12 @@ class _Checker:
             )
         return value
 
-    def targets(self, kind: Kind, operate: str) -> tuple[str, ...]:
+    def targets(self, kind: FrameSubject, operate: str) -> tuple[str, ...]:
         state = FeedbackState.BAD_TARGET_ID
         value = self._fields.get("target_id")
         if not isinstance(value, list) or len(value) > TARGETS_MAX:
             self.refuse(state, f"target_id must be an array of at most {TARGETS_MAX} ids")
-        stored = kind in (Kind.TASK, Kind.MODULE)  # people, maps and points have names instead of ids
+        stored = kind in (FrameSubject.TASK, FrameSubject.MODULE)  # people, maps and points have names instead of ids
         for target in value:
             if not isinstance(target, str) or not _text_of(target):
                 self.refuse(state, f"target_id holds strings of 1 to {ID_MAX} characters")
@@ -175,12 +175,12 @@ class _Checker:
             self.refuse(state, "the id debug is for the operation debug")
         return tuple(dict.fromkeys(value))
 
-    def mode(self, kind: Kind, operate: str) -> str:
+    def mode(self, kind: FrameSubject, operate: str) -> str:
         state = FeedbackState.BAD_MODE
         value = self.text("mode", state, ID_MAX)
         if operate == DEBUG and value != "single":
             self.refuse(state, "mode of debug is single")
-        needed = operate == "save" or kind in (Kind.AI, Kind.SLAM)
+        needed = operate == "save" or kind in (FrameSubject.AI, FrameSubject.SLAM)
         if not needed and operate not in ("run", DEBUG):
             return ""
         if value not in MODES[kind] and (needed or value):

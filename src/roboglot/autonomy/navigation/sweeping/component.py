@@ -12,8 +12,8 @@ from roboglot.autonomy.navigation.course import Course, Goal
 from roboglot.autonomy.navigation.journey import Journey
 from roboglot.autonomy.navigation.navigation import GridNavigation
 from roboglot.autonomy.navigation.sweeping.lanes import (
-    Part,
     Stretch,
+    SweptPart,
     open_stretches,
     parts,
     zigzag,
@@ -78,7 +78,7 @@ class LaneSweeping(Sweeping):
 
         here = self._robot[Localization].pose.point
         floor, frame = await self._course.open_floor(here)
-        found: list[Part] = [part for area in areas for part in parts(area, floor, frame, width)]
+        found: list[SweptPart] = [part for area in areas for part in parts(area, floor, frame, width)]
         middles = [here, *(part[len(part) // 2].start for part in found)]
         costs = np.array([[a.distance_to(b) for b in middles] for a in middles])
         ways: list[list[Point]] = []
@@ -100,7 +100,7 @@ class LaneSweeping(Sweeping):
             raise Unreachable("no lane was reachable")
 
     async def _drive(self, action: Action, lanes: Sequence[Stretch]) -> None:
-        """Along ``lanes`` in turn, on to the next where one cannot be driven."""
+        """Drive along ``lanes`` in turn; skip a lane that cannot be driven."""
         at = 0
         while at < len(lanes):
             points = [point for lane in lanes[at : at + LANES_AT_ONCE] for point in (lane.start, lane.end)]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.autonomy.navigation.rules import Frame
+from roboglot.autonomy.navigation.rules import GridFrame
 from roboglot.autonomy.slam.evidence import RESOLUTION
 from roboglot.model.components.mapping.annotations import Area
 from roboglot.model.geometry import Point
@@ -35,10 +35,10 @@ class Stretch:
         return self.start.distance_to(self.end)
 
 
-Part = tuple[Stretch, ...]  # one stretch of each of its lanes, in order
+SweptPart = tuple[Stretch, ...]  # one stretch of each of its lanes, in order
 
 
-def parts(area: Area, floor: NDArray[np.bool_], frame: Frame, width: float) -> list[Part]:
+def parts(area: Area, floor: NDArray[np.bool_], frame: GridFrame, width: float) -> list[SweptPart]:
     """The parts of ``area`` where ``floor`` is open, with lanes at most ``width`` m apart along its centre line."""
     length = area.start.distance_to(area.end)
     if length <= 0.0 or area.half_width <= 0.0:
@@ -70,7 +70,7 @@ def parts(area: Area, floor: NDArray[np.bool_], frame: Frame, width: float) -> l
     return [tuple(part) for part in found]
 
 
-def open_stretches(lane: Stretch, floor: NDArray[np.bool_], frame: Frame) -> list[Stretch]:
+def open_stretches(lane: Stretch, floor: NDArray[np.bool_], frame: GridFrame) -> list[Stretch]:
     """Return the open stretches of ``lane``."""
     count = math.ceil(lane.length / (RESOLUTION / 2)) + 1
     x, y = (np.linspace(a, b, count) for a, b in ((lane.start.x, lane.end.x), (lane.start.y, lane.end.y)))
@@ -80,7 +80,7 @@ def open_stretches(lane: Stretch, floor: NDArray[np.bool_], frame: Frame) -> lis
 
 
 def _sampled(
-    floor: NDArray[np.bool_], frame: Frame, x: NDArray[np.float64], y: NDArray[np.float64]
+    floor: NDArray[np.bool_], frame: GridFrame, x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
     """True if the floor is open at those places."""
     columns = np.floor((x - frame.corner.x) / RESOLUTION).astype(np.int64)
@@ -97,7 +97,7 @@ def _runs(is_open: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
-def zigzag(part: Part, start: Point) -> list[Point]:
+def zigzag(part: SweptPart, start: Point) -> list[Point]:
     """The ends of the lanes to and fro, beginning at the corner of the part nearest to ``start``."""
     ways = [list(_to_and_fro(lanes, flipped)) for lanes in (part, tuple(reversed(part))) for flipped in (False, True)]
     return min(ways, key=lambda way: start.distance_to(way[0]))

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Mapping
 
 from roboglot.clients.cyberdog.calls import Calls, CyberDogRefused, NoAnswer
-from roboglot.clients.cyberdog.values import Frame
+from roboglot.clients.cyberdog.values import ProgramFrame
 from roboglot.clients.errors import TimedOut
 from roboglot.model.feed import Feed, Viewer
 from roboglot.wire.cyberdog.codes import Code
@@ -27,7 +27,7 @@ class Programs(Calls):
         except NoAnswer:
             return
 
-    async def operate(self, kind: str, operate: str, *targets: str, **fields: object) -> Frame:
+    async def operate(self, kind: str, operate: str, *targets: str, **fields: object) -> ProgramFrame:
         """Send a frame and wait for its feedback. Raises CyberDogRefused with the feedback's state, TimedOut."""
         id = f"roboglot-{next(self._numbers)}"
         frame = {"type": kind, "id": id, "operate": operate, "target_id": list(targets), **fields}
@@ -51,8 +51,8 @@ class Programs(Calls):
         await self.operate("task", "run", task)
 
 
-async def _with_id(frames: Viewer[object], id: str) -> Frame:
+async def _with_id(frames: Viewer[object], id: str) -> ProgramFrame:
     async for frame in frames:
-        if isinstance(frame, Frame) and frame.feedback.get("id") == id:
+        if isinstance(frame, ProgramFrame) and frame.feedback.get("id") == id:
             return frame
     raise TimedOut("the client was closed")

@@ -9,9 +9,8 @@ from roboglot.clients.robomaster.client import RoboMasterClient
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.components.interaction.input_device import Input, InputDevice, MouseButton
 from roboglot.model.errors import Refused, RobotError
-from roboglot.wire.robomaster.telemetry import GameInput
+from roboglot.wire.robomaster.telemetry import KEYS_AND_MOUSE, GameInput
 
-KEYS_AND_MOUSE = 0  # cmd_id
 BUTTONS = {1: MouseButton.RIGHT, 2: MouseButton.LEFT, 4: MouseButton.MIDDLE}
 KEYS = {8: "space", 9: "tab", 16: "shift", 17: "ctrl", 18: "alt", 20: "caps"}
 RANGE = 100  # of the mouse

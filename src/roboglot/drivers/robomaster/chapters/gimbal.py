@@ -15,9 +15,9 @@ from roboglot.model.actions import Action
 from roboglot.model.components.motion.gimbal import (
     GIMBAL,
     FollowMode,
-    Frame,
     Gimbal,
     GimbalAngles,
+    GimbalFrame,
     GimbalLimits,
 )
 from roboglot.model.errors import InvalidGoal, Refused
@@ -110,19 +110,19 @@ class RoboMasterGimbal(Gimbal):
         *,
         pitch: float | None = None,
         yaw: float | None = None,
-        frame: Frame = Frame.BODY,
+        frame: GimbalFrame = GimbalFrame.BODY,
         pitch_speed: float | None = None,
         yaw_speed: float | None = None,
         source: str = "",
     ) -> Action:
         low, high = self.limits.lowest, self.limits.highest
-        if frame is Frame.BODY and not (
+        if frame is GimbalFrame.BODY and not (
             low.pitch <= (pitch or 0.0) <= high.pitch and low.yaw <= (yaw or 0.0) <= high.yaw
         ):
             raise InvalidGoal(f"the gimbal does not reach {pitch}, {yaw}")
         body = self._reported.imu.orientation
-        goal_pitch = None if pitch is None else pitch + (body.pitch if frame is Frame.BODY else 0.0)
-        goal_yaw = None if yaw is None else self._joint(yaw - body.yaw) if frame is Frame.WORLD else yaw
+        goal_pitch = None if pitch is None else pitch + (body.pitch if frame is GimbalFrame.BODY else 0.0)
+        goal_yaw = None if yaw is None else self._joint(yaw - body.yaw) if frame is GimbalFrame.WORLD else yaw
 
         async def turn() -> None:
             goal = self._far_yaw(goal_yaw)

@@ -13,11 +13,10 @@ from roboglot.model.components.system.link import Link
 from roboglot.model.errors import NotFound
 from roboglot.model.events import AdapterLevelChanged
 from roboglot.model.robot import Robot
-from roboglot.wire.robomaster.telemetry import AdapterLevel
+from roboglot.wire.robomaster.telemetry import RAW_MAX, AdapterLevel
 
 COUNT_MAX, PORTS = 6, 2
 VOLTAGE_MAX = 3.3  # V
-RAW_MAX = 1023  # full scale of the converters of real robots
 
 
 @dataclass(slots=True)

@@ -34,7 +34,7 @@ class ShownLight(Light):
     def __init__(self, zones: Mapping[str, int], clock: Clock) -> None:
         self.zones: dict[str, int] = {}
         self._clock = clock
-        self._told: dict[str, list[ZoneState]] = {}
+        self._commanded: dict[str, list[ZoneState]] = {}
         self._last: dict[str, ZoneState] = {}
         self.provide(zones)
 
@@ -43,11 +43,11 @@ class ShownLight(Light):
         dark = ZoneState(DARK, LightEffect.OFF, 2.0, self._clock.time())
         for zone, count in zones.items():
             if zone not in self.zones:
-                self.zones[zone], self._told[zone], self._last[zone] = count, [dark] * count, dark
+                self.zones[zone], self._commanded[zone], self._last[zone] = count, [dark] * count, dark
 
     def commanded(self, zone: str, lamp: int) -> ZoneState:
         """Return the last command of this lamp (from 0)."""
-        return self._told[zone][lamp]
+        return self._commanded[zone][lamp]
 
     def shine(
         self,
@@ -94,7 +94,7 @@ class ShownLight(Light):
 
     def _lamps(self, zone: str) -> list[ZoneState]:
         try:
-            return self._told[zone]
+            return self._commanded[zone]
         except KeyError:
             raise NotFound(f"there is no light {zone!r}; there are: {', '.join(self.zones)}") from None
 

@@ -20,7 +20,7 @@ class FollowMode(StrEnum):
     GIMBAL_LEAD = "gimbal_lead"  # the chassis turns its front to where the gimbal points
 
 
-class Frame(StrEnum):
+class GimbalFrame(StrEnum):
     """Reference of the angles of a goal."""
 
     BODY = "body"  # the chassis' front and plane
@@ -95,7 +95,7 @@ class Gimbal(Component):
         *,
         pitch: float | None = None,
         yaw: float | None = None,
-        frame: Frame = Frame.BODY,
+        frame: GimbalFrame = GimbalFrame.BODY,
         pitch_speed: float | None = None,
         yaw_speed: float | None = None,
         source: str = "",

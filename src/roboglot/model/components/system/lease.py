@@ -67,7 +67,7 @@ class Lease(Component):
         robot.events.listen(LinkChanged, lambda _: self._look_outside())
         if self._taken_by:
             log.warning("robot %s: control is still taken by %s", robot.id, self._taken_by)
-            self._tell()
+            self._report()
 
     @property
     def taken_by(self) -> str:
@@ -117,7 +117,7 @@ class Lease(Component):
             raise InvalidGoal(f"a client's name has 1 to {NAME_MAX} printable characters")
         self._taken_by = who.strip()
         log.warning("robot %s: control is taken by %s", self._robot.id, self._taken_by)
-        self._tell()
+        self._report()
         doomed = [a for a in self._robot.actions.running() if moves(a) and not self.may_move(a.client)]
         for action in doomed:
             self._publish_refused(action, f"{self._taken_by} took control")
@@ -142,7 +142,7 @@ class Lease(Component):
         if self._taken_by:
             log.warning("robot %s: %s released control", self._robot.id, self._taken_by)
             self._taken_by = ""
-            self._tell()
+            self._report()
             await self._keep()
 
     async def _keep(self) -> None:
@@ -190,9 +190,9 @@ class Lease(Component):
             self._look()
         else:
             log.info("robot %s: the other client is done", self._robot.id)
-        self._tell()
+        self._report()
 
-    def _tell(self) -> None:
+    def _report(self) -> None:
         if Health in self._robot:
             health = self._robot[Health]
             for fault in (TAKEN, OUTSIDE):

@@ -32,7 +32,7 @@ class FollowedMember:
         self.name = ""
 
     def start(self, name: str, distance: float) -> None:
-        """Follow this one and no other. Raises ComponentMissing."""
+        """Follow this person and no other. Raises ComponentMissing."""
         robot = self._session.robot
         vision, skill = robot[Vision], robot[Following]
         self.stop()

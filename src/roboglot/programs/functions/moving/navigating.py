@@ -83,20 +83,20 @@ async def turn_on_navigation(
     asks for that, and says how it went.
     """
     doing = _turn_on(session, outdoor, assisted_relocation, interact)
-    return await _told(_with_words(session, doing, interact, volume))
+    return await _outcome(_with_words(session, doing, interact, volume))
 
 
 @ABILITIES.on("cyberdog.navigation.turn_off_navigation")
 async def turn_off_navigation(session: Session) -> Record:
     """Call off every drive to a place, and use navigation no more."""
     session.part(NavigationMode).map = None
-    return await _told(_cancel(session.robot))
+    return await _outcome(_cancel(session.robot))
 
 
 @ABILITIES.on("cyberdog.navigation.cancel_navigation")
 async def cancel_navigation(session: Session) -> Record:
     """Call off every drive to a place; returns when the robot stands."""
-    return await _told(_cancel(session.robot))
+    return await _outcome(_cancel(session.robot))
 
 
 @ABILITIES.on("cyberdog.navigation.to_preset", needs=(Localization, MapLibrary, Mapping, Navigation, Speaker))
@@ -115,7 +115,7 @@ async def to_preset(
         await _turn_on(session, stored.outdoor, assisted_relocation, interact)
         await _go(session, point, None)
 
-    return await _told(_with_words(session, do(), interact, volume))
+    return await _outcome(_with_words(session, do(), interact, volume))
 
 
 @ABILITIES.on("cyberdog.navigation.navigation_to_preset", needs=(Localization, MapLibrary, Navigation))
@@ -126,7 +126,7 @@ async def navigation_to_preset(session: Session, preset_name: str = "") -> Recor
         stored = await session.robot[MapLibrary].get(_map_in_use(session))
         await _go(session, _preset(stored, preset_name), None)
 
-    return await _told(do())
+    return await _outcome(do())
 
 
 @ABILITIES.on("cyberdog.navigation.navigation_to_coordinates", needs=(Localization, Navigation))
@@ -147,7 +147,7 @@ async def navigation_to_coordinates(
             raise InvalidGoal(f"coordinates are within {COORDINATE_MAX:g} m")
         await _go(session, Point(x, y), yaw)
 
-    return await _told(do())
+    return await _outcome(do())
 
 
 async def _turn_on(session: Session, outdoor: bool, assisted: bool, interact: bool) -> None:
@@ -204,7 +204,7 @@ async def _cancel(robot: Robot) -> None:
 
 
 async def _with_words(session: Session, doing: Coroutine[object, object, None], interact: bool, volume: int) -> None:
-    """Do it, and say how it went if ``interact``."""
+    """Carry it out; with ``interact``, say the outcome aloud."""
     try:
         usable_volume(volume)
         if interact:
@@ -221,7 +221,7 @@ async def _with_words(session: Session, doing: Coroutine[object, object, None], 
             await say(session, words)
 
 
-async def _told(doing: Coroutine[object, object, None]) -> Record:
+async def _outcome(doing: Coroutine[object, object, None]) -> Record:
     outcome, result = state(), SUCCESS
     try:
         await doing

@@ -10,12 +10,12 @@ from roboglot.model.feed import Viewer
 from roboglot.model.perception import Gesture, GestureSeen, Sighting
 from roboglot.programs.functions.enums import GESTURES
 from roboglot.programs.functions.results import StateCode, state
+from roboglot.programs.functions.senses.people import SENSITIVITY_MAX
 from roboglot.programs.functions.session import Session
 from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.worker.values import Record
 
 DURATION_MIN, DURATION_MAX = 30, 300  # s for which recognition may stay on
-SENSITIVITY_MAX = 60  # s
 LOOK_EVERY = 0.04  # s
 HELD = 1.0  # s for which a sighting counts
 
@@ -86,7 +86,7 @@ async def recognized(session: Session, duration: int = 60, sensitivity: int = 1)
     try:
         session.part(GestureWatch).open(_seconds("duration", duration))
     except RobotError as error:
-        return _told(state(StateCode.FAIL, str(error)), set())
+        return _gestures(state(StateCode.FAIL, str(error)), set())
     return await _wait(session, duration, sensitivity)
 
 
@@ -100,7 +100,7 @@ async def recognized_any_gesture(session: Session, timeout: int = 60, sensitivit
 async def recognized_designated_gesture(session: Session, timeout: int = 60, gesture_type: int = 0) -> Record:
     """Wait for one gesture (1 to 300 s) once recognition is on; none in time is all False, and no failure."""
     if not 1 <= gesture_type <= len(GESTURES):
-        return _told(state(StateCode.FAIL, f"gesture_type = {gesture_type} is no gesture"), set())
+        return _gestures(state(StateCode.FAIL, f"gesture_type = {gesture_type} is no gesture"), set())
     return await _wait(session, timeout, 1, GESTURES[gesture_type - 1], least=1)
 
 
@@ -115,14 +115,14 @@ async def _wait(
         if not watch.on:
             raise Refused("gesture recognition is off")
     except RobotError as error:
-        return _told(state(StateCode.FAIL, str(error)), set())
+        return _gestures(state(StateCode.FAIL, str(error)), set())
     within = max(HELD, sensitivity)
     while True:
         seen = watch.seen(within)
         if (wanted in seen) if wanted else seen:
-            return _told(state(), seen)
+            return _gestures(state(), seen)
         if left <= 0 or not watch.on:
-            return _told(state(), set())
+            return _gestures(state(), set())
         await session.sleep(LOOK_EVERY)
         left -= LOOK_EVERY
 
@@ -143,6 +143,6 @@ def _switched(switch: Callable[[], None]) -> Record:
     return Record("GestureRecognizedSeviceResponse", {"state": outcome, "response": body})
 
 
-def _told(outcome: Record, seen: set[str]) -> Record:
+def _gestures(outcome: Record, seen: set[str]) -> Record:
     data = Record("GestureData", dict.fromkeys(sorted(seen), True))
     return Record("GestureRecognizedMessageResponse", {"state": outcome, "data": data})

@@ -27,7 +27,7 @@ SPORTS = dict(  # SkeletonType
 
 
 class Switch(IntEnum):
-    """algo_switch: open, or why closed."""
+    """State of algo_switch: open, or the reason why it is closed."""
 
     OPEN = 0
     COMPLETE = 1

@@ -33,7 +33,7 @@ class Ai:
     def __init__(self, context: Context) -> None:
         self._context, self._robot = context, context.robot
         self._open: dict[str, contextlib.ExitStack] = {}
-        self._told: dict[str, float] = {}
+        self._reported: dict[str, float] = {}
         self._task: asyncio.Task[None] | None = None
         self.line_colour: str | None = None  # None: any
         self.marker_colour = "red"
@@ -72,8 +72,8 @@ class Ai:
             attributes: list[tuple[str, Numbers]] = []
             for name in tuple(self._open):
                 sighting = _detector(vision, name).latest
-                if sighting is not None and self._told.get(name) != sighting.stamp:
-                    self._told[name] = sighting.stamp
+                if sighting is not None and self._reported.get(name) != sighting.stamp:
+                    self._reported[name] = sighting.stamp
                     word = ROBOTS_NAMES.get(name, name) if profile.as_robots else name
                     attributes.append((word, self._numbers(name, sighting.seen)))
             if profile.as_robots and attributes:  # in one datagram, without `;` between the kinds

@@ -10,9 +10,9 @@ from roboglot.operations import Right
 from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.limits import KEYS_MAX
 from roboglot.protocols.robomaster.table import TABLE
+from roboglot.wire.robomaster.telemetry import KEYS_AND_MOUSE
 
 PERIOD = 0.1  # s between two datagrams without changes; a change is sent at once
-KEYS_AND_MOUSE = 0  # cmd_id; the others carry a match's score, which does not exist here
 BUTTONS = {MouseButton.RIGHT: 1, MouseButton.LEFT: 2, MouseButton.MIDDLE: 4}
 # Codes as clients of 2024 read them from robots; the manual prints only 199 for w, which none of them accepts.
 KEYS = {"space": 8, "tab": 9, "shift": 16, "ctrl": 17, "alt": 18, "caps": 20}
@@ -38,7 +38,7 @@ class GamePushes:
     def switch(self, on: bool) -> None:
         """Twice is no matter. Raises ComponentMissing if the robot has no pilot's keyboard."""
         if on and self._task is None:
-            self._deafen = self._robot[InputDevice].listen(self._tell)
+            self._deafen = self._robot[InputDevice].listen(self._send)
             self._task = asyncio.get_running_loop().create_task(self._beat(), name="push game msg")
         elif not on and self._task:
             self._task.cancel()
@@ -50,13 +50,13 @@ class GamePushes:
         """Off."""
         self.switch(False)
 
-    def _tell(self, state: Input) -> None:
+    def _send(self, state: Input) -> None:
         self._context.send(self._context.profile.game(numbers(state, self._seq)))
         self._seq = (self._seq + 1) % 256
 
     async def _beat(self) -> None:
         async for _ in self._robot.clock.every(PERIOD):
-            self._tell(self._robot[InputDevice].state)
+            self._send(self._robot[InputDevice].state)
 
 
 @TABLE.on("game_msg on", right=Right.SEE)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from roboglot.model.actions import Action
-from roboglot.model.components.motion.gimbal import FollowMode, Frame, Gimbal
+from roboglot.model.components.motion.gimbal import FollowMode, Gimbal, GimbalFrame
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.operations import Right
 from roboglot.protocols.robomaster import readings
@@ -85,7 +85,7 @@ async def move_to(
     action = gimbal.move_to(
         pitch=pitch,
         yaw=yaw,
-        frame=Frame.STABILIZED,
+        frame=GimbalFrame.STABILIZED,
         pitch_speed=None if pitch is None else _top("vp", vp),
         yaw_speed=None if yaw is None else _top("vy", vy),
         source=context.source,

@@ -8,8 +8,7 @@ from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.event_switches import EventSwitches
 from roboglot.protocols.robomaster.ranges import AdapterId, AdapterPort, OnOff
 from roboglot.protocols.robomaster.table import TABLE
-
-RAW_MAX = 1023  # full scale of the robot's converters
+from roboglot.wire.robomaster.telemetry import RAW_MAX
 
 
 @TABLE.on("sensor_adapter adc ?", right=Right.SEE, needs=(SensorAdapters,))

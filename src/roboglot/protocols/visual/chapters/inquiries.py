@@ -15,7 +15,7 @@ from roboglot.programs.tasks.states import TaskOperation
 from roboglot.protocols.visual.context import Context
 from roboglot.protocols.visual.table import TABLE
 from roboglot.wire.visual.codes import FeedbackState
-from roboglot.wire.visual.requests import Kind, Request
+from roboglot.wire.visual.requests import FrameSubject, Request
 
 Item = dict[str, str]
 
@@ -45,9 +45,9 @@ async def inquire(context: Context) -> None:
 async def _items(robot: Robot, request: Request) -> list[Item]:
     """Each kind of thing by id, ascending; raises RobotError."""
     match request.kind, request.mode:
-        case Kind.SLAM, "map":
+        case FrameSubject.SLAM, "map":
             return _sorted(await _maps(robot[MapLibrary]))
-        case Kind.SLAM, _:
+        case FrameSubject.SLAM, _:
             return _sorted(await _presets(robot[MapLibrary]))
         case _, "training_words":
             return _words(robot)

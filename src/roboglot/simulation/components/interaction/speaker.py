@@ -71,7 +71,7 @@ class SimulatedSpeaker(Speaker):
         return self._robot.actions.start("play", run, resources=[SPEAKER], goal=sound.name, source=source)
 
     async def _sound(self, sound: Sound | None, seconds: float, speech: Speech | None) -> None:
-        """Be heard (unless there is nothing) and wait for the end; cancelled, it falls silent."""
+        """Play the sound, if there is any, and wait for its end; silence it when cancelled."""
         clock, hull = self._robot.clock, self._hull
         if sound is None:
             await clock.sleep(seconds)

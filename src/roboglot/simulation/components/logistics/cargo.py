@@ -101,7 +101,7 @@ class SimulatedCargo(Cargo):
         if box.opening < 0.5:
             raise Refused(f"the door of box {id} is not open")
         box.fill = fill
-        self._tell(box)
+        self._publish(box)
 
     def hold_hand_into(self, id: int, there: bool) -> None:
         """Put a hand or a parcel into the door, or take it out."""
@@ -146,9 +146,9 @@ class SimulatedCargo(Cargo):
     def _set_moving(self, box: _Box, moving: int) -> None:
         if moving != box.moving:
             box.moving = moving
-            self._tell(box)
+            self._publish(box)
 
-    def _tell(self, box: _Box) -> None:
+    def _publish(self, box: _Box) -> None:
         self._robot.events.publish(BoxChanged(stamp=self._robot.clock.time(), box=box.state()))
 
     def _get(self, id: int) -> _Box:

@@ -42,7 +42,7 @@ class SimulatedJack(Jack):
         self._free: tuple[Pose, frozenset[Hashable]] = Pose(), frozenset()  # where the shelf was, its contacts there
         self._alarm = ""
         self.jammed = False  # whether the drive fails
-        self._told: tuple[JackStage, bool, str] = (JackStage.DOWN, False, "")
+        self._published: tuple[JackStage, bool, str] = (JackStage.DOWN, False, "")
 
     @property
     def stage(self) -> JackStage:
@@ -72,7 +72,7 @@ class SimulatedJack(Jack):
 
     def clear_alarm(self) -> None:
         self._alarm = ""
-        self._tell()
+        self._publish()
 
     def sense(self, _stamp: float, _seconds: float) -> None:
         """Move the shelf with the robot after every tick, and no farther than what stands in its way."""
@@ -109,7 +109,7 @@ class SimulatedJack(Jack):
         try:
             while self._position != end:
                 self._moving = direction
-                self._tell()
+                self._publish()
                 await action.hold(self._stop)
                 await self._robot.clock.sleep(LOOK)
                 if self.jammed:
@@ -122,7 +122,7 @@ class SimulatedJack(Jack):
 
     def _stop(self) -> None:
         self._moving = 0
-        self._tell()
+        self._publish()
 
     def _lifted(self, shelf: ShelfStand) -> float:
         """Return the height of the shelf at the platform's position, m; negative: not touched."""
@@ -140,17 +140,17 @@ class SimulatedJack(Jack):
                     self.carrying.begin()
                     self._shelf, self._offset = shelf, shelf.pose.relative_to(self._hull.pose)
                     self._free = self._hull.pose, shelf.meets(shelf.pose, shelf.floor, 0.0)
-                    self._tell()
+                    self._publish()
         elif self._lifted(self._shelf) <= 0.0:
             self._shelf.move(self._shelf.pose, self._shelf.floor, 0.0)
             self._shelf = None
             self.carrying.end()
-            self._tell()
+            self._publish()
 
-    def _tell(self) -> None:
+    def _publish(self) -> None:
         now = self.stage, self.loaded, self._alarm
-        if now != self._told:
-            self._told = now
+        if now != self._published:
+            self._published = now
             stamp = self._robot.clock.time()
             self._robot.events.publish(JackChanged(stamp=stamp, stage=now[0], alarm=now[2]))
 

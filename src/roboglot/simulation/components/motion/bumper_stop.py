@@ -25,7 +25,7 @@ class BumperStop:
         bumper.reactions.append(self.duty)
 
     def sense(self, _stamp: float, _seconds: float) -> None:
-        """Look after the bumper did, while it feels something."""
+        """Act after the bumper's own sensing, while it is pressed."""
         base, bumper = self._base, self._bumper
         if not bumper.touched:
             self.duty.end()

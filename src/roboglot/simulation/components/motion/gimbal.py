@@ -15,9 +15,9 @@ from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.motion.gimbal import (
     GIMBAL,
     FollowMode,
-    Frame,
     Gimbal,
     GimbalAngles,
+    GimbalFrame,
     GimbalLimits,
 )
 from roboglot.model.errors import InvalidGoal, Refused
@@ -96,13 +96,15 @@ class SimulatedGimbal(Gimbal):
         *,
         pitch: float | None = None,
         yaw: float | None = None,
-        frame: Frame = Frame.BODY,
+        frame: GimbalFrame = GimbalFrame.BODY,
         pitch_speed: float | None = None,
         yaw_speed: float | None = None,
         source: str = "",
     ) -> Action:
         for axis, goal in ((self.axes.pitch, pitch), (self.axes.yaw, yaw)):
-            if goal is not None and (not math.isfinite(goal) or (frame is Frame.BODY and not reaches(axis, goal))):
+            if goal is not None and (
+                not math.isfinite(goal) or (frame is GimbalFrame.BODY and not reaches(axis, goal))
+            ):
                 raise InvalidGoal(f"the gimbal turns from {axis.lowest:.3f} to {axis.highest:.3f} rad, not to {goal}")
         return self._move_to(pitch, yaw, frame, self._top(pitch_speed), self._top(yaw_speed), source)
 
@@ -121,11 +123,11 @@ class SimulatedGimbal(Gimbal):
             axis.position + offset if offset else None
             for axis, offset in ((self.axes.pitch, pitch), (self.axes.yaw, yaw))
         )
-        return self._move_to(up, side, Frame.BODY, self._top(pitch_speed), self._top(yaw_speed), source)
+        return self._move_to(up, side, GimbalFrame.BODY, self._top(pitch_speed), self._top(yaw_speed), source)
 
     def recenter(self, *, source: str = "") -> Action:
         speed = self.limits.speed / 3
-        return self._move_to(0.0, 0.0, Frame.BODY, speed, speed, source)
+        return self._move_to(0.0, 0.0, GimbalFrame.BODY, speed, speed, source)
 
     def sight_line(self) -> tuple[Floats, Floats]:
         """Crossing of the axes, and the gimbal's direction of view, world."""
@@ -146,7 +148,13 @@ class SimulatedGimbal(Gimbal):
     # -- actions -------------------------------------------------------------------------------------------------------
 
     def _move_to(
-        self, pitch: float | None, yaw: float | None, frame: Frame, pitch_speed: float, yaw_speed: float, source: str
+        self,
+        pitch: float | None,
+        yaw: float | None,
+        frame: GimbalFrame,
+        pitch_speed: float,
+        yaw_speed: float,
+        source: str,
     ) -> Action:
         goals = GimbalAngles(pitch or 0.0, yaw or 0.0)
 
@@ -157,11 +165,13 @@ class SimulatedGimbal(Gimbal):
                     None if yaw is None else Aim(heading, yaw_speed, yaw_frame),
                 )
 
-            pitch_frame, yaw_frame = (Frame.WORLD, Frame.BODY) if frame is Frame.STABILIZED else (frame, frame)
+            pitch_frame, yaw_frame = (
+                (GimbalFrame.WORLD, GimbalFrame.BODY) if frame is GimbalFrame.STABILIZED else (frame, frame)
+            )
             heading = yaw
-            if heading is not None and self.axes.mode is FollowMode.GIMBAL_LEAD and yaw_frame is Frame.BODY:
+            if heading is not None and self.axes.mode is FollowMode.GIMBAL_LEAD and yaw_frame is GimbalFrame.BODY:
                 # In the world, or else it would run after the next body.
-                heading, yaw_frame = heading + self.axes.heading, Frame.WORLD
+                heading, yaw_frame = heading + self.axes.heading, GimbalFrame.WORLD
             await move(action, self._robot.clock, begin, self.axes.arrived, self.axes.halt)
 
         return self._start("move gimbal", run, goals, source)

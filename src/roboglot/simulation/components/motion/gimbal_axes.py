@@ -10,7 +10,7 @@ from msgspec import Meta, Struct
 
 from roboglot.model.components.motion.base import WheelSpeeds
 from roboglot.model.components.motion.driving import BASE
-from roboglot.model.components.motion.gimbal import FollowMode, Frame
+from roboglot.model.components.motion.gimbal import FollowMode, GimbalFrame
 from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.errors import Unreachable
 from roboglot.model.geometry import Twist, wrap_angle
@@ -43,7 +43,7 @@ class Aim:
 
     goal: float | None
     speed: float
-    frame: Frame = Frame.WORLD
+    frame: GimbalFrame = GimbalFrame.WORLD
 
 
 UNAIMED = (None, None)
@@ -118,7 +118,7 @@ class GimbalAxes:
         aim = self._aims[index]
         if aim is None or aim.goal is None or (index and self.mode is FollowMode.CHASSIS_LEAD):
             return None
-        if aim.frame is Frame.BODY:
+        if aim.frame is GimbalFrame.BODY:
             return aim.goal
         return aim.goal - (self.heading if index else self.lean)
 
@@ -167,7 +167,7 @@ class GimbalAxes:
     def _advance(self, index: int, axis: Axis, held: float, seconds: float) -> None:
         """Move one axis; ``held`` is how it turns to point where it did before the body moved."""
         aim, led = self._aims[index], index == 1 and self.mode is FollowMode.CHASSIS_LEAD
-        if held and (aim is None or led or aim.goal is None or aim.frame is Frame.WORLD):
+        if held and (aim is None or led or aim.goal is None or aim.frame is GimbalFrame.WORLD):
             axis.shift(held)
         if led:
             self._follow(axis, seconds)

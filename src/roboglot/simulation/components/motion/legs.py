@@ -24,7 +24,7 @@ from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.performing import (
     Body,
-    Frame,
+    MotionTick,
     Performance,
     Stance,
     Track,
@@ -235,7 +235,7 @@ class SimulatedLegs(Legs):
         check_fit(self._robot, self._hull, self._section.tired_below, getting_up=Posture.LYING in before)
 
     async def _play(
-        self, action: Action, motion: Motion | None, make: Callable[[], Iterator[Frame]], spec: MotionSpec | None
+        self, action: Action, motion: Motion | None, make: Callable[[], Iterator[MotionTick]], spec: MotionSpec | None
     ) -> None:
         """Brake, perform to the end, and see where one is. Given up, the body lands and straightens itself."""
         await self._brake()

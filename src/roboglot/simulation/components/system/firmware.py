@@ -136,7 +136,7 @@ class SimulatedFirmware(Firmware):
                 self._robot[Disk].release(PACKAGE)
                 raise
             await self._record.put_downloaded(package)
-            self._tell(action, FirmwareProgress(FirmwareState.DOWNLOADED, 1.0, package))
+            self._report(action, FirmwareProgress(FirmwareState.DOWNLOADED, 1.0, package))
 
         return self._robot.actions.start("download firmware", run, resources=[FIRMWARE], goal=package, source=source)
 
@@ -159,7 +159,7 @@ class SimulatedFirmware(Firmware):
             finally:
                 self._base.locks.unlock(FIRMWARE)
             self._robot[Disk].release(PACKAGE)
-            self._tell(action, FirmwareProgress(FirmwareState.INSTALLED, 1.0, package))
+            self._report(action, FirmwareProgress(FirmwareState.INSTALLED, 1.0, package))
 
         return self._robot.actions.start("install firmware", run, resources=[FIRMWARE], goal=digest, source=source)
 
@@ -179,15 +179,15 @@ class SimulatedFirmware(Firmware):
         steps = 100 if fetched or state is FirmwareState.INSTALLING else 0
         try:
             for percent in range(steps):
-                self._tell(action, FirmwareProgress(state, percent / 100, package))
+                self._report(action, FirmwareProgress(state, percent / 100, package))
                 await self._clock.sleep(package.size / rate / steps)
                 if fetched and Network in self._robot and not self._robot[Network].state.internet:
                     raise Blocked("the network was lost during the download")
         except Blocked as error:
-            self._tell(action, FirmwareProgress(FirmwareState.FAILED, 0.0, package, str(error)))
+            self._report(action, FirmwareProgress(FirmwareState.FAILED, 0.0, package, str(error)))
             raise
         except asyncio.CancelledError:
-            self._tell(action, before)
+            self._report(action, before)
             raise
 
     def reboot(self, *, source: str = "", after: float = 0.0) -> Action:
@@ -205,7 +205,7 @@ class SimulatedFirmware(Firmware):
         robot, seconds = self._robot, self._section.reboot_time
         self._base.locks.lock("reboot", "the robot restarts")
         robot.events.publish(Rebooting(stamp=self._clock.time(), seconds=seconds))
-        self._tell(action, replace(self._progress, state=FirmwareState.REBOOTING, share=0.0))
+        self._report(action, replace(self._progress, state=FirmwareState.REBOOTING, share=0.0))
         for other in robot.actions.running():
             if other is not action:
                 other.cancel("the robot restarts")
@@ -214,7 +214,7 @@ class SimulatedFirmware(Firmware):
         await self._clock.sleep(seconds)
         await self._record.boot()
         self._base.locks.unlock("reboot")
-        self._tell(action, FirmwareProgress())
+        self._report(action, FirmwareProgress())
         robot.events.publish(Rebooted(stamp=self._clock.time()))
 
     @property
@@ -274,7 +274,7 @@ class SimulatedFirmware(Firmware):
             self._robot[Disk].take(PACKAGE, package.size)
             self._progress = FirmwareProgress(FirmwareState.DOWNLOADED, 1.0, package)
 
-    def _tell(self, action: Action, progress: FirmwareProgress) -> None:
+    def _report(self, action: Action, progress: FirmwareProgress) -> None:
         action.report(progress)
         self._become(progress)
 

@@ -83,7 +83,7 @@ class SimulatedNetwork(Network):
         self._ssid = ""  # of the joined network
         self._levels: tuple[tuple[float, float, int], dict[str, float]] | None = None  # place, dBm of all networks
         self._joining = False
-        self._told: NetworkState | None = None
+        self._published: NetworkState | None = None
         self._next = -math.inf
         self.jammed = False  # whether it receives no signal at all
         self.sense(0.0, 0.0)
@@ -205,10 +205,10 @@ class SimulatedNetwork(Network):
         self.strongest = FLOOR_OF_NOISE if self.jammed else max(self._heard.values(), default=SILENCE) + noise
         listening = not self.jammed and not self._joining and self._mode is NetworkMode.STATION
         self._signal, self._ssid = self._best(noise) if listening else (FLOOR_OF_NOISE, "")
-        if (state := self.state) != self._told:
-            if self._told is not None:
+        if (state := self.state) != self._published:
+            if self._published is not None:
                 self._robot.events.publish(NetworkChanged(stamp=stamp, state=state))
-            self._told = state
+            self._published = state
 
     def _best(self, noise: float) -> tuple[float, str]:
         """The network that it is in, as long as it holds; else the first known one that is strong enough."""

@@ -12,6 +12,7 @@ from google.protobuf.json_format import MessageToDict, ParseDict, ParseError
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 
 HEARTBEAT = "heartbeat"  # the operation; the service's name for it
+LEGS = ("left front", "right front", "left rear", "right rear")  # the order of motors' values
 AGAIN = 20  # heartbeats after which an unchanged one is reported again
 
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from roboglot.drivers.cyberdog.chapters.mapping.tasks import Skills
+from roboglot.drivers.linked_base import OFF_DOCK
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.errors import Refused
 from roboglot.model.geometry import Pose
-
-OFF = 0.6  # m off the dock
 
 
 class CyberDogDocking(Docking):
@@ -32,4 +31,4 @@ class CyberDogDocking(Docking):
     def undock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
         if not self._skills.reported.docked:
             raise Refused("the robot is on no dock")
-        return self._skills.robot[Driving].move_by(Pose(OFF), source=source, on_busy=on_busy)
+        return self._skills.robot[Driving].move_by(Pose(OFF_DOCK), source=source, on_busy=on_busy)

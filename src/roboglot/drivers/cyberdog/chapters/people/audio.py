@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from roboglot.clients.cyberdog import CyberDogClient
-from roboglot.clients.cyberdog.values import Frame
+from roboglot.clients.cyberdog.values import ProgramFrame
 from roboglot.drivers.cyberdog.telemetry import StatusPoll
 from roboglot.drivers.cyberdog.vocabulary import robot_errors
 from roboglot.drivers.supervisor import Supervisor
@@ -61,7 +61,7 @@ class CyberDogSpeaker(Speaker):
     async def _speak(self, text: str) -> None:
         client = self._client
         await client.deploy(TASK, f"cyberdog.audio.play({text!r})\n")
-        with client.watch(Frame) as frames:
+        with client.watch(ProgramFrame) as frames:
             await client.run_program(TASK)
             try:
                 await self._robot.clock.wait_for(_ended(frames), SAID_WITHIN)
@@ -72,7 +72,7 @@ class CyberDogSpeaker(Speaker):
                 raise
 
 
-async def _ended(frames: Viewer[Frame]) -> None:
+async def _ended(frames: Viewer[ProgramFrame]) -> None:
     async for frame in frames:
         if frame.feedback.get("operate") == "stop" and frame.feedback.get("target_id") == TASK:
             return

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from roboglot.clients.slamware import SlamwareClient
+from roboglot.drivers.linked_base import OFF_DOCK
 from roboglot.drivers.slamware.chapters.motion.actions import ActionRunner, VendorAction
 from roboglot.drivers.slamware.state import ReportedState
 from roboglot.drivers.slamware.vocabulary import pose3d
@@ -13,8 +14,6 @@ from roboglot.model.components.motion.driving import Driving
 from roboglot.model.errors import Refused
 from roboglot.model.geometry import Pose
 from roboglot.wire.slamware.chapters.motion import ActionInfo, GoHomeOptions
-
-OFF = 0.6  # m straight ahead, off the contacts and with room to turn
 
 
 class SlamwareDocking(Docking):
@@ -48,7 +47,7 @@ class SlamwareDocking(Docking):
     def undock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
         if not self._reported.docked:
             raise Refused("the robot is on no dock")
-        return self._driving.move_by(Pose(OFF), source=source, on_busy=on_busy)
+        return self._driving.move_by(Pose(OFF_DOCK), source=source, on_busy=on_busy)
 
 
 async def _stage(info: ActionInfo) -> str:

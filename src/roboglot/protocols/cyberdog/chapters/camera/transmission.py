@@ -73,7 +73,7 @@ class Transmission:
                 log.info("ignored a signal of type %s", type(signal).__name__)
 
     async def close(self) -> None:
-        """Hang up on everybody."""
+        """End all calls."""
         peers, self._peers = list(self._peers.values()), {}
         for task in self._running:
             task.cancel()
@@ -96,7 +96,7 @@ class Transmission:
         """Tell it, and let the peer go."""
         if self._forget(peer):
             if peer.offered:
-                self._tell(Failure(peer.uid, code, message))
+                self._push(Failure(peer.uid, code, message))
             self._begin(peer.close())
 
     def _forget(self, peer: _Peer) -> bool:
@@ -124,9 +124,9 @@ class Transmission:
         if self._peers.get(peer.uid) is not peer:  # it gave up meanwhile
             await call.close()
             return
-        self._tell(Description(peer.uid, "answer", answer))
+        self._push(Description(peer.uid, "answer", answer))
         for ours in call.candidates():
-            self._tell(Candidate(peer.uid, ours.text, ours.mid, ours.index))
+            self._push(Candidate(peer.uid, ours.text, ours.mid, ours.index))
         await peer.pass_on(webrtc.BadOffer)
 
     def _changed(self, peer: _Peer, state: str) -> None:
@@ -159,9 +159,9 @@ class Transmission:
     async def _end(self, peer: _Peer) -> None:
         peer.give_up.cancel()
         await peer.close()
-        self._tell(End(peer.uid, done=True))
+        self._push(End(peer.uid, done=True))
 
-    def _tell(self, signal: Signal) -> None:
+    def _push(self, signal: Signal) -> None:
         self._app.push(SIGNAL, fields_of(signal))
 
     def _begin(self, work: Coroutine[object, None, None]) -> None:

@@ -36,7 +36,7 @@ NOT_LOCALIZED = frozenset({TaskState.IDLE, TaskState.LOCALIZATION_FAILED, TaskSt
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class TaskRequest:
     """Request for a task: its kind, ``outdoor`` for an outdoor map, ``thing`` to follow a thing and not a person."""
 
     kind: TaskType
@@ -108,7 +108,7 @@ class Tasks:
         return int(self.current.last or 0) if self.current else 0
 
     def start(
-        self, order: Order, run: Callable[[Task], Awaitable[TaskResult]], *, then: Mapping[TaskResult, TaskState]
+        self, order: TaskRequest, run: Callable[[Task], Awaitable[TaskResult]], *, then: Mapping[TaskResult, TaskState]
     ) -> Task:
         """Run it from now on; its result decides the state that follows (``then``; IDLE for what is not there)."""
         kind = order.kind

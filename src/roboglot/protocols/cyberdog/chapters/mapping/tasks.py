@@ -22,7 +22,7 @@ from roboglot.protocols.cyberdog.call import Call, follow
 from roboglot.protocols.cyberdog.chapters.mapping.docking import dock
 from roboglot.protocols.cyberdog.chapters.mapping.mapping import build_map, keep_map
 from roboglot.protocols.cyberdog.chapters.mapping.navigation import Goal, navigate, relocalize
-from roboglot.protocols.cyberdog.chapters.mapping.task_state import OUTDOORS, Order, Task
+from roboglot.protocols.cyberdog.chapters.mapping.task_state import OUTDOORS, Task, TaskRequest
 from roboglot.protocols.cyberdog.chapters.people.following import (
     AUTOMATIC,
     Manner,
@@ -84,7 +84,7 @@ async def start_task(
     if type not in NEEDS:
         return call.refused({"accepted": int(Accepted.NO)}, f"there is no task of type {type}")
     kind = TaskType(type)
-    order = Order(kind, outdoor and kind in IN_A_MAP, object_tracking and kind is TaskType.VISION_FOLLOWING)
+    order = TaskRequest(kind, outdoor and kind in IN_A_MAP, object_tracking and kind is TaskType.VISION_FOLLOWING)
     for component in NEEDS_FOR_THINGS if order.thing else NEEDS[kind]:
         context.robot[component]
     if kind is TaskType.NAVIGATION and (goalX is None or goalY is None):
@@ -97,7 +97,7 @@ async def start_task(
     return await follow(call, task.stream, STREAM_MAX)
 
 
-def _hindrance(context: Context, order: Order) -> str:
+def _hindrance(context: Context, order: TaskRequest) -> str:
     """Return why the task cannot begin now; "" if it can."""
     if context.gaits.state is MachineState.LOW_POWER:
         return "the robot is in low power"
@@ -111,7 +111,7 @@ def _hindrance(context: Context, order: Order) -> str:
     return f"a task of type {int(order.kind)} cannot begin while the robot is {state.name.lower().replace('_', ' ')}"
 
 
-def _run(context: Context, order: Order, goal: Goal, manner: Manner) -> Callable[[Task], Awaitable[TaskResult]]:
+def _run(context: Context, order: TaskRequest, goal: Goal, manner: Manner) -> Callable[[Task], Awaitable[TaskResult]]:
     """Return what does the work of a task."""
     match order.kind:
         case TaskType.NAVIGATION:

@@ -57,7 +57,7 @@ async def end_stair_alignment(call: Call) -> dict[str, bool]:
 
 
 def call_off(robot: Robot, reason: str, source: str | None = None) -> list[Action]:
-    """Cancel the alignment under way, if ``source`` asked for it or none is named; what was cancelled."""
+    """Cancel the alignment under way if ``source`` started it or is empty; return what was cancelled."""
     running = [action for action in robot.actions.running(BASE) if action.name == ALIGN_WITH_STAIRS]
     doomed = [action for action in running if source is None or action.source == source]
     for action in doomed:

@@ -96,14 +96,14 @@ class Faces:
     async def _recognise(self, name: str, id: int, seconds: float) -> None:
         reported: dict[str, float] = {}
         try:
-            await self._robot.clock.wait_for(self._tell(name, id, reported), seconds)
+            await self._robot.clock.wait_for(self._push_faces(name, id, reported), seconds)
         except TimeoutError:
             if not reported:
                 self._app.push(RECOGNISED, _recognised(FaceResult.TIMEOUT, name, id, 0.0, 0.0))
         except RobotError as error:
             log.info("face recognition: %s", error)
 
-    async def _tell(self, wanted: str, id: int, reported: dict[str, float]) -> None:
+    async def _push_faces(self, wanted: str, id: int, reported: dict[str, float]) -> None:
         with self._robot[Vision].faces.subscribe() as sightings:
             async for sighting in sightings:
                 for face in sighting.seen:

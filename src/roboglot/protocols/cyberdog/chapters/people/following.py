@@ -80,7 +80,7 @@ async def _pursue(
         chosen = await pursuit.chosen
         task.feedback(Feedback.FOLLOW_CHOSEN)
         action = task.action = follow(chosen)
-        await _tell(context, task, action, Feedback.FOLLOWING, Feedback.TARGET_SEARCHED)
+        await _report(context, task, action, Feedback.FOLLOWING, Feedback.TARGET_SEARCHED)
     except NotFound:
         task.feedback(Feedback.TARGET_LOST if task.last is not Feedback.FOLLOW_CHOSEN else Feedback.TARGET_NOT_LOCKED)
     except RobotError:
@@ -103,7 +103,7 @@ async def follow_tag(context: Context, task: Task, manner: Manner) -> TaskResult
         return TaskResult.FAILED
     task.feedback(Feedback.ACTIVATED)
     try:
-        await _tell(context, task, action, Feedback.TAG_FOLLOWED, None)
+        await _report(context, task, action, Feedback.TAG_FOLLOWED, None)
     except NotFound:
         task.feedback(Feedback.TAG_LOST if task.last is Feedback.TAG_FOLLOWED else Feedback.TAG_NOT_THERE)
     except RobotError:
@@ -111,7 +111,7 @@ async def follow_tag(context: Context, task: Task, manner: Manner) -> TaskResult
     return TaskResult.FAILED
 
 
-async def _tell(context: Context, task: Task, action: Action, followed: Feedback, searched: Feedback | None) -> None:
+async def _report(context: Context, task: Task, action: Action, followed: Feedback, searched: Feedback | None) -> None:
     """Report the progress of ``action`` until it has ended; cancelled if the task is."""
 
     def watch(event: ActionChanged) -> None:

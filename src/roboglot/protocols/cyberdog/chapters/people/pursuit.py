@@ -89,7 +89,7 @@ class ThingPursuit:
 
 
 def _box(x: int, y: int, width: int, height: int) -> Box:
-    """A region of the app's, as shares of the picture."""
+    """Region that the app chose, as shares of the picture."""
     return Box((x + width / 2) / WIDTH, (y + height / 2) / HEIGHT, width / WIDTH, height / HEIGHT)
 
 

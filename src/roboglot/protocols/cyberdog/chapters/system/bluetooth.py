@@ -89,7 +89,7 @@ async def connect(call: Call, *, selected_device: object = None) -> dict[str, in
 
 @TABLE.on(Code.BLUETOOTH_CONNECTED, right=Right.SEE, needs=(Bluetooth,))
 async def connected(call: Call) -> dict[str, object]:
-    """None or one."""
+    """Connected device, as a list of none or one."""
     device = call.context.robot[Bluetooth].connected
     return _listed([device] if device else [])
 

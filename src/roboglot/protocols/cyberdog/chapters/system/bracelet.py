@@ -29,7 +29,7 @@ class Bracelet:
     def __init__(self, robot: Robot, app: AppLink) -> None:
         self._robot, self._app = robot, app
         self._update: Action | None = None
-        self._told = -1.0  # progress of the last push
+        self._pushed = -1.0  # progress of the last push
         events = robot.events
         self._leave: list[Callable[[], None]] = [
             events.listen(BluetoothLost, lambda _: app.push(LOST, {"disconnected": True})),
@@ -46,7 +46,7 @@ class Bracelet:
 
     def follow(self, update: Action) -> None:
         """Report the progress of ``update`` until it has ended."""
-        self._update, self._told = update, -1.0
+        self._update, self._pushed = update, -1.0
 
     def offer(self) -> None:
         """Report newer firmware, if there is a device for it."""
@@ -72,11 +72,11 @@ class Bracelet:
             return
         if action.status.ended:
             well = action.status is ActionStatus.SUCCEEDED
-            self._tell(SUCCEEDED if well else FAILED, 1.0 if well else max(0.0, self._told), action.reason)
+            self._push(SUCCEEDED if well else FAILED, 1.0 if well else max(0.0, self._pushed), action.reason)
             self._update = None
-        elif isinstance(action.feedback, float) and action.feedback >= self._told + STEP:
-            self._told = action.feedback
-            self._tell(SENDING, action.feedback, "")
+        elif isinstance(action.feedback, float) and action.feedback >= self._pushed + STEP:
+            self._pushed = action.feedback
+            self._push(SENDING, action.feedback, "")
 
-    def _tell(self, status: int, progress: float, message: str) -> None:
+    def _push(self, status: int, progress: float, message: str) -> None:
         self._app.push(PROGRESS, {"status": status, "progress": progress, "message": message})

@@ -23,6 +23,7 @@ from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.protocols.cyberdog.vocabulary import percent, wifi_strength
+from roboglot.wire.cyberdog.chapters.system import LEGS
 from roboglot.wire.cyberdog.codes import Code, SelfCheck
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.text import write
@@ -152,7 +153,6 @@ def _motor_temperatures(context: Context) -> dict[str, object]:
 
 
 NX = "nx"
-LEGS = ("left front", "right front", "left rear", "right rear")
 JOINTS = {"hip": "hip", "thigh": "thigh", "crus": "knee"}
 INFORMATION: Mapping[str, Callable[[Context, str], object]] = {
     "version": lambda context, _: _versions(context),

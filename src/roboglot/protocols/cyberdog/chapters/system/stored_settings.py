@@ -11,7 +11,6 @@ MICROPHONE, VOICE_CONTROL = "cyberdog.microphone", "cyberdog.voice_control"
 ACCOUNT = "cyberdog.audio_account"
 VOICEPRINTS = "cyberdog.voiceprints"  # as the app sent them
 ENVIRONMENT = "cyberdog.environment"
-APP = "cyberdog.app"  # the address of the last connected app
 APP = "cyberdog.app"  # the host of the last connected app
 UPDATE = "cyberdog.update"  # the version for which the robot restarts
 

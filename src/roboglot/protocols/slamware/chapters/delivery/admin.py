@@ -10,7 +10,6 @@ from roboglot.misfits import misfit
 from roboglot.model.components.logistics.cargo import Cargo
 from roboglot.model.components.logistics.delivery import Delivery, Policy, WorkMode
 from roboglot.model.components.motion.base import Base
-from roboglot.model.components.motion.navigation import Tracks
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.events import DeliveryNews, DeliveryReported
@@ -21,6 +20,7 @@ from roboglot.protocols.slamware.chapters.delivery.voice import LANGUAGE, langua
 from roboglot.protocols.slamware.chapters.system.system import device_id, software_version
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
+from roboglot.protocols.slamware.vocabulary import TRACKS
 from roboglot.wire.slamware.chapters.delivery import (
     AdminPassword,
     BatteryLevels,
@@ -42,7 +42,6 @@ from roboglot.wire.slamware.chapters.motion import MoveOptions
 
 API = "/api/delivery/v1"
 PASSWORD = "slamware.delivery_password"
-TRACKS = (Tracks.FREE, Tracks.STRICT, Tracks.PREFERRED)  # by move mode
 RATIO_MIN = 0.1
 DONE = OperationReply(result=True)
 
@@ -71,7 +70,7 @@ async def set_password(context: Context, body: Password | None = None) -> Operat
 @TABLE.on(f"GET {API}/admin/mode", right=Right.SEE, needs=(Delivery,))
 async def get_work_mode(context: Context) -> WorkModeEntry:
     """Return which tasks may be created at the robot."""
-    return WorkModeEntry(context.robot[Delivery].policy.work_mode.value.upper())  # type: ignore[arg-type]
+    return msgspec.convert({"work_mode": context.robot[Delivery].policy.work_mode.value.upper()}, WorkModeEntry)
 
 
 @TABLE.on(f"PUT {API}/admin/mode", right=Right.EDIT, needs=(Delivery,))

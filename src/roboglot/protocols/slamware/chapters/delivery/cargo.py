@@ -71,7 +71,7 @@ async def operate_box(context: Context, cargo_id: str, box_id: int, op: Literal[
 
 @TABLE.on(f"GET {BOXES}/{{box_id}}/operation_result", right=Right.SEE, needs=(CargoComponent,))
 async def get_operation_result(context: Context, cargo_id: str, box_id: int) -> OperationResult:
-    """The last opening or closing of the box; 404 while there was none."""
+    """Return the last opening or closing of the box; 404 if there was none."""
     id = _box_id(context, cargo_id, box_id)
     if (action := context.boxes.last(id)) is None:
         raise NotFound(f"box {id} has not been operated yet")

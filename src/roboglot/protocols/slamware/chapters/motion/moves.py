@@ -18,6 +18,7 @@ from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
 from roboglot.protocols.slamware.chapters.motion.strategies import speed_share
 from roboglot.protocols.slamware.chapters.multi_floor.track_graph import way_along
 from roboglot.protocols.slamware.context import Context
+from roboglot.protocols.slamware.vocabulary import TRACKS
 from roboglot.wire.slamware import geometry
 from roboglot.wire.slamware.chapters.motion import (
     AngleOptions,
@@ -33,7 +34,6 @@ from roboglot.wire.slamware.chapters.motion import (
 MOVE_BY_SECONDS = 0.5
 MOVE_BY_TWIST = Twist(x=0.4, yaw=0.8)  # speed for a bare direction: slow, because there is no obstacle avoidance
 SPEED_RATIO_MIN = 0.1
-TRACKS = (Tracks.FREE, Tracks.STRICT, Tracks.PREFERRED)  # by move mode
 OCCUPIED = 0.1  # m from an occupied target that suffice
 PRECISE, OCCUPIED_MAX = 0.05, 10.0  # m
 
@@ -99,7 +99,7 @@ def move_to(context: Context, options: MoveToOptions) -> Action:
 
 
 def series_move_to(context: Context, options: SeriesMoveToOptions) -> Action:
-    """Through several in turn."""
+    """Drive through several points in turn."""
     return navigate(context.robot, _points(options.targets), options.move_options or MoveOptions())
 
 

@@ -31,7 +31,7 @@ class RideEvents:
     """Follows one ride after the other; each stage is reported once."""
 
     def __init__(self) -> None:
-        self._told: tuple[int, RideStage | None] = (0, None)
+        self._reported: tuple[int, RideStage | None] = (0, None)
 
     def of(self, action: Action) -> tuple[ElevatorEvent, ...]:
         """Return what a change of ``action`` means."""
@@ -42,7 +42,7 @@ class RideEvents:
             blocked = isinstance(action.error, Blocked) and stage in OCCUPIED
             occupied = (OCCUPIED[stage], ElevatorEvent.TAKE_ELEVATOR_OCCUPIED) if blocked else ()
             return (*occupied, FAILURES[stage]) if stage in FAILURES else occupied
-        if action.status.ended or self._told == (action.id, stage):
+        if action.status.ended or self._reported == (action.id, stage):
             return ()
-        self._told = (action.id, stage)
+        self._reported = (action.id, stage)
         return BEGINNINGS.get(stage, ())

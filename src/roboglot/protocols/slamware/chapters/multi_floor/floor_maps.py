@@ -33,7 +33,7 @@ class LoadedStoreys:
         return _label(found.name) if found else self.current
 
     def go_to(self, floor: str, source: str) -> Action:
-        """Drive there by lift."""
+        """Drive to the floor by lift."""
         found = next((known for known in self._context.maps.floors if _label(known.name) == floor), None)
         if found is None:
             raise InvalidGoal(f"no floor {floor} is loaded")

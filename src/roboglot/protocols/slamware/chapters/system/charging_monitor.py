@@ -41,9 +41,9 @@ class ChargingWatch:
         if not self._starves():
             self._forget()
         elif self._timer is None:
-            self._timer = self._robot.clock.call_later(PATIENCE, self._tell)
+            self._timer = self._robot.clock.call_later(PATIENCE, self._check)
 
-    def _tell(self) -> None:
+    def _check(self) -> None:
         """The timer stays until the robot charges or leaves: once is enough."""
         if self._starves():
             self._failed()

@@ -38,7 +38,7 @@ class Parameter(msgspec.Struct):
     value: Annotated[str, msgspec.Meta(max_length=64)] | float
 
 
-Part = Annotated[int, msgspec.Meta(ge=0, le=255)]
+ColourPart = Annotated[int, msgspec.Meta(ge=0, le=255)]
 
 
 Milliseconds = Annotated[int, msgspec.Meta(ge=0, le=600_000)]
@@ -70,9 +70,9 @@ class Mode(StrEnum):
 class LightColour(msgspec.Struct):
     """Parts of 255."""
 
-    red: Part = 0
-    green: Part = 0
-    blue: Part = 0
+    red: ColourPart = 0
+    green: ColourPart = 0
+    blue: ColourPart = 0
 
 
 class LightControl(msgspec.Struct, rename="camel"):

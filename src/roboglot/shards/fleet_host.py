@@ -10,7 +10,7 @@ from roboglot.shards.plan import FleetPlan
 from roboglot.shards.supervisor import Shard
 
 
-class Keeper(Protocol):
+class FleetHost(Protocol):
     """Keeps the shards of one plan up."""
 
     plan: FleetPlan

@@ -18,7 +18,7 @@ from roboglot.model.components.mapping.map_memory import MapMemory
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.motion.base import Base, WheelSpeeds
 from roboglot.model.components.motion.driving import Driving
-from roboglot.model.components.motion.gimbal import FollowMode, Frame, Gimbal
+from roboglot.model.components.motion.gimbal import FollowMode, Gimbal, GimbalFrame
 from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.sensing.odometry import Odometry
@@ -121,7 +121,7 @@ async def test_the_gimbal_turns_the_models_way(driven_ep: Robot, robot: Robot, f
     gimbal.set_mode(FollowMode.FREE)
     await forward(seconds=0.2)
     assert (gimbal.mode, real.mode) == (FollowMode.FREE, FollowMode.FREE)
-    action = gimbal.move_to(pitch=-0.3, yaw=0.6, frame=Frame.WORLD, source="test")
+    action = gimbal.move_to(pitch=-0.3, yaw=0.6, frame=GimbalFrame.WORLD, source="test")
     await forward(seconds=3)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     assert (real.attitude.pitch, real.attitude.yaw) == pytest.approx((-0.3, 0.6), abs=0.03)
