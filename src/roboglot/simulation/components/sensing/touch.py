@@ -15,7 +15,7 @@ class TouchSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedTouch(Touch):
-    """``World.touch`` is the finger."""
+    """Pad that ``Hands.touch`` presses."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
