@@ -6,8 +6,10 @@ import json
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from urllib.request import urlopen
 
 import pytest
 
@@ -30,7 +32,19 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Run]:
         return subprocess.run(line, capture_output=True, text=True, timeout=180, env=environment, **more)  # type: ignore[call-overload]
 
     with served(data, *arguments, address=ADDRESS):
+        wait_for_map()
         yield command
+
+
+def wait_for_map() -> None:
+    """Wait until the robot has mapped something: on a busy machine its lidar may take long to turn once."""
+    deadline = time.monotonic() + 120.0
+    while True:
+        with urlopen(f"http://{ADDRESS}:1448/api/core/slam/v1/knownarea", timeout=60) as reply:
+            if json.load(reply)["width"] > 0:
+                return
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
 
 
 def test_status_is_json(run: Run) -> None:
