@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 import pytest_asyncio
 
+from roboglot.model.geometry import Pose
 from tests.browser.served import STILL, Served, becomes, shows, until
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
@@ -54,6 +55,12 @@ FOREVER = {
         ],
     }
 }  # fmt: skip
+
+
+DIRECTIONS = """(() => {
+  const { prototype } = CanvasRenderingContext2D, { rotate } = prototype;
+  prototype.rotate = function (angle) { this.canvas.turned = -angle; rotate.call(this, angle); };
+})()"""  # each picture keeps the direction in which it drew a robot
 
 
 @pytest_asyncio.fixture(loop_scope="session")
@@ -251,6 +258,23 @@ async def test_the_program_is_simulated_first(studio: Open, opened: Served) -> N
     await until(page, "document.querySelector('.failure.fine')")
     assert opened.robot.actions.running() == []
     await prints(page)  # the robot's own log
+    assert page.errors == []
+
+
+async def test_simulated_picture_has_the_frame_of_the_map(studio: Open, opened: Served) -> None:
+    world, page = opened.runtime.fleet.world, await studio()
+    before = world.truth.pose_of("a")
+    world.hands.place("a", Pose(before.x, before.y, before.yaw + 1.5))  # no time passes: it believes what it did
+    await page.evaluate(DIRECTIONS)
+    await page.click("#tab-robot")
+    await until(page, "document.querySelector('.world canvas').turned !== undefined")
+    await loaded(page, FOREVER)
+    await page.click("text=Simulate first")
+    await until(page, "document.querySelector('canvas.trace')?.turned !== undefined")
+    shown = await page.evaluate("['.world canvas', 'canvas.trace'].map(c => document.querySelector(c).turned)")
+    world.hands.place("a", before)
+    await page.click(".panel >> text=Stop")
+    assert shown[1] == pytest.approx(shown[0], abs=0.05)
     assert page.errors == []
 
 

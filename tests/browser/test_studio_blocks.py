@@ -20,6 +20,7 @@ from tests.browser.served import Served, until
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 SCRIPT = Path(__file__).with_name("round_trip.js").read_text("utf-8").partition("\n")[2]
+TOGETHER = Path(__file__).with_name("loaded_together.js").read_text("utf-8").partition("\n")[2]
 ENDLESS = {"forever"}
 REFUSALS = {"IndexError", "AttributeError", "TypeError", "ZeroDivisionError", "ValueError"}
 EMPTY = {
@@ -32,8 +33,7 @@ EMPTY = {
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="session")
-async def played(opened: Served, browser: Any) -> AsyncIterator[dict[str, Any]]:
-    """Yield the page's programs for every block."""
+async def page(opened: Served, browser: Any) -> AsyncIterator[Any]:
     console = opened.runtime.console
     assert console is not None
     await console.ready()
@@ -42,8 +42,15 @@ async def played(opened: Served, browser: Any) -> AsyncIterator[dict[str, Any]]:
     page.on("console", lambda message: said.append(message.text))
     await page.goto(f"{console.address}/studio/")
     await until(page, "window.studio && studio.editor.workspace")
-    yield await page.evaluate(SCRIPT) | {"said": said}
+    page.said = said
+    yield page
     await page.close()
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="session")
+async def played(page: Any) -> dict[str, Any]:
+    """Return the page's programs for every block."""
+    return {**await page.evaluate(SCRIPT), "said": page.said}
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="session")
@@ -75,6 +82,13 @@ async def test_functions_are_called_with_their_block_s_values(played: dict[str, 
 async def test_what_was_kept_writes_the_same_program(played: dict[str, Any]) -> None:
     assert played["code"] == played["again"]
     assert played["said"] == []
+
+
+async def test_what_is_loaded_quickly_looks_the_same(page: Any) -> None:
+    found = await page.evaluate(TOGETHER)
+    assert found["elements"] > 1000
+    assert found["unlike"] == []
+    assert all(found["connected"])
 
 
 async def test_each_block_of_the_language_runs(played: dict[str, Any], engine: Engine) -> None:

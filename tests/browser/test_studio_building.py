@@ -95,11 +95,11 @@ async def test_the_focus_stays_when_blocks_move(studio: Open) -> None:
     stays = """async () => {
         const { getFocusManager } = await import("/studio/vendor/blockly.mjs");
         const [first, second] = ["first", "second"].map((id) => studio.editor.workspace.getBlockById(id));
-        const field = second.getInputTargetBlock("TEXT").getField("TEXT");
+        const words = second.getInputTargetBlock("TEXT");
         first.bringToFront(); // which moves its neighbours a frame later
-        getFocusManager().focusNode(field);
+        getFocusManager().focusNode(words);
         for (let frame = 0; frame < 2; frame += 1) await new Promise(requestAnimationFrame);
-        return document.activeElement === field.getFocusableElement();
+        return document.activeElement === words.getFocusableElement();
     }"""
     assert await page.evaluate(stays)
     assert page.errors == []

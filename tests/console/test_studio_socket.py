@@ -18,6 +18,7 @@ from roboglot.console.studio import channel
 from roboglot.console.studio.blocks import table
 from roboglot.console.studio.classroom import PUPILS_MAX
 from roboglot.console.studio.mistakes import explain
+from roboglot.model.components.mapping.localization import Localization
 from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.language import check
 from roboglot.wire.contracts import contract
@@ -162,6 +163,15 @@ async def test_program_is_tried_in_mission_and_world_copy(shown: Shown) -> None:
         assert "ZeroDivisionError" in (await studio.kind("tried"))["error"]
         await studio.say(type="try", id=3, lesson="../../secret", body="x = 1\n")
         assert "there is no mission" in (await studio.kind("refused"))["why"]
+
+
+async def test_trial_begins_where_the_map_has_it(shown: Shown) -> None:
+    async with page(shown) as studio:
+        await studio.say(type="try", id=1, lesson="", body="x = 1\n")
+        spot = await studio.until(lambda m: m.get("what") == "spot")
+        believed = shown.robot[Localization].pose
+        assert (spot["x"], spot["y"], spot["yaw"]) == pytest.approx((believed.x, believed.y, believed.yaw), abs=0.01)
+        assert shown.runtime.fleet.world.truth.pose_of("a").distance_to(believed) > 0.5
 
 
 async def test_a_class_is_joined_seen_and_handed_in(shown: Shown) -> None:

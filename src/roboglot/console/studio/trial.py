@@ -15,7 +15,10 @@ from roboglot.console.studio.checks import HULL, distance
 from roboglot.console.studio.lessons import Lesson, grade, no_program
 from roboglot.console.studio.mistakes import explain
 from roboglot.console.studio.programs import Programs, Studio
+from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.errors import Busy, NotFound
+from roboglot.model.geometry import Pose
+from roboglot.model.robot import Robot
 from roboglot.programs.errors import ProgramError
 from roboglot.programs.language import Problem
 from roboglot.programs.rehearsing import Played, Scene
@@ -44,6 +47,7 @@ class Trial:
     def __init__(self, tell: Tell) -> None:
         self._send = tell
         self._playing: asyncio.Task[Played] | None = None
+        self._origin = Pose()  # of the world, in the frame that the page's map has
 
     async def take(self, wish: TrialWish, studio: Studio, programs: Programs) -> None:
         """Try it and report the result. Raises NotFound, Busy, ValueError, ProgramError."""
@@ -55,7 +59,9 @@ class Trial:
         if problems := await programs.service.check(wish.body):
             self._answer(wish, lesson, problems=problems)
             return
-        played = await self._play(wish, _scene(studio, programs, lesson), studio, programs)
+        scene = _scene(studio, programs, lesson)
+        self._origin = _origin(programs.robot, scene) if lesson is None else Pose()
+        played = await self._play(wish, scene, studio, programs)
         self._answer(wish, lesson, played)
 
     async def _play(self, wish: TrialWish, scene: Scene, studio: Studio, programs: Programs) -> Played:
@@ -74,6 +80,10 @@ class Trial:
             self._playing = None
 
     def _notice(self, news: dict[str, object]) -> None:
+        match news:
+            case {"x": float(x), "y": float(y), "yaw": float(yaw)}:
+                spot = self._origin.compose(Pose(x, y, yaw))
+                news = news | {"x": spot.x, "y": spot.y, "yaw": spot.yaw}
         self._send({"type": "trial", **news})
 
     def _answer(
@@ -108,6 +118,13 @@ def _scene(studio: Studio, programs: Programs, lesson: Lesson | None) -> Scene:
     if studio.scene_of is None:
         raise NotFound("there is no simulation here to try it in")
     return studio.scene_of(programs.robot.id)
+
+
+def _origin(robot: Robot, scene: Scene) -> Pose:
+    """Origin of the world in the robot's map, as the robot believes."""
+    if scene.start is None or Localization not in robot:
+        return Pose()
+    return robot[Localization].pose.compose(scene.start.inverse())
 
 
 async def _modules(programs: Programs, body: str) -> dict[str, str]:

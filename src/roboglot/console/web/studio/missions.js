@@ -87,6 +87,7 @@ function paint(canvas, scene, path) {
   pen.strokeStyle = c.path; pen.lineWidth = 4; pen.beginPath();
   path.forEach(([x, y], i) => { const [px, py] = at(x, y); if (i) pen.lineTo(px, py); else pen.moveTo(px, py); });
   pen.stroke();
+  if (!path.length && !scene.start) return; // where it is, is not known yet
   const [x, y, yaw] = path[path.length - 1] ?? [scene.start[0], scene.start[1], scene.start[2] * Math.PI / 180], [px, py] = at(x, y);
   pen.save(); pen.translate(px, py); pen.rotate(-yaw); pen.fillStyle = c.robot; pen.beginPath(); pen.moveTo(14, 0); pen.lineTo(-10, 9); pen.lineTo(-10, -9); pen.fill(); pen.restore();
 }
@@ -116,5 +117,5 @@ export function Missions() {
 export function Simulate() {
   if (program.value.lesson) return null;
   return html`<div class="buttons">${trying.value ? html`<${Button} icon="stop" label=${t("studio.stop")} onClick=${() => send({ type: "end_try" })} />` : html`<${Button} icon="eye" label=${t("studio.try")} onClick=${() => attempt("")} />`}</div>
-    ${(trying.value || trace.value.length > 1) && html`<${Chart} scene=${{ boxes: [], goals: [], start: trace.value[0] ?? [0, 0, 0] }} />`}<${Verdict} found=${outcome.value} />`;
+    ${(trying.value || trace.value.length > 1) && html`<${Chart} scene=${{ boxes: [], goals: [], start: null }} />`}<${Verdict} found=${outcome.value} />`;
 }
