@@ -32,6 +32,7 @@ FITS = 0.04  # m from a surface within which a point votes
 ONE_VOICE = 0.9  # share of the votes that the scan's pose needs
 VOTES_MIN = 4  # votes for odometry below which it is ignored, as far as the lidar's noise explains them
 NOISE_MAX = 0.1  # m between both poses from which no noise makes a point prefer the wrong one
+STOOD = 0.02  # m driven up to which a robot stood, and its wheels cannot be that wrong
 SIGMAS = 1.0  # of odometry: smaller contradictions are its own errors
 WAY_MAX, TURN_MAX = 0.3, 0.3  # m, rad: longer steps of odometry are no evidence against a scan
 PASTS = (1.0, 4.0)  # s of history over which odometry is compared again
@@ -99,7 +100,7 @@ class WheelWitness:
             far = Pose(by_wheels.x, by_wheels.y, before.yaw)
             sigma = self._sigma(driven_way, last.variance - then.variance + newest)
             driven = contested(grid, scan, far, best, prior, driven_way, sigma)
-            if driven is not None:
+            if driven is not None and driven_way <= STOOD:
                 self._forget_since(then)
         return driven
 
@@ -142,7 +143,7 @@ def contested(
     least = max(GAP_MIN, TELLING * apart)
     for_wheels = np.count_nonzero((off_scan - off_wheels > least) & (off_wheels < FITS))
     for_scan = np.count_nonzero((off_wheels - off_scan > least) & (off_scan < FITS))
-    if for_wheels < VOTES_MIN and apart < NOISE_MAX:
+    if for_wheels < VOTES_MIN and (apart < NOISE_MAX or way > STOOD):
         return None
     if for_scan >= ONE_VOICE * (for_scan + for_wheels):
         return None
