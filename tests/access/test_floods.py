@@ -63,7 +63,9 @@ def ask(line: socket.socket) -> bytes:
     return line.recv(64)
 
 
-@pytest.mark.parametrize("flood", FLOODS)
+@pytest.mark.parametrize(
+    "flood", [pytest.param(name, marks=[] if name == "log-ins" else pytest.mark.slow) for name in FLOODS]
+)
 def test_others_are_served_while_one_floods(attacked: tuple[ServedRobot, Path], flood: str) -> None:
     robot, phone = attacked
     with socket.create_connection((ADDRESS, 40923), 20, source_address=(FRIEND, 0)) as line:
