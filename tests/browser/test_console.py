@@ -15,13 +15,14 @@ from urllib.request import Request, urlopen
 
 import pytest
 
-from roboglot.config import ConsoleConfig, RobotConfig, load_config, with_addresses
+from roboglot.config import ConsoleConfig, RobotConfig, load_config
 from roboglot.model.components.mapping.map_library import MapLibrary
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.components.system.lease import Lease
 from roboglot.recording.reader import read_recording
 from roboglot.runtime import Runtime
+from roboglot.testing.addresses import free_addresses
 from tests.browser.served import ADDRESS, OpenConsole, Page, Served, becomes, drive_until, is_driven, shows
 from tests.browser.served import PAGE_PATIENCE as PATIENCE
 from tests.browser.served import until as until_page
@@ -275,7 +276,7 @@ async def test_languages_and_themes_change_while_it_runs(served: Served, open_co
 
 async def test_the_floor_that_is_shown_is_chosen(tmp_path: Path, browser: Any) -> None:
     base = load_config(None, {"data": str(tmp_path), "world": "office", "lockstep": True})
-    robots = with_addresses((RobotConfig("a", "universal"),))
+    robots = (RobotConfig("a", "universal", free_addresses(1)),)
     runtime = Runtime(replace(base, robots=robots, doors={}, console=ConsoleConfig(port=0)))
     assert runtime.console is not None
     await runtime.start()
@@ -294,7 +295,7 @@ async def test_the_floor_that_is_shown_is_chosen(tmp_path: Path, browser: Any) -
 
 async def test_robot_without_a_map_offers_nothing_of_one(tmp_path: Path, browser: Any) -> None:
     base = load_config(None, {"data": str(tmp_path), "world": "empty", "lockstep": True})
-    robots = with_addresses((RobotConfig("a", "robomaster_ep"),))
+    robots = (RobotConfig("a", "robomaster_ep", free_addresses(1)),)
     runtime = Runtime(replace(base, robots=robots, doors={}, console=ConsoleConfig(port=0)))
     assert runtime.console is not None
     await runtime.start()
