@@ -17,9 +17,9 @@ def test_pieces_are_as_the_whole(shape: tuple[int, int]) -> None:
     grid.evidence[random.random(shape) < 0.01] = 0
     points = random.uniform(-0.02, 1.02, (400, 2)) * (shape[1] * RESOLUTION, shape[0] * RESOLUTION)
     whole, cells = narrow(grid.evidence), np.floor(points / RESOLUTION).astype(int)
-    inside = ((cells >= 0) & (cells < shape[::-1])).all(axis=1)
-    expected = [bool(ok and whole[row, column]) for ok, (column, row) in zip(inside, cells, strict=True)]
-    assert 0 < sum(expected) < inside.sum()
+    inside = [0 <= row < shape[0] and 0 <= column < shape[1] for column, row in cells]
+    expected = [ok and bool(whole[row, column]) for ok, (column, row) in zip(inside, cells, strict=True)]
+    assert 0 < sum(expected) < sum(inside)
     assert NarrowPlaces().at(grid, points, 0.0).tolist() == expected
 
 

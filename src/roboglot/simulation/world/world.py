@@ -247,7 +247,7 @@ class World:
     def _tick(self) -> Iterator[None]:
         self._ticks += 1
         stamp = self._origin + self._ticks * TICK
-        robots = self._population.simulated.values()
+        robots = tuple(self._population.simulated.values())  # steps lie apart: one may join meanwhile
         for robot in robots:
             robot.control()
         yield
