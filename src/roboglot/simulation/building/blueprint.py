@@ -9,7 +9,6 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import lru_cache
 
 from roboglot.model.geometry import Pose
 from roboglot.simulation.world.description import (
@@ -27,7 +26,6 @@ DOCK_WIDTH, DOCK_DEPTH, DOCK_HEIGHT = 0.36, 0.12, 0.45
 SHAFT_WALL = 0.10
 OUTER_WALL = 0.20
 SHELF_LEG = 0.04
-FLOORS_KEPT = 16  # with their solids
 
 
 class SolidKind(StrEnum):
@@ -72,12 +70,8 @@ class Rectangle:
         return math.hypot(dx, dy)
 
 
-@lru_cache(maxsize=FLOORS_KEPT)
 def solids_of(floor: Floor, lift: Lift | None, lift_here: bool) -> tuple[Solid, ...]:
-    """All that stands still on one floor. ``lift_here``: the car is parked here, so the landing door is open.
-
-    A world's physics, radio, rays and pictures each ask for it, and the next robot's world again.
-    """
+    """All that stands still on one floor. ``lift_here``: the car is parked here, so the landing door is open."""
     return tuple(_solids(floor, lift, lift_here))
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from functools import lru_cache
 
 import msgspec
 
@@ -25,11 +24,9 @@ from roboglot.simulation.world.description import (
     WorldDescription,
 )
 
-WORLDS_KEPT = 8  # that were checked
 EDGE = 0.5  # m by which objects may protrude from a floor
 
 
-@lru_cache(maxsize=WORLDS_KEPT)
 def completed(world: WorldDescription, where: str) -> WorldDescription:
     """``world`` with every floor's ``like`` carried out. Raises BadFile that begins with ``where``."""
     floors: list[Floor] = []

@@ -12,8 +12,8 @@ from roboglot.model.components.interaction.armor import PlatePlace
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
+from roboglot.testing.addresses import free_addresses
 
-ADDRESS = "127.0.0.9"
 TOUR = Path(__file__).with_name("robomasterpy_tour.py")
 
 
@@ -77,10 +77,11 @@ def check(said: list[str], address: str, *, late: bool = False) -> None:
 
 @pytest.mark.world("office", body="robomaster_ep")
 async def test_robomasterpy_works_unmodified(robot, world, forward, vendor_ports) -> None:
-    door = RoboMasterDoor(robot, ADDRESS, RoboMasterConfig())
+    address = free_addresses(1)
+    door = RoboMasterDoor(robot, address, RoboMasterConfig())
     await door.start()
     tour = await asyncio.create_subprocess_exec(
-        sys.executable, str(TOUR), ADDRESS, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE
+        sys.executable, str(TOUR), address, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE
     )
     said: list[str] = []
     ended = asyncio.ensure_future(listen(tour, said, lambda: world.hands.touch_plate("a", PlatePlace.REAR)))
@@ -96,5 +97,5 @@ async def test_robomasterpy_works_unmodified(robot, world, forward, vendor_ports
             await ended
         await door.close()
     assert tour.returncode == 0, errors.decode()
-    check(said, ADDRESS)
+    check(said, address)
     assert robot[Odometry].reading.pose.x > 0.25
