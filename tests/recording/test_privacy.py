@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,8 +14,10 @@ from roboglot.model.components.system.network import Network
 from roboglot.model.tap import Direction, Exchange
 from roboglot.recording.playback import Playback
 from roboglot.recording.reader import read_messages, read_recording
+from roboglot.recording.redaction import Redaction
 from roboglot.recording.replaying import sendable
 from roboglot.wire.cyberdog.codes import Code
+from roboglot.wire.visual.replies import feedback, responses
 from tests.recording.everything import Session, begun
 
 NAMES = ("Xanthippe", "Aspasia")
@@ -90,3 +93,29 @@ async def test_redacted_requests_are_known_again(field: str) -> None:
 def test_redacted_requests_are_not_sent_again() -> None:
     session = exchanges(b'{"member": "[redacted]"}', b'{"member": ""}')
     assert sendable(session) == (session[2:], 1)
+
+
+@pytest.mark.parametrize("kind", ["personnel", "face", "voiceprint"])
+@pytest.mark.parametrize("name", ["Xanthippe", 'X "Y} Z'])
+def test_people_in_lists_of_programming_have_no_names(kind: str, name: str) -> None:
+    person = {"id": "1", "mode": kind, "style": "0", "condition": "1", "describe": name}
+    (frame,) = responses(kind="AI", id="x", items=[person, {**person, "id": "2"}])
+    for payload in (frame, json.dumps({"data": frame})):
+        found = Redaction()(payload.encode()).decode()
+        assert found.count("[redacted]") == 2
+        assert found.replace("[redacted]", "") == payload.replace(_inside(name, payload != frame), "")
+
+
+def _inside(text: str, nested: bool) -> str:
+    inside = json.dumps(text)[1:-1]
+    return json.dumps(inside)[1:-1] if nested else inside
+
+
+def test_descriptions_of_programs_stay() -> None:
+    frame = feedback(kind="task", id="x", target="t", operate="run", state=1, describe="line 3: face").encode()
+    assert Redaction()(frame) == frame
+
+
+@pytest.mark.parametrize("field", ["GRÖSSE", "größe"])
+def test_fields_beyond_ascii_are_left_out(field: str) -> None:
+    assert Redaction((field,))(json.dumps({field: "1 m"}, ensure_ascii=False).encode()).count(b"[redacted]") == 1
