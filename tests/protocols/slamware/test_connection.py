@@ -141,3 +141,18 @@ async def test_no_one_is_connected_elsewhere(bare_door: SlamwareDoor) -> None:
     assert (await raw(bare_door, b"CONNECT example.org:443 HTTP/1.1\r\nHost: example.org:443\r\n\r\n")).startswith(
         b"HTTP/1.1 400 "
     )
+
+
+async def test_trailers_let_no_page_in(bare_door: SlamwareDoor) -> None:
+    head = f"PUT {POIS}/x HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n"
+    head += "Transfer-Encoding: chunked\r\nExpect: 100-continue\r\n"
+    origin = "Origin: http://evil.example\r\n"
+    reader, writer = await asyncio.open_connection("127.0.0.1", bare_door.port)
+    try:
+        writer.write(f"{head}\r\n".encode())
+        assert await reader.readuntil(b"\r\n\r\n") == b"HTTP/1.1 100 Continue\r\n\r\n"  # the headers were looked at
+        writer.write(f"2\r\n{{}}\r\n0\r\n{origin}\r\n".encode())
+        assert b" 403 " not in await reader.readuntil(b"\r\n\r\n")
+    finally:
+        writer.close()
+    assert b" 403 " in await raw(bare_door, f"{head}{origin}\r\n2\r\n{{}}\r\n0\r\n\r\n".encode())

@@ -144,7 +144,7 @@ class Application:
             shared = [(b"access-control-allow-origin", b"*")]
         elif asked.origin is not None:
             shared = [(b"access-control-allow-origin", asked.origin.encode("latin-1")), (b"vary", b"Origin")]
-        self._admitted = method, rows, shared
+        self._admitted = method, list(rows), shared  # a copy: trailers are added to the list itself
         return shared
 
     def _log(self, client: str, scope: Scope, status: int, body: bytes, seconds: float) -> None:
