@@ -59,9 +59,8 @@ class SightLines:
         """All that stands there."""
         if floor not in self._still:
             solids = solids_of(self._world.floors[floor], self._world.lift, lift_here=True)
-            self._still[floor] = [
-                _row(solid) for solid in solids if solid.kind is not SolidKind.DOCK
-            ]  # docks are props
+            # Docks are props.
+            self._still[floor] = [_row(solid) for solid in solids if solid.kind is not SolidKind.DOCK]
         rows = [*self._still[floor], *(_row(solid) for solid in self._props.on(floor))]
         movers: dict[Hull | Walker, int] = {}
         for walker in self._walkers:
