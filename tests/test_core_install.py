@@ -20,6 +20,7 @@ import pytest
 from packaging.requirements import Requirement
 
 from roboglot.extras import EXTRA_OF, MODULES
+from roboglot.testing.addresses import free_addresses
 from roboglot.testing.process import served
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -74,7 +75,7 @@ def run(core: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 @pytest.fixture(scope="module")
 def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """A robot of this environment that the other one's commands talk to; its address."""
-    address = "127.0.0.177"
+    address = free_addresses(1)
     with served(tmp_path_factory.mktemp("up") / "data", "--no-console", address=address):
         yield address
 

@@ -16,8 +16,9 @@ from roboglot.model.clock import LockstepClock
 from roboglot.model.components.energy.power import Power
 from roboglot.model.components.system.settings import Settings
 from roboglot.runtime import Runtime
+from roboglot.testing.addresses import free_addresses
 
-ADDRESS = "127.0.0.62"
+ADDRESS = free_addresses(1)
 PORTS = (1448, 40923, 50052)
 
 

@@ -31,10 +31,11 @@ from roboglot.operations import Right
 from roboglot.runtime import Runtime
 from roboglot.storage.opening import open_registry
 from roboglot.storage.transactions import Connection, DatabaseError, Transactions
+from roboglot.testing.addresses import free_addresses
 from tests.storage.postgresql_server import PostgreSQLServer, binary_folder, needs_postgresql, postgresql_server
 
 T = TypeVar("T")
-ADDRESS = "127.0.0.177"
+ADDRESS = free_addresses(1)
 POSE = f"http://{ADDRESS}:1448/api/core/slam/v1/localization/pose"
 SEE, DRIVE = frozenset({Right.SEE}), frozenset({Right.DRIVE})
 ODD = "naïve 狗\0 \ue000 \ud800'; DROP TABLE audit; --"

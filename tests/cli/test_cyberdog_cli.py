@@ -13,10 +13,10 @@ from urllib.request import urlopen
 
 import pytest
 
-from roboglot.testing.addresses import free_port
+from roboglot.testing.addresses import free_addresses, free_port
 from roboglot.testing.process import served
 
-ADDRESS = "127.0.0.50"
+ADDRESS = free_addresses(1)
 Run = Callable[..., subprocess.CompletedProcess[str]]
 
 

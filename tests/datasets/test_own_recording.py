@@ -15,8 +15,9 @@ from roboglot.model.clock import LockstepClock
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.geometry import Pose
 from roboglot.runtime import Runtime
+from roboglot.testing.addresses import free_addresses
 
-ADDRESS = "127.0.0.84"
+ADDRESS = free_addresses(1)
 
 
 async def test_our_own_recording_becomes_a_map(tmp_path: Path) -> None:

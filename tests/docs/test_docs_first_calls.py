@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 import shutil
 import sys
-import zlib
 from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
 
 from roboglot.model.geometry import Pose
+from roboglot.testing.addresses import free_addresses
 from tests.docs.docs_terminal import ROOT, Terminal, terminal
 from tests.docs.test_docs import blocks
 
@@ -38,9 +38,8 @@ def first_call(page: str, language: str) -> str:
 
 
 @pytest.fixture
-async def user(tmp_path: Path, request: pytest.FixtureRequest) -> AsyncIterator[Terminal]:
-    address = f"127.0.7.{zlib.crc32(request.node.name.encode()) % 250 + 2}"  # tests run in parallel
-    async with terminal(tmp_path, address) as opened:
+async def user(tmp_path: Path) -> AsyncIterator[Terminal]:
+    async with terminal(tmp_path, free_addresses(1)) as opened:
         assert (await opened.type(".venv/bin/roboglot certs --export phone")).status == 0
         yield opened
 

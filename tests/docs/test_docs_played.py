@@ -12,6 +12,7 @@ from roboglot.config import AccessConfig
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.geometry import Point, Pose
 from roboglot.testing import assert_pose, passed_in_order
+from roboglot.testing.addresses import free_addresses
 from tests.docs.docs_terminal import ROOT, commands, terminal
 from tests.docs.test_docs import blocks
 
@@ -37,7 +38,7 @@ def inline(page: Path, words: str) -> str:
     ids=lambda page: page.name,
 )
 async def test_the_first_drive_ends_where_it_says(tmp_path: Path, page: Path) -> None:
-    async with terminal(tmp_path, "127.0.0.71") as user:
+    async with terminal(tmp_path, free_addresses(1)) as user:
         said = await user.type_block(block_with(page, "MoveToAction"))
         answered = re.fullmatch(r"ok;ok;(\S+) (\S+) (\S+);ok;", said[3].said)
         assert answered, said
@@ -54,7 +55,7 @@ async def test_the_first_drive_ends_where_it_says(tmp_path: Path, page: Path) ->
 
 
 async def test_the_rest_page_drives_and_stops(tmp_path: Path) -> None:
-    async with terminal(tmp_path, "127.0.0.72", body="hermes") as user:
+    async with terminal(tmp_path, free_addresses(1), body="hermes") as user:
         said = await user.type_block(block_with(DOCS / "slamware.md", "action-factories"))
         await user.stand()
         assert any('"status":4,"result":0' in each.said for each in said), said
@@ -66,7 +67,7 @@ async def test_the_rest_page_drives_and_stops(tmp_path: Path) -> None:
 @pytest.mark.parametrize("page", ["robomaster.md", "robomaster.zh.md"])
 async def test_the_text_page_begins_with_a_drive(page: str, tmp_path: Path) -> None:
     line, answer = next(blocks(DOCS / page, "")).splitlines()
-    async with terminal(tmp_path, "127.0.0.73", body="robomaster_ep") as user:
+    async with terminal(tmp_path, free_addresses(1), body="robomaster_ep") as user:
         ended = await user.type(line.removeprefix("$ "))
         numbers = r"-?\d+\.\d+"
         assert re.sub(numbers, "#", ended.said) == re.sub(numbers, "#", answer)
@@ -78,7 +79,7 @@ async def test_the_text_page_begins_with_a_drive(page: str, tmp_path: Path) -> N
 @pytest.mark.slow  # a long story; tests/protocols/cyberdog/maps has the tasks
 async def test_the_dogs_page_localizes_and_goes(tmp_path: Path) -> None:
     page = DOCS / "cyberdog.md"
-    async with terminal(tmp_path, "127.0.0.74") as user:
+    async with terminal(tmp_path, free_addresses(1)) as user:
         said = await user.type_block(block_with(page, 'goalX": 1.5'))
         first, last = next(blocks(page, "")).split("…")
         assert said[-1].said.startswith(first)
@@ -89,14 +90,14 @@ async def test_the_dogs_page_localizes_and_goes(tmp_path: Path) -> None:
 @pytest.mark.slow  # tests/cli/test_cyberdog_cli.py runs the command there, the English page above its messages
 async def test_the_dogs_chinese_page_goes_there_too(tmp_path: Path) -> None:
     [line] = re.findall(r"^.*cyberdog go 1.5 0.2", block_with(DOCS / "cyberdog.zh.md", "cyberdog go"), re.MULTILINE)
-    async with terminal(tmp_path, "127.0.0.75", body="cyberdog2") as user:
+    async with terminal(tmp_path, free_addresses(1), body="cyberdog2") as user:
         ended = await user.type(f"{line} --app-port {user.app_port}")
         assert ended.status == 0, ended
         assert_pose(user.moved, x=1.5, y=0.2, within=GOAL)
 
 
 async def test_the_consoles_page_drives_and_drains(tmp_path: Path) -> None:
-    async with terminal(tmp_path, "127.0.0.79", body="hermes") as user:
+    async with terminal(tmp_path, free_addresses(1), body="hermes") as user:
         said = await user.type_block(block_with(DOCS.parent / "console.md", "go_to"))
         assert '"a"' in said[0].said
         await user.stand()
@@ -106,7 +107,7 @@ async def test_the_consoles_page_drives_and_drains(tmp_path: Path) -> None:
 
 @pytest.mark.slow  # a long story; tests/cli/test_program.py has the commands
 async def test_the_page_of_programs_runs_and_keeps_them(tmp_path: Path) -> None:
-    async with terminal(tmp_path, "127.0.0.80", body="cyberdog2") as user:
+    async with terminal(tmp_path, free_addresses(1), body="cyberdog2") as user:
         (tmp_path / "my_program.py").write_text("cyberdog.motion.go_straight(0.5, 0.5)\nprint('there')\n")
         (tmp_path / "greet.py").write_text("def greet(name):\n    print('hello', name)\n")
         said = {}
@@ -123,7 +124,7 @@ async def test_the_page_of_programs_runs_and_keeps_them(tmp_path: Path) -> None:
 @pytest.mark.slow  # a long story; tests/drivers has the lease
 async def test_the_drivers_page_takes_and_releases_control(tmp_path: Path) -> None:
     block = block_with(DOCS.parent / "drivers.md", "lease b --take").replace("lease b", "lease a")
-    async with terminal(tmp_path, "127.0.0.81", body="hermes") as user:
+    async with terminal(tmp_path, free_addresses(1), body="hermes") as user:
         looked, taken, given, released = [ended.said for ended in await user.type_block(block)]
         assert "a" in looked
         assert len({looked, taken, given}) == 3
@@ -132,7 +133,7 @@ async def test_the_drivers_page_takes_and_releases_control(tmp_path: Path) -> No
 
 @pytest.mark.slow  # a long story; test_docs_first_calls has the page's first call
 async def test_the_dogs_page_photographs_and_films(tmp_path: Path) -> None:
-    async with terminal(tmp_path, "127.0.0.82", body="cyberdog2") as user:
+    async with terminal(tmp_path, free_addresses(1), body="cyberdog2") as user:
         block = block_with(DOCS / "cyberdog.md", "cyberdog photo")
         await user.type_block(block.replace("cyberdog ", f"cyberdog --app-port {user.app_port} "))
         assert (tmp_path / "door.jpg").read_bytes()[:2] == b"\xff\xd8"
@@ -141,7 +142,7 @@ async def test_the_dogs_page_photographs_and_films(tmp_path: Path) -> None:
 
 @pytest.mark.slow  # a long story; tests/recording has the commands
 async def test_the_page_of_recordings_records_what_runs(tmp_path: Path) -> None:
-    async with terminal(tmp_path, "127.0.0.83", body="hermes") as user:
+    async with terminal(tmp_path, free_addresses(1), body="hermes") as user:
         await user.type_block(block_with(DOCS.parent / "recording.md", "record mark", "bash"))
         ended = await user.type(".venv/bin/roboglot record info today.mcap")
         assert ended.status == 0, ended
@@ -151,7 +152,7 @@ async def test_the_page_of_recordings_records_what_runs(tmp_path: Path) -> None:
 async def test_page_of_access_lets_in_and_throws_out(tmp_path: Path) -> None:
     page = DOCS.parent / "access.md"
     pose = "http://127.0.0.1:1448/api/core/slam/v1/localization/pose"
-    async with terminal(tmp_path, "127.0.0.84", access=AccessConfig(on=True, local=False)) as user:
+    async with terminal(tmp_path, free_addresses(1), access=AccessConfig(on=True, local=False)) as user:
         guard = user.runtime.guard
         assert guard is not None
 
@@ -191,7 +192,7 @@ async def test_page_of_access_lets_in_and_throws_out(tmp_path: Path) -> None:
 
 
 async def test_the_text_client_drives_and_listens(tmp_path: Path, vendor_ports: None) -> None:
-    async with terminal(tmp_path, "127.0.0.76", body="robomaster_ep") as user:
+    async with terminal(tmp_path, free_addresses(1), body="robomaster_ep") as user:
         printed = await user.run(snippet("RoboMasterClient"), lines=4)
         where = printed[0]
         assert (where.x, where.y) == pytest.approx((0.5, 0.0), abs=SLACK)
@@ -199,7 +200,7 @@ async def test_the_text_client_drives_and_listens(tmp_path: Path, vendor_ports: 
 
 
 async def test_the_rest_client_goes_and_looks(tmp_path: Path) -> None:
-    async with terminal(tmp_path, "127.0.0.176") as user:
+    async with terminal(tmp_path, free_addresses(1)) as user:
         printed = await user.run(snippet("SlamwareClient"))
         assert printed, "progress"
         assert_pose(user.moved, x=1.0, y=0.5, deg=90)
@@ -207,7 +208,7 @@ async def test_the_rest_client_goes_and_looks(tmp_path: Path) -> None:
 
 @pytest.mark.slow  # a long story; tests/clients/cyberdog has the calls
 async def test_the_dogs_client_goes_photographs_and_walks(tmp_path: Path) -> None:
-    async with terminal(tmp_path, "127.0.0.78", body="cyberdog2") as user:
+    async with terminal(tmp_path, free_addresses(1), body="cyberdog2") as user:
         assert (await user.type(".venv/bin/roboglot certs --export phone")).status == 0
         await user.run(snippet("CyberDogClient"))
         assert passed_in_order(user.track, [Point(1.5, 0.2)], within=GOAL) == 1

@@ -13,11 +13,11 @@ import pytest
 from roboglot.clients.cyberdog import Certificates, CyberDogClient
 from roboglot.clients.cyberdog.values import FilesLeft, Grid, Label, UpdateProgress
 from roboglot.clients.errors import ClientError
-from roboglot.testing.addresses import free_port
+from roboglot.testing.addresses import free_addresses, free_port
 from roboglot.testing.process import ServedRobot, served
 from roboglot.wire.cyberdog.codes import TaskType
 
-ADDRESS = "127.0.0.49"
+ADDRESS = free_addresses(1)
 PATIENCE = 60.0  # s
 FILE = {"version": "1.3.2.0", "type": "FULL_PACKAGE", "md5": "0" * 32, "fileSize": 900_000_000, "fileName": "dog.zip"}
 SMALL = {**FILE, "fileSize": 30_000_000}  # 1.5 s to fetch, 3 s to install

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import httpx
 
+from roboglot.testing.addresses import free_addresses
 from roboglot.testing.process import served
 
-ADDRESS = "127.0.7.2"
+ADDRESS = free_addresses(1)
 SLAM, MULTI = "/api/core/slam/v1", "/api/multi-floor/map/v1"
 LINES = "/api/core/artifact/v1/lines/walls"
 WALL = {"start": {"x": 0.0, "y": 1.0}, "end": {"x": 2.0, "y": 1.0}, "metadata": {"colour": "red"}}

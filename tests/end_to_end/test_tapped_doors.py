@@ -18,10 +18,11 @@ from roboglot.model.clock import LockstepClock
 from roboglot.model.tap import Direction, Exchange
 from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.runtime import Runtime
+from roboglot.testing.addresses import free_addresses
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import GrpcAppStub
 
-ADDRESS = "127.0.0.94"
+ADDRESS = free_addresses(1)
 
 
 @pytest.fixture

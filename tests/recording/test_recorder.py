@@ -24,8 +24,9 @@ from roboglot.protocols.record_desk import NAME, Answer, Request
 from roboglot.recording.files import PartWriter
 from roboglot.recording.reader import pair, read_messages, read_recording
 from roboglot.runtime import Runtime
+from roboglot.testing.addresses import free_addresses
 
-ADDRESS = "127.0.0.83"
+ADDRESS = free_addresses(1)
 
 
 @pytest.fixture(autouse=True)

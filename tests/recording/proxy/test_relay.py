@@ -131,7 +131,7 @@ async def test_a_phone_and_its_dog_do_not_notice(tmp_path: Path) -> None:
     assert beats[0][0].payload == beats[1][0].payload  # also of the one that found the app
 
 
-async def test_client_that_looks_for_ep_finds_the_proxy(tmp_path: Path) -> None:
+async def test_client_that_looks_for_ep_finds_the_proxy(tmp_path: Path, vendor_ports: None) -> None:
     """The robot's address is not this machine's, so its broadcast comes from a socket that is bound to it."""
     path, found = tmp_path / "x.mcap", asyncio.get_running_loop().create_future()
 
