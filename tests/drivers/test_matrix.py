@@ -24,7 +24,7 @@ from tests.drivers.chain import EP_ADDRESS, Drive, ep_config, url_of
 from tests.drivers.fronts import Front, front
 from tests.drivers.rig import time_passes
 
-# Each vendor's protocol once, the other cells are slow. A door before a dog: test_cyberdog_driver.py.
+# Each vendor's protocol once, the other cells are slow. A door before a dog: cyberdog/test_driver.py.
 QUICK = {("slamware", "robomaster"), ("slamware", "cyberdog"), ("robomaster", "slamware")}
 CELLS = [
     pytest.param(back, door, marks=() if (back, door) in QUICK else pytest.mark.slow)

@@ -27,7 +27,7 @@ from roboglot.recording.proxy.sniffers import RestSniffer, TextSniffer, rest_ope
 from roboglot.recording.reader import pair, read_recording
 from roboglot.testing.addresses import free_port
 from roboglot.wire.cyberdog.chapters.system import HEARTBEAT
-from tests.recording.test_playback import ADDRESS, PROGRAM, by_frames, run, whole_closing
+from tests.recording.test_playback import ADDRESS, PROGRAM, by_frames, by_rest, run, whole_closing
 
 assert whole_closing  # a fixture for these tests, too
 BETWEEN = ADDRESS.replace("127.0.193.", "127.0.195.")
@@ -72,10 +72,11 @@ async def by_text(address: str) -> list[bytes]:
     ("url", "script"),
     [
         (f"slamware://{ADDRESS}", reading),
+        pytest.param(f"slamware://{ADDRESS}", by_rest, marks=pytest.mark.slow),
         (f"robomaster://{ADDRESS}", by_text),
         (f"visual://{ADDRESS}", by_frames),
     ],
-    ids=["slamware", "robomaster", "visual"],
+    ids=["slamware", "slamware drive", "robomaster", "visual"],
 )
 async def test_what_passes_is_what_robots_own_tap_says(url: str, script: Any, tmp_path: Path) -> None:
     own, passed = tmp_path / "own.mcap", tmp_path / "passed.mcap"
