@@ -154,7 +154,7 @@ async def use_a_phone(folder: Path) -> None:
     async with CyberDogClient(HERE, Certificates.load(out)) as dog:
         first = await dog.found()
         assert first.battery > 0
-        async with asyncio.timeout(20.0):
+        async with asyncio.timeout(60.0):
             while dog.heartbeat is None or dog.heartbeat.at == first.at:  # noqa: ASYNC110 - they come twice a second
                 await asyncio.sleep(0.05)
         await dog.stand()

@@ -79,7 +79,7 @@ async def test_a_half_closed_connection_is_answered() -> None:
         writer.close()
 
     server = await asyncio.start_server(answer, "127.0.0.1", 0)
-    async with tunnels(server.sockets[0].getsockname()[1]) as tunnel, asyncio.timeout(20.0):
+    async with tunnels(server.sockets[0].getsockname()[1]) as tunnel, asyncio.timeout(60.0):
         local = await asyncio.get_running_loop().create_server(tunnel.accept(1), "127.0.0.1", 0)
         reader, writer = await asyncio.open_connection(*local.sockets[0].getsockname())
         writer.write(b"hello")
@@ -137,7 +137,7 @@ async def test_both_ends_beat_often_while_the_client_drives(
         asked.set()
         return drives
 
-    async with tunnels(0, drives=driven) as own, asyncio.timeout(20.0):
+    async with tunnels(0, drives=driven) as own, asyncio.timeout(60.0):
         sent: list[bytes] = []
         monkeypatch.setattr(own._link, "send", lambda *frame: sent.append(frame[-1]))
         await asked.wait()

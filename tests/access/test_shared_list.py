@@ -202,7 +202,7 @@ async def test_programs_of_fleet_share_list_and_audit(server: PostgreSQLServer, 
         async with httpx.AsyncClient(headers=bearer) as client:
 
             async def answers(status: int) -> None:
-                async with asyncio.timeout(20.0):
+                async with asyncio.timeout(60.0):
                     while (await client.get(POSE)).status_code != status:  # noqa: ASYNC110 - a thread follows
                         await asyncio.sleep(0.02)
 
@@ -270,7 +270,7 @@ async def test_server_away_rights_stay_and_rows_are_kept(
                 return True
             return False
 
-        async with asyncio.timeout(20.0):
+        async with asyncio.timeout(60.0):
             while not await turned_away():  # noqa: ASYNC110 - a thread follows the server
                 await asyncio.sleep(0.02)
         guard.close()
@@ -285,7 +285,7 @@ def said(caplog: pytest.LogCaptureFixture) -> set[str]:
 
 
 async def until(condition: Callable[[], bool]) -> None:
-    async with asyncio.timeout(20.0):
+    async with asyncio.timeout(60.0):
         while not condition():  # noqa: ASYNC110 - a thread follows the server
             await asyncio.sleep(0.02)
 

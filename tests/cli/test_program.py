@@ -22,7 +22,7 @@ from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
 from roboglot.storage.programs import program_stores
 
-PATIENCE = 30.0  # s of the machine's time
+PATIENCE = 90.0  # s of the machine's time
 HELLO = "cyberdog.task.block('greet')\nprint('hello')\nprint('狗')\n"
 
 

@@ -70,7 +70,7 @@ async def answer(reader: asyncio.StreamReader) -> bytes:
         return head
 
 
-PATIENCE = 20.0  # s of the machine's time
+PATIENCE = 60.0  # s of the machine's time
 REQUEST = b"POST /programs HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 2\r\n\r\n{}"
 
 

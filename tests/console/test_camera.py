@@ -98,6 +98,6 @@ async def test_call_ends_when_its_caller_loses_the_right(monkeypatch: pytest.Mon
     calls._calls.add(call)
     calls._look_after(robot, call)
     assert not closed.is_set()
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(60):
         await closed.wait()
     assert not calls._calls

@@ -63,7 +63,7 @@ async def refused(driven: Robot) -> None:
 
 async def succeeds(driven: Robot, patience: float = 20.0, speed: float | None = None) -> None:
     action = driven[Driving].move_by(Pose(x=0.2), speed=speed, source="test")
-    async with asyncio.timeout(30):
+    async with asyncio.timeout(60):
         await until(driven.clock, lambda: action.status.ended, patience)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
 

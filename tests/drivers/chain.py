@@ -13,7 +13,7 @@ from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.testing import Forward
 from roboglot.testing.addresses import free_port
 
-PATIENCE = 20  # real seconds, on a busy machine
+PATIENCE = 60  # real seconds, on a busy machine
 EP_ADDRESS = "127.0.0.78"
 
 

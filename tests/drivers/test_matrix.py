@@ -106,7 +106,7 @@ async def test_a_cell(
             await agree(client, reported_start, world.truth.pose_of("a").relative_to(start))
         begun = world.truth.pose_of("a")
         await client.go()
-        async with asyncio.timeout(30):
+        async with asyncio.timeout(60):
             while world.truth.pose_of("a").distance_to(begun) < 0.1:
                 await robot.clock.sleep(0.05)
         await client.hang_up()

@@ -240,7 +240,7 @@ def test_a_mistake_ends_the_command(pair: ServedRobot, tmp_path: Path) -> None:
     assert "Traceback" not in done.stderr
 
 
-def wait_for(condition: object, seconds: float = 10.0) -> bool:
+def wait_for(condition: object, seconds: float = 60.0) -> bool:
     """Look until it holds; False if it never does."""
     assert callable(condition)
     end = time.monotonic() + seconds

@@ -77,7 +77,7 @@ async def meanwhile(asking: Awaitable[T], forward: Forward) -> T:
         if asked.done():
             break
         await forward(seconds=0.1)
-    return await asyncio.wait_for(asked, 20.0)
+    return await asyncio.wait_for(asked, 60.0)
 
 
 @every_body

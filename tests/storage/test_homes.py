@@ -301,7 +301,7 @@ class Held:
 
 def wait_for_a_lock(url: str) -> None:
     """Return when a transaction waits for another's."""
-    query, end = "SELECT count(*) FROM pg_stat_activity WHERE wait_event_type = 'Lock'", time.monotonic() + 20.0
+    query, end = "SELECT count(*) FROM pg_stat_activity WHERE wait_event_type = 'Lock'", time.monotonic() + 60.0
     with psycopg.connect(url, autocommit=True) as connection:
         while connection.execute(query).fetchone() == (0,):
             assert time.monotonic() < end

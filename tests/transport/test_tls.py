@@ -58,7 +58,7 @@ async def echoed(number: int, data: bytes, context: ssl.SSLContext | None) -> by
         return b""
     try:
         writer.write(data)
-        async with asyncio.timeout(20.0):
+        async with asyncio.timeout(60.0):
             return await reader.readexactly(len(data))
     except (asyncio.IncompleteReadError, ConnectionError):
         return b""
@@ -95,7 +95,7 @@ async def test_what_is_no_handshake_ends(tmp_path: Path, data: bytes, monkeypatc
     async with port(tmp_path) as (number, _):
         reader, writer = await asyncio.open_connection("127.0.0.1", number)
         writer.write(data)
-        async with asyncio.timeout(20.0):
+        async with asyncio.timeout(60.0):
             with contextlib.suppress(ConnectionError):
                 await reader.read()
         assert Echo.opened == 0
@@ -106,7 +106,7 @@ async def test_a_silent_connection_ends(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setattr(layer, "HANDSHAKE_SECONDS_MAX", 0.1)
     async with port(tmp_path) as (number, _):
         reader, writer = await asyncio.open_connection("127.0.0.1", number)
-        async with asyncio.timeout(20.0):
+        async with asyncio.timeout(60.0):
             with contextlib.suppress(ConnectionError):
                 assert await reader.read() == b""
         writer.close()
@@ -128,7 +128,7 @@ async def test_client_that_keeps_renewing_keys_is_cut_off(tmp_path: Path, monkey
         )
         assert client.stdin is not None
         try:
-            async with asyncio.timeout(20.0):
+            async with asyncio.timeout(60.0):
                 with contextlib.suppress(ConnectionError):
                     while client.returncode is None:
                         client.stdin.write(b"K\n")

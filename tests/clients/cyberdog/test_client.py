@@ -241,7 +241,7 @@ async def test_files_come_whole_with_their_share(client: CyberDogClient, door) -
 async def test_pictures_move(client: CyberDogClient, door, world) -> None:
     await client.found()
     await _until(lambda: door._context.app.connected)
-    async with asyncio.timeout(30), client.video() as pictures:
+    async with asyncio.timeout(60), client.video() as pictures:
         first = await pictures.next()
         await pictures.next()
     assert (first.width, first.height) == (1280, 720)
@@ -271,6 +271,6 @@ async def test_dead_link_is_reported_at_once_and_mends(client: CyberDogClient, d
 
 
 async def _until(condition: Any) -> None:
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(60):
         while not condition():  # noqa: ASYNC110
             await asyncio.sleep(0.01)

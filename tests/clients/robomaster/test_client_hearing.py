@@ -66,10 +66,10 @@ async def test_events(client, run, forward, robot, world) -> None:
         await run(client.sensor_adapter.event(True))
         world.hands.touch_plate("a", PlatePlace.REAR)
         await forward(seconds=0.2)
-        assert await asyncio.wait_for(anext(events), 5) == ArmorHit(1, 2)
+        assert await asyncio.wait_for(anext(events), 60) == ArmorHit(1, 2)
         world.hands.apply_voltage("a", 3, 2, 2.5)
         await forward(seconds=0.2)
-        assert await asyncio.wait_for(anext(events), 5) == AdapterLevel(3, 2, 1)
+        assert await asyncio.wait_for(anext(events), 60) == AdapterLevel(3, 2, 1)
 
 
 async def test_events_of_robot_whose_address_was_found_later(client, run, forward, robot, world) -> None:
@@ -80,7 +80,7 @@ async def test_events_of_robot_whose_address_was_found_later(client, run, forwar
             await run(late.armor.event(True))
             world.hands.touch_plate("a", PlatePlace.REAR)
             await forward(seconds=0.2)
-            assert await asyncio.wait_for(anext(events), 5) == ArmorHit(1, 2)
+            assert await asyncio.wait_for(anext(events), 60) == ArmorHit(1, 2)
 
 
 async def test_what_is_watched_ends_with_the_client(client) -> None:
@@ -134,7 +134,7 @@ async def test_sound(client, run, forward) -> None:
     first = asyncio.ensure_future(anext(packets))
     await run(asyncio.sleep(0.03))
     await forward(seconds=1)
-    got = [await first, *[await asyncio.wait_for(anext(packets), 5) for _ in range(20)]]
+    got = [await first, *[await asyncio.wait_for(anext(packets), 60) for _ in range(20)]]
     decoder = av.CodecContext.create("opus", "r")
     assert {len(packet) for packet in got} == {len(got[0])}, "not glued together"
     sounds = [sound for packet in got for sound in decoder.decode(av.Packet(packet))]

@@ -44,7 +44,7 @@ from tests.drivers.chain import Drive
 from tests.drivers.rig import time_passes
 
 pytestmark = pytest.mark.world("empty", body="cyberdog2")
-PATIENCE = 30  # real s
+PATIENCE = 60  # real s
 
 
 @pytest.fixture

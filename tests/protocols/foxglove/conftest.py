@@ -23,7 +23,7 @@ from roboglot.runtime import Runtime
 WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])  # files of this folder run in parallel
 ADDRESS = f"127.0.194.{1 + WORKER}"
 PORT = 8765
-PATIENCE = 20.0  # real s
+PATIENCE = 60.0  # real s
 
 
 class Viewer:

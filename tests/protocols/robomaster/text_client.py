@@ -8,7 +8,7 @@ import socket
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 
 ADDRESS = "127.0.0.9"
-PATIENCE = 5  # real seconds
+PATIENCE = 60  # real seconds
 
 
 class TextClient:

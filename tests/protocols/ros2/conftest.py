@@ -25,7 +25,7 @@ from roboglot.runtime import Runtime
 
 WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])  # files of this folder run in parallel
 ADDRESS, PORT = f"127.0.195.{1 + WORKER}", 7447
-PATIENCE = 20.0  # real s
+PATIENCE = 60.0  # real s
 STORE = get_typestore(Stores.ROS2_JAZZY)
 
 

@@ -15,7 +15,7 @@ ACTIONS = "/api/core/motion/v1/actions"
 POIS = "/api/core/artifact/v1/pois"
 
 
-async def raw(door: SlamwareDoor, data: bytes, *, wait: float = 5.0) -> bytes:
+async def raw(door: SlamwareDoor, data: bytes, *, wait: float = 60.0) -> bytes:
     """Send ``data``, say no more, read until the door closes."""
     reader, writer = await asyncio.open_connection("127.0.0.1", door.port)
     writer.write(data)
@@ -72,7 +72,7 @@ async def test_long_body_may_arrive_slowly_but_steadily(
     for _ in range(5):
         await asyncio.sleep(0.3)
         writer.write(b"x" * 1000)
-    assert b"Failed to install application" in await asyncio.wait_for(reader.read(), 5.0)
+    assert b"Failed to install application" in await asyncio.wait_for(reader.read(), 60.0)
     writer.close()
 
 
@@ -130,7 +130,7 @@ async def test_who_wishes_for_another_protocol_gets_plain_answer(
         for start in range(0, len(data), size):
             writer.write(data[start : start + size])
             await asyncio.sleep(0)
-        answers = await asyncio.wait_for(reader.read(), 5.0)
+        answers = await asyncio.wait_for(reader.read(), 60.0)
     writer.close()
     assert answers.count(b"HTTP/1.1 200 OK") == answers.count(b"HTTP/1.1 ") == 4
     assert answers.count(b'"id":"a"') == 3

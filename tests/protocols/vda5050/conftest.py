@@ -24,7 +24,7 @@ from tests.protocols.vda5050.orders import encoded
 
 mqtt = pytest.importorskip("paho.mqtt.client", reason="needs paho-mqtt, which aiomqtt brings")
 MOSQUITTO = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin")
-PATIENCE = 20.0  # real s
+PATIENCE = 60.0  # real s
 ADDRESS = "127.0.0.83"
 
 

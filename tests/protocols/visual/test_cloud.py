@@ -50,7 +50,7 @@ class Cloud:
         config = uvicorn.Config(BackEnd(self.store), host=HOST, port=self.port, lifespan="off", log_config=None)
         self._server = uvicorn.Server(config)
         self._serving = asyncio.create_task(self._server.serve())
-        async with asyncio.timeout(30):
+        async with asyncio.timeout(60):
             while not self._server.started:  # noqa: ASYNC110
                 await asyncio.sleep(0.005)
         self.port = self._server.servers[0].sockets[0].getsockname()[1]
@@ -69,7 +69,7 @@ class Cloud:
         bearer = f"Authorization: Bearer {token}\r\n" if token else ""
         data = body.encode()
         writer.write(f"{method} {path} HTTP/1.0\r\n{bearer}Content-Length: {len(data)}\r\n\r\n".encode() + data)
-        answer = await asyncio.wait_for(reader.read(), 30)
+        answer = await asyncio.wait_for(reader.read(), 60)
         writer.close()
         return parse_answer(answer.partition(b"\r\n\r\n")[2])
 
@@ -346,7 +346,7 @@ async def test_who_never_answers_is_given_up(clock: LockstepClock) -> None:
     server = await asyncio.start_server(silent, HOST, 0)
     link = CloudLink(f"http://{HOST}:{server.sockets[0].getsockname()[1]}", "t", "a", clock)
     asking = asyncio.create_task(link.post("{}"))
-    await asyncio.wait_for(connected.wait(), 30)
+    await asyncio.wait_for(connected.wait(), 60)
     await clock.advance(3.1)
     with pytest.raises(TimedOut):
         await asking

@@ -68,7 +68,7 @@ async def test_a_program_does_not_outlive_its_server(
         lines = iter(server.stdout.readline, "")
         worker = next(line for line in lines if line.strip().isdigit()).strip()
         server.kill()
-    deadline = time.monotonic() + 5
+    deadline = time.monotonic() + 60
     while runs(worker) and time.monotonic() < deadline:
         time.sleep(0.01)  # noqa: ASYNC251
     assert not runs(worker)

@@ -22,7 +22,7 @@ from tests.protocols.visual.front_end import Frame
 
 KILLS = int(os.environ.get("ROBOGLOT_KILLS", "6"))
 SPEED = 600.0  # a robot minute is 0.1 s here
-PATIENCE = 30.0  # s of the machine's time
+PATIENCE = 60.0  # s of the machine's time
 TASKS = ("t", "t1", "t10", "t100")
 MODULES = ("m", "m1")
 PADDING = "# " + "x" * 40_000

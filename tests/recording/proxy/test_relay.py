@@ -152,7 +152,7 @@ async def test_client_that_looks_for_ep_finds_the_proxy(tmp_path: Path, vendor_p
         other.send(b"robot ip 127.0.0.90;", "127.255.255.255", BROADCAST_PORT)
         robot.send(b"robot ip 127.0.0.89;", "127.255.255.255", BROADCAST_PORT)
         try:
-            return await asyncio.wait_for(found, 10)
+            return await asyncio.wait_for(found, 60)
         finally:
             for socket_of in (hearing, robot, other):
                 socket_of.close()
