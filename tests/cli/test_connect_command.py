@@ -60,7 +60,7 @@ def test_robots_of_gateway_are_on_addresses_of_range(tmp_path: Path) -> None:
                 assert sum("seen for the first time" in line for line in said) == 1
                 with urllib.request.urlopen(f"http://127.0.97.33:1448/{POSE}", timeout=60) as reply:
                     assert reply.status == 200
-                with socket.create_connection(("127.0.97.34", 40923), 20) as line:
+                with socket.create_connection(("127.0.97.34", 40923), 60) as line:
                     line.sendall(b"command;chassis speed x 0.1;")
                     got = b""
                     while got.count(b";") < 2:
