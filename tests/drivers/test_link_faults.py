@@ -80,6 +80,7 @@ FAULTS: dict[str, tuple[Callable[[Rig], Awaitable[None]], Callable[[Rig], Awaita
 # Each driver notices silence in its own way; the supervisor handles all other faults alike.
 QUICK = {
     *((back, "half-open") for back in BACKS),
+    ("slamware", "cut"),
     ("robomaster", "garbage"),
 }
 CELLS = [

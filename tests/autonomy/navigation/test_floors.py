@@ -103,7 +103,6 @@ async def test_unreadable_or_unwritable_floor_on_disk_is_reported(tour: Tour, ca
     assert await shelf.take(1) is None
 
 
-@pytest.mark.slow  # the ride itself: test_up_and_down_with_maps_and_docks
 async def test_a_lift_out_of_service_is_not_boarded(tour: Tour) -> None:
     say_where_the_lift_is(tour)
     assert tour.world.building.lift is not None
