@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
+import threading
 from collections.abc import Callable
 
 import grpc
@@ -53,3 +54,23 @@ async def test_server_made_within_wakes_so(monkeypatch: pytest.MonkeyPatch) -> N
             await channel.unary_unary("/nothing/there")(b"")
     await server.stop(None)
     assert takes
+
+
+def test_loops_of_two_threads_take_turns() -> None:
+    reads, writes = socket.socketpair()
+    left, others = list[int](), list[int]()
+
+    def wake() -> None:
+        other = threading.Thread(target=wakes._take, args=(reads, lambda: others.append(len(reads.recv(1)))))
+        other.start()
+        other.join()
+        left.append(len(reads.recv(1)))
+
+    with reads, writes:
+        reads.setblocking(False)
+        writes.send(bytes(5))
+        wakes._take(reads, wake)
+        assert (left, others) == ([1], [])
+        writes.send(bytes(1))
+        wakes._take(reads, lambda: left.append(len(reads.recv(1))))
+    assert left == [1, 1]

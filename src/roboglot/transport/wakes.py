@@ -12,10 +12,12 @@ import fcntl
 import socket
 import sys
 import termios
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 INT = 4  # bytes of the count that the kernel gives
+_reading = threading.Lock()  # the loops of all threads read one socket
 
 
 @contextmanager
@@ -36,9 +38,18 @@ def prompt_wakes() -> Iterator[None]:
 
 
 def _take(wakes: socket.socket, wake: Callable[[], object]) -> None:
-    """Read all bytes but the one that gRPC reads itself, then have it take the events."""
-    count = int.from_bytes(fcntl.ioctl(wakes, termios.FIONREAD, bytes(INT)), sys.byteorder)
-    if count > 1:
-        wakes.recv(count - 1)
-    if count:
-        wake()
+    """Read all bytes but the one that gRPC reads itself, then have it take the events, those of other loops, too.
+
+    Two threads at once could read that one as well: then neither would take the events. A loop that comes too early is
+    called again while there are bytes.
+    """
+    if not _reading.acquire(blocking=False):
+        return
+    try:
+        count = int.from_bytes(fcntl.ioctl(wakes, termios.FIONREAD, bytes(INT)), sys.byteorder)
+        if count > 1:
+            wakes.recv(count - 1)
+        if count:
+            wake()
+    finally:
+        _reading.release()
