@@ -35,22 +35,12 @@ async def carried(tour: Tour, x: float, y: float, deg: float) -> None:
 
 
 @pytest.mark.world("office")
-@pytest.mark.parametrize(
-    "places",
-    [
-        ((20.0, 10.2, 170.0), (13.0, 6.6, -60.0)),
-        pytest.param(((20.0, 10.2, 170.0), (13.0, 6.6, -60.0), (9.5, 9.7, 30.0)), marks=pytest.mark.slow),
-    ],
-    ids=len,
-)
-async def test_a_robot_carried_elsewhere_finds_itself(
-    tour: Tour, places: tuple[tuple[float, float, float], ...]
-) -> None:
+async def test_a_robot_carried_elsewhere_finds_itself(tour: Tour) -> None:
     await tour.go((12.0, 9.8))
     await tour.go((12.0, 6.5))
     jumps: list[PoseJumped] = []
     tour.robot.events.listen(PoseJumped, jumps.append)
-    for x, y, deg in places:
+    for x, y, deg in ((20.0, 10.2, 170.0), (13.0, 6.6, -60.0), (9.5, 9.7, 30.0)):
         await carried(tour, x, y, deg)
         assert tour.error[0] > 1.0
         action = await tour.end_of(tour.robot[Localization].relocalize())
