@@ -74,10 +74,13 @@ def test_wheels_that_slip_are_not_believed_alone(painted: EvidenceGrid) -> None:
 LEFT = 0.18  # m that the robot ahead drove on
 
 
-def seen(driven: float, far: float = 2.0) -> ScanPoints:
-    """Walls as ``far`` as it sees, two points of a pillar, and eight of a robot ahead that has ``driven`` on."""
+def seen(driven: float, far: float = 2.0, step: float = 0.03) -> ScanPoints:
+    """Walls as ``far`` as it sees, two points of a pillar, and eight of a robot ahead that has ``driven`` on.
+
+    More with a smaller ``step`` (m) between them.
+    """
     walls = np.concatenate([line((-far, y), (far, y)) for y in (-HALF, HALF)])
-    robot, pillar = line((1.3, 0.2), (1.3, 0.44)), line((-1.5, 0.1), (-1.5, 0.16))
+    robot, pillar = line((1.3, 0.2), (1.3, 0.44), step), line((-1.5, 0.1), (-1.5, 0.16))
     points = np.concatenate([walls, robot + np.array((driven, 0.0)), pillar])
     return ScanPoints(points, np.ones(len(points), np.uint8), points, Point())
 
@@ -93,12 +96,13 @@ def left() -> EvidenceGrid:
     return grid
 
 
-def test_robot_that_leaves_moves_none_that_stands(left: EvidenceGrid) -> None:
+@pytest.mark.parametrize(("far", "step"), [(2.0, 0.03), (1.5, 0.0095)], ids=["few to few", "few to many"])
+def test_robot_that_leaves_moves_none_that_stands(left: EvidenceGrid, far: float, step: float) -> None:
     """Few points tell, but no noise makes those on the pillar prefer the wrong place."""
     from roboglot.autonomy.slam.contest import contested
     from roboglot.autonomy.slam.matcher import FREE, fit
 
-    scan = seen(LEFT)
+    scan = seen(LEFT, far, step)
     misled = fit(left, scan, Pose(-LEFT), FREE, iterations=0)
     found = contested(left, scan, Pose(), misled, TIGHT, 0.0, 0.004)
     assert found is not None

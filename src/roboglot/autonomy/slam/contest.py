@@ -29,7 +29,7 @@ POINTS_MAX = 300
 TELLING, GAP_MIN, GAP_MAX = 0.3, 0.01, 0.2  # share of the contradiction, m, by which a point must prefer a pose; cap
 MAD, NOISES = 1.48, 1.5  # standard deviation from a median; the number of them that a contradiction needs
 FITS = 0.04  # m from a surface within which a point votes
-ONE_VOICE = 0.9  # share of the votes that the scan's pose needs
+ONE_VOICE, STOOD_VOICE = 0.9, 0.97  # share of the votes that the scan's pose needs; of a robot that stood, far from it
 VOTES_MIN = 4  # votes for odometry below which it is ignored, as far as the lidar's noise explains them
 NOISE_MAX = 0.1  # m between both poses from which no noise makes a point prefer the wrong one
 STOOD = 0.02  # m driven up to which a robot stood, and its wheels cannot be that wrong
@@ -143,9 +143,10 @@ def contested(
     least = max(GAP_MIN, TELLING * apart)
     for_wheels = np.count_nonzero((off_scan - off_wheels > least) & (off_wheels < FITS))
     for_scan = np.count_nonzero((off_wheels - off_scan > least) & (off_scan < FITS))
-    if for_wheels < VOTES_MIN and (apart < NOISE_MAX or way > STOOD):
+    jumped = apart >= NOISE_MAX and way <= STOOD
+    if for_wheels < VOTES_MIN and not jumped:
         return None
-    if for_scan >= ONE_VOICE * (for_scan + for_wheels):
+    if for_scan >= (STOOD_VOICE if jumped else ONE_VOICE) * (for_scan + for_wheels):
         return None
     return driven
 
