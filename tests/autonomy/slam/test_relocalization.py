@@ -52,11 +52,13 @@ async def test_a_robot_carried_elsewhere_finds_itself(tour: Tour) -> None:
         assert jumps[-1].pose.distance_to(tour.robot[Localization].pose) < 0.01
 
 
-@pytest.mark.slow  # one that is set down before: test_a_robot_carried_elsewhere_finds_itself
 @pytest.mark.world("office")
 @pytest.mark.parametrize(
     ("x", "y", "deg", "towards"),
-    [(9.5, 9.7, 30.0, -30.0), (20.0, 10.2, 170.0, 0.0), (13.0, 6.6, -60.0, 0.0)],
+    [
+        (9.5, 9.7, 30.0, -30.0),
+        *(pytest.param(*place, 0.0, marks=pytest.mark.slow) for place in ((20.0, 10.2, 170.0), (13.0, 6.6, -60.0))),
+    ],
 )
 async def test_who_is_carried_on_is_found_there(tour: Tour, x: float, y: float, deg: float, towards: float) -> None:
     await tour.go((12.0, 9.8))
