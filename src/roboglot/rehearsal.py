@@ -127,8 +127,10 @@ class Rehearsals:
         return self._loop
 
     async def _end(self) -> None:
-        for task in asyncio.all_tasks() - {asyncio.current_task()}:
+        tasks = asyncio.all_tasks() - {asyncio.current_task()}
+        for task in tasks:
             task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
         if self._engine is not None:
             await self._engine.close()
 
@@ -215,15 +217,18 @@ class _Play:
 
     async def _answer(self, event: Call, run: Run, session: Session) -> None:
         answering = asyncio.ensure_future(call_function(session, event.name, event.args, event.kwargs))
-        await self.clock.advance(0.0)
-        while not answering.done():
-            if self.clock.time() - self._began > self.scene.longest:
+        try:
+            await self.clock.advance(0.0)
+            while not answering.done() and self.clock.time() - self._began <= self.scene.longest:
+                await self._pass(LOOK)
+        finally:  # also when the play is called off
+            if late := not answering.done():
                 answering.cancel()
                 await asyncio.gather(answering, return_exceptions=True)
-                self.played.late = self._over = True
-                await run.kill()
-                return
-            await self._pass(LOOK)
+        if late:
+            self.played.late = self._over = True
+            await run.kill()
+            return
         self._note_lights()
         try:
             run.calls.reply(event.id, answering.result())

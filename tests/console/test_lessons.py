@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import re
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -13,6 +14,8 @@ import typer
 
 from roboglot.cli.lesson import command
 from roboglot.console.studio.lessons import FOLDER, Grade, Lesson, grade, load, read
+from roboglot.programs.functions.table import call
+from roboglot.programs.rehearsing import Scene
 from roboglot.rehearsal import Rehearsals
 
 LESSONS = load([FOLDER])
@@ -73,6 +76,28 @@ async def test_a_teacher_writes_one_in_ten_lines(rehearsals: Rehearsals) -> None
     lesson = read(TEN_LINES)
     assert (await graded(rehearsals, lesson, lesson.solution)).stars == 3
     assert (await graded(rehearsals, lesson, "x = 1")).rows[-1].en == "The dog said nothing."
+
+
+@pytest.mark.parametrize("how", ["called off", "closed"])
+async def test_a_play_leaves_no_call_behind(how: str) -> None:
+    made, sleeps, printed = Rehearsals(), asyncio.Event(), asyncio.Event()
+
+    def notice(news: dict[str, object]) -> None:
+        if news["what"] == "print":
+            printed.set()
+        elif printed.is_set():
+            sleeps.set()
+
+    playing = asyncio.ensure_future(made.play("print(1)\ntime.sleep(9)", Scene(), speed=1.0, notice=notice))
+    await asyncio.wait_for(sleeps.wait(), 60)
+    if how == "called off":
+        playing.cancel()
+        await made.play("", Scene(), speed=0)  # in its turn: the other has ended
+    else:
+        await made.close()
+    tasks = [one for one in gc.get_objects() if isinstance(one, asyncio.Task) and not one.done()]
+    assert [task for task in tasks if getattr(task.get_coro(), "__name__", "") == call.__name__] == []
+    await made.close()
 
 
 async def test_an_endless_program_is_ended(rehearsals: Rehearsals) -> None:
