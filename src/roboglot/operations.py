@@ -132,6 +132,9 @@ class OperationTable(Generic[K]):
         """The operation under ``key``, or None."""
         return self._operations.get(key)
 
+    def __getitem__(self, key: K) -> Operation[K]:
+        return self._operations[key]
+
     def __contains__(self, key: K) -> bool:
         return key in self._operations
 

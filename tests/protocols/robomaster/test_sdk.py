@@ -1,6 +1,7 @@
 """SDK mode, versions, the robot chapter, sequence numbers, and everything that is refused."""
 
 import asyncio
+from dataclasses import replace
 
 import pytest
 
@@ -144,4 +145,15 @@ async def test_broken_part_is_fail_for_one_command_only(client, robot, caplog, m
     monkeypatch.setattr(type(robot[Base]), "wheel_speeds", property(lambda _self: 1 / 0))
     assert await client.ask("chassis speed ?;") == "fail;"
     assert "broke" in caplog.text
+    assert await client.ask("robot mode ?;") == "chassis_lead;"
+
+
+async def test_kept_lines_find_the_current_handler(client, monkeypatch) -> None:
+    async def other(_context: object) -> str:
+        return "another"
+
+    assert await client.ask("robot mode ?;") == "chassis_lead;"
+    with monkeypatch.context() as patched:
+        patched.setitem(TABLE._operations, "robot mode ?", replace(TABLE["robot mode ?"], handler=other))
+        assert await client.ask("robot mode ?;") == "another;"
     assert await client.ask("robot mode ?;") == "chassis_lead;"

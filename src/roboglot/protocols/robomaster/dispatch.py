@@ -9,7 +9,7 @@ from functools import lru_cache, partial
 
 from roboglot.model.errors import NotFound, RobotError
 from roboglot.model.stand_in import StandIn
-from roboglot.operations import BadParameters, Operation, Right
+from roboglot.operations import BadParameters, Right
 from roboglot.protocols.robomaster.chapters import (  # noqa: F401
     ai,
     arm,
@@ -98,12 +98,13 @@ async def _answered(context: Context, text: str | None, asked: _Asked) -> Answer
         if text is None:
             raise _Refusal(Reply.PARSE_ERROR, lambda: f"longer than {LINE_MAX} bytes")
         seq = _parsed(text).seq
-        operation, _ = _meant(text, context.active)
-        asked.key = operation.key
+        key, _ = _meant(text, context.active)
+        operation = TABLE[key]
+        asked.key = key
         if context.robot.tap.watched:
-            asked.began = context.robot.tap.request(DOOR, operation.key, text)
+            asked.began = context.robot.tap.request(DOOR, key, text)
         if context.robot.admission.asks:
-            context.robot.admission.check(DOOR, operation.key, operation.right)
+            context.robot.admission.check(DOOR, key, operation.right)
         values = _checked(text, context.active, context.profile.as_robots)
         result: str | Sequence[Number | str] | None = await operation.handler(context, **values)
     except (Malformed, _Refusal) as refusal:
@@ -163,28 +164,28 @@ def _parsed(text: str) -> Command:
 
 
 @lru_cache(KEPT_MAX)
-def _meant(text: str, active: bool) -> tuple[Operation[str], Sequence[str]]:
-    """Return the operation that is meant, in SDK mode or outside of it, and the words left for its parameters."""
+def _meant(text: str, active: bool) -> tuple[str, Sequence[str]]:
+    """Return the key of what is meant, in SDK mode or outside of it, and the words left for its parameters."""
     command = _parsed(text)
     for key, words in command.keys:
         if not active and key not in OUTSIDE_SDK_MODE:
             continue
-        if operation := TABLE.get(key):
-            return operation, words
+        if key in TABLE:
+            return key, words
     raise _Refusal(Reply.PARSE_ERROR, partial(_unknown, command))
 
 
 @lru_cache(KEPT_MAX)
 def _checked(text: str, active: bool, as_robots: bool) -> Mapping[str, object]:
     """Return the handler's parameters; not to be changed."""
-    operation, words = _meant(text, active)
-    shape = shape_of(operation, as_robots)
-    values = _values(operation.key, shape, words)
+    key, words = _meant(text, active)
+    shape = shape_of(TABLE[key], as_robots)
+    values = _values(key, shape, words)
     try:
         return shape.check(values)
     except BadParameters as error:
         why = str(error)
-        raise _Refusal(Reply.FAIL, lambda: nearest_values(operation.key, shape, values) or why) from None
+        raise _Refusal(Reply.FAIL, lambda: nearest_values(key, shape, values) or why) from None
 
 
 def _unknown(command: Command) -> str:
