@@ -20,7 +20,7 @@ IDS_MAX = 10_000
 def sendable(exchanges: Sequence[Exchange]) -> tuple[list[Exchange], int]:
     """Return a session without the requests whose values were redacted, and their answers; and how many those are.
 
-    A robot must not be told that its Wi-Fi, or a person, is called "[redacted]".
+    Sent as they are, they would name a robot's Wi-Fi, or a person, "[redacted]".
     """
     asked, _ = pair(exchanges)
     held = [one for one in asked if REDACTED in one.request.payload]
