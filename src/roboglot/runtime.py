@@ -296,6 +296,7 @@ class Runtime:
 
         desk = Desk(world, self.fleet.robots, self.fleet.world.hands, listed, studio, running)
         desk.recordings = Recordings(self.config.data, lambda: self.recorder)
+        desk.sessions = data / "sessions.db" if self.guard is not None else None
         return desk
 
     def _scene_of(self, name: str) -> Scene:

@@ -164,7 +164,9 @@ async def test_a_teacher_stops_and_locks(tmp_path: Path) -> None:
                 await session.frame(socket, "run")
                 await session.clock.advance(1.1)
                 await asyncio.gather(program_runs.end_all(desk, "a"), session.clock.advance(0.5))
-            classes = Classes(desk, Classroom(), lambda name: program_runs.end_all(desk, name), set, lambda _: None)
+            classes = Classes(
+                desk, Classroom(), lambda name: program_runs.end_all(desk, name), set, lambda _: asyncio.sleep(0)
+            )
             await asyncio.gather(classes._do_with("lock", "a"), session.clock.advance(0.5))
             await session.rest.get_pose()
             await classes._do_with("unlock", "a")

@@ -44,7 +44,7 @@ GOING_AWAY, BAD_DATA, POLICY, TRY_LATER = 1001, 1003, 1008, 1013
 class Application:
     """One console's. ``pages`` and ``sessions`` (of the studio) are those open now."""
 
-    def __init__(self, desk: Desk, browsers: Browsers, classroom: Classroom | None, page: str) -> None:
+    def __init__(self, desk: Desk, browsers: Browsers, classroom: Classroom | None, login: Sessions, page: str) -> None:
         """``classroom``: the one of this program; without it the one of ``desk.studio.home``. ``page``: our address."""
         self._desk, self._browsers = desk, browsers
         self._assets = Assets()
@@ -53,8 +53,10 @@ class Application:
         self._ending: set[asyncio.Task[None]] = set()  # classes that are ending
         self._classroom = self._enter_classroom(classroom, page)
         self._listening: dict[asyncio.Task[None], str] = {}  # and the page's client
-        self._login = Sessions()
+        self._login = login
         self._classes = Classes(desk, self._classroom, self._stop, self._listening.values, self._put_out)
+        for left in login.all():
+            self._classes.restore(left)
         self._api = Api(desk, self._classes)
         self._codes = Limiter(JOIN_TRIES / 60.0, JOIN_BURST, time.monotonic)
         self._signing = Signing(desk, self._login, self._classes)
@@ -69,6 +71,7 @@ class Application:
         if self._metrics is not None:
             self._metrics.close()
         await self._api.calls.close()
+        await asyncio.to_thread(self._login.close)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "http":
@@ -212,8 +215,8 @@ class Application:
             page.close()
             sending.cancel()
 
-    def _put_out(self, who: str) -> None:
-        self._login.end_all_of(who)
+    async def _put_out(self, who: str) -> None:
+        await self._login.end_all_of(who)
         self._close_pages_of(who)
 
     def _close_pages_of(self, who: str) -> None:

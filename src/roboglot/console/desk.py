@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from roboglot.console import drawings
@@ -55,6 +56,7 @@ class Desk:
     studio: Studio = field(default_factory=Studio)
     running: Callable[[], int] = lambda: 0
     recordings: Recordings | None = None
+    sessions: Path | None = None  # the file of signed-in browsers, where names are asked for
     views: dict[str, RobotView] = field(init=False)
     pupils: set[str] = field(default_factory=set)  # identities of the pupils in the open class
     locked: set[str] = field(default_factory=set)  # robots that only a teacher may move

@@ -9,6 +9,7 @@ import importlib
 import logging
 import math
 import socket
+import sqlite3
 import time
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
@@ -20,6 +21,7 @@ from roboglot.console.settings import BEAT, BEAT_PAGES, PORTS_TRIED_MAX
 from roboglot.extras import MissingExtra, in_words, is_there
 from roboglot.model.admission import Admission
 from roboglot.model.background import load
+from roboglot.model.errors import RobotError
 from roboglot.protocols.browsers import Browsers
 from roboglot.protocols.gate import Gate
 from roboglot.transport.tls import Tls
@@ -27,6 +29,7 @@ from roboglot.transport.tls import Tls
 if TYPE_CHECKING:
     from roboglot.console.application import Application
     from roboglot.console.live import Page
+    from roboglot.console.people.sessions import Sessions
     from roboglot.console.studio.classroom import Classroom
 
 log = logging.getLogger(__name__)
@@ -86,7 +89,8 @@ class Console:
 
         browsers = Browsers("[console]", self._config.origins, self._config.hosts)
         classroom = await asyncio.to_thread(self._build_classroom)
-        self._application = Application(self._desk, browsers, classroom, self.address)
+        login = await asyncio.to_thread(self._open_sessions)
+        self._application = Application(self._desk, browsers, classroom, login, self.address)
         config = Config(
             self._application,
             ws="wsproto",
@@ -116,6 +120,19 @@ class Console:
 
         folder = self._desk.studio.classes
         return Classroom(ClassFiles(folder)) if folder is not None and self._desk.studio.home is None else None
+
+    def _open_sessions(self) -> Sessions:
+        """Return the sessions that a former program left, or none if they cannot be read."""
+        from roboglot.console.people.session_file import SessionFile
+        from roboglot.console.people.sessions import Sessions
+
+        if self._desk.sessions is None:
+            return Sessions()
+        try:
+            return Sessions(SessionFile(self._desk.sessions))
+        except (OSError, ValueError, sqlite3.Error, RobotError) as error:
+            log.error("cannot read who was signed in, all sign in again: %s: %s", self._desk.sessions, error)
+            return Sessions()
 
     async def _push(self, application: Application) -> None:
         """Send metrics to the collector."""

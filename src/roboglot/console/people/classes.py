@@ -1,7 +1,8 @@
 """Classes: a teacher opens one for the robots here, pupils join by its code and get a robot each.
 
 A pupil is a guest of the admission where one is configured: with the right to program that robot, for the lesson, and
-no other. What the teacher locks, only the teacher moves. A class lives as long as the program.
+no other. What the teacher locks, only the teacher moves. A class lives as long as the program; after a restart its
+pupils, as those of the studio's classes, are in the studio's class of its code, with their robots.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import msgspec
 
 from roboglot.console.desk import CLIENT, Desk
 from roboglot.console.http import Problem
+from roboglot.console.people.sessions import Session
 from roboglot.console.studio import class_wishes, classroom
 from roboglot.model.admission import Proof, Right
 from roboglot.model.components.system.lease import Lease
@@ -81,7 +83,7 @@ class Classes:
         room: classroom.Room,
         stop: Callable[[str], Awaitable[None]],
         present: Callable[[], Collection[str]],
-        put_out: Callable[[str], None],
+        put_out: Callable[[str], Awaitable[None]],
         now: Callable[[], float] = time.monotonic,
     ) -> None:
         self._desk, self._room, self._stop = desk, room, stop
@@ -136,6 +138,13 @@ class Classes:
     def _least_used(self, lesson: Lesson) -> str:
         taken = [seat.robot for seat in lesson.seats.values()]
         return min(self._desk.robots, key=taken.count)
+
+    def restore(self, session: Session) -> None:
+        """Have a pupil whose session outlived the program in the class again, with the robot of before."""
+        if session.code and session.robot in self._desk.robots:
+            lesson = self._studio.setdefault(session.code, Lesson(session.code, "", 0.0))
+            lesson.seats[session.name] = Seat(session.name, session.robot, session.code, None, studio=True)
+            self._desk.pupils.add(session.name)
 
     async def end(self, code: str) -> None:
         """A class of the studio is over: its pupils have robots no more."""
@@ -225,7 +234,7 @@ class Classes:
             with contextlib.suppress(RobotError):
                 await _release(self._desk.robots[seat.robot])
         await self._desk.robots[seat.robot].admission.shut_out(seat.identity)
-        self._put_out(seat.identity)
+        await self._put_out(seat.identity)
 
     def _check_teacher(self) -> None:
         if not self._desk.may_teach:

@@ -45,7 +45,7 @@ async def enter(desk: Desk, sessions: Sessions, scope: Scope) -> str:
             raise
         except Unknown:
             if session is not None:  # a session replaces earlier proofs
-                sessions.end(cookie_of(scope))
+                await sessions.end(cookie_of(scope))
             raise
     named = who if shown and admission is not None else session.name if session is not None else ""
     ask_for(f"{CLIENT} {named or address.rpartition(':')[0]}".strip(), address, who)

@@ -1,7 +1,8 @@
 """Sessions of browsers: a cookie stands for what a person showed at the log-in page, until they log out.
 
-A session holds the proof and not the verdict: every request asks the admission anew, so that a password that was
-changed or a right that was revoked counts for signed-in browsers as it does for everybody else.
+A session outlives the program, if there is a file for it. It holds the proof and not the verdict: every request asks
+the admission anew, so that a password that was changed or a right that was revoked counts for signed-in browsers as it
+does for everybody else.
 """
 
 from __future__ import annotations
@@ -10,9 +11,10 @@ import hashlib
 import secrets
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from roboglot.model.admission import Proof
+from roboglot.console.people.session_file import KeptSession, SessionFile, seal, unseal
+from roboglot.model.admission import NO_PROOF, Proof
 
 COOKIE = "roboglot"
 COOKIE_MAX = 4096  # characters of a Cookie header that are read
@@ -34,37 +36,71 @@ class Session:
 
 
 class Sessions:
-    """All of one console, in memory: only hashes of the cookies are kept."""
+    """All of one console: only hashes of the cookies are kept. With a ``file`` they outlive the program.
 
-    def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
-        self._now = now
-        self._sessions: dict[str, Session] = {}
+    Raises DatabaseError if it cannot be read.
+    """
 
-    def open(self, proof: Proof, name: str, robot: str = "", code: str = "") -> str:
+    def __init__(self, file: SessionFile | None = None, now: Callable[[], float] = time.time) -> None:
+        self._file, self._now = file, now
+        left = file.load(now()) if file is not None else []
+        self._sessions = {kept.key: Session(NO_PROOF, kept.name, kept.until, kept.robot, kept.code) for kept in left}
+        self._sealed = {kept.key: kept.sealed for kept in left}  # proofs of those that have not come back yet
+
+    def all(self) -> list[Session]:
+        """All that last; the proof of one that has not come back since the program began is unknown."""
+        return [session for session in self._sessions.values() if session.until > self._now()]
+
+    async def open(self, proof: Proof, name: str, robot: str = "", code: str = "") -> str:
         """Begin a session; returns the cookie's value."""
         now = self._now()
-        self._sessions = {key: session for key, session in self._sessions.items() if session.until > now}
-        own = [key for key, session in self._sessions.items() if session.name == name]
-        for key in own[: len(own) - SESSIONS_OF_ONE_MAX + 1] if len(own) >= SESSIONS_OF_ONE_MAX else ():
-            del self._sessions[key]
-        if len(self._sessions) >= SESSIONS_MAX:
-            del self._sessions[next(iter(self._sessions))]
+        ended = [key for key, session in self._sessions.items() if session.until <= now]
+        own = [key for key, session in self._sessions.items() if session.name == name and key not in ended]
+        ended += own[: len(own) - SESSIONS_OF_ONE_MAX + 1] if len(own) >= SESSIONS_OF_ONE_MAX else []
+        if len(self._sessions) - len(ended) >= SESSIONS_MAX:
+            ended.append(next(key for key in self._sessions if key not in ended))
         token = secrets.token_urlsafe(TOKEN_BYTES)
-        self._sessions[_key(token)] = Session(proof, name, now + LIFETIME, robot, code)
+        session = self._sessions[_key(token)] = Session(proof, name, now + LIFETIME, robot, code)
+        await self._drop(ended)
+        if self._file is not None:
+            kept = KeptSession(_key(token), name, seal(proof, token), session.until, robot, code)
+            await self._file.keep(kept)
         return token
 
     def find(self, token: str) -> Session | None:
         """The session of a cookie, while it lasts."""
-        session = self._sessions.get(_key(token)) if token else None
-        return session if session is not None and session.until > self._now() else None
+        key = _key(token) if token else ""
+        session = self._sessions.get(key)
+        if session is None or session.until <= self._now():
+            return None
+        if (sealed := self._sealed.pop(key, None)) is not None:
+            proof = unseal(sealed, token)
+            if proof is None:
+                del self._sessions[key]
+                return None
+            session = self._sessions[key] = replace(session, proof=proof)
+        return session
 
-    def end(self, token: str) -> None:
+    async def end(self, token: str) -> None:
         """End one session."""
-        self._sessions.pop(_key(token), None)
+        if token and _key(token) in self._sessions:
+            await self._drop([_key(token)])
 
-    def end_all_of(self, name: str) -> None:
+    async def end_all_of(self, name: str) -> None:
         """End every session of one person."""
-        self._sessions = {key: session for key, session in self._sessions.items() if session.name != name}
+        await self._drop([key for key, session in self._sessions.items() if session.name == name])
+
+    async def _drop(self, keys: list[str]) -> None:
+        for key in keys:
+            self._sessions.pop(key, None)
+            self._sealed.pop(key, None)
+        if keys and self._file is not None:
+            await self._file.drop(keys)
+
+    def close(self) -> None:
+        """Finish writing."""
+        if self._file is not None:
+            self._file.close()
 
 
 def cookie_name(port: int) -> str:

@@ -48,7 +48,7 @@ class Signing:
         name = cookie_name((scope.get("server") or ("", 0))[1] or 0)
         secure = scope.get("scheme") == "https"
         if scope["path"] == SIGN_OUT:
-            self._sessions.end(cookie_of(scope))
+            await self._sessions.end(cookie_of(scope))
             await answer_json(send, {"name": ""}, 200, [set_cookie(name, "", secure=secure)])
             return True
         try:
@@ -59,7 +59,7 @@ class Signing:
         if not token:  # the pupil belongs to another world
             await answer_json(send, answer)
             return True
-        self._sessions.end(cookie_of(scope))  # a session that others may know is not continued
+        await self._sessions.end(cookie_of(scope))  # a session that others may know is not continued
         await answer_json(send, answer, 200, [set_cookie(name, token, secure=secure)])
         return True
 
@@ -78,7 +78,7 @@ class Signing:
             raise Problem(429, str(locked)) from None
         except Unknown as unknown:
             raise Problem(401, str(unknown)) from None
-        return self._sessions.open(proof, who), {"name": who}
+        return await self._sessions.open(proof, who), {"name": who}
 
     async def _join(self, address: str, shown: Shown) -> tuple[str, dict[str, object]]:
         host = address.rpartition(":")[0]
@@ -88,7 +88,7 @@ class Signing:
         self._tries.give_back(host)
         if isinstance(seat, Elsewhere):
             return "", {"elsewhere": seat.page, "code": seat.code, "name": seat.name}
-        token = self._sessions.open(seat.proof or NO_PROOF, seat.identity, seat.robot, seat.code)
+        token = await self._sessions.open(seat.proof or NO_PROOF, seat.identity, seat.robot, seat.code)
         answer: dict[str, object] = {"name": seat.identity, "robot": seat.robot}
         return token, answer | ({"studio": seat.code} if seat.studio else {})
 

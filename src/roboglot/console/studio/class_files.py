@@ -30,11 +30,12 @@ class Bag(msgspec.Struct):
 
 
 class Sheet(msgspec.Struct):
-    """A class."""
+    """A class. ``until``: Unix time (s) at which its code admits no more pupils."""
 
     code: str
     name: str
     only: str = ""
+    until: float = 0.0
     bags: list[Bag] = []
 
 
@@ -52,11 +53,11 @@ class ClassFiles:
             return []
         return [sheet for folder in folders[-CLASSES_MAX:] if (sheet := _read_class(folder)) is not None]
 
-    def begin(self, code: str, name: str, only: str) -> None:
-        """Keep a class. Raises OSError."""
+    def begin(self, code: str, name: str, only: str, until: float) -> None:
+        """Keep a class, in place of what was there of it. Raises OSError."""
         folder = self._folder / code
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        _write(folder / CLASS, msgspec.json.encode(Sheet(code, name, only)))
+        _write(folder / CLASS, msgspec.json.encode(Sheet(code, name, only, until)))
 
     def keep(self, code: str, bag: Bag) -> None:
         """Keep what a pupil handed in, in place of what was there. Raises OSError."""

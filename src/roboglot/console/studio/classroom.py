@@ -142,12 +142,13 @@ class Room(Protocol):
 class Classroom:
     """All classes of one console, or of the consoles of all ``worlds``. What pupils hand in is kept in ``files``."""
 
-    def __init__(self, files: ClassFiles | None = None, now: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, files: ClassFiles | None = None, now: Callable[[], float] = time.time) -> None:
         self._files, self._writing, self.now = files, asyncio.Lock(), now
         self.worlds: dict[str, World] = {}
         self.classes: dict[str, Class] = {}
         for sheet in files.load() if files else []:
             kept = self.classes[sheet.code] = Class(sheet.code, sheet.name, sheet.only)
+            kept.until = sheet.until
             for bag in sheet.bags:
                 doing = Doing(stars=bag.all_stars, program=bag.program)
                 kept.pupils[bag.name] = Pupil(bag.name, bag.world, "", None, doing, bag)
@@ -179,12 +180,20 @@ class Classroom:
             await self.end(oldest.code)
         code = code or "".join(secrets.choice(CODE_LETTERS) for _ in range(CODE_LENGTH))
         opened = self.classes[code] = Class(code, name, only)
-        if self._files is not None:
-            try:
-                await asyncio.to_thread(self._files.begin, code, name, only)
-            except OSError as error:
-                log.error("cannot keep class %s: %s", code, error)
+        await self.save(opened)
         return opened
+
+    async def save(self, kept: Class) -> None:
+        """Save a class's own data."""
+        if self._files is None:
+            return
+        async with self._writing:
+            if self.classes.get(kept.code) is not kept:
+                return  # it was ended meanwhile
+            try:
+                await asyncio.to_thread(self._files.begin, kept.code, kept.name, kept.only, kept.until)
+            except OSError as error:
+                log.error("cannot keep class %s: %s", kept.code, error)
 
     async def end(self, code: str) -> None:
         """Forget a class, with what was handed in; pages in it hear that."""
@@ -196,7 +205,8 @@ class Classroom:
         for world in self.worlds.values():
             world.end(code)
         if self._files is not None:
-            await asyncio.to_thread(self._files.end, code)
+            async with self._writing:
+                await asyncio.to_thread(self._files.end, code)
 
     async def admit(self, code: str, name: str, at: str = "") -> Place:
         """Return the world of a pupil who signs in at some world with a class's code. Raises NotFound, Refused."""
@@ -289,6 +299,7 @@ class Seat:
         opened.until = self._room.now() + OPEN_SECONDS
         opened.teachers.add(self)
         opened.tell_teachers()
+        await self._room.save(opened)
 
     async def _join(self, wish: Member) -> None:
         name, joined = wish.name.strip(), self._room.find(wish.code)

@@ -1,0 +1,103 @@
+"""Sessions of browsers on the disk: no one has to sign in again because the program was started again.
+
+The file lets no one in: of a cookie it has a hash, and what its owner showed is sealed by the cookie itself.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from roboglot.model.admission import Proof, ProofKind
+from roboglot.model.errors import RobotError
+from roboglot.storage.opening import open_private
+from roboglot.storage.transactions import Connection
+
+log = logging.getLogger(__name__)
+SCHEMA = "roboglot.storage.schema.sessions"
+NONCE_BYTES = 12
+
+
+@dataclass(frozen=True, slots=True)
+class KeptSession:
+    """Row of the file. ``until``: Unix time (s)."""
+
+    key: str
+    name: str
+    sealed: bytes
+    until: float
+    robot: str
+    code: str
+
+
+class SessionFile:
+    """The file of one console. Raises OSError, ValueError, sqlite3.Error, DatabaseError if it cannot be opened."""
+
+    def __init__(self, path: Path) -> None:
+        self._database = open_private(path, SCHEMA)
+
+    def load(self, now: float) -> list[KeptSession]:
+        """Return what lasts at ``now``, the oldest first, and delete the others. Raises DatabaseError."""
+
+        def work(connection: Connection) -> list[KeptSession]:
+            connection.execute("DELETE FROM session WHERE until<=?", (now,))
+            rows = connection.execute("SELECT key, name, proof, until, robot, code FROM session ORDER BY until")
+            return [KeptSession(*row) for row in rows]
+
+        return self._database.run_now(work)
+
+    async def keep(self, session: KeptSession) -> None:
+        """Write a session; one that cannot be written lasts until the program ends."""
+        values = (session.key, session.name, session.sealed, session.until, session.robot, session.code)
+        insert = "INSERT OR REPLACE INTO session (key, name, proof, until, robot, code) VALUES (?, ?, ?, ?, ?, ?)"
+        try:
+            await self._database.run(lambda connection: connection.execute(insert, values).rowcount)
+        except RobotError as error:
+            log.error("cannot keep the session of %s over a restart: %s", session.name, error)
+
+    async def drop(self, keys: list[str]) -> None:
+        """Delete sessions."""
+        rows = [(key,) for key in keys]
+
+        def work(connection: Connection) -> None:
+            connection.executemany("DELETE FROM session WHERE key=?", rows)
+
+        try:
+            await self._database.run(work)
+        except RobotError as error:
+            log.error("cannot end %d sessions for good, a restart brings them back: %s", len(keys), error)
+
+    def close(self) -> None:
+        """Finish writing."""
+        self._database.close()
+
+
+def seal(proof: Proof, token: str) -> bytes:
+    """Return a proof that only who has the cookie can read."""
+    from cryptography.hazmat.primitives.ciphers.aead import ChaCha20Poly1305
+
+    nonce = os.urandom(NONCE_BYTES)
+    text = f"{proof.kind}\n{proof.value}".encode("utf-8", "surrogatepass")
+    return nonce + ChaCha20Poly1305(_sealing(token)).encrypt(nonce, text, None)
+
+
+def unseal(sealed: bytes, token: str) -> Proof | None:
+    """Return the proof; None if the cookie is another, or the row was changed."""
+    from cryptography.exceptions import InvalidTag
+    from cryptography.hazmat.primitives.ciphers.aead import ChaCha20Poly1305
+
+    nonce, text = sealed[:NONCE_BYTES], sealed[NONCE_BYTES:]
+    try:
+        opened = ChaCha20Poly1305(_sealing(token)).decrypt(nonce, text, None)
+        kind, _, value = opened.decode("utf-8", "surrogatepass").partition("\n")
+        return Proof(ProofKind(kind), value)
+    except (InvalidTag, ValueError):
+        return None
+
+
+def _sealing(token: str) -> bytes:
+    """Return the key; it does not follow from the hash that the file has of the cookie."""
+    return hashlib.sha256(b"seal" + token.encode("utf-8", "surrogatepass")).digest()

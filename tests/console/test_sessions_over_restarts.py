@@ -1,0 +1,112 @@
+"""Browsers stay signed in when the program is started again; what ended a session before, or meanwhile, counts."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from pathlib import Path
+from typing import Any
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
+
+import pytest
+
+from roboglot.access.store import Grant, open_store
+from roboglot.config import AccessConfig
+from roboglot.console.people.session_file import KeptSession, SessionFile, seal
+from roboglot.console.people.sessions import LIFETIME, Sessions
+from roboglot.model.admission import Proof, ProofKind
+from roboglot.operations import Right
+from tests.console.conftest import ADDRESS, Shown
+from tests.console.test_class_sign_in import PASSWORD, paged, signed
+from tests.console.test_classes import asked, grid, opened, world
+from tests.console.test_studio_socket import SAVE
+
+PROOF = Proof(ProofKind.HTTP, "Basic a secret")
+
+
+async def test_file_lets_no_one_in_but_the_cookie(tmp_path: Path) -> None:
+    now = 1000.0
+    first = Sessions(SessionFile(tmp_path / "s.db"), lambda: now)
+    cookie, left = await first.open(PROOF, "anna"), await first.open(PROOF, "ben")
+    await first.end(left)
+    first.close()
+    kept = b"".join(file.read_bytes() for file in sorted(tmp_path.glob("*")))  # noqa: ASYNC240 - small
+    assert b"anna" in kept
+    assert not [secret for secret in (cookie, "a secret") if secret.encode() in kept]
+    assert (tmp_path / "s.db").stat().st_mode & 0o077 == 0
+
+    second = Sessions(SessionFile(tmp_path / "s.db"), lambda: now)
+    assert [session.name for session in second.all()] == ["anna"]
+    assert second.find("another") is second.find(left) is None
+    found = second.find(cookie)
+    assert found is not None
+    assert found.proof == PROOF
+    assert second.find(cookie) == found
+    second.close()
+    now += LIFETIME
+    assert Sessions(SessionFile(tmp_path / "s.db"), lambda: now).find(cookie) is None
+
+
+async def test_a_row_that_was_changed_is_no_session(tmp_path: Path) -> None:
+    file = SessionFile(tmp_path / "s.db")
+    before = Sessions(file)
+    cookie = await before.open(PROOF, "anna")
+    [kept] = file.load(0.0)
+    await file.keep(KeptSession(kept.key, "mx", seal(PROOF, "another cookie"), kept.until, "", ""))
+    assert Sessions(file).find(cookie) is None
+
+
+def me(url: str, cookie: str) -> str:
+    """Return the name under which a browser comes in; empty if it does not."""
+    try:
+        with urlopen(Request(f"{url}/api/me", headers={"Cookie": cookie}), timeout=60) as reply:
+            found: dict[str, Any] = json.loads(reply.read())
+            return str(found["name"])
+    except HTTPError as error:
+        return "" if error.code == 401 else str(error)
+
+
+async def names(shown: Shown, *cookies: str) -> list[str]:
+    return [await asyncio.to_thread(me, shown.url, cookie) for cookie in cookies]
+
+
+async def test_a_class_goes_on_after_a_restart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
+    asking = AccessConfig(on=True, local=False)
+    (tmp_path / "w").mkdir()
+    store = open_store(tmp_path / "w")
+    for name in ("mx", "gone", "changed"):
+        store.add_person(name, PASSWORD, [Grant("*", frozenset({Right.ADMIN}))])
+    async with world(tmp_path, "w", ADDRESS, shared=False, access=asking) as shown:
+        _, _, teacher = await signed(shown, name="mx", password=PASSWORD)
+        _, _, gone = await signed(shown, name="gone", password=PASSWORD)
+        _, _, changed = await signed(shown, name="changed", password=PASSWORD)
+        async with paged(shown, teacher) as page:
+            code = await opened(page)
+            _, _, anna = await signed(shown, name="Anna", code=code)
+            _, _, ben = await signed(shown, name="Ben", code=code)
+        assert await names(shown, teacher, gone, anna) == ["mx", "gone", f"Anna@{code}"]
+        request = Request(f"{shown.url}/api/sign_out", data=b"{}", headers={"Cookie": gone})
+        await asyncio.to_thread(lambda: urlopen(request, timeout=60).close())
+    store.rotate("changed", "another long secret")
+    store.close()
+    async with world(tmp_path, "w", ADDRESS, shared=False, access=asking) as shown:
+        port = shown.url.rpartition(":")[2]  # another one, and cookies have it in their names
+        again = [f"roboglot-{port}={cookie.partition('=')[2]}" for cookie in (teacher, anna, ben, gone, changed)]
+        assert await names(shown, *again[3:]) == ["", ""]
+        again = again[:3]
+        assert await names(shown, *again) == ["mx", f"Anna@{code}", f"Ben@{code}"]
+        assert (await signed(shown, name="Cem", code=code))[0] == 200  # though its teacher is not back yet
+        async with paged(shown, again[0]) as page, paged(shown, again[1]) as pupil:
+            await asked(pupil, do="join", code="ZZZZZZ", name="Ben", id=3)  # a pupil still, under the name of before
+            assert (await pupil.kind("joined"))["name"] == "Anna"
+            assert (await pupil.frame(**SAVE, id="1", body="print(1)\n"))["feedback"]["state"] == 0
+            await asked(page, do="open", code=code)
+            await grid(page, name="Anna", here=True)
+            await asked(page, do="close")
+            assert (await page.kind("ended"))["type"] == "ended"
+        assert (await signed(shown, name="Anna", code=code))[0] == 401
+        async with asyncio.timeout(60):  # they are put out one by one
+            while await names(shown, *again) != ["mx", "", ""]:  # also who did not come back with a page
+                pass
