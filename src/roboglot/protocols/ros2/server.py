@@ -23,6 +23,7 @@ from roboglot.protocols.door import Endpoint
 from roboglot.protocols.ros2.config import Ros2Config
 from roboglot.protocols.ros2.context import Context
 from roboglot.protocols.ros2.dispatch import MESSAGE_MAX, answer
+from roboglot.protocols.ros2.table import PUBLISHED
 from roboglot.protocols.ros2.vocabulary import DOOR, TYPES
 from roboglot.transport.seldom import Seldom
 from roboglot.wire.ros2.zenoh import KEPT, RELIABLE, Node, attachment, topic_key
@@ -40,7 +41,6 @@ PENDING_MAX = 32  # messages queued for handling; beyond this they are dropped a
 PICTURE_PERIOD = 0.2  # s
 JPEG_QUALITY = 80
 NODE = "roboglot"
-SHOWN = frozenset({"scan", "transforms", "pose", "grid", "battery", "pressure"})  # kinds of a recording
 
 
 class Ros2Door:
@@ -243,7 +243,7 @@ class Ros2Door:
         """Publish what a recording would keep, as far as ROS has a type for it."""
         if entry.kind == "battery":  # a recording contains changes only; ROS expects it periodically
             self._battery = entry
-        if entry.kind in SHOWN:
+        if entry.kind in PUBLISHED:
             self._show(entry)
 
     def _show(self, entry: Entry) -> None:

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from itertools import chain
+
 from roboglot.operations import OperationTable
 
 TABLE: OperationTable[str] = OperationTable("ros2")
-PUBLISHED = frozenset(
-    {"scan", "odom", "tf", "tf_static", "map", "battery_state", "pose", "pressure", "rosout", "image/compressed"}
-)
-
+# Kinds of a recording's entries that are published, and the topics of each.
+PUBLISHED = {
+    "scan": ("scan",),
+    "transforms": ("odom", "tf", "tf_static"),
+    "pose": ("pose",),
+    "grid": ("map",),
+    "battery": ("battery_state",),
+    "pressure": ("pressure",),
+}
+NOT_RECORDED = ("rosout", "image/compressed")  # topics that the door makes itself
 
 implemented, partly = TABLE.implemented, TABLE.partly
 
@@ -19,7 +27,7 @@ class Messages:
     @staticmethod
     def implemented() -> set[str]:
         """Keys of ``ros2_messages``."""
-        return set(PUBLISHED)
+        return {*chain.from_iterable(PUBLISHED.values()), *NOT_RECORDED}
 
     @staticmethod
     def partly() -> dict[str, str]:
