@@ -180,14 +180,21 @@ class Life:
         await self.let_pass(self.web.post("/api/multi-floor/map/v1/stcm/:save"))
 
 
+def objects() -> int:
+    """Count the objects of this process, also those that were set aside since: each library that loads sets all aside."""
+    gc.unfreeze()
+    gc.collect()
+    return len(gc.get_objects())
+
+
 def measure() -> dict[str, float]:
     """Resident memory, objects and descriptors of this process, without what the C library keeps for later."""
-    gc.collect()
+    count = objects()
     ctypes.CDLL(None).malloc_trim(0)
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return {
         "RSS, MB": pages * os.sysconf("SC_PAGE_SIZE") / 1e6,
-        "objects": len(gc.get_objects()),
+        "objects": count,
         "descriptors": len(os.listdir("/proc/self/fd")),
     }
 
@@ -204,7 +211,6 @@ async def born(data: Path) -> AsyncIterator[Life]:
     )
     runtime = Runtime(config)
     await runtime.start()
-    gc.unfreeze()  # count what exists now, too
     life = Life(runtime)
     try:
         yield life

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import gc
 import os
 from pathlib import Path
 
@@ -27,8 +26,7 @@ async def test_connections_and_programs_keep_nothing(tmp_path: Path) -> None:
             for _ in range(PROGRAMS):
                 await life.program()
             await life.new_map()
-            gc.collect()
-            objects.append(len(gc.get_objects()))
+            objects.append(soak.objects())
             descriptors.append(len(os.listdir("/proc/self/fd")))
     assert descriptors[-1] <= descriptors[SETTLED]
     assert objects[-1] <= objects[SETTLED] * GROWTH_MAX, objects
