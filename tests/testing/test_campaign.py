@@ -50,7 +50,19 @@ def trial(seed: int, fingerprint: str = "f") -> Trial:
 
 def begin(folder: Path, *options: str) -> subprocess.Popen[str]:
     command = [sys.executable, "-u", "-m", "roboglot", "campaign", "scenarios", "--workers", "2", *options]
-    return subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    pipe = subprocess.PIPE
+    return subprocess.Popen(
+        command, cwd=folder, stdout=pipe, stderr=subprocess.STDOUT, text=True, start_new_session=True
+    )
+
+
+def fork_server_of(process: subprocess.Popen[str]) -> bool:
+    """Return whether the process from which it forks trials has begun to load."""
+    for path in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split():
+        with contextlib.suppress(OSError):
+            if b"multiprocessing.forkserver" in Path(f"/proc/{path}/cmdline").read_bytes():
+                return True
+    return False
 
 
 def rows(folder: Path) -> Sequence[dict[str, str]]:
@@ -92,6 +104,17 @@ def test_interrupted_campaign_leaves_a_table_and_no_process(folder: Path) -> Non
     assert "1 of 2 trials were played" in said
     assert (folder / "campaign/report.md").exists()
     assert not still_sleeping()
+
+
+def test_ctrl_c_while_kernels_load_interrupts_in_words(folder: Path) -> None:
+    (folder / "scenarios/a_stays.yaml").write_text(STAYS)
+    process = begin(folder, "--seeds", "1")
+    wait_until(lambda: fork_server_of(process))
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does
+    said, _ = process.communicate(timeout=180)
+    assert process.returncode == 130, said
+    assert "0 of 1 trials were played" in said
+    assert "Traceback" not in said
 
 
 def test_a_killed_campaign_leaves_no_process(folder: Path) -> None:

@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from multiprocessing import forkserver
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -44,6 +45,7 @@ def play_here(trials: Iterator[Trial], workers: int, seconds_max: float, leave: 
     os.environ.update(ENVIRONMENT)
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(PRELOADED)
+    _start_fork_server()
     running: list[_Running] = []
 
     def start(trial: Trial, attempt: int) -> None:
@@ -75,6 +77,15 @@ def play_here(trials: Iterator[Trial], workers: int, seconds_max: float, leave: 
             for one in running:
                 _end(one.process)
     raise KeyboardInterrupt
+
+
+def _start_fork_server() -> None:
+    """Start the process from which trials are forked: Ctrl-C is for the campaign alone, also while that one loads."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # a new program inherits what is ignored, not a handler
+    try:
+        forkserver.ensure_running()
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @contextlib.contextmanager
@@ -122,6 +133,7 @@ def _end(process: BaseProcess) -> None:
 def _play(trial: Trial, leave: Path | None, mouth: Connection) -> None:
     """Play in the forked process: a group of its own, so that Ctrl-C reaches the campaign alone; it ends with that."""
     os.setpgid(0, 0)
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # for the commands of its scenario
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     threading.Thread(target=_end_with_campaign, daemon=True).start()
     mouth.send_bytes(msgspec.json.encode(play_trial(trial, leave)))
