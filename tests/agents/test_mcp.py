@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import socket
 import sys
 from collections.abc import AsyncIterator
 from typing import TYPE_CHECKING, Any
@@ -83,8 +84,25 @@ async def test_over_standard_input(shown: Shown) -> None:
         assert [robot["name"] for robot in await call(client, "robots")] == ["a"]
 
 
-@pytest.mark.slow  # the tools: test_over_standard_input
 async def test_over_streamable_http(shown: Shown) -> None:
+    from mcp import Client
+    from uvicorn import Config, Server
+
+    from roboglot.agents.server import make_server
+
+    app = make_server(ConsoleClient(shown.url)).streamable_http_app()
+    server = Server(Config(app, log_config=None))
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        serving = asyncio.create_task(server.serve([listening]))
+        async with Client(f"http://127.0.0.1:{listening.getsockname()[1]}/mcp") as client:
+            assert {tool.name for tool in (await client.list_tools()).tools} >= TOOLS
+            assert (await call(client, "where_am_i"))["name"] == "a"
+        server.should_exit = True
+        await serving
+
+
+@pytest.mark.slow  # a process of its own: the same server as above, the same process as test_over_standard_input
+async def test_the_command_serves_streamable_http(shown: Shown) -> None:
     from mcp import Client
 
     port = free_port()

@@ -151,7 +151,7 @@ def rest(served: Served, x: float) -> tuple[int, str]:
         return error.code, error.read().decode()
 
 
-@pytest.mark.slow  # long; tests/protocols/test_lease_desk.py has the rules
+@pytest.mark.slow  # long; tests/console/test_live.py has two pages without a browser
 async def test_two_browsers_and_rest_client_contend_for_control(served: Served, open_console: OpenConsole) -> None:
     anna, ben = await open_console("anna"), await open_console("ben")
     await anna.click("text=Take control")

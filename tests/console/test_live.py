@@ -14,6 +14,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from roboglot.console.live import Page
 from roboglot.console.server import those_due
 from roboglot.console.settings import BEAT_PAGES
+from roboglot.model.components.system.lease import Lease
 from tests.console.conftest import Shown
 
 
@@ -42,6 +43,32 @@ async def test_page_without_map_gets_poses_each_second(shown: Shown) -> None:
         await reading.send(json.dumps({"type": "watch", "robot": "a", "moving": True}))
         while not isinstance(await reading.recv(), bytes):  # by now the map is shown
             pass
+
+
+async def test_two_pages_contend_for_control(shown: Shown) -> None:
+    """The one who took control moves the robot, the others are refused by name; a page may take it from the other."""
+    live = shown.url.replace("http", "ws") + "/live"
+
+    async def done(page: ClientConnection, verb: str, **values: object) -> str:
+        """Return why a page's wish is refused; empty: it is done."""
+        await page.send(json.dumps({"type": "do", "id": 1, "robot": "a", "verb": verb, "values": values}))
+        while True:
+            text = await page.recv()
+            if isinstance(text, str) and (answer := json.loads(text))["type"] == "done":
+                return str(answer.get("error", ""))
+
+    async with connect(live) as anna, connect(live) as ben, asyncio.timeout(60):
+        for page, name in ((anna, "anna"), (ben, "ben")):
+            await page.send(json.dumps({"type": "hello", "name": name}))
+        assert await done(anna, "take_control") == ""
+        assert shown.robot[Lease].taken_by == "console anna"
+        assert "taken by console anna" in await done(ben, "go_to", points=[[1, 0]])
+        assert shown.robot.actions.running() == []
+        assert await done(ben, "take_control") == ""
+        assert "taken by console ben" in await done(anna, "go_to", points=[[1, 0]])
+        assert await done(ben, "release_control") == ""
+        assert await done(anna, "go_to", points=[[1, 0]]) == ""
+        assert len(shown.robot.actions.running()) == 1
 
 
 @given(drawing=st.integers(0, 32), reading=st.integers(0, 32), number=st.integers(0, 10_000))

@@ -81,6 +81,7 @@ FAULTS: dict[str, tuple[Callable[[Rig], Awaitable[None]], Callable[[Rig], Awaita
 QUICK = {
     *((back, "half-open") for back in BACKS),
     ("slamware", "cut"),
+    ("slamware", "restart"),
     ("robomaster", "garbage"),
 }
 CELLS = [

@@ -22,8 +22,7 @@ async def digests(seed: int, hash_seed: str, seconds: int) -> list[bytes]:
         env={**os.environ, "PYTHONHASHSEED": hash_seed},
     )
     try:
-        async with asyncio.timeout(100):
-            output, _ = await process.communicate()
+        output, _ = await process.communicate()  # a hung one ends with the test, at pytest's limit
     finally:
         if process.returncode is None:
             process.kill()

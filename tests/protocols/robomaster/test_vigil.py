@@ -1,5 +1,6 @@
 """A client that is gone without a word: no FIN, no RST, the cable is cut."""
 
+import asyncio
 import json
 import shutil
 import socket
@@ -9,8 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from roboglot.protocols.robomaster.limits import VIGIL_MISSES_MAX
+from roboglot.model.components.motion.base import Base
+from roboglot.model.robot import Robot
+from roboglot.protocols.robomaster.limits import VIGIL_MISSES_MAX, VIGIL_PERIOD
 from roboglot.protocols.robomaster.liveness import DrivingClient, Echoes, Vigil
+from roboglot.protocols.robomaster.server import RoboMasterDoor
+from roboglot.testing import Forward
+from tests.protocols.robomaster.conftest import Connect
 
 LAB = Path(__file__).with_name("dead_client_lab.py")
 ALONE = ("unshare", "--user", "--map-root-user", "--net")
@@ -29,7 +35,7 @@ def network() -> None:
         pytest.skip(f"a network of one's own is not permitted here: {trial.stderr.decode().strip()}")
 
 
-@pytest.mark.slow  # in real time, on a network of its own; the rules are below
+@pytest.mark.slow  # in real time, on a network of its own; test_the_door_stops_what_a_lost_client_drives
 @pytest.mark.parametrize(
     ("groups", "ordered", "stopped"),
     [("0 0", 0.5, 0.6), ("", 1.6, 1.7)],
@@ -44,6 +50,36 @@ def test_the_robot_stops_when_the_cable_is_cut(network: None, groups: str, order
     assert reported["ordered"] < ordered
     assert reported["stopped"] < stopped
     assert 3 < reported["forgotten"] < 7, "the session ends with the connection, which the kernel gives up"
+
+
+@pytest.mark.world("empty", body="robomaster_ep")
+async def test_the_door_stops_what_a_lost_client_drives(
+    connect: Connect, door: RoboMasterDoor, robot: Robot, forward: Forward, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same without a cable: its host answers echoes, then no more; the test looks when it likes."""
+    answering = {"127.0.0.1"}
+    monkeypatch.setattr(DrivingClient, "askable", True)
+    monkeypatch.setattr(Echoes, "heard", lambda _self: set(answering))
+    monkeypatch.setattr(Vigil, "_plan", lambda _self: None)
+    client = await connect()
+
+    async def look_often() -> None:
+        for _ in range(VIGIL_MISSES_MAX):
+            door._vigil._looked = asyncio.get_running_loop().time() + 3600  # acknowledgements are all older
+            door._vigil._look()
+            await forward(seconds=VIGIL_PERIOD)
+
+    assert await client.ask("command;") == "ok;"
+    assert await client.ask("chassis speed x 0.4;") == "ok;"
+    await forward(seconds=0.5)
+    await look_often()
+    await look_often()
+    assert robot[Base].velocity.x > 0.35
+    answering.clear()
+    await look_often()
+    assert not robot.actions.running()
+    await forward(seconds=0.5)
+    assert robot[Base].velocity.speed < 0.02
 
 
 @pytest.fixture

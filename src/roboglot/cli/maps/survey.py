@@ -59,16 +59,27 @@ def _grid(floor: Floor, lift: Lift | None) -> OccupancyGrid:
     y = origin.y + (np.arange(rows)[:, None] + 0.5) * RESOLUTION
     inside = (x > left) & (x < left + width) & (y > bottom) & (y < bottom + depth)
     cells = np.where(inside, FREE, UNKNOWN).astype(np.int8)
-    depths = [
-        _depth(solid, x, y)
+    near = [
+        (cells[window], _depth(solid, x[window[1]], y[window[0]]))
         for solid in solids_of(floor, lift, lift_here=True)
         if solid.base <= LIDAR < solid.base + solid.size[2]
+        for window in [_around(solid, x, y)]
     ]
-    for deep in depths:
-        cells[deep >= SURFACE] = UNKNOWN
-    for deep in depths:  # surfaces take precedence over hidden space
-        cells[(deep >= -RESOLUTION / 2) & (deep < SURFACE)] = OCCUPIED
+    for part, deep in near:
+        part[deep >= SURFACE] = UNKNOWN
+    for part, deep in near:  # surfaces take precedence over hidden space
+        part[(deep >= -RESOLUTION / 2) & (deep < SURFACE)] = OCCUPIED
     return OccupancyGrid(cells, RESOLUTION, origin)
+
+
+def _around(solid: Solid, x: NDArray[np.floating], y: NDArray[np.floating]) -> tuple[slice, slice]:
+    """Return the rows and columns that a solid may reach, whichever way it faces; a cell more on each side."""
+    reach = math.hypot(solid.size[0], solid.size[1]) / 2 + RESOLUTION
+    (top, bottom), (left, right) = (
+        np.searchsorted(axis, (middle - reach, middle + reach))
+        for axis, middle in ((y[:, 0], solid.pose.y), (x, solid.pose.x))
+    )
+    return slice(top, bottom), slice(left, right)
 
 
 def _depth(solid: Solid, x: NDArray[np.floating], y: NDArray[np.floating]) -> NDArray[np.float64]:

@@ -13,6 +13,7 @@ from roboglot.config import RobotConfig
 from roboglot.fleet import Fleet, build_fleet
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
 from roboglot.simulation.world.world import World
 from roboglot.simulation.world.world_files import load_world
@@ -33,21 +34,36 @@ async def fleet(clock: LockstepClock) -> AsyncIterator[Fleet]:
     database.close()
 
 
-@pytest.mark.slow  # only after changes of the office or of its map
 def test_the_shipped_map_is_of_the_shipped_office() -> None:
     assert SHIPPED.read_bytes() == surveyed(load_world("office")), "roboglot map survey examples/maps/office.stcm"
 
 
-@pytest.mark.slow  # a long story
+async def loaded(client: httpx.AsyncClient, at: Pose) -> None:
+    """Load the shipped map, the robot being there."""
+    assert (await client.post(f"{MULTI}/stcm", content=SHIPPED.read_bytes())).status_code == 200
+    pose = {"x": at.x, "y": at.y, "yaw": at.yaw}
+    assert (await client.post(f"{MULTI}/stcm/:reload", json={"pose": pose})).status_code == 200
+    assert [floor["floor"] for floor in (await client.get(f"{MULTI}/floors")).json()] == ["ground", "first", "second"]
+
+
+async def test_robot_finds_its_place_on_shipped_map(
+    robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward
+) -> None:
+    await forward(seconds=1)
+    here = world.truth.pose_of("a")
+    await loaded(client, here.compose(Pose(0.1, 0.1, 0.05)))
+    await forward(seconds=2)
+    found = robot[Localization].pose  # the map's frame is the world's
+    assert found.distance_to(here) < 0.03
+    assert abs(found.relative_to(here).yaw) < 0.02
+
+
+@pytest.mark.slow  # a long story; in short: the place above, and rides in test_elevators.py
 async def test_a_robot_rides_by_the_shipped_map(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward
 ) -> None:
     await forward(seconds=1)
-    assert (await client.post(f"{MULTI}/stcm", content=SHIPPED.read_bytes())).status_code == 200
-    here = world.truth.pose_of("a")
-    pose = {"x": here.x, "y": here.y, "yaw": here.yaw}
-    assert (await client.post(f"{MULTI}/stcm/:reload", json={"pose": pose})).status_code == 200
-    assert [floor["floor"] for floor in (await client.get(f"{MULTI}/floors")).json()] == ["ground", "first", "second"]
+    await loaded(client, world.truth.pose_of("a"))
     options = {"target": {"poi_name": "first lift"}}
     body = {"action_name": "slamtec.agent.actions.MultiFloorMoveAction", "options": options}
     id = (await client.post(ACTIONS, json=body)).json()["action_id"]

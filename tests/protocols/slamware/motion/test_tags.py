@@ -124,8 +124,19 @@ async def test_from_a_place_by_its_name(client: httpx.AsyncClient, world: World,
     assert (await client.post(ACTIONS, json=body)).status_code == 400
 
 
+@pytest.mark.world(str(WORLD.with_name("shelf.toml")), body="hermes")
+async def test_under_a_shelf_nearby(client: httpx.AsyncClient, world: World, forward: Forward) -> None:
+    origin = world.truth.pose_of("a")
+    await forward(seconds=1)
+    seen_from = Pose(2.6, 2.1, 0.0).relative_to(origin)
+    target = {"x": seen_from.x, "y": seen_from.y, "yaw": seen_from.yaw}
+    assert await run(client, forward, "MoveToTagAction", target=target, tag_type=3) == SUCCESS
+    stands = world.truth.pose_of("a")
+    assert (stands.x, stands.y) == (pytest.approx(4.5, abs=0.03), pytest.approx(2.0, abs=0.03))
+
+
 @pytest.mark.world(MARKS, body="hermes")
-@pytest.mark.slow  # tests/autonomy/test_tag_docking.py has shelves
+@pytest.mark.slow  # from afar and not all the way; the shelf itself: test_under_a_shelf_nearby
 @pytest.mark.parametrize(("more", "x"), [({}, 7.5), ({"dock_allowance": 0.2}, 7.12)])
 async def test_under_a_shelf(
     client: httpx.AsyncClient, world: World, forward: Forward, more: dict[str, float], x: float
