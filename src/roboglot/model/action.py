@@ -27,7 +27,7 @@ class ActionStatus(IntEnum):
 
     @property
     def ended(self) -> bool:
-        """True if nothing more will happen."""
+        """True once the action has ended, however it ended."""
         return self >= ActionStatus.SUCCEEDED
 
 
@@ -37,7 +37,7 @@ class Announcer(Protocol):
     clock: Clock
 
     def announce(self, action: Action, /) -> None:
-        """Publish that something about ``action`` changed."""
+        """Publish a change of ``action``."""
 
 
 class Action:
@@ -75,7 +75,7 @@ class Action:
         return str(self.error) if self.error else ""
 
     async def done(self) -> ActionStatus:
-        """Wait for the end and say how it ended (never raises for the action's own failure)."""
+        """Wait for the end and return the status; an action's own failure raises nothing."""
         await self._ended.wait()
         return self.status
 
@@ -85,7 +85,7 @@ class Action:
             raise self.error.again() if self.error else Busy(f"{self.name} was cancelled")
 
     def cancel(self, reason: str = "", *, hard: bool = False) -> None:
-        """Ask it to stop; it ends CANCELED as soon as it has braked. Nothing happens if it has ended.
+        """Request a stop; the action ends CANCELED once it has braked. No effect if it has ended.
 
         ``hard``: brake as in an emergency, because the client is lost or may no longer drive.
         """
@@ -98,9 +98,9 @@ class Action:
             self._task.cancel()
 
     def abort(self, error: RobotError) -> None:
-        """Stop it as ``cancel`` does, but end it ABORTED with ``error``: for what protects the robot.
+        """Stop as ``cancel`` does, but end ABORTED with ``error``: for functions that protect the robot.
 
-        Nothing happens if it has ended or is being cancelled.
+        No effect if the action has ended or is being cancelled.
         """
         if self.status.ended or self.status is ActionStatus.CANCELING:
             return
@@ -124,7 +124,7 @@ class Action:
             self._owner.announce(self)
 
     def may_go_on(self, source: str) -> bool:
-        """True if a new wish of ``source`` can be met by this action: the same client asks, and it still runs."""
+        """True if this action can serve a new request of ``source``: it runs and comes from the same client."""
         going = self.status in (ActionStatus.ACCEPTED, ActionStatus.EXECUTING)
         return going and (self.source, self.client) == (source, client())
 

@@ -1,4 +1,4 @@
-"""Actions: things that take time. One executing action per resource; who may interrupt whom is decided here.
+"""Actions, that is, things that take time: one executing action per resource, and the rules of preemption.
 
 The words are ROS 2's: a goal is accepted, executes, may be paused (ours), is cancelled, succeeds or aborts.
 """
@@ -24,7 +24,7 @@ HISTORY_MAX = 20
 
 
 class OnBusy(Enum):
-    """Policy of a new action whose resource is held by another: replace that one, or be refused."""
+    """Policy for a new action whose resource is held: replace the holder, or be refused."""
 
     REPLACE = "replace"
     REFUSE = "refuse"
@@ -42,7 +42,7 @@ class Actions:
         self._admit: Callable[[Action], None] = lambda _: None
 
     def guard(self, admit: Callable[[Action], None]) -> None:
-        """Ask ``admit`` before an action is accepted; it raises RobotError if that may not be."""
+        """Call ``admit`` before each action is accepted; it raises RobotError to refuse one."""
         self._admit = admit
 
     def start(
@@ -99,15 +99,15 @@ class Actions:
         action._move_to(status)
 
     def announce(self, action: Action) -> None:
-        """Publish that something about ``action`` changed."""
+        """Publish a change of ``action``."""
         self._events.publish(ActionChanged(stamp=self.clock.time(), action=action))
 
     def running(self, resource: str | None = None) -> list[Action]:
-        """Return those not ended, oldest first; only those that hold ``resource`` if given."""
+        """Return actions under way, oldest first; with ``resource``, only those that hold it."""
         return [a for a in self._running.values() if resource is None or resource in a.resources]
 
     def get(self, id: int) -> Action:
-        """A running one or one of the last 20, or NotFound."""
+        """Return a running action or one of the last 20 ended ones. Raises NotFound."""
         if id in self._running:
             return self._running[id]
         for action in self._history:
@@ -121,7 +121,7 @@ class Actions:
         return list(self._history)
 
     async def cancel(self, *, resource: str | None = None, source: str | None = None, reason: str = "") -> None:
-        """Cancel all, or what holds ``resource``, or what ``source`` asked for; returns when it stands still."""
+        """Cancel all, those that hold ``resource``, or those of ``source``; return when the robot stands."""
         doomed = [a for a in self.running(resource) if source is None or a.source == source]
         for action in doomed:
             action.cancel(reason)
@@ -130,7 +130,7 @@ class Actions:
 
 
 async def _execute(action: Action, run: Callable[[Action], Awaitable[None]], before: list[Action]) -> None:
-    """Wait until those that have to give way stand still, and what must come first is over; then run."""
+    """Wait for preempted actions to stand still and for ``before`` to end; then run."""
     for other in before:
         await other.done()
     action._move_to(ActionStatus.EXECUTING)

@@ -1,6 +1,6 @@
 """Access control: every door asks it when a client connects and before each operation.
 
-With nothing configured nothing is asked: ``asks`` is false, and a door looks no further.
+Without access control, ``asks`` is false, and doors check nothing.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ NO_PROOF = Proof(ProofKind.NONE, "")
 
 
 class Unknown(Forbidden):
-    """The client is not known, or does not say who it is: it may come again with a proof."""
+    """The client is unknown or anonymous; it may try again with a proof."""
 
 
 class LockedOut(Unknown):
-    """Too many wrong proofs came from its address, or for its name: it is not looked at for a while."""
+    """Too many wrong proofs from an address, or for a name: further ones are refused for a while."""
 
 
 class Admission:
@@ -53,34 +53,34 @@ class Admission:
     connections_max = 0  # per address, where ``asks``
 
     def known(self, address: str, proof: Proof = NO_PROOF) -> str | None:
-        """Return who the client at ``address`` ("10.0.0.7:40312") is, if that needs no work; None: ask ``admit``."""
+        """Return the identity of the client at ``address`` ("10.0.0.7:40312") if it is cached; None: call ``admit``."""
         return ""
 
     async def admit(self, address: str, proof: Proof = NO_PROOF) -> str:
-        """Return who the client is; the name of a person or machine, or an address. Raises Unknown."""
+        """Return the client's identity: the name of a person or machine, or an address. Raises Unknown."""
         return ""
 
     def check(self, door: str, operation: str, right: Right | None) -> None:
-        """Raises Forbidden unless the client that is asked for (``asking.identity``) has ``right``; None is ADMIN."""
+        """Raise Forbidden unless the current client (``client_context.identity``) has ``right``; None is ADMIN."""
 
     @contextmanager
     def noting(self, door: str, operation: str) -> Iterator[None]:
-        """Keep what becomes of an operation that changes something, where no tap shows it: done, or refused and why."""
+        """Audit the outcome of a change that no tap shows: done, or refused and why."""
         yield
 
     def may(self, right: Right) -> bool:
-        """True if the client that is asked for has ``right``."""
+        """True if the current client has ``right``."""
         return True
 
     async def invite(self, name: str, rights: frozenset[Right], seconds: float) -> Proof | None:
-        """Let a guest in for so long; what the guest shows from now on. None: nothing is asked here."""
+        """Admit a guest for ``seconds``; return the guest's secret, or None where there is no access control."""
         return None
 
     async def shut_out(self, name: str) -> None:
-        """Let a guest in no more."""
+        """Stop admitting a guest."""
 
     def spend(self, client: str, amount: int) -> float:
-        """Count bytes to and from a client (its identity, or its host); seconds until it may send more."""
+        """Count bytes to and from a client (identity or host); return the seconds until it may send more."""
         return 0.0
 
     def may_shake_hands(self, host: str) -> bool:

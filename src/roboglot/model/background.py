@@ -1,4 +1,4 @@
-"""Work beside the event loop: in threads that give way to clients, and in one that the end does not wait for."""
+"""Work outside the event loop: in low-priority threads, and in one that does not delay the program's end."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ GAP_MIN, GAP_MAX = 0.1, 0.8  # s between the claps of a run
 
 
 class ClapCounter:
-    """Feed it gapless blocks; it answers with a run of claps once none has followed for GAP_MAX."""
+    """Counts claps in gapless blocks; a run is complete once GAP_MAX has passed without a further clap."""
 
     def __init__(self) -> None:
         self._levels: deque[float] = deque(maxlen=BEFORE + LOUDEST_FIRST + AFTER)

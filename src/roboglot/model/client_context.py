@@ -1,6 +1,6 @@
-"""On whose behalf something is done: a door names its client once, whatever follows from that remembers it.
+"""The client on whose behalf something is done: a door sets it once, and everything that follows inherits it.
 
-A context variable, so that it passes through every call and every task that is begun, and no signature knows of it.
+A context variable: every call and every new task inherits it, and no signature mentions it.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ _identity: ContextVar[str] = ContextVar("identity", default="")
 
 
 def ask_for(client: str, connection: str = "", identity: str = "") -> None:
-    """From here on, in this task and those it begins, what is done is done for ``client``: "slamware 10.0.0.7".
+    """Set the client ("slamware 10.0.0.7") of this task and of all that it starts.
 
-    ``connection`` is the address of the client's end, with its port; ``identity`` is who it showed to be.
+    ``connection``: the client's address and port; ``identity``: the one that it proved.
     """
     _client.set(client.strip()[:NAME_MAX])
     _connection.set(connection)
@@ -27,17 +27,17 @@ def ask_for(client: str, connection: str = "", identity: str = "") -> None:
 
 
 def client() -> str:
-    """The client's name; empty: no client asked, the robot or the program acts by itself."""
+    """Return the client's name; empty when the robot or a program acts by itself."""
     return _client.get()
 
 
 def connection() -> str:
-    """Over which connection it was asked; empty: over none, or over one that is not known."""
+    """Return the connection of the request; empty if there is none or it is unknown."""
     return _connection.get()
 
 
 def identity() -> str:
-    """Return the client's admitted identity; empty if no client is acting: the robot or a program acts by itself."""
+    """Return the client's admitted identity; empty when the robot or a program acts by itself."""
     return _identity.get()
 
 
@@ -53,7 +53,7 @@ def asking_for(client: str) -> Iterator[None]:
 
 @contextmanager
 def concerning(robot: str) -> Iterator[None]:
-    """Inside ``with``, and in what is begun there (tasks, sockets, timers): it is about ``robot``; the log names it."""
+    """Attribute log lines of the ``with`` block, and of tasks, sockets and timers begun there, to ``robot``."""
     token = _robot.set(robot)
     try:
         yield
@@ -62,11 +62,11 @@ def concerning(robot: str) -> Iterator[None]:
 
 
 def context_of(robot: str) -> Context:
-    """Return a context whose ``run`` is ``concerning`` at a tenth of the price, for what is done at every tick."""
+    """Return a context whose ``run`` does what ``concerning`` does at a tenth of the cost, for use at every tick."""
     with concerning(robot):
         return copy_context()
 
 
 def concerned() -> str:
-    """Name of the robot that this is about; empty: none, or all of them."""
+    """Return the name of the robot that log lines are attributed to; empty: none, or all of them."""
     return _robot.get()

@@ -38,7 +38,7 @@ class _RealTimer:
         self.arm()
 
     def arm(self) -> None:
-        """Wait anew: the pace of the clock has changed."""
+        """Arm again after a change of the clock's pace."""
         if self._armed is not None:
             self._armed.cancel()
         delay = self._clock.real_seconds_until(self.when)
@@ -58,10 +58,9 @@ class _RealTimer:
 
 
 class RealClock(Clock):
-    """Time as it passes outside, times ``speed``. It can be paused, stepped and made faster or slower while it runs.
+    """Real time multiplied by ``speed``; can be paused, stepped and sped up or slowed down while it runs.
 
-    While it is paused nothing falls due and ``time()`` stands still: the robots and their world are frozen, the
-    doors go on answering.
+    While it is paused, no timer fires and ``time()`` stands still: robots and world are frozen, doors still answer.
     """
 
     def __init__(self, speed: float = 1.0) -> None:
@@ -116,7 +115,7 @@ class RealClock(Clock):
         self._turn = asyncio.get_running_loop().call_soon(self._work)
 
     def _work(self) -> None:
-        """Do jobs for a short while; the loop sees to its sockets before the next ones.
+        """Run jobs for one SLICE; the loop serves its sockets before the next ones.
 
         A request of several steps (over gRPC, five turns of the loop) waits for so many of these at most.
         """
@@ -136,15 +135,15 @@ class RealClock(Clock):
         self._change(speed, self._until)
 
     def pause(self) -> None:
-        """Let time stand still until ``resume`` or ``step``."""
+        """Stop time until ``resume`` or ``step``."""
         self._change(self._speed, self.time())
 
     def resume(self) -> None:
-        """Let time pass."""
+        """Let time run again."""
         self._change(self._speed, math.inf)
 
     def step(self, seconds: float) -> None:
-        """Let ``seconds`` pass from now, at the clock's speed, and pause. Raises ValueError for less than nothing."""
+        """Let ``seconds`` pass from now, at the clock's speed, and pause. Raises ValueError if negative."""
         if not 0 <= seconds < math.inf:
             raise ValueError("time does not go back")
         self._change(self._speed, self.time() + seconds)
@@ -156,12 +155,12 @@ class RealClock(Clock):
         return max(0.0, when - self.time()) / self._speed
 
     def real_time_of(self, stamp: float) -> float:
-        """Return the instant of ``time.monotonic`` at which robot time was ``stamp``, at the pace of now."""
+        """Return the ``time.monotonic`` instant of robot time ``stamp``, at the current pace."""
         real, robot = self._anchor
         return real + (stamp - robot) / self._speed
 
     def late(self, _when: float) -> bool:
-        """Return whether the clock stood still since a timer for then was armed, so that it is not yet due."""
+        """Return whether a timer woke too early because the clock stood still after it was armed."""
         return False
 
     def forget(self, timer: _RealTimer) -> None:
@@ -176,9 +175,9 @@ class RealClock(Clock):
 
 
 class PatientClock(RealClock):
-    """A real clock that waits for the world: a machine that is too slow makes time pass later, and loses none of it.
+    """A real clock that waits for the world: on a slow machine robot time falls behind instead of being lost.
 
-    It goes LEAD further than the world at most. Until ``reached`` is called first it waits for nothing.
+    It leads the world by LEAD at most. Before the first call of ``reached`` it waits for nothing.
     """
 
     def __init__(self, speed: float = 1.0) -> None:
@@ -218,7 +217,7 @@ class LockstepClock(Clock):
 
     Needs asyncio's own event loop: after each instant it waits until the loop has nothing ready to run, and only that
     loop lets us see it (uvloop does not). Sockets are not waited for: code that uses one awaits the reply itself.
-    What ``hold`` has announced is waited for, at most HOLD_MAX seconds each. What ``arrive`` brings happens when
+    Work announced by ``hold`` is waited for, at most HOLD_MAX seconds each. What ``arrive`` brings happens when
     nothing is ready to run any more, one after the other; at rest after ROUNDS_MAX rounds of the loop at the latest.
     """
 
@@ -251,7 +250,7 @@ class LockstepClock(Clock):
         return timer
 
     async def advance(self, seconds: float) -> None:
-        """Let ``seconds`` pass: every due callback runs, and all that follows from it, before the next instant."""
+        """Let ``seconds`` pass; all due callbacks and their consequences run before the next instant."""
         await self.advance_to(self._now + seconds)
 
     async def advance_to(self, end: float, turn: int = -1) -> None:
@@ -295,7 +294,7 @@ class LockstepClock(Clock):
             self._now, self._turn = now, 0
 
     async def _settle(self) -> None:
-        """Give way until no other callback of the loop is ready, and what came from outside has happened."""
+        """Yield until no callback of the loop is ready and all outside events have been handled."""
         ready = _ready()
         while ready or self._held or self._arrived:
             if ready:
@@ -333,7 +332,7 @@ class LockstepClock(Clock):
             self._wake()
 
     async def _wait_for_work(self) -> None:
-        """Wait until some of it has ended, or has taken too long: that no longer counts."""
+        """Wait until some of the held work has ended; drop work that took too long."""
         loop = asyncio.get_running_loop()
         self._released = loop.create_future()
         timer = loop.call_at(min(self._held.values()), self._wake)
@@ -350,7 +349,7 @@ class LockstepClock(Clock):
 
 
 def _ready() -> Sized:
-    """Return what the running loop will do next."""
+    """Return the running loop's queue of ready callbacks."""
     ready: Sized | None = getattr(asyncio.get_running_loop(), "_ready", None)
     if ready is None:
         raise RuntimeError("a lockstep clock needs asyncio's own event loop")

@@ -1,4 +1,4 @@
-"""Interface of every clock of robots; ``model/clock.py`` has the clocks themselves."""
+"""Interface of all robot clocks; ``model/clock.py`` implements them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ HOLD_MAX = 5.0  # s (machine clock) that lockstep time waits for work outside th
 
 
 class Timer(Protocol):
-    """Something due on the clock that can still be called off."""
+    """A pending callback that can be cancelled."""
 
     def cancel(self) -> None: ...
 
@@ -22,18 +22,18 @@ class Timer(Protocol):
 class Clock(ABC):
     """Reads and waits for robot time, in seconds.
 
-    ``repeats``: the same inputs give the same trace; nothing may come from chance or from how fast the machine is.
+    ``repeats``: the same inputs give the same trace, independent of chance and of the machine's speed.
     """
 
     repeats = False
 
     @abstractmethod
     def time(self) -> float:
-        """Seconds since this clock started; never goes back."""
+        """Return seconds since this clock started; monotonic."""
 
     @abstractmethod
     def epoch(self) -> float:
-        """Calendar time as seconds since 1970-01-01 UTC, running at this clock's pace."""
+        """Return calendar time, s since 1970-01-01 UTC, at this clock's pace."""
 
     @abstractmethod
     def call_at(self, when: float, callback: Callable[[], None]) -> Timer:
@@ -45,36 +45,36 @@ class Clock(ABC):
         return -1
 
     def arrive(self, happening: Callable[[], None]) -> None:
-        """Have something happen that comes from outside. Lockstep robots learn of it when they have come to rest."""
+        """Handle an outside event; lockstep robots learn of it when they have come to rest."""
         happening()
 
     def in_turn(self, job: Callable[[], None], *, first: bool = False) -> None:  # noqa: ARG002 - nothing waits here
-        """Do a longer piece of work: at once, or soon where time passes by itself, when others have had their turn.
+        """Run a longer job: at once in lockstep, otherwise soon, after other jobs have had their turn.
 
         ``first``: before all others that wait.
         """
         job()
 
     def in_steps(self, steps: Iterator[None]) -> None:
-        """Take all steps of a piece of work, before all that wait: others have their turn in between, as above."""
+        """Run all steps of a job ahead of waiting ones; others get their turn between steps, as above."""
         for _ in steps:
             pass
 
     def hold(self, work: object, seconds: float = HOLD_MAX) -> None:  # noqa: B027 - time that passes waits for nothing
         """Begin ``work`` outside of the event loop (a process, a disk); lockstep time waits until ``release``.
 
-        It waits no longer than so many seconds of the machine.
+        It waits at most ``seconds`` of real time.
         """
 
     def release(self, work: object) -> None:  # noqa: B027
-        """End what ``hold`` began; do nothing if it has ended."""
+        """End work announced by ``hold``; no effect if it has ended."""
 
     def reached(self, stamp: float) -> None:  # noqa: B027 - most clocks wait for no world
-        """The world has been simulated up to there; inf: there is none any more."""
+        """Report that the world has been simulated up to ``stamp``; inf: the world is gone."""
 
     @contextmanager
     def holding(self) -> Iterator[None]:
-        """Hold while ``with`` lasts."""
+        """Hold lockstep time inside ``with``."""
         work = object()
         self.hold(work)
         try:
@@ -113,7 +113,7 @@ class Clock(ABC):
             yield self.time()
 
     async def wait_for(self, awaitable: Awaitable[T], timeout: float) -> T:
-        """The awaitable's result, or TimeoutError after ``timeout`` seconds of robot time (it is cancelled then)."""
+        """Return the result; after ``timeout`` s of robot time cancel the awaitable and raise TimeoutError."""
         task = asyncio.ensure_future(awaitable)
         waiter = asyncio.current_task()
         cancelled_before = waiter.cancelling() if waiter else 0

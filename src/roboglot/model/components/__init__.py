@@ -1,1 +1,1 @@
-"""The interfaces of what a robot can have, one a file. Simulation, drivers and autonomy implement them."""
+"""Component interfaces, one per file. Simulation, drivers and autonomy implement them."""

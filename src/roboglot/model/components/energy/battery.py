@@ -1,4 +1,4 @@
-"""The battery and how it is charged."""
+"""The battery and its charging contacts."""
 
 from __future__ import annotations
 
@@ -25,4 +25,4 @@ class DockContact(Component):
     @property
     @abstractmethod
     def docked(self) -> bool:
-        """True if they touch a dock."""
+        """True if the contacts touch a dock."""

@@ -1,4 +1,4 @@
-"""Being awake, saving power, sleeping, being off."""
+"""Power modes: awake, low power, asleep, off."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Power(Component):
 
     @abstractmethod
     async def set_automatic(self, on: bool) -> None:
-        """Returns when it is safe on disk."""
+        """Switch ``automatic`` on or off; returns once the setting is on disk."""
 
     @abstractmethod
     def save(self, *, source: str = "") -> Action:
@@ -48,7 +48,7 @@ class Power(Component):
 
     @abstractmethod
     def wake(self, *, source: str = "") -> Action:
-        """Back to AWAKE, lying; succeeds at once if awake. Aborts with Refused when off or the battery is empty."""
+        """Return to AWAKE, lying; succeeds at once if awake. Aborts with Refused when off or the battery is empty."""
 
     @abstractmethod
     def shut_down(self, *, source: str = "", after: float = 0.0, restart_after: float | None = None) -> Action:

@@ -1,4 +1,4 @@
-"""Armor plates that feel what hits them."""
+"""Armor plates that detect hits."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ class Armor(Component):
     @property
     @abstractmethod
     def sensitivity(self) -> int:
-        """0 (feels hard blows only) to 10; 5 at power-on."""
+        """Sensitivity, 0 (hard blows only) to 10; 5 at power-on."""
 
     @abstractmethod
     def set_sensitivity(self, sensitivity: int) -> None:
-        """Raises InvalidGoal outside 0 to 10."""
+        """Set the sensitivity. Raises InvalidGoal outside 0 to 10."""

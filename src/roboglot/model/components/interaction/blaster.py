@@ -31,18 +31,18 @@ class Blaster(Component):
     @property
     @abstractmethod
     def firing(self) -> bool:
-        """True if beads of a shot are still to come."""
+        """True while beads of a shot have yet to leave."""
 
     @abstractmethod
     def fire(self) -> int:
-        """Fire one shot; returns how many beads will leave, one after the other at ``rate``.
+        """Fire one shot; return the number of beads, which leave one by one at ``rate``.
 
-        Fewer than ``beads`` if the magazine holds no more. Raises Refused when it is empty, Busy while firing.
+        It is lower than ``beads`` if the magazine runs out. Raises Refused when it is empty, Busy while firing.
         """
 
     @abstractmethod
     def cease(self) -> None:
-        """Keep the beads of the shot under way that have not left yet."""
+        """Stop the shot under way; its remaining beads stay in the magazine."""
 
     @abstractmethod
     def reload(self) -> None:

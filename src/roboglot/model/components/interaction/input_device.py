@@ -46,14 +46,14 @@ class InputDevice(Component):
         return self._state
 
     def press(self, key: str) -> None:
-        """Hold a key down. Raises InvalidGoal for one that is none."""
+        """Hold a key down. Raises InvalidGoal for an unknown key."""
         if key not in NAMED_KEYS and not (len(key) == 1 and key.isascii() and (key.islower() or key.isdigit())):
             raise InvalidGoal(f"a key is a lower-case letter, a digit or one of {', '.join(NAMED_KEYS)}, not {key!r}")
         if key not in self._state.keys:
             self._change(replace(self._state, keys=(*self._state.keys, key)))
 
     def release(self, key: str) -> None:
-        """Let a key go; nothing happens if it is not held."""
+        """Release a key; no effect if it is not held."""
         self._change(replace(self._state, keys=tuple(each for each in self._state.keys if each != key)))
 
     def click(self, *buttons: MouseButton) -> None:
@@ -67,7 +67,7 @@ class InputDevice(Component):
         self._change(replace(self._state, x=x, y=y))
 
     def listen(self, listener: Callable[[Input], None]) -> Callable[[], None]:
-        """Call ``listener`` on every change; returns what ends it."""
+        """Call ``listener`` on every change; return a function that unsubscribes it."""
         self._listeners.append(listener)
         return lambda: self._listeners.remove(listener) if listener in self._listeners else None
 

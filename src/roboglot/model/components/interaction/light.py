@@ -21,7 +21,7 @@ class Colour:
     blue: int = 0
 
     def dimmed(self, share: float) -> Colour:
-        """This colour at ``share`` (0..1) of its brightness."""
+        """Return this colour at ``share`` (0..1) of its brightness."""
         return Colour(round(self.red * share), round(self.green * share), round(self.blue * share))
 
 
@@ -71,10 +71,10 @@ class Light(Component):
         frequency: float = 2.0,
         lamp: int | None = None,
     ) -> None:
-        """Show this from now on; ``lamp`` (from 0): only that one of a ring, SOLID or OFF.
+        """Command a zone, or one ``lamp`` (from 0) of a ring: SOLID or OFF only.
 
         Raises NotFound for an unknown zone or lamp, InvalidGoal for a colour or frequency (Hz) out of range and for an
-        effect that the zone cannot show (what runs or draws figures, with a single lamp).
+        effect that the zone cannot show (running lights and figures on a single lamp).
         """
 
     @abstractmethod
@@ -83,4 +83,4 @@ class Light(Component):
 
     @abstractmethod
     def lamps(self, zone: str) -> tuple[Colour, ...]:
-        """The colour of each lamp of the zone at this moment; raises NotFound."""
+        """Return the current colour of each lamp of the zone. Raises NotFound."""

@@ -39,7 +39,7 @@ class ShownLight(Light):
         self.provide(zones)
 
     def provide(self, zones: Mapping[str, int]) -> None:
-        """Have these zones (their lamps by name) too; those that are known go on."""
+        """Add zones (number of lamps by name); known ones keep their state."""
         dark = ZoneState(DARK, LightEffect.OFF, 2.0, self._clock.time())
         for zone, count in zones.items():
             if zone not in self.zones:
@@ -100,7 +100,7 @@ class ShownLight(Light):
 
 
 def _hue(command: ZoneState, now: float) -> Colour:
-    """The colour with its hue turned on by as much of the wheel as the period is gone."""
+    """Return the colour, its hue rotated in step with the elapsed share of the period."""
     colour = command.colour
     hue, saturation, value = colorsys.rgb_to_hsv(colour.red / 255, colour.green / 255, colour.blue / 255)
     turned = (hue + (now - command.since) * command.frequency) % 1.0
@@ -108,7 +108,7 @@ def _hue(command: ZoneState, now: float) -> Colour:
 
 
 def _brightness(command: ZoneState, now: float, index: int, count: int) -> float:
-    """0..1 of lamp ``index`` of ``count``."""
+    """Return the brightness (0..1) of lamp ``index`` of ``count``."""
     phase = (now - command.since) * command.frequency % 1.0
     match command.effect:
         case LightEffect.OFF:

@@ -1,4 +1,4 @@
-"""The people whom the robot knows: its members, with their faces and voiceprints."""
+"""People whom the robot knows (members), with faceprints and voiceprints."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PRINT_MAX = 64 * 1024  # bytes of a face's or a voice's print
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """``face`` and ``voice``: what a recogniser made of them, opaque here; None: not entered. ``host``: the owner."""
+    """``face`` and ``voice``: a recogniser's prints, opaque here; None: not enrolled. ``host``: the owner."""
 
     id: int
     name: str
@@ -25,7 +25,7 @@ class Member:
 
 
 class Members(Component):
-    """By name. What was acknowledged survives a crash; every change publishes ``MembersChanged``."""
+    """Members by name. An acknowledged change survives a crash and publishes ``MembersChanged``."""
 
     @abstractmethod
     def all(self) -> Sequence[Member]:
@@ -33,24 +33,24 @@ class Members(Component):
 
     @abstractmethod
     def get(self, name: str) -> Member:
-        """The one, or NotFound."""
+        """Return a member. Raises NotFound."""
 
     @abstractmethod
     async def add(self, name: str, *, host: bool = False) -> Member:
-        """Raises InvalidGoal for a name that is empty, too long or taken, or when there are MEMBERS_MAX."""
+        """Add a member. Raises InvalidGoal for an empty, long or taken name, or beyond MEMBERS_MAX."""
 
     @abstractmethod
     async def rename(self, name: str, new: str) -> Member:
-        """Raises NotFound, and InvalidGoal as ``add`` does."""
+        """Rename a member. Raises NotFound, and InvalidGoal as ``add`` does."""
 
     @abstractmethod
     async def remove(self, name: str) -> None:
-        """With face and voice. Raises NotFound."""
+        """Remove a member with face and voice. Raises NotFound."""
 
     @abstractmethod
     async def set_face(self, name: str, face: bytes | None) -> Member:
-        """Keep a face's print, or forget it. Raises NotFound, and InvalidGoal for one that is too large."""
+        """Store a faceprint, or delete it (None). Raises NotFound, and InvalidGoal if it is too large."""
 
     @abstractmethod
     async def set_voice(self, name: str, voice: bytes | None) -> Member:
-        """Keep a voice's print, or forget it. Raises as ``set_face`` does."""
+        """Store a voiceprint, or delete it (None). Raises as ``set_face`` does."""

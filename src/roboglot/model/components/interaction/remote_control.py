@@ -24,8 +24,8 @@ class RemoteControl(Component):
     @property
     @abstractmethod
     def gear(self) -> Gear:
-        """The present one, also while no device is connected."""
+        """Current gear, valid even while no device is connected."""
 
     @abstractmethod
     async def set_gear(self, gear: Gear) -> None:
-        """Choose it from the robot's side; returns when it is safe on disk."""
+        """Set the gear from the robot; returns once it is on disk."""

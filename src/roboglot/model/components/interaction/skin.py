@@ -63,7 +63,7 @@ class ElectronicSkin(Component):
     @property
     @abstractmethod
     def state(self) -> SkinState:
-        """The last command."""
+        """Last command."""
 
     @property
     @abstractmethod
@@ -76,7 +76,7 @@ class ElectronicSkin(Component):
 
     @abstractmethod
     def show(self, pattern: SkinPattern, *, cycle: float = 1.0, standing: Shade = Shade.LIGHT) -> None:
-        """Show this from now on.
+        """Command a pattern.
 
         Raises InvalidGoal for a cycle beyond CYCLE_MIN and CYCLE_MAX, Refused while the skin is switched off and for
         FOOTFALLS of a body without feet.

@@ -41,7 +41,7 @@ class ShownSkin(ElectronicSkin):
     @property
     @abstractmethod
     def feet(self) -> Mapping[Foot, FootState]:
-        """The legs that bear patches; empty where their state is unknown."""
+        """Contact of the legs that have patches; empty where unknown."""
 
     @property
     def state(self) -> SkinState:
@@ -71,7 +71,7 @@ class ShownSkin(ElectronicSkin):
         return {patch: _shade(self._is_light(state.pattern, patch, turns)) for patch in patches}
 
     def _is_light(self, pattern: SkinPattern, patch: Patch, turns: float) -> bool:
-        """``turns``: how many cycles have gone by."""
+        """Return whether the patch is light; ``turns``: cycles elapsed."""
         whole = int(turns)
         reached = 3.0 * (turns - whole)  # thirds of the body that the wave has passed
         match pattern:

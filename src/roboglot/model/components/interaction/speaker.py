@@ -13,24 +13,24 @@ TEXT_MAX = 1000  # characters
 
 
 class Speaker(Component):
-    """Says texts and plays sounds, one at a time: a new one takes over."""
+    """Speaks texts and plays sounds one at a time; a new one replaces the current one."""
 
     @property
     @abstractmethod
     def volume(self) -> float:
-        """0 silent to 1 loudest."""
+        """Volume from 0 (silent) to 1 (loudest)."""
 
     @abstractmethod
     def set_volume(self, volume: float) -> None:
-        """Raises InvalidGoal unless 0..1."""
+        """Set the volume. Raises InvalidGoal unless 0..1."""
 
     @abstractmethod
     def say(self, text: str, *, source: str = "") -> Action:
-        """Speak ``text``; ends when it has been said, and then publishes ``Spoke``.
+        """Speak ``text``; the action ends with it, and ``Spoke`` is published.
 
-        Raises InvalidGoal if there is nothing to say or more than TEXT_MAX characters.
+        Raises InvalidGoal for an empty text or one above TEXT_MAX characters.
         """
 
     @abstractmethod
     def play(self, sound: Sound, *, source: str = "") -> Action:
-        """Play ``sound``; ends with it, and then publishes ``SoundPlayed``."""
+        """Play ``sound``; the action ends with it, and ``SoundPlayed`` is published."""

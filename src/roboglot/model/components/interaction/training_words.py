@@ -1,4 +1,4 @@
-"""Words that people teach the robot, and what each stands for."""
+"""Words that people teach the robot, with their meanings."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ REPEATS = 3  # utterances of a word needed to learn it
 
 @dataclass(frozen=True, slots=True)
 class TrainedWord:
-    """``trigger`` is what is said, ``value`` what it stands for, ``kind`` what sort of thing that is ("vp_task")."""
+    """``trigger``: the spoken word; ``value``: its meaning; ``kind``: the meaning's type ("vp_task")."""
 
     trigger: str
     value: str
@@ -25,7 +25,7 @@ class TrainedWord:
 
 
 class TrainingWords(Component):
-    """Made of Hearing and Settings; what was learnt survives restarts."""
+    """Built on Hearing and Settings; learnt words survive restarts."""
 
     @abstractmethod
     def all(self) -> Sequence[TrainedWord]:
@@ -33,7 +33,7 @@ class TrainingWords(Component):
 
     @abstractmethod
     def teach(self, value: str, *, kind: str = "vp_task", seconds: float = 30.0, source: str = "") -> Action:
-        """Listen until one and the same utterance was heard REPEATS times; it triggers ``value`` from then on.
+        """Listen until the same utterance was heard REPEATS times; from then on it triggers ``value``.
 
         Feedback: how often it was heard. Raises InvalidGoal; aborts with Expired when nothing was said often enough in
         time, Refused when the robot knows WORDS_MAX words.
@@ -41,8 +41,8 @@ class TrainingWords(Component):
 
     @abstractmethod
     async def learn(self, word: TrainedWord) -> None:
-        """Know it without having heard it, in place of one with that trigger. Raises InvalidGoal or Refused."""
+        """Add a word without hearing it, replacing one with the same trigger. Raises InvalidGoal or Refused."""
 
     @abstractmethod
     async def forget(self, trigger: str) -> None:
-        """Raises NotFound."""
+        """Delete a word. Raises NotFound."""

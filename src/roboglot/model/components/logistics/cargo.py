@@ -31,7 +31,7 @@ class Stock(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class BoxState:
-    """One box now; ``errors`` in plain words."""
+    """Current state of one box; ``errors`` in plain words."""
 
     id: int
     door: DoorState
@@ -59,12 +59,12 @@ class Cargo(Component):
 
     @abstractmethod
     def box(self, id: int) -> BoxState:
-        """The one, or NotFound."""
+        """Return a box. Raises NotFound."""
 
     @abstractmethod
     def open_box(self, id: int, *, source: str = "") -> Action:
-        """Unlock and open; the action holds the box. Aborts with Blocked when the door stalls. NotFound for no box."""
+        """Unlock and open; the action holds the box. Aborts with Blocked when the door stalls. Raises NotFound."""
 
     @abstractmethod
     def close_box(self, id: int, *, source: str = "") -> Action:
-        """Close and lock; aborts with Blocked when something is in the door, which then opens again a little."""
+        """Close and lock; aborts with Blocked when something is in the door, which then reopens slightly."""

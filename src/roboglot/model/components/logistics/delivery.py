@@ -1,4 +1,4 @@
-"""Carrying things to people: orders, what became of them, and the rules of the service. Knows no vendor's words."""
+"""Delivery to people: orders, their outcomes, and the policy of the service. Knows no vendor's words."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class OrderStatus(StrEnum):
 
     @property
     def ended(self) -> bool:
-        """True if nothing more will happen."""
+        """True once the order has ended, however it ended."""
         return self in (OrderStatus.SUCCEEDED, OrderStatus.FAILED, OrderStatus.CANCELED)
 
 
@@ -76,7 +76,7 @@ class Failure(StrEnum):
 
 
 class Phase(StrEnum):
-    """State of the service; while ``WORKING``, the current order's stage says more."""
+    """State of the service; details of ``WORKING`` are in the current order's stage."""
 
     IDLE = "idle"
     WORKING = "working"
@@ -102,7 +102,7 @@ class BoxChoice:
 
 @dataclass(frozen=True, slots=True)
 class PickUp:
-    """Outcome of one box, or of one stop (``box`` None); without ``failure`` all went well."""
+    """Outcome of one box, or of one stop (``box`` None); no ``failure``: success."""
 
     box: BoxChoice | None = None
     stop: str = ""

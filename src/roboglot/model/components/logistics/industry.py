@@ -1,4 +1,4 @@
-"""Carrying things about a plant: templates of rounds, and the calls that people send from where they stand."""
+"""Transport in a plant: templates of rounds, and calls that people send from calling stations."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class RoundTemplate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Call:
-    """A call and what became of it; times in seconds since 1970, ``began_at`` 0 before it began."""
+    """A call and its outcome; times in seconds since 1970, ``began_at`` 0 before it began."""
 
     id: str
     number: str
@@ -53,7 +53,7 @@ class Call:
 
 
 class Industry(Component):
-    """Keeps templates and calls over crashes. The client that carries out a call reports its progress."""
+    """Templates and calls; both survive crashes. The client that carries out a call reports its progress."""
 
     @property
     @abstractmethod
@@ -66,7 +66,7 @@ class Industry(Component):
 
     @abstractmethod
     async def remove_template(self, key: str) -> None:
-        """Or NotFound."""
+        """Delete a template. Raises NotFound."""
 
     @property
     @abstractmethod
@@ -79,4 +79,4 @@ class Industry(Component):
 
     @abstractmethod
     async def report(self, id: str, status: OrderStatus, reason: str = "") -> Call:
-        """Report that it runs, succeeded or failed. NotFound; Refused for one that has ended."""
+        """Report a call as running, succeeded or failed. Raises NotFound; Refused if it has ended."""

@@ -47,7 +47,7 @@ class Jack(Component):
 
     @abstractmethod
     def raise_platform(self, *, source: str = "") -> Action:
-        """Lift; aborts with Blocked, and with Refused while an alarm stands."""
+        """Lift; aborts with Blocked, or with Refused while an alarm is active."""
 
     @abstractmethod
     def lower_platform(self, *, source: str = "") -> Action:
@@ -55,4 +55,4 @@ class Jack(Component):
 
     @abstractmethod
     def clear_alarm(self) -> None:
-        """Acknowledge the alarm; it comes back if its cause persists."""
+        """Acknowledge the alarm; it returns if its cause persists."""

@@ -45,11 +45,11 @@ class LiftClient(Component):
     @property
     @abstractmethod
     def state(self) -> LiftState:
-        """The newest that was heard."""
+        """Latest state received."""
 
     @abstractmethod
     def call(self, floor: int) -> None:
-        """Have the car come to (or, from within, go to) ``floor`` and open. InvalidGoal for no such floor."""
+        """Call the car to (or, from within, send it to) ``floor``, doors opening. Raises InvalidGoal."""
 
     @abstractmethod
     def hold_door(self, seconds: float) -> None:
@@ -57,4 +57,4 @@ class LiftClient(Component):
 
     @abstractmethod
     def close_door(self) -> None:
-        """Do not keep it open any longer; it shuts as soon as it is free."""
+        """Stop holding the door; it closes once nothing blocks it."""

@@ -1,4 +1,4 @@
-"""A radio by which robots announce which places they occupy, and where they go next."""
+"""A radio by which robots claim places and announce where they go next."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ class TrafficRadio(Component):
     @property
     @abstractmethod
     def claims(self) -> frozenset[str]:
-        """Names that this robot claims."""
+        """Return the names that this robot claims."""
 
     @abstractmethod
     def claim(self, names: Collection[str]) -> None:
-        """Claim these and nothing else. Raises InvalidGoal for more or longer ones than the radio carries."""
+        """Replace the claims. Raises InvalidGoal for more or longer names than the radio carries."""
 
     @abstractmethod
     def others(self, name: str) -> int:
@@ -57,8 +57,8 @@ class TrafficRadio(Component):
 
     @abstractmethod
     def announce(self, announcement: Announcement | None) -> None:
-        """Announce this from now on, or nothing. Raises InvalidGoal for a longer way than the radio carries."""
+        """Set the announcement, or clear it (None). Raises InvalidGoal for a longer way than the radio carries."""
 
     @abstractmethod
     def heard(self) -> Sequence[Announcement]:
-        """Last announcements of the other robots in range."""
+        """Return the last announcements of other robots in range."""

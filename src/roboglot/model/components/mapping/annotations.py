@@ -52,7 +52,7 @@ class Line:
     metadata: Mapping[str, str] = field(default_factory=dict)
 
     def points(self) -> tuple[Point, ...]:
-        """The polyline: both ends, and what a curve needs between them."""
+        """Return the polyline: both ends, and points between them on a curve."""
         if self.control is None:
             return (self.start, self.end)
         corners = (self.start, *self.control, self.end)
@@ -98,7 +98,7 @@ class Area:
         return 0.0 <= dx * ux + dy * uy <= along and abs(dy * ux - dx * uy) <= self.half_width
 
     def corners(self) -> tuple[Point, Point, Point, Point]:
-        """Counter-clockwise, from the one right of ``start``."""
+        """Return the corners counter-clockwise, from the one to the right of ``start``."""
         along = self.start.distance_to(self.end) or 1.0
         ux, uy = (self.end.x - self.start.x) / along, (self.end.y - self.start.y) / along
         wx, wy = -uy * self.half_width, ux * self.half_width
@@ -109,7 +109,7 @@ class Area:
 
 @dataclass(frozen=True, slots=True)
 class Annotations:
-    """All of them at one moment. ``docks`` and ``landmarks`` are poses with an id; ``last_id`` is never given again."""
+    """A snapshot of all annotations. ``docks`` and ``landmarks``: poses with an id; ``last_id`` is never reused."""
 
     lines: tuple[Line, ...] = ()
     areas: tuple[Area, ...] = ()
@@ -126,7 +126,7 @@ class Annotations:
         return tuple(area for area in self.areas if area.kind is kind)
 
     def with_new(self, *entries: Line | Area) -> Annotations:
-        """With these too; their ids are given here."""
+        """Return a copy with further annotations, which get new ids."""
         fresh = [replace(entry, id=self.last_id + number) for number, entry in enumerate(entries, 1)]
         return replace(
             self,
@@ -142,11 +142,11 @@ class MapAnnotations(Component):
     @property
     @abstractmethod
     def current(self) -> Annotations:
-        """Everything drawn at this moment; a value, so compare it by identity to see whether anything changed."""
+        """Current annotations: a value, so a change is a change of identity."""
 
     @abstractmethod
     async def change(self, edit: Callable[[Annotations], Annotations]) -> None:
-        """Replace the current ones by ``edit`` of them, one change after the other; returns when safe on disk.
+        """Replace the current annotations by ``edit`` of them, serialized; return once they are on disk.
 
         What ``edit`` raises goes to the caller, and nothing changes. InvalidGoal beyond ``LINES_MAX`` and its kin.
         """

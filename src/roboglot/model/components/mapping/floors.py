@@ -1,4 +1,4 @@
-"""The floors of a building that the robot goes between by lift, each with its own map, dock and annotations."""
+"""Floors of a building, joined by lift, each with its own map, dock and annotations."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ class Floors(Component):
     @property
     @abstractmethod
     def current(self) -> int:
-        """The floor whose map is in use."""
+        """Floor whose map is in use."""
 
     @abstractmethod
     def begin_on(self, floor: int) -> None:
-        """Say that the present map is of ``floor``. InvalidGoal for no such floor."""
+        """Declare the current map to be that of ``floor``. Raises InvalidGoal."""
 
     @abstractmethod
     def set_lift(self, waiting: Pose, inside: Pose) -> None:
-        """On the present map: where to wait and where to stand in the car. InvalidGoal for nonsense."""
+        """Set the poses to wait at and to stand at in the car, on the current map. Raises InvalidGoal."""
 
     @abstractmethod
     def ride(self, floor: int, *, redraw: bool = True, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
-        """To the lift, in, to ``floor``, out; its map is used from then on, a new one where there is none yet.
+        """Ride the lift to ``floor`` and leave it there; switch to its map, or to a new one if it has none.
 
-        Not ``redraw``: the annotations stay, for the caller to replace.
+        Without ``redraw``, the annotations stay, for the caller to replace.
 
         Feedback: ``RideStage``. Aborts with Expired (the lift did not come), Blocked (a person stands in the way),
         Refused (out of service, out of reach) and navigation's errors. InvalidGoal without a known lift.

@@ -1,4 +1,4 @@
-"""Reflecting strips as landmarks of the map: found while driving, and found again by a robot that is lost."""
+"""Reflecting strips as landmarks of the map: recorded while driving, and used by a lost robot to find itself."""
 
 from __future__ import annotations
 
@@ -17,4 +17,4 @@ class LaserLandmarks(Component):
 
     @abstractmethod
     async def set_updating(self, on: bool) -> None:
-        """Returns when it is safe on disk."""
+        """Switch ``updating``; return once it is on disk."""

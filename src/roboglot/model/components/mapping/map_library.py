@@ -1,4 +1,4 @@
-"""The maps that the robot keeps by name."""
+"""Stored maps of the robot, by name."""
 
 from __future__ import annotations
 
@@ -41,20 +41,20 @@ class StoredMap:
 
 
 class MapLibrary(Component):
-    """Saved maps by name. What was acknowledged survives a crash."""
+    """Stored maps by name. An acknowledged change survives a crash."""
 
     @abstractmethod
     async def names(self, *, outdoor: bool | None = None, number: int | None = None) -> Sequence[str]:
-        """Oldest first; only the outdoor ones, the indoor ones, those of that number, if asked so."""
+        """Return names, oldest first; filtered by outdoor or indoor, and by number, if given."""
 
     @abstractmethod
     async def get(self, name: str) -> StoredMap:
-        """The one, or NotFound."""
+        """Return a map. Raises NotFound."""
 
     @abstractmethod
     async def put(self, stored: StoredMap) -> None:
-        """Save, or replace the one of the same name."""
+        """Store a map, replacing one of the same name."""
 
     @abstractmethod
     async def remove(self, name: str) -> None:
-        """Forget it, or NotFound."""
+        """Delete a map. Raises NotFound."""

@@ -33,8 +33,8 @@ class MapMemory(Component):
 
     @abstractmethod
     async def replace(self, edit: Callable[[Drawings], Replacement]) -> None:
-        """Put what ``edit`` makes of the present drawings in their place; no other change comes between.
+        """Replace the current drawings by ``edit`` of them, atomically.
 
-        Returns when all is safe on disk. InvalidGoal beyond what the components take, and nothing changes. Ids of
-        annotations given before are never given again.
+        Returns once all is on disk. Raises InvalidGoal beyond the components' limits, and then nothing changes. Ids of
+        annotations are never reused.
         """

@@ -1,4 +1,4 @@
-"""The map that the robot makes of what its lidar saw."""
+"""The map that the robot builds from lidar scans."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from roboglot.model.maps import OccupancyGrid
 
 
 class Mapping(Component):
-    """Begins with nothing at the pose where the robot woke up, which is the origin of map."""
+    """Starts empty; the pose at power-on is the origin of map."""
 
     @property
     @abstractmethod
@@ -20,40 +20,40 @@ class Mapping(Component):
     @property
     @abstractmethod
     def revision(self) -> int:
-        """Counts up whenever a cell changed."""
+        """Number that increases whenever a cell changes."""
 
     @property
     @abstractmethod
     def enabled(self) -> bool:
-        """False: the map stays as it is."""
+        """True if scans update the map."""
 
     @abstractmethod
     def enable(self, on: bool) -> None:
-        """Go on or stop adding scans."""
+        """Switch the updates by scans on or off."""
 
     @property
     @abstractmethod
     def closes_loops(self) -> bool:
-        """True if a place known again after a long way straightens the map."""
+        """True if recognising a place after a long way corrects the map."""
 
     @abstractmethod
     def close_loops(self, on: bool) -> None:
-        """Switch that. Each time it happens, ``LoopClosed`` is published, and ``PoseJumped``."""
+        """Switch loop closing. Each closed loop publishes ``LoopClosed`` and ``PoseJumped``."""
 
     @abstractmethod
     def clear(self) -> None:
-        """Forget the map; the robot's pose becomes the new origin. Publishes ``MapReplaced``."""
+        """Delete the map; the robot's pose becomes the new origin. Publishes ``MapReplaced``."""
 
     @abstractmethod
     def load(self, grid: OccupancyGrid, pose: Pose) -> None:
-        """Use ``grid`` from now on, with the robot at ``pose`` in it, or near enough to be found by the lidar.
+        """Replace the map by ``grid``, with the robot at ``pose``, or near enough for the lidar to correct it.
 
-        Its cells are resampled to this map's. InvalidGoal for what is too large. Publishes ``MapReplaced``.
+        Its cells are resampled to this map's. Raises InvalidGoal if it is too large. Publishes ``MapReplaced``.
         """
 
     @abstractmethod
     def move_origin(self, point: Point) -> Point:
-        """Make ``point`` of the map its origin, to the nearest cell border, which is returned.
+        """Move the origin to ``point``, rounded to a cell border; return the rounded point.
 
         InvalidGoal beyond 10 km. Publishes ``MapReplaced``.
         """

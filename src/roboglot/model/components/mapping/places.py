@@ -1,4 +1,4 @@
-"""The named places that people put on the map. What was acknowledged survives a crash."""
+"""Named places that people put on the map. An acknowledged change survives a crash."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from roboglot.model.maps import PointOfInterest
 
 
 class Places(Component):
-    """Points of interest by id; every change publishes ``PlacesChanged`` when it is safe on disk."""
+    """Points of interest by id; every change publishes ``PlacesChanged`` once it is on disk."""
 
     @abstractmethod
     def all(self) -> Sequence[PointOfInterest]:
@@ -18,16 +18,16 @@ class Places(Component):
 
     @abstractmethod
     def get(self, id: str) -> PointOfInterest:
-        """The one, or NotFound."""
+        """Return a place. Raises NotFound."""
 
     @abstractmethod
     async def put(self, *places: PointOfInterest) -> None:
-        """Add, or replace those with the same id; all or none."""
+        """Add places, replacing those with the same id; all or none."""
 
     @abstractmethod
     async def remove(self, id: str) -> None:
-        """Forget it, or NotFound."""
+        """Delete a place. Raises NotFound."""
 
     @abstractmethod
     async def clear(self) -> None:
-        """Forget all."""
+        """Delete all places."""

@@ -1,4 +1,4 @@
-"""The other floors' places and the way there. Provided by the store of the building's maps; empty if there is none."""
+"""Places on other floors, and riding there. Provided by the store of the building's maps; empty without one."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class StoreyMaps(Protocol):
         """The floor of the dock that the robot goes home to."""
 
     def go_to(self, floor: str, source: str) -> Action:
-        """Ride there; its map, places and docks are in use then. InvalidGoal for a floor that is not known."""
+        """Ride to a floor and switch to its map, places and docks. Raises InvalidGoal for an unknown floor."""
 
 
 class Storeys(Component):

@@ -29,7 +29,7 @@ class ArmReach:
 
 
 class Arm(Component):
-    """Moves in straight lines; holds where it is between commands."""
+    """Moves in straight lines; holds its position between commands."""
 
     reach: ArmReach
     home: ArmPosition
@@ -41,16 +41,16 @@ class Arm(Component):
 
     @abstractmethod
     def move_to(self, position: ArmPosition, *, source: str = "") -> Action:
-        """Go there; raises InvalidGoal out of reach."""
+        """Move to a position; raises InvalidGoal out of reach."""
 
     @abstractmethod
     def move_by(self, offset: ArmPosition, *, source: str = "") -> Action:
-        """Go so much further from where it is; raises InvalidGoal if that is out of reach."""
+        """Move by an offset from the current position; raises InvalidGoal out of reach."""
 
     @abstractmethod
     def recenter(self, *, source: str = "") -> Action:
-        """Go to ``home``."""
+        """Move to ``home``."""
 
     @abstractmethod
     def stop(self) -> None:
-        """Cancel what moves it; it stays where it is."""
+        """Cancel its action and hold the position."""

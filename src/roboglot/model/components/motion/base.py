@@ -1,4 +1,4 @@
-"""The drive: wheels or whatever else moves base_link over the floor."""
+"""The drive, on wheels or legs, that moves base_link over the floor."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ class Base(Component):
 
     @property
     def delay(self) -> float:
-        """Seconds from a command until odometry shows its effect, beyond the base's own inertia; 0 for a base here."""
+        """Latency from a command to its effect in odometry, s, beyond the base's inertia; 0 for a local base."""
         return 0.0
 
     @property
     def refusal(self) -> Refused | None:
-        """Return why it would not drive now (a button, a cable); None if nothing is known against it."""
+        """Return the reason why the base would refuse to drive now (a button, a cable), or None."""
         return None
 
     def check_free(self, command: Twist | WheelSpeeds) -> None:
@@ -54,9 +54,9 @@ class Base(Component):
         return
 
     def hindrance(self, command: Twist | WheelSpeeds) -> Blocked | None:
-        """Return what keeps it from driving so without touching it (emergency braking, a cliff); None if nothing does.
+        """Return the contactless hindrance (emergency braking, a cliff) to driving like this, or None.
 
-        The base turns as commanded and stands otherwise; who plans a way around may go on.
+        A hindered base still turns as commanded; a planner may look for a way around.
         """
         return None
 
@@ -65,12 +65,12 @@ class Base(Component):
         """Drive at ``twist`` (base_link; cut to the limits, reached by the limits' accelerations)."""
 
     def brake_hard(self) -> None:
-        """Stop as fast as the drive can, beyond the limits' accelerations; a drive that has but one way stops so."""
+        """Stop as fast as the drive can, exceeding the limits' accelerations where it is able to."""
         self.set_velocity(STILL)
 
     @abstractmethod
     def set_wheel_speeds(self, speeds: WheelSpeeds) -> None:
-        """Turn the wheels at these speeds; the body follows as the wheels' geometry has it."""
+        """Turn the wheels at these speeds; the body follows by their kinematics."""
 
     @property
     @abstractmethod

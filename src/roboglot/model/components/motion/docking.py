@@ -1,4 +1,4 @@
-"""Going home to charge."""
+"""Docking at the charging station."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ class Docking(Component):
 
     @abstractmethod
     def set_home(self, pose: Pose | None) -> None:
-        """The dock is here: base_link's pose in map when docked. None: forget it."""
+        """Set the docked pose of base_link in map; None deletes it."""
 
     @abstractmethod
     def dock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
-        """Drive home and onto the contacts. Succeeds when they touch; aborts with DockNotFound and navigation's errors.
+        """Drive to the dock and onto its contacts; aborts with DockNotFound and navigation's errors.
 
         A dock whose place is unknown is looked for nearby. Feedback: "searching" then, "approaching", "docking",
         "docked".
@@ -33,7 +33,7 @@ class Docking(Component):
 
     @abstractmethod
     def undock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
-        """Leave the contacts, straight ahead, until there is room to turn. Succeeds at once off the dock.
+        """Leave the dock straight ahead until there is room to turn; succeeds at once off the dock.
 
         Aborts with Blocked when something holds the robot. Feedback: "leaving".
         """

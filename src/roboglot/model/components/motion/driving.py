@@ -1,4 +1,4 @@
-"""Driving by hand: velocities and short moves by odometry, each an action that holds the base."""
+"""Manual driving: velocities and short moves by odometry, each an action that holds the base."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ BASE = "base"  # the resource of all actions that move the robot over the floor
 
 
 class Driving(Component):
-    """Made of Base and Odometry (and Legs: a robot that lies down stands up first). Avoids no obstacles."""
+    """Built on Base and Odometry (and Legs: a lying robot stands up first). Does not avoid obstacles."""
 
     @abstractmethod
     def drive(self, command: Twist | WheelSpeeds, *, lifetime: float | None = None, source: str = "") -> Action:
         """Keep ``command`` until it is replaced or cancelled, or ``lifetime`` seconds passed (then it SUCCEEDED).
 
-        While the same source is driving already, its action goes on with the new command (no restart, no gap).
+        If the same source is driving already, its action continues with the new command, without a gap.
         """
 
     @abstractmethod
@@ -35,6 +35,6 @@ class Driving(Component):
         """Move by ``offset`` (base_link at the start; its yaw may exceed a turn) at up to these speeds (m/s, rad/s).
 
         Translation and rotation end together where the speeds allow. Succeeds within 1 cm / 1 degree of odometry.
-        When the same source is moving so already, that move ends as cancelled and this one goes on at its speed,
-        without standing still between them.
+        If the same source is already in such a move, that one ends cancelled and this one continues at its speed,
+        without a stop in between.
         """

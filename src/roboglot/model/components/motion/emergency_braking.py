@@ -1,4 +1,4 @@
-"""Automatic emergency braking: the robot stops by itself before what is right ahead."""
+"""Automatic emergency braking: the robot stops by itself in front of obstacles."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from roboglot.model.components.component import Component
 
 
 class EmergencyBraking(Component):
-    """Publishes ``ObstacleBraked`` when it cuts in. Driving away from what is ahead stays possible."""
+    """Publishes ``ObstacleBraked`` when it intervenes. Driving away from the obstacle stays possible."""
 
     @property
     @abstractmethod
     def enabled(self) -> bool:
-        """True if it watches."""
+        """True if it is switched on."""
 
     @abstractmethod
     def enable(self, on: bool) -> None:
@@ -22,4 +22,4 @@ class EmergencyBraking(Component):
     @property
     @abstractmethod
     def braking(self) -> bool:
-        """True if it holds the robot back now."""
+        """True while it holds the robot back."""

@@ -16,7 +16,7 @@ class EmergencyStop(Component):
     @property
     @abstractmethod
     def engaged(self) -> bool:
-        """True if anything (the button, an application) holds the robot."""
+        """True while the button or an application holds the robot."""
 
     @abstractmethod
     def engage(self) -> None:

@@ -1,4 +1,4 @@
-"""Single feet: where each one is, in which order they leave the floor, where they come down again.
+"""Single feet: their positions, the order of their steps, and their landing places.
 
 Knows no gait by name and no vendor's order of legs.
 """
@@ -15,7 +15,7 @@ FOOTFALL_SECONDS_MIN = 0.02
 
 
 class Foot(StrEnum):
-    """The four, in the order in which everything here lists them."""
+    """Feet, in the order of every list here."""
 
     RIGHT_FRONT = "right front"
     LEFT_FRONT = "left front"
@@ -43,7 +43,7 @@ class Foothold:
 
 @dataclass(frozen=True, slots=True)
 class Footfall:
-    """Phase of a gait: for so long (s) these feet are on the floor and the others in the air."""
+    """Phase of a gait, in seconds: these feet are on the floor, the others in the air."""
 
     seconds: float
     down: frozenset[Foot]

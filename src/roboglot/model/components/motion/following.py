@@ -1,4 +1,4 @@
-"""Keeping near a person who walks, or a thing that is moved."""
+"""Following a walking person or a moving object."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class FollowSide(StrEnum):
 
 
 class Following(Component):
-    """Made of Vision or UltraWideband, Lidar and Base; goes around what stands between, as the person did.
+    """Built on Vision or UltraWideband, Lidar and Base; goes around obstacles in between.
 
-    Feedback: "searching" (not seen now: it goes to where they were), "following" or "waiting" (there is no way).
+    Feedback: "searching" (out of sight: drives to the last place seen), "following" or "waiting" (no way).
     """
 
     @abstractmethod
@@ -71,4 +71,4 @@ class Following(Component):
     @property
     @abstractmethod
     def place(self) -> Point | None:
-        """Last place seen of the one followed, in base_link as it is now (m); None without."""
+        """Place where the target was seen last, in the current base_link (m); None without a target."""

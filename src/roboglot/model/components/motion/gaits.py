@@ -12,7 +12,7 @@ FOOT_LIFT_MIN, FOOT_LIFT_MAX = 0.005, 0.10  # m
 
 
 class Gait(StrEnum):
-    """The ways to walk."""
+    """Gait of a legged robot."""
 
     TROT_SLOW = "slow trot"
     TROT_MEDIUM = "medium trot"
@@ -46,7 +46,7 @@ class GaitSpec:
     rock: float = 0.0
 
     def clamp(self, twist: Twist) -> Twist:
-        """The velocity cut axis by axis to what the gait can do."""
+        """Return the velocity, limited axis by axis to what the gait can walk."""
         low, high = self.lowest, self.highest
         return Twist(
             max(low.x, min(high.x, twist.x)), max(low.y, min(high.y, twist.y)), max(low.yaw, min(high.yaw, twist.yaw))
@@ -54,7 +54,7 @@ class GaitSpec:
 
 
 def _even(x: float, y: float, yaw: float, **more: float) -> GaitSpec:
-    """Return a gait as fast to one side as to the other."""
+    """Return a gait with the same speeds to both sides."""
     return GaitSpec(Twist(-x, -y, -yaw), Twist(x, y, yaw), **more)
 
 

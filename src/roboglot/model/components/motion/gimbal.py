@@ -1,4 +1,4 @@
-"""The gimbal: two axes that aim camera and blaster, and who follows whom in yaw. Knows no camera and no blaster."""
+"""The gimbal: two axes that aim camera and blaster, coupled in yaw to the chassis. Knows neither camera nor blaster."""
 
 from __future__ import annotations
 
@@ -46,14 +46,14 @@ class GimbalLimits:
 
 
 class Gimbal(Component):
-    """Stabilised: between commands it holds its direction in the world as far as mode and limits let it."""
+    """Stabilised: between commands it holds its direction in the world, within mode and limits."""
 
     limits: GimbalLimits
 
     @property
     @abstractmethod
     def angles(self) -> GimbalAngles:
-        """Relative to the body, now."""
+        """Current angles relative to the body."""
 
     @property
     @abstractmethod
@@ -67,7 +67,7 @@ class Gimbal(Component):
 
     @abstractmethod
     def set_mode(self, mode: FollowMode) -> None:
-        """Let another one lead from now on."""
+        """Set the follow mode."""
 
     @property
     @abstractmethod
@@ -76,17 +76,17 @@ class Gimbal(Component):
 
     @abstractmethod
     def suspend(self) -> None:
-        """Take the torque away: what moves it is cancelled, friction keeps it on the body; commands are refused."""
+        """Cut the torque: its action is cancelled, friction holds it on the body, and commands are refused."""
 
     @abstractmethod
     def resume(self) -> None:
-        """Give the torque back; it holds where it is."""
+        """Restore the torque; the gimbal holds its current angles."""
 
     @abstractmethod
     def set_speed(self, pitch: float, yaw: float, *, source: str = "") -> Action:
         """Turn at these speeds (rad/s, cut to the limit) until the next command; both 0 stops and SUCCEEDs.
 
-        Speeds are relative to the world. While the same source turns it already, its action goes on with them.
+        Speeds are relative to the world. If the same source is turning it already, its action continues with them.
         """
 
     @abstractmethod
@@ -102,8 +102,8 @@ class Gimbal(Component):
     ) -> Action:
         """Turn to these angles (rad; None: leave that axis alone) at up to these speeds (rad/s).
 
-        In GIMBAL_LEAD, where the body follows, a yaw against the body is measured from where that stands at the
-        beginning. Raises InvalidGoal outside the limits (frame BODY) or for a speed of 0, Refused while suspended. When
+        In GIMBAL_LEAD, where the body follows, a yaw in frame BODY is relative to the body's heading at the
+        start. Raises InvalidGoal outside the limits (frame BODY) or for a speed of 0, Refused while suspended. When
         a goal turns out to be beyond its travel, the axis goes as far as it can and the action fails (Unreachable).
         """
 
@@ -117,7 +117,7 @@ class Gimbal(Component):
         yaw_speed: float | None = None,
         source: str = "",
     ) -> Action:
-        """Turn by these angles (rad) from where it is; beyond the limits as ``move_to``: Unreachable, at the limit."""
+        """Turn by these angles (rad); beyond the limits it ends Unreachable, at the limit, as ``move_to`` does."""
 
     @abstractmethod
     def recenter(self, *, source: str = "") -> Action:

@@ -31,7 +31,7 @@ class Gripper(Component):
     @property
     @abstractmethod
     def opening(self) -> float:
-        """Between the jaws, m."""
+        """Distance between the jaws, m."""
 
     @abstractmethod
     def open(self, level: int = 1, *, source: str = "") -> Action:
@@ -43,4 +43,4 @@ class Gripper(Component):
 
     @abstractmethod
     def stop(self) -> None:
-        """Cancel what moves the jaws; they stay where they are."""
+        """Cancel the jaws' action; they hold their position."""

@@ -1,4 +1,4 @@
-"""Legs: postures and the ways between them, how the body is held above the feet, gaits, motions."""
+"""Legs: postures and changes between them, body poses above the feet, gaits, motions."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class BodyPose:
 
 @dataclass(frozen=True, slots=True)
 class FootLift:
-    """Swing height of the feet at every step, and how much nearer to the middle they come down, m."""
+    """Swing height of the feet at every step, and the inward shift of their landing places, m."""
 
     front: float = 0.03
     rear: float = 0.03
@@ -52,8 +52,8 @@ class FootLift:
 class Step:
     """A piece of a choreography: ``seconds`` long, base_link moving at ``twist``, the body coming to ``body``.
 
-    ``footholds``: one of each Foot, in that order, in place of ``lift``. ``friction`` of the floor that is counted on:
-    no faster does the velocity change (times gravity). ``landing``: how fast feet come down, as a share of their rise.
+    ``footholds``: one of each Foot, in that order, in place of ``lift``. ``friction``: assumed coefficient of the
+    floor; times gravity it limits changes of velocity. ``landing``: how fast feet come down, as a share of their rise.
     """
 
     seconds: float
@@ -67,7 +67,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Choreography:
-    """Steps, and when which feet are in the air meanwhile; no ``footfalls``: as it walks."""
+    """Steps with their footfalls; no ``footfalls``: those of walking."""
 
     steps: Sequence[Step] = ()
     footfalls: Sequence[Footfall] = ()
@@ -77,7 +77,7 @@ class Choreography:
 class LegLimits:
     """Belly heights (m), the largest angle of each axis (rad) and the largest shift (m) of a body pose.
 
-    ``reach``: how far from below its hip a foot stands at most, m.
+    ``reach``: largest distance of a standing foot from the point below its hip, m.
     """
 
     lowest: float
@@ -88,7 +88,7 @@ class LegLimits:
 
 
 class Legs(Component):
-    """Postures and motions take time and hold the base meanwhile; driving needs STANDING."""
+    """Changes of posture and motions are actions that hold the base; driving needs STANDING."""
 
     limits: LegLimits
     choreography: Choreography  # the last dance; empty before the first
@@ -101,17 +101,17 @@ class Legs(Component):
     @property
     @abstractmethod
     def body_height(self) -> float:
-        """Height of the body's belly above the floor, m, now."""
+        """Current height of the belly above the floor, m."""
 
     @property
     @abstractmethod
     def attitude(self) -> Orientation:
-        """Roll, pitch and yaw of the body against standing straight, rad, now."""
+        """Current roll, pitch and yaw of the body against standing straight, rad."""
 
     @property
     @abstractmethod
     def performing(self) -> Motion | None:
-        """The motion under way."""
+        """Motion under way; None: none."""
 
     @property
     @abstractmethod
@@ -130,7 +130,7 @@ class Legs(Component):
 
     @abstractmethod
     def stand(self, *, source: str = "") -> Action:
-        """Stand up, straight; succeeds at once if standing so."""
+        """Stand up straight; succeeds at once if already so."""
 
     @abstractmethod
     def lie_down(self, *, source: str = "") -> Action:
@@ -138,31 +138,31 @@ class Legs(Component):
 
     @abstractmethod
     def go_limp(self) -> None:
-        """Emergency: cancel everything that holds the base or the legs and let the body sink at once."""
+        """Cut the legs' torque in an emergency: cancel all actions on base and legs; the body sinks at once."""
 
     @abstractmethod
     def walk(self, gait: Gait | None, lift: FootLift | None = None) -> None:
-        """Walk so from now on: velocities are cut to what the gait can do.
+        """Set the gait; velocities are limited to what it can walk.
 
-        The robot's own way of walking comes back when it has stood still for a second, except on a leash
+        After standing still for a second the robot returns to its default gait, except on a leash
         (TROT_PASSIVE): it waits to be pulled until the next command. Raises InvalidGoal for a lift beyond FOOT_LIFT_MIN
         and FOOT_LIFT_MAX.
         """
 
     @abstractmethod
     def hold(self, body: BodyPose, *, duration: float = 1.0, relative: bool = False, source: str = "") -> Action:
-        """Bring the body there within ``duration`` s and keep it there, standing or walking, until the next command.
+        """Move the body to a pose within ``duration`` s and hold it, standing or walking, until the next command.
 
-        ``relative``: by this much from how it is held now (the result is cut to the limits). Raises InvalidGoal beyond
+        ``relative``: change against the current pose (the result is cut to the limits). Raises InvalidGoal beyond
         the limits; aborts with Refused unless the robot stands.
         """
 
     @abstractmethod
     def perform(self, motion: Motion, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
-        """Do a motion of ``MOTIONS`` to its end; its effect on the place is the table's, unless something is hit.
+        """Perform a motion of ``MOTIONS``; it displaces the robot as the table says, unless something is hit.
 
-        Aborts with Refused in a posture that it cannot begin in or with a low battery, with Blocked when something
-        stood in the way. Raises Busy as ``on_busy`` says.
+        Aborts with Refused in a wrong initial posture or with a low battery, with Blocked when something
+        was in the way. Raises Busy as ``on_busy`` says.
         """
 
     @abstractmethod
@@ -174,10 +174,10 @@ class Legs(Component):
         source: str = "",
         on_busy: OnBusy = OnBusy.REPLACE,
     ) -> Action:
-        """Go through the steps of one's own choreography, then stand straight again.
+        """Perform a custom choreography, then stand straight again.
 
-        ``footfalls``: when which feet are in the air, from the start again as long as there are steps; none: as it
-        walks. Feet that stand hold the body back where a leg is stretched to its end. Raises InvalidGoal for too many
+        ``footfalls`` repeat as long as there are steps; none: those of walking. Standing feet hold the body back
+        where a leg is fully stretched. Raises InvalidGoal for too many
         steps, impossible body poses, footholds or lifts, and for footfalls that no body can balance on; aborts as
         ``perform`` does.
         """

@@ -10,7 +10,7 @@ from roboglot.model.components.component import Component
 
 @dataclass(frozen=True, slots=True)
 class MotionFlags:
-    """All true or false at this moment; an impact is held for a moment longer, so that slow readers see it."""
+    """Current flags; an impact is held a moment longer, so that slow readers see it."""
 
     static: bool = True  # neither moving nor turning
     uphill: bool = False  # driving up a slope
@@ -26,7 +26,7 @@ class MotionFlags:
 
 
 class MotionStatus(Component):
-    """The robot's own sense of how it goes."""
+    """Motion as sensed by the robot itself."""
 
     @property
     @abstractmethod

@@ -17,7 +17,7 @@ from roboglot.model.geometry import ORIGIN, Pose
 
 
 class Motion(StrEnum):
-    """The motions by name."""
+    """Motion, by name."""
 
     GET_UP_FAST = "get up fast"
     GET_UP = "get up"
@@ -170,7 +170,7 @@ def _figure(duration: float, x: float = 0.0, footfalls: tuple[Footfall, ...] = (
 
 
 def _up(*turns: frozenset[Foot], seconds: float = 0.4) -> tuple[Footfall, ...]:
-    """One after the other, these feet are in the air for so long."""
+    """Return footfalls that lift these feet one after the other, for ``seconds`` each."""
     return tuple(Footfall(seconds, frozenset(Foot) - turn) for turn in turns)
 
 

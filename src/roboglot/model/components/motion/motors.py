@@ -1,4 +1,4 @@
-"""The motors' own sensors."""
+"""Temperature sensors of the motors."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ class Motors(Component):
     @property
     @abstractmethod
     def temperatures(self) -> Mapping[str, float]:
-        """Celsius, now."""
+        """Current temperatures, degrees Celsius."""
 
     @property
     def hottest(self) -> float:
-        """Celsius of the warmest one."""
+        """Temperature of the warmest motor, degrees Celsius."""
         return max(self.temperatures.values())

@@ -1,4 +1,4 @@
-"""Going somewhere without hitting anything."""
+"""Navigation: driving to goals without collisions."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class NavigationFeedback:
 
 
 class Navigation(Component):
-    """Plans on the map and what the lidar sees now; the feedback of its actions is ``NavigationFeedback``."""
+    """Plans on the map and current scans; its actions' feedback is ``NavigationFeedback``."""
 
     @abstractmethod
     def navigate_to(
@@ -56,11 +56,11 @@ class Navigation(Component):
 
     @abstractmethod
     async def plan(self, start: Point, goal: Point) -> Path:
-        """The path it would drive, or Unreachable."""
+        """Return the path that it would drive. Raises Unreachable."""
 
     @abstractmethod
     async def visiting_order(self, places: Sequence[Point], *, round_trip: bool = False) -> Sequence[int]:
-        """The indices of ``places`` (map) in the order of a short tour from here, and back if ``round_trip``.
+        """Return the indices of ``places`` (map) in the order of a short tour from here, and back if ``round_trip``.
 
         The shortest by the planned ways up to 12 places; beyond, a good one. Without ``round_trip``, places that cannot
         be reached come last; with it, they are Unreachable. InvalidGoal beyond 500.

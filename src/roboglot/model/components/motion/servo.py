@@ -11,7 +11,7 @@ SERVO = "servo "  # prefix of the servos' resources
 
 
 def servo_resource(number: int) -> str:
-    """The resource that is held by whatever turns this servo."""
+    """Return the resource of the actions that turn this servo."""
     return f"{SERVO}{number}"
 
 
@@ -24,7 +24,7 @@ class Servos(Component):
 
     @abstractmethod
     def angle(self, number: int) -> float:
-        """Return where it stands, rad in [-pi, pi]; half a turn has the sign of the side from which it got there."""
+        """Return the angle, rad in [-pi, pi]; half a turn has the sign of the side that it was reached from."""
 
     @abstractmethod
     def move_to(self, number: int, angle: float, *, speed: float | None = None, source: str = "") -> Action:
@@ -36,4 +36,4 @@ class Servos(Component):
 
     @abstractmethod
     def stop(self, number: int | None = None) -> None:
-        """Cancel what turns this one, or all of them; they hold where they are."""
+        """Cancel the action of this servo, or of all; they hold their angle."""

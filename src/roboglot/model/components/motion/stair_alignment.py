@@ -1,4 +1,4 @@
-"""Standing square before a flight of stairs."""
+"""Alignment square to a flight of stairs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class StairDirection(StrEnum):
 
 
 class AlignmentStage(StrEnum):
-    """Feedback: it looks for the first step; it has seen it and moves; it stands as it should."""
+    """Feedback of an alignment: searching the first step, moving to it, aligned."""
 
     LOOKING = "looking"
     ALIGNING = "aligning"
@@ -31,9 +31,9 @@ class StairAlignment(Component):
 
     @abstractmethod
     def align(self, direction: StairDirection, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
-        """Turn and shift until the first step's edge lies straight across ahead, half a metre from base_link.
+        """Turn and shift until the first step's edge is square ahead, 0.5 m from base_link.
 
         Feedback is an ``AlignmentStage``. Raises at once, with no effect: NotFound where a standing robot sees no
-        step, Refused where the base would not drive. Aborts with NotFound when it loses it, Expired when it takes too
+        step, Refused where the base would not drive. Aborts with NotFound when it loses sight of it, Expired after too
         long.
         """

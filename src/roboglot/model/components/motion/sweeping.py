@@ -1,4 +1,4 @@
-"""Covering floor, as cleaners and disinfectors do."""
+"""Floor coverage, for cleaning and disinfection."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from roboglot.model.geometry import Point
 
 @dataclass(frozen=True, slots=True)
 class SweepFeedback:
-    """Metres of lanes driven and in all; metres of those left out because no way led there."""
+    """Metres of lanes driven, in total, and skipped as unreachable."""
 
     done: float
     total: float
@@ -22,7 +22,7 @@ class SweepFeedback:
 
 
 class Sweeping(Component):
-    """Made of Navigation: drives over all known free floor of an area, lane by lane. Feedback: ``SweepFeedback``."""
+    """Built on Navigation: covers the known free floor of an area, lane by lane. Feedback: ``SweepFeedback``."""
 
     @abstractmethod
     def sweep(
@@ -40,4 +40,4 @@ class Sweeping(Component):
 
     @abstractmethod
     async def lanes(self, areas: Sequence[Area] = (), *, width: float | None = None) -> Sequence[Sequence[Point]]:
-        """The way it would go: for each part of the floor the ends of its lanes in turn (map)."""
+        """Return the lanes it would drive: for each part of the floor, their ends in order (map)."""

@@ -1,4 +1,4 @@
-"""Driving precisely to a mark: a printed tag, a board or strips that the lidar knows, a shelf to lift."""
+"""Precise docking at a mark: a printed tag, a board or reflectors seen by lidar, a shelf to lift."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class MarkGoal:
 
 
 class TagDocking(Component):
-    """Made of Navigation, Driving, Odometry and what sees the mark."""
+    """Built on Navigation, Driving, Odometry and the sensor that sees the mark."""
 
     @property
     @abstractmethod
@@ -53,8 +53,8 @@ class TagDocking(Component):
 
     @abstractmethod
     def dock_at(self, goal: MarkGoal, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
-        """Raises InvalidGoal for marks and places that cannot be; aborts with NotFound when the mark is not seen,
-        Blocked when something holds the robot or it ends beside, and navigation's errors.
+        """Dock at a mark. Raises InvalidGoal for impossible marks and places; aborts with NotFound when the mark is not
+        seen, Blocked when the robot is held or misses it, and navigation's errors.
 
         Feedback: "approaching", "looking", "docking", "lifting", "docked".
         """
@@ -70,8 +70,8 @@ class TagDocking(Component):
         source: str = "",
         on_busy: OnBusy = OnBusy.REPLACE,
     ) -> Action:
-        """Straight backwards (``ahead``: forwards) by ``distance`` m; None: until the robot has room to turn.
+        """Drive straight backwards (``ahead``: forwards) by ``distance`` m; None: until there is room to turn.
 
-        ``watchful``: square to the mark, as long as that is seen. A shelf on the jack is set down before. Does nothing
-        on a charging dock. Aborts with Blocked. Feedback: "lowering", "leaving".
+        ``watchful``: keep square to the mark while it is seen. A shelf on the jack is set down first. No effect on a
+        charging dock. Aborts with Blocked. Feedback: "lowering", "leaving".
         """

@@ -1,4 +1,4 @@
-"""Sensor adapters: inputs that measure what users attach."""
+"""Sensor adapters: inputs for sensors that users attach."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ class SensorAdapters(Component):
 
     @abstractmethod
     def voltage(self, adapter: int, port: int) -> float:
-        """V at the input now."""
+        """Return the voltage at the input, V."""
 
     @abstractmethod
     def level(self, adapter: int, port: int) -> bool:
-        """True if that counts as logically high."""
+        """Return whether the input is logically high."""
 
     @abstractmethod
     def pulse_period(self, adapter: int, port: int) -> float:
-        """Seconds between the last two changes of the level; 0 before there were two."""
+        """Return the seconds between the last two changes of the level; 0 before the second."""

@@ -1,4 +1,4 @@
-"""The barometer, which feels how high the robot stands."""
+"""The barometer, which measures air pressure and so the robot's height."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ class BarometerReading:
 
 
 class Barometer(Component):
-    """The air's pressure falls by 12 Pa with each metre: a floor of a building is about 40 Pa."""
+    """Air pressure falls by 12 Pa per metre: a storey is about 40 Pa."""
 
     @property
     @abstractmethod
     def reading(self) -> BarometerReading:
-        """The newest measurement."""
+        """Latest measurement."""

@@ -15,4 +15,4 @@ class Bumper(Component):
     @property
     @abstractmethod
     def pressed(self) -> frozenset[str]:
-        """The zones that touch something now."""
+        """Zones that are touching something."""

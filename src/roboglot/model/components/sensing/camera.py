@@ -1,4 +1,4 @@
-"""The camera that looks ahead, and the pictures that it takes."""
+"""The forward camera and its pictures."""
 
 from __future__ import annotations
 
@@ -31,26 +31,26 @@ class Frame:
 
     @property
     def width(self) -> int:
-        """Pixels across."""
+        """Width, pixels."""
         return int(self.planes.shape[1])
 
     @property
     def height(self) -> int:
-        """Pixels down."""
+        """Height, pixels."""
         return int(self.planes.shape[0]) * 2 // 3
 
     @property
     def luma(self) -> NDArray[np.uint8]:
-        """(height, width), 16 black to 235 white."""
+        """Brightness (height, width), 16 black to 235 white."""
         return self.planes[: self.height]
 
     @property
     def chroma(self) -> NDArray[np.uint8]:
-        """(2, height / 2, width / 2): U and V, 128 is grey."""
+        """U and V (2, height / 2, width / 2), 128 is grey."""
         return self.planes[self.height :].reshape(2, self.height // 2, self.width // 2)
 
     def rgb(self) -> NDArray[np.uint8]:
-        """(height, width, 3), 0..255."""
+        """Return the picture as RGB (height, width, 3), 0..255."""
         luma = (self.luma.astype(np.float32) - 16.0) * np.float32(255 / 219)
         u, v = (self.chroma.astype(np.float32) - 128.0).repeat(2, 1).repeat(2, 2) * np.float32(255 / 224)
         pixels = np.stack((luma + 1.402 * v, luma - 0.344136 * u - 0.714136 * v, luma + 1.772 * u), axis=-1)
@@ -91,12 +91,12 @@ class Camera(Component):
         """Correct the brightness. Raises InvalidGoal beyond EXPOSURE_MAX."""
 
     def prepare(self) -> None:
-        """Pictures may soon be asked for: begin what the first one takes long for. Returns at once."""
+        """Start the slow preparations of a first picture in the background; return at once."""
 
     @abstractmethod
     async def capture(self) -> Frame:
-        """A picture of this instant."""
+        """Take a picture now."""
 
     @abstractmethod
     def subscribe(self) -> Viewer[Frame]:
-        """Pictures at ``rate`` from now on; the same ones for every viewer."""
+        """Return a viewer of pictures at ``rate``; all viewers share them."""

@@ -1,4 +1,4 @@
-"""Sensors that look down for the floor's end."""
+"""Downward sensors that detect drops."""
 
 from __future__ import annotations
 
@@ -15,4 +15,4 @@ class Cliff(Component):
     @property
     @abstractmethod
     def detected(self) -> frozenset[str]:
-        """The zones under which there is no floor now."""
+        """Zones without floor below."""

@@ -1,4 +1,4 @@
-"""Depth cameras, and switching sensors off."""
+"""The depth camera."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ class DepthImage:
 
     @property
     def rays(self) -> NDArray[np.float64]:
-        """Every pixel's way (rows x columns x 3) through base_link for 1 m along the optical axis, to be read."""
+        """Vector (rows x columns x 3) of each pixel in base_link per 1 m along the optical axis; read only."""
         rows, columns = self.depths.shape
         return _rays(rows, columns, self.width, self.height, self.attitude.pitch)
 
     @property
     def points(self) -> NDArray[np.float32]:
-        """Points measured (n, 3): x, y, z in base_link, m, z above the floor."""
+        """Measured points (n, 3): x, y, z in base_link, m, z above the floor."""
         seen = np.isfinite(self.depths)
         points = self.rays[seen] * self.depths[seen][:, None]
         points += (self.mount.x, self.mount.y, self.mount.z)
@@ -50,7 +50,7 @@ class DepthImage:
 
 
 class DepthCamera(Component):
-    """Takes an image when asked for one, at most ``rate`` a second."""
+    """Takes images on request, at most ``rate`` per second."""
 
     rate: float
     connected: bool = True  # whether it responds; without a response there is no image
@@ -58,7 +58,7 @@ class DepthCamera(Component):
     @property
     @abstractmethod
     def image(self) -> DepthImage | None:
-        """The newest of the camera ahead; None before the first, and while switched off or masked."""
+        """Latest image; None before the first, and while switched off or masked."""
 
     @property
     @abstractmethod

@@ -12,18 +12,18 @@ T = TypeVar("T")
 
 
 class Detector(ABC, Generic[T]):
-    """Looks ``rate`` times a second while it has viewers, and costs nothing otherwise."""
+    """Runs ``rate`` times per second while it has viewers, and costs nothing otherwise."""
 
     rate: float
 
     @abstractmethod
     def subscribe(self) -> Viewer[Sighting[T]]:
-        """Return what it makes out from now on, also when that is nothing; the same for every viewer.
+        """Return a viewer of its sightings, empty ones included; all viewers share them.
 
-        Closing the viewer switches the detector off, if it was the last. Raises Busy when there are too many.
+        Closing the last viewer switches the detector off. Raises Busy when there are too many viewers.
         """
 
     @property
     @abstractmethod
     def latest(self) -> Sighting[T] | None:
-        """The newest sighting; None without viewers, and before the first."""
+        """Latest sighting; None without viewers, and before the first."""

@@ -39,4 +39,4 @@ class Gps(Component):
     @property
     @abstractmethod
     def reading(self) -> GpsReading:
-        """The newest."""
+        """Latest reading."""

@@ -14,11 +14,11 @@ class Hearing(Component):
 
     @abstractmethod
     def claps(self) -> Viewer[ClapsHeard]:
-        """Runs of claps from now on, each reported when it is over."""
+        """Return a viewer of runs of claps, each reported when it is over."""
 
     @abstractmethod
     def speech(self) -> Viewer[SpeechHeard]:
-        """Utterances from now on, reported shortly after each one; the robot's own voice is left out.
+        """Return a viewer of utterances, each reported shortly after its end; the robot's own voice is left out.
 
         Voices are named after the robot's members.
         """

@@ -17,9 +17,9 @@ class Imu(Component):
     @property
     @abstractmethod
     def reading(self) -> ImuReading:
-        """The newest."""
+        """Latest reading."""
 
     @property
     def raw(self) -> RawImu:
-        """The newest raw reading, before any conversion; Refused where the robot does not report it."""
+        """Return the latest raw reading, before any conversion. Raises Refused where the robot does not report it."""
         raise Refused("this robot's IMU does not report raw values")

@@ -16,4 +16,4 @@ class Lidar(Component):
     @property
     @abstractmethod
     def scan(self) -> LaserScan | None:
-        """The last whole turn; None before the first."""
+        """Scan of the last full turn; None before the first."""

@@ -16,4 +16,4 @@ class Microphone(Component):
 
     @abstractmethod
     def subscribe(self) -> Viewer[SoundBlock]:
-        """Return what it hears from now on, in gapless blocks of BLOCK samples; the same ones for every listener."""
+        """Return a viewer of gapless blocks of BLOCK samples; all listeners share them."""

@@ -11,7 +11,7 @@ from roboglot.model.sensing import OdometryReading
 
 @dataclass(frozen=True, slots=True)
 class OdometryNoise:
-    """Standard deviations of what odometry says between two scans.
+    """Standard deviations of odometry between two scans.
 
     ``still`` (m) and ``yaw_still`` (rad) always; ``along`` (m per m driven), ``turning`` (m per rad turned: a base that
     is off its centre), ``yaw_per_rad`` (rad per rad turned), ``yaw_per_metre`` (rad per m driven).
@@ -33,12 +33,12 @@ class OdometryNoise:
 
 
 class Odometry(Component):
-    """Smooth and drifting."""
+    """Dead reckoning: smooth, but drifting."""
 
     @property
     @abstractmethod
     def reading(self) -> OdometryReading:
-        """The newest: pose in odom, measured twist in base_link, metres travelled."""
+        """Latest reading: pose in odom, measured twist in base_link, metres travelled."""
 
     @property
     def noise(self) -> OdometryNoise:

@@ -1,4 +1,4 @@
-"""Distance sensors that look one way: infrared, ultrasonic, time of flight."""
+"""Single-beam distance sensors: infrared, ultrasonic, time of flight."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ class RangeSensors(Component):
 
     @abstractmethod
     def measure(self, on: bool) -> None:
-        """Switch them all."""
+        """Switch all of them on or off."""
 
     @abstractmethod
     def reading(self, name: str) -> RangeReading | None:
-        """The newest; None while they do not measure, and of a silent one. Raises NotFound."""
+        """Return the latest reading; None while off, and of a silent sensor. Raises NotFound."""

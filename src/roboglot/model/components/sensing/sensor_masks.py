@@ -1,4 +1,4 @@
-"""Switching single sensors off, as one does where a ramp or a curtain fools them."""
+"""Masks that switch off single sensors, for instance where a ramp or a curtain fools them."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ class SensorMasks(Component):
 
     @abstractmethod
     def mask(self, id: int, *, always: bool = False) -> None:
-        """Switch it off, or NotFound."""
+        """Mask a sensor. Raises NotFound."""
 
     @abstractmethod
     def unmask(self, id: int) -> None:
-        """Switch it on again, or NotFound."""
+        """Unmask a sensor. Raises NotFound."""
 
     @abstractmethod
     def masks(self, kind: SensorKind, zone: str) -> bool:
-        """True if the sensor there is masked."""
+        """Return whether the sensor in that zone is masked."""

@@ -41,11 +41,11 @@ class ZoneDistances:
 
 
 class TimeOfFlight(Component):
-    """All such sensors of the robot by name; they measure only when read, at most ``rate`` a second."""
+    """Time-of-flight sensors of the robot, by name; they measure only when read, at most ``rate`` times per second."""
 
     names: tuple[str, ...]
     rate: float
 
     @abstractmethod
     def reading(self, name: str) -> ZoneDistances:
-        """The newest. Raises NotFound."""
+        """Return the latest measurement. Raises NotFound."""

@@ -1,4 +1,4 @@
-"""Ultra-wideband ranging: where a tag is, as the robot's antennas feel it."""
+"""Ultra-wideband ranging: distance and direction of a tag."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from roboglot.model.components.component import Component
 class TagReading:
     """``distance`` (m) and ``azimuth`` (rad in base_link, counter-clockwise, 0 ahead) of the tag at ``address``.
 
-    Walls and people in between make it farther and less sure: ``line_of_sight`` is then false.
+    Walls and people in between add range error and noise: ``line_of_sight`` is then false.
     """
 
     stamp: float
@@ -28,4 +28,4 @@ class UltraWideband(Component):
     @property
     @abstractmethod
     def tag(self) -> TagReading | None:
-        """The newest; None while no tag is connected or heard."""
+        """Latest reading; None while no tag is connected or received."""

@@ -17,7 +17,7 @@ from roboglot.model.perception import (
 
 
 class Vision(Component):
-    """One detector for each kind of thing. Choosing (a colour, the nearest) is the viewers' business."""
+    """One detector per kind of object. Viewers select (by colour, the nearest) themselves."""
 
     people: Detector[PersonSeen]
     faces: Detector[FaceSeen]  # with the names of the robot's members

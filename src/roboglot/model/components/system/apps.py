@@ -24,7 +24,7 @@ class App:
 
 
 class Apps(Component):
-    """Kept, listed and removed; the robot does not run them. What was acknowledged survives a crash."""
+    """Store of apps; the robot does not run them. An acknowledged change survives a crash."""
 
     @abstractmethod
     def all(self) -> Sequence[App]:
@@ -32,8 +32,8 @@ class Apps(Component):
 
     @abstractmethod
     async def install(self, name: str, version: str, package: BinaryIO) -> App:
-        """Keep it, or replace the one of the same name. Raises InvalidGoal (name, size, too many) or Refused."""
+        """Install an app, replacing one of the same name. Raises InvalidGoal (name, size, too many) or Refused."""
 
     @abstractmethod
     async def remove(self, name: str) -> None:
-        """Raises NotFound."""
+        """Delete an app. Raises NotFound."""

@@ -24,7 +24,7 @@ class DeviceKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class BluetoothDevice:
-    """A device as the radio knows it. ``signal`` in dBm as heard last; ``random``: its address changes now and then.
+    """A device as the radio knows it. ``signal``: last one received, dBm; ``random``: its address changes now and then.
 
     ``kind``, ``firmware`` and ``battery`` (0..1) are known only of a device that was connected once.
     """
@@ -41,13 +41,13 @@ class BluetoothDevice:
 class Bluetooth(Component):
     """One connection at a time. Publishes ``BluetoothConnected`` and ``BluetoothLost``.
 
-    A connection that was lost (out of reach, battery empty) comes back by itself when the device is heard again.
+    A lost connection (out of range, battery empty) is restored when the device is received again.
     """
 
     @property
     @abstractmethod
     def connected(self) -> BluetoothDevice | None:
-        """The device, with fresh values; None while there is none or it is out of reach."""
+        """Connected device with current values; None without one, or while it is out of range."""
 
     @property
     @abstractmethod
@@ -62,7 +62,7 @@ class Bluetooth(Component):
     @property
     @abstractmethod
     def update_available(self) -> str:
-        """A newer firmware version for the connected device; "" if there is none."""
+        """Newer firmware version for the connected device; "" if there is none."""
 
     @abstractmethod
     def scan(self, seconds: float, *, source: str = "") -> Action:
@@ -70,18 +70,18 @@ class Bluetooth(Component):
 
     @abstractmethod
     def connect(self, address: str, *, source: str = "") -> Action:
-        """Connect, instead of the present device; aborts with NotFound when it is not heard. Takes some seconds."""
+        """Connect to a device in place of the current one; takes some seconds, aborts with NotFound out of range."""
 
     @abstractmethod
     async def disconnect(self) -> None:
-        """Let go of the device; raises Refused without one."""
+        """Disconnect; raises Refused without a device."""
 
     @abstractmethod
     async def forget(self, address: str | None) -> None:
-        """Strike a device, or all but the connected one (None), from the history; NotFound if it is not there."""
+        """Delete a device, or all but the connected one (None), from the history. Raises NotFound."""
 
     @abstractmethod
     def update_device(self, *, source: str = "") -> Action:
-        """Bring the newer firmware to the device; feedback is 0..1. Aborts with Refused (no device, no newer one, its
-        battery below a third) or Blocked (lost on the way).
+        """Update the device's firmware; feedback is 0..1. Aborts with Refused (no device, no update, device battery
+        below a third) or Blocked (connection lost).
         """

@@ -1,4 +1,4 @@
-"""Access for developers, which a key from the maker opens."""
+"""Developer access, which a key from the manufacturer unlocks."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class Developer(Component):
 
     @abstractmethod
     async def unlock(self, link: str) -> None:
-        """Fetch the key that lies at ``link`` and open the access.
+        """Fetch the key at ``link`` and unlock the access.
 
-        Raises InvalidGoal for what is no link, Refused when the internet is not reached, and NotFound when the key is
-        another robot's.
+        Raises InvalidGoal for a malformed link, Refused without internet access, and NotFound for the key of another
+        robot.
         """

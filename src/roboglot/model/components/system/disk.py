@@ -16,7 +16,7 @@ class Disk(Component):
     @property
     @abstractmethod
     def size(self) -> int:
-        """All of it."""
+        """Total size, bytes."""
 
     @property
     @abstractmethod
@@ -26,12 +26,12 @@ class Disk(Component):
     @property
     @abstractmethod
     def uses(self) -> Mapping[str, int]:
-        """Bytes taken by each use, by its name."""
+        """Return the bytes of each use, by name."""
 
     @abstractmethod
     def take(self, name: str, size: int) -> None:
-        """``name`` takes ``size`` bytes from now on, instead of what it took. Raises Refused when there is no room."""
+        """Set the size of a use to ``size`` bytes. Raises Refused if there is no room."""
 
     @abstractmethod
     def release(self, name: str) -> None:
-        """``name`` takes nothing any more; nothing happens if it took nothing."""
+        """Free the space of a use; no effect if it has none."""
