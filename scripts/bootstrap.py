@@ -207,7 +207,8 @@ def set_up(profile: str) -> None:
 
 if __name__ == "__main__":
     if sys.argv[1:] not in [[profile] for profile in PROFILES]:
-        sys.exit(f"usage: {sys.argv[0]} {'|'.join(PROFILES)}")
+        print(f"usage: {sys.argv[0]} {'|'.join(PROFILES)}", file=sys.stderr)
+        sys.exit(2)
     try:
         set_up(sys.argv[1])
     except (SetupFailed, OSError) as error:

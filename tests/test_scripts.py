@@ -4,6 +4,7 @@ import hashlib
 import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 from typing import BinaryIO
@@ -104,6 +105,14 @@ def mirror(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def open_file(url: str, **_: object) -> BinaryIO:
     path = Path(unquote(urlsplit(url).path))
     return (path / "index.html" if path.is_dir() else path).open("rb")
+
+
+@pytest.mark.parametrize("words", [[], ["nonsense"], ["run", "dev"]])
+def test_wrong_usage_of_the_set_up_is_answered_so(words: list[str]) -> None:
+    script = Path(bootstrap.__file__)
+    done = subprocess.run([sys.executable, script, *words], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("usage: ")
 
 
 def test_pip_comes_from_the_users_index(mirror: Path, tmp_path: Path) -> None:

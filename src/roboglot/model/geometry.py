@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 from msgspec import Struct
 
+POSITION_MAX = 10_000.0  # m from the origin of its map to a place that is asked for
+
 
 def wrap_angle(angle: float) -> float:
     """The same direction as ``angle`` (rad) in (-pi, pi]."""

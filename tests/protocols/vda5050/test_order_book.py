@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 
 from roboglot.protocols.vda5050.errors import Rejected
 from roboglot.protocols.vda5050.order_book import ActionStatus, OrderBook
-from roboglot.wire.vda5050.orders import Malformed, Order, read
+from roboglot.wire.vda5050.orders import Malformed, OrderMessage, read
 from roboglot.wire.vda5050.versions import V2, V3, ErrorKind
 from tests.protocols.vda5050.orders import action, encoded, order, valid_orders
 
 
-def parsed(made: dict[str, Any]) -> Order:
-    return read(encoded(made), Order)
+def parsed(made: dict[str, Any]) -> OrderMessage:
+    return read(encoded(made), OrderMessage)
 
 
 def take(book: OrderBook, made: dict[str, Any], *, near: bool = True) -> bool:
@@ -108,7 +108,7 @@ def test_malformed_orders_say_where(change: Any, words: str) -> None:
     made = order("one", [(0, 0), (1, 0)])
     change(made)
     with pytest.raises(Malformed, match=words):
-        read(encoded(made), Order)
+        read(encoded(made), OrderMessage)
 
 
 def test_both_versions_have_their_words() -> None:
@@ -137,7 +137,7 @@ def test_ten_thousand_valid_orders_are_read(made: dict[str, Any]) -> None:
 )
 def test_anything_else_is_malformed(data: bytes) -> None:
     with pytest.raises(Malformed):
-        read(data, Order)
+        read(data, OrderMessage)
 
 
 @settings(max_examples=50)

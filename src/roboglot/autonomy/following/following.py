@@ -30,7 +30,7 @@ from roboglot.model.sensing import LaserScan
 
 DISTANCE_MIN, DISTANCE_MAX = 0.5, 5.0  # m
 OUT_OF_SIGHT = 0.6  # s after which the robot stops and searches where the person was last seen
-LOST = 15.0  # s after which it gives up
+GIVE_UP_AFTER = 15.0  # s without sight of the person
 SPEED, TURN_RATE = 1.0, 1.5  # m/s, rad/s at most
 GAIN, TURN_GAIN = 1.2, 2.5  # 1/s
 AHEAD = 1.0  # m of free room straight ahead that suffice for the moment
@@ -173,8 +173,8 @@ class SightFollowing(Following):
                 quarry.seen_at = robot.clock.time()
             look()
             age = robot.clock.time() - quarry.seen_at
-            if age > LOST:
-                raise NotFound(f"no person to follow was seen for {LOST:g} s")
+            if age > GIVE_UP_AFTER:
+                raise NotFound(f"no person to follow was seen for {GIVE_UP_AFTER:g} s")
             if quarry.place is None:
                 action.report("searching")
                 base.set_velocity(STILL)

@@ -21,7 +21,7 @@ from roboglot.model.robot import Robot
 
 KEY = "laser_landmarks.updating"
 SURE = 0.5  # quality of localization from which strips are placed
-LOST, LOST_SECONDS = 0.2, 3.0  # quality below which known landmarks are searched, after so long
+LOST_QUALITY, LOST_SECONDS = 0.2, 3.0  # quality below which known landmarks are searched, after so long
 TURNING_MAX = 0.4  # rad/s beyond which directions are vague
 SIGHTINGS = 12  # at one place before it becomes a landmark
 NEAR = 0.3  # m between two sightings of one strip
@@ -95,7 +95,7 @@ class LandmarkKeeper(LaserLandmarks):
         belief.move_to(pose, odometry)
 
     def _lost(self, now: float) -> bool:
-        if not self._belief.localizing or self._belief.quality >= LOST:
+        if not self._belief.localizing or self._belief.quality >= LOST_QUALITY:
             self._lost_since = None
             return False
         self._lost_since = now if self._lost_since is None else self._lost_since

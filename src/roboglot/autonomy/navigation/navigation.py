@@ -19,11 +19,10 @@ from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions
 from roboglot.model.errors import Blocked, InvalidGoal, Unreachable
-from roboglot.model.geometry import Path, Point
+from roboglot.model.geometry import POSITION_MAX, Path, Point
 from roboglot.model.robot import Robot
 
 GOALS_MAX = 500
-POSITION_MAX = 10_000.0  # m from the origin
 RETRIES_MAX = 1000
 RETRY_AFTER = 5.0  # s
 TOUR_PASSES = 30  # of improving a tour

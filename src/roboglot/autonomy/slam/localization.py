@@ -11,14 +11,13 @@ from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.mapping.localization import LOCALIZATION, Localization, Region
 from roboglot.model.errors import InvalidGoal, NotLocalized, NotReady
 from roboglot.model.events import LostReason, PoseJumped
-from roboglot.model.geometry import ORIGIN, Pose, wrap_angle
+from roboglot.model.geometry import ORIGIN, POSITION_MAX, Pose, wrap_angle
 from roboglot.model.robot import Robot
 
 if TYPE_CHECKING:
     from roboglot.autonomy.slam.matcher import Match
     from roboglot.autonomy.slam.slam import Slam
 
-POSITION_MAX = 10_000.0  # m from the origin
 SEARCH_SECONDS = 10.0  # to search for a place that fits
 AROUND_SECONDS = 60.0  # … including driving around, if allowed
 SEARCH_PERIOD = 0.5  # s between two scans that are tried

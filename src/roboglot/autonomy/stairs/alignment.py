@@ -27,7 +27,7 @@ from roboglot.model.robot import Robot
 BEFORE = 0.3  # m between the hull's circle and the edge
 LOOK_SECONDS, LOOKS_MIN = 1.5, 4  # until a step must have been seen; images collected at standstill
 ALIGN_MAX = 30.0  # s from the first step to the end
-BLIND, LOST = 0.3, 1.5  # s without sight of the edge before the robot stops, and before it gives up
+BLIND_AFTER, LOST_AFTER = 0.3, 1.5  # s without sight of the edge before the robot stops, and before it gives up
 SPEED, TURN_RATE = 0.15, 0.4  # m/s, rad/s at most
 GAIN, TURN_GAIN = 1.5, 1.5  # 1/s
 CLOSE, CLOSE_YAW = 0.008, math.radians(0.8)  # offset at which braking begins
@@ -83,7 +83,7 @@ class _Approach:
 
     async def _look_standing(self) -> None:
         looks, deadline = 0, self._clock.time() + LOOK_SECONDS
-        while looks < LOOKS_MIN or self._clock.time() - self._seen_at > BLIND:
+        while looks < LOOKS_MIN or self._clock.time() - self._seen_at > BLIND_AFTER:
             if self._clock.time() >= deadline:
                 raise NotFound(f"no step {self._direction} is visible ahead")
             looks += self._look()
@@ -98,7 +98,7 @@ class _Approach:
                 self._seen_at = self._clock.time()
             self._look()
             unseen = self._clock.time() - self._seen_at
-            if unseen > LOST:
+            if unseen > LOST_AFTER:
                 raise NotFound("the step is out of sight")
             if self._clock.time() >= deadline:
                 raise Expired(f"not aligned after {ALIGN_MAX:g} s")
@@ -106,7 +106,7 @@ class _Approach:
             away = math.hypot(left.x, left.y)
             if away <= CLOSE and abs(left.yaw) <= CLOSE_YAW:
                 return
-            if unseen > BLIND:
+            if unseen > BLIND_AFTER:
                 self._brake()
             else:
                 speed = min(SPEED, GAIN * away) / max(away, 1e-9)

@@ -27,7 +27,7 @@ from roboglot.protocols.vda5050.performing import Performer
 from roboglot.protocols.vda5050.route import Route
 from roboglot.protocols.vda5050.table import INSTANT, operation_of
 from roboglot.protocols.vda5050.vocabulary import DOOR
-from roboglot.wire.vda5050.orders import Edge, InstantActions, Malformed, Node, Order, read
+from roboglot.wire.vda5050.orders import Edge, InstantActions, Malformed, Node, OrderMessage, read
 from roboglot.wire.vda5050.versions import ErrorKind, Level, Version
 
 log = logging.getLogger(__name__)
@@ -82,7 +82,7 @@ class Context:
         if self.hibernating:
             log.info("robot %s hibernates: refused an order", self.robot.id)
             return
-        order = self._read(payload, Order)
+        order = self._read(payload, OrderMessage)
         check_order(order, self.robot, self.version, self.map_id)
         new = order.order_id != self.book.order_id
         if not self.book.take(order, self.near):

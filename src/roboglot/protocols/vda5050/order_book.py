@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from roboglot.protocols.vda5050.errors import Rejected
-from roboglot.wire.vda5050.orders import Action, Edge, Node, Order, OrderPart
+from roboglot.wire.vda5050.orders import Action, Edge, Node, OrderMessage, OrderPart
 from roboglot.wire.vda5050.versions import ErrorKind
 
 ACTIONS_KEPT_MAX = 1000  # action states; the oldest finished ones are dropped first
@@ -56,7 +56,7 @@ class OrderBook:
     decision: Node | None = None  # the last released node in all messages so far
     cancelled: bool = False
     canceling: bool = False
-    last: Order | None = None
+    last: OrderMessage | None = None
     measure: Callable[[], float] = lambda: 0.0  # returns the robot's total distance in m
     placed_at: float | None = None  # that distance at the last node
 
@@ -73,7 +73,7 @@ class OrderBook:
             if node.released:
                 yield edges.get(node.sequence_id - 1), node
 
-    def take(self, order: Order, near: Callable[[Node], bool]) -> bool:
+    def take(self, order: OrderMessage, near: Callable[[Node], bool]) -> bool:
         """Take an order or an update; False if it is the one that is held. Raises Rejected, and changes nothing."""
         known = {"orderId": order.order_id, "orderUpdateId": order.order_update_id}
         if order.order_id != self.order_id:
@@ -94,7 +94,7 @@ class OrderBook:
         self.update_id, self.last = order.order_update_id, order
         return True
 
-    def _check_new(self, order: Order, near: Callable[[Node], bool], known: dict[str, object]) -> None:
+    def _check_new(self, order: OrderMessage, near: Callable[[Node], bool], known: dict[str, object]) -> None:
         if not self.idle or self.canceling:
             raise Rejected(ErrorKind.OTHER_ORDER, f"order {self.order_id} is not finished", known)
         if not near(order.nodes[0]):
@@ -103,7 +103,7 @@ class OrderBook:
                 ErrorKind.START_TOO_FAR, f"node {first} is not where the robot is", {**known, "nodeId": first}
             )
 
-    def _check_update(self, order: Order, known: dict[str, object]) -> None:
+    def _check_update(self, order: OrderMessage, known: dict[str, object]) -> None:
         if order.order_update_id < self.update_id:
             raise Rejected(ErrorKind.OUTDATED, f"update {self.update_id} was taken already", known)
         if self.cancelled or self.canceling:
@@ -118,7 +118,7 @@ class OrderBook:
         if reused := sorted(new & {key for key, state in self.actions.items() if self._released(state.action)}):
             raise Rejected(ErrorKind.NOT_A_CONTINUATION, "an actionId came before", {**known, "actionId": reused[0]})
 
-    def _extend(self, order: Order, nodes: tuple[Node, ...]) -> None:
+    def _extend(self, order: OrderMessage, nodes: tuple[Node, ...]) -> None:
         self.nodes += nodes
         self.edges += order.edges
         parts: tuple[OrderPart, ...] = (*nodes, *order.edges)

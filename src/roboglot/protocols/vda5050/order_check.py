@@ -6,11 +6,11 @@ from roboglot.model.robot import Robot
 from roboglot.operations import BadParameters
 from roboglot.protocols.vda5050.errors import Rejected
 from roboglot.protocols.vda5050.table import AT_NODES, operation_of
-from roboglot.wire.vda5050.orders import Action, Edge, Order
+from roboglot.wire.vda5050.orders import Action, Edge, OrderMessage
 from roboglot.wire.vda5050.versions import ErrorKind, Level, Version
 
 
-def check_order(order: Order, robot: Robot, version: Version, map_id: str) -> None:
+def check_order(order: OrderMessage, robot: Robot, version: Version, map_id: str) -> None:
     """Raise Rejected for what this robot cannot use or do."""
     if order.zone_set_id:
         raise _unsupported("this robot uses no zones", {"zoneSetId": order.zone_set_id})

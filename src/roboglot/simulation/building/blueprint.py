@@ -70,12 +70,8 @@ class Rectangle:
         return math.hypot(dx, dy)
 
 
-def solids_of(floor: Floor, lift: Lift | None, lift_here: bool) -> tuple[Solid, ...]:
-    """All that stands still on one floor. ``lift_here``: the car is parked here, so the landing door is open."""
-    return tuple(_solids(floor, lift, lift_here))
-
-
-def _solids(floor: Floor, lift: Lift | None, lift_here: bool) -> Iterator[Solid]:
+def solids_of(floor: Floor, lift: Lift | None, lift_here: bool) -> Iterator[Solid]:
+    """Yield all that stands still on one floor. ``lift_here``: the car is parked here, so the landing door is open."""
     if floor.enclosed:
         yield from _enclosure(floor)
     for wall in floor.walls:

@@ -13,7 +13,7 @@ from ipaddress import IPv4Address
 
 TEXT_MAX = 8192  # bytes read of a datagram
 TARGETS_MAX = 128
-LINE_POINTS = 10
+POINTS_PER_LINE = 10
 KEYS_AND_MOUSE = 0  # cmd_id of a game's messages; the others carry a match's score
 RAW_MAX = 1023  # full scale of the adapters' converters
 
@@ -208,7 +208,7 @@ def _seen(words: Sequence[str]) -> Iterator[Telemetry]:
     rest = list(reversed(words))
     while rest:
         kind, count = KINDS.get(rest.pop(), ""), int(rest.pop() if rest else "x")
-        size = LINE_POINTS * 4 if kind == "line" else 5 if kind in WITH_INFO else 4
+        size = POINTS_PER_LINE * 4 if kind == "line" else 5 if kind in WITH_INFO else 4
         if not kind or not 0 <= count <= TARGETS_MAX or len(rest) < count * size:
             raise ValueError("not what an AI push looks like")
         targets = [[float(rest.pop()) for _ in range(size)] for _ in range(count)]

@@ -125,7 +125,7 @@ class Edge(OrderPart, frozen=True, rename="camel", kw_only=True):
         return self.maximum_height if self.max_height is None else self.max_height
 
 
-class Order(msgspec.Struct, frozen=True, rename="camel"):
+class OrderMessage(msgspec.Struct, frozen=True, rename="camel"):
     """A way through nodes, or more of one that is under way."""
 
     header_id: Count
@@ -156,7 +156,7 @@ class InstantActions(msgspec.Struct, frozen=True, rename="camel"):
     actions: Actions
 
 
-M = TypeVar("M", Order, InstantActions)
+M = TypeVar("M", OrderMessage, InstantActions)
 
 
 def read(data: bytes, kind: type[M]) -> M:
@@ -167,13 +167,13 @@ def read(data: bytes, kind: type[M]) -> M:
         message = msgspec.json.decode(data, type=kind)
     except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
         raise Malformed(misfit(error, "the message")) from None
-    if isinstance(message, Order):
+    if isinstance(message, OrderMessage):
         _check_graph(message)
     _check_ids(message)
     return message
 
 
-def _check_graph(order: Order) -> None:
+def _check_graph(order: OrderMessage) -> None:
     """Raise Malformed unless nodes and edges take turns, numbered in step, released ones first."""
     nodes, edges = order.nodes, order.edges
     if len(edges) != len(nodes) - 1:
@@ -202,9 +202,9 @@ def _check_edge(edge: Edge, start: Node, end: Node) -> None:
             raise Malformed(f"edge {edge.edge_id} names node {said} where {node.node_id} is")
 
 
-def _check_ids(message: Order | InstantActions) -> None:
+def _check_ids(message: OrderMessage | InstantActions) -> None:
     """Raise Malformed for an actionId that comes twice."""
-    parts: Iterable[OrderPart | InstantActions] = message.parts if isinstance(message, Order) else (message,)
+    parts: Iterable[OrderPart | InstantActions] = message.parts if isinstance(message, OrderMessage) else (message,)
     ids = [action.action_id for part in parts for action in part.actions]
     if len(ids) != len(set(ids)):
         raise Malformed("an actionId comes twice")

@@ -16,7 +16,7 @@ from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.mapping.localization import LOCALIZATION, Localization, Region
 from roboglot.model.errors import InvalidGoal
-from roboglot.model.geometry import Point, Pose
+from roboglot.model.geometry import POSITION_MAX, Point, Pose
 from roboglot.model.maps import OccupancyGrid
 from roboglot.wire.slamware import geometry
 from roboglot.wire.slamware.chapters.motion import (
@@ -31,7 +31,6 @@ from roboglot.wire.slamware.chapters.slam.stcm_layers import grid_layer
 
 Replacing = Callable[[], AbstractAsyncContextManager[None]]
 
-POSITION_MAX = 10_000.0  # m
 CELLS_MAX = 1 << 26
 
 

@@ -1,4 +1,4 @@
-"""Localization: the robot's pose in its map."""
+"""Localization: the pose of the robot in its map."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from roboglot.model.components.component import Component
 from roboglot.model.events import LostReason
 from roboglot.model.geometry import Pose
 
+GOOD_FIT = 0.5  # quality from which the pose counts as known
 LOCALIZATION = "localization"  # the resource held while searching for the robot's pose
 
 
@@ -24,24 +25,24 @@ class Region:
 
 
 class Localization(Component):
-    """Corrects odometry by what the lidar sees; publishes ``PoseJumped`` when the pose is set or found elsewhere.
+    """Corrects odometry by lidar scans; publishes ``PoseJumped`` when the pose is set or corrected by a jump.
 
-    ``LocalizationLost`` and ``LocalizationRecovered`` report when it loses its place and knows it again.
+    ``LocalizationLost`` and ``LocalizationRecovered`` report the loss and the recovery of the pose.
     """
 
     @property
     @abstractmethod
     def pose(self) -> Pose:
-        """base_link in map, now."""
+        """Current pose of base_link in map."""
 
     @property
     @abstractmethod
     def quality(self) -> float:
-        """0..1: how well the last scans fit the map."""
+        """Fit of the last scans to the map, 0..1."""
 
     @property
     def started(self) -> bool:
-        """False while the first scan is still to be compared with the map: ``quality`` says nothing yet."""
+        """False until the first scan has been matched; ``quality`` is meaningless before that."""
         return True
 
     @property
@@ -52,7 +53,7 @@ class Localization(Component):
     @property
     @abstractmethod
     def enabled(self) -> bool:
-        """False: the pose follows odometry alone."""
+        """True if scans correct the pose; False: it follows odometry alone."""
 
     @abstractmethod
     def enable(self, on: bool) -> None:
@@ -71,9 +72,9 @@ class Localization(Component):
         source: str = "",
         on_busy: OnBusy = OnBusy.REPLACE,
     ) -> Action:
-        """Find the robot anywhere in the map, or with its centre in ``region``, by what the lidar sees.
+        """Search for the robot by lidar, anywhere in the map or with its centre in ``region``.
 
-        It stays put unless it ``may_move``: then it may drive around to tell places that look alike from each other.
-        Aborts with NotLocalized when no place, or more than one, fits within some seconds; with NotReady when it cannot
-        be tried yet. InvalidGoal for an empty region.
+        The robot stands still, unless ``may_move`` lets it drive to tell similar places apart. Aborts with NotLocalized
+        when no place, or more than one, fits within some seconds; with NotReady when a search is not possible yet.
+        Raises InvalidGoal for an empty region.
         """

@@ -18,7 +18,7 @@ from roboglot.programs.worker.values import Record
 DISTANCE_MIN, DISTANCE_DEFAULT, DISTANCE_MAX = 0.5, 1.0, 5.0  # m
 PERIOD = 0.1  # s
 GIVE_UP_AFTER = 30.0  # s without seeing a person
-LOST = 15.0  # s of that, during which the skill itself searches where they were
+SKILL_SEARCHES = 15.0  # s of that, during which the skill itself searches where they were
 
 
 class FollowedMember:
@@ -67,7 +67,7 @@ class FollowedMember:
                 elif self._walk.status.ended:
                     why, lost = await self._ended(self._walk)
                     left, who, self._walk = (
-                        (GIVE_UP_AFTER - LOST if lost else GIVE_UP_AFTER),
+                        (GIVE_UP_AFTER - SKILL_SEARCHES if lost else GIVE_UP_AFTER),
                         (None if lost else who),
                         None,
                     )

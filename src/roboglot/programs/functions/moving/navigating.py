@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from roboglot.model.components.interaction.speaker import Speaker
-from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.localization import GOOD_FIT, Localization
 from roboglot.model.components.mapping.map_library import MapLibrary, StoredMap
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions
@@ -25,7 +25,6 @@ from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.worker.values import Record
 
 SUCCESS, UNAVAILABLE, FAILED, REFUSED, CANCELLED = 0, 2, 3, 4, 5  # NavigationActionResponse.response.result
-GOOD_FIT = 0.5  # quality of localization from which the pose counts as known
 COORDINATE_MAX = 10_000.0  # m
 SAME_WALLS = 0.5  # share of a stored map's walls also present in the current map, if both have the same origin
 WALL = 20  # log odds from which a cell counts as a wall

@@ -10,9 +10,9 @@ from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.mapping.localization import LOCALIZATION, Localization, Region
 from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
 from roboglot.model.errors import InvalidGoal, Refused
-from roboglot.model.geometry import Path, Point, Pose
+from roboglot.model.geometry import POSITION_MAX, Path, Point, Pose
 
-GOALS_MAX, POSITION_MAX = 100, 10_000.0
+GOALS_MAX = 100
 FRESH = 1.0  # s: maximum age of a pose for the dog to count as localized
 
 

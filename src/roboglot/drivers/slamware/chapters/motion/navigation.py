@@ -19,7 +19,7 @@ from roboglot.model.components.motion.navigation import (
     Tracks,
 )
 from roboglot.model.errors import InvalidGoal, Refused, Unreachable
-from roboglot.model.geometry import Path, Point
+from roboglot.model.geometry import POSITION_MAX, Path, Point
 from roboglot.wire.slamware import geometry
 from roboglot.wire.slamware.chapters.motion import (
     ActionInfo,
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 else:
     np = lazy("numpy")
 
-GOALS_MAX, PLACES_MAX, POSITION_MAX = 1000, 500, 10_000.0
+GOALS_MAX, PLACES_MAX = 1000, 500
 MODES = {Tracks.FREE: 0, Tracks.STRICT: 1, Tracks.PREFERRED: 2}
 HERE = 0.5  # m from the robot within which a path may begin: robots search from where they stand
 PRECISE = 0.1  # m of tolerance up to which the precise flag is set

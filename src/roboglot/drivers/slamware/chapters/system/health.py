@@ -12,18 +12,18 @@ from roboglot.model.components.system.health import FaultLevel, Health
 from roboglot.model.events import BrakeChanged, EmergencyStopChanged
 from roboglot.model.robot import Robot
 from roboglot.wire.slamware.chapters.system.devices import Parameter
-from roboglot.wire.slamware.chapters.system.system import BaseError, Level, Part
+from roboglot.wire.slamware.chapters.system.system import BaseError, HealthPart, Level
 
 LEVELS = {Level.WARN: FaultLevel.WARNING, Level.ERROR: FaultLevel.ERROR, Level.FATAL: FaultLevel.FATAL}
 STOP, BRAKE = "emergency stop", "brake released"
 # Names by component and its own error number, as seen on robots; other faults are named by their number.
 NAMES = {
-    (Part.SYSTEM, 0x0100): STOP,
-    (Part.SYSTEM, 0x0700): BRAKE,
-    (Part.SYSTEM, 0x0900): "not localized",
-    (Part.POWER, 0x0100): "battery low",
-    (Part.MOTION, 0x0100): "motor alarm",
-    (Part.SENSOR, 0x0100): "bumper stuck",
+    (HealthPart.SYSTEM, 0x0100): STOP,
+    (HealthPart.SYSTEM, 0x0700): BRAKE,
+    (HealthPart.SYSTEM, 0x0900): "not localized",
+    (HealthPart.POWER, 0x0100): "battery low",
+    (HealthPart.MOTION, 0x0100): "motor alarm",
+    (HealthPart.SENSOR, 0x0100): "bumper stuck",
 }
 
 

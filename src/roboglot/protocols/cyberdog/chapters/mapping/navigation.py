@@ -6,7 +6,7 @@ import asyncio
 from dataclasses import dataclass
 
 from roboglot.model.actions import Action, ActionStatus
-from roboglot.model.components.mapping.localization import Localization, Region
+from roboglot.model.components.mapping.localization import GOOD_FIT, Localization, Region
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions
 from roboglot.model.errors import Busy, NotLocalized, RobotError
@@ -23,7 +23,6 @@ from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.errors import codes_of
 from roboglot.wire.cyberdog.codes import Feedback, TaskResult
 
-GOOD_FIT = 0.5  # quality of localization from which the robot counts as localized
 GIVE_UP_AFTER = 120.0  # s
 NEAR = 0.5  # m around the believed pose that are searched first
 LOOK_AT_MOST = 1.5  # s

@@ -15,7 +15,7 @@ from roboglot.protocols.cyberdog.app_link import AppLink
 from roboglot.protocols.cyberdog.table import push
 from roboglot.wire.cyberdog.codes import Code
 
-LOST = push(Code.BLUETOOTH_LOST)
+BRACELET_LOST = push(Code.BLUETOOTH_LOST)
 OFFERED = push(Code.BLUETOOTH_UPDATE_OFFERED)
 PROGRESS = push(Code.BLUETOOTH_UPDATE_PROGRESS)
 GEAR = push(Code.GEAR_CHANGED)
@@ -32,7 +32,7 @@ class Bracelet:
         self._pushed = -1.0  # progress of the last push
         events = robot.events
         self._leave: list[Callable[[], None]] = [
-            events.listen(BluetoothLost, lambda _: app.push(LOST, {"disconnected": True})),
+            events.listen(BluetoothLost, lambda _: app.push(BRACELET_LOST, {"disconnected": True})),
             events.listen(BluetoothConnected, self._connected),
             events.listen(GearChanged, lambda event: app.push(GEAR, {"data": event.gear})),
             events.listen(ActionChanged, self._progressed),
@@ -63,7 +63,7 @@ class Bracelet:
 
     def _connected(self, event: BluetoothConnected) -> None:
         if event.again:
-            self._app.push(LOST, {"disconnected": False})
+            self._app.push(BRACELET_LOST, {"disconnected": False})
         self.offer()
 
     def _progressed(self, event: ActionChanged) -> None:

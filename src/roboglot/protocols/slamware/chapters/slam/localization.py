@@ -32,7 +32,7 @@ from roboglot.wire.slamware.chapters.slam.localization import (
 from roboglot.wire.slamware.geometry import COORDINATE_MAX, Location, Pose3D, Quaternion, Rectangle
 
 API = "/api/core/slam/v1"
-LOST = "not localized"  # the fault
+NOT_LOCALIZED = "not localized"  # the fault
 Bound = Annotated[float, msgspec.Meta(ge=-COORDINATE_MAX, le=COORDINATE_MAX)]
 
 
@@ -83,7 +83,7 @@ async def reset_localization_status(context: Context) -> bool:
     robot[Localization].set_pose(robot[Localization].pose)
     if Health in robot:
         for fault in robot[Health].faults:
-            if fault.name == LOST:
+            if fault.name == NOT_LOCALIZED:
                 robot[Health].dismiss(fault.id)  # raised again if it persists
     return True
 

@@ -12,19 +12,19 @@ from roboglot.operations import Right
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import HttpError
 from roboglot.protocols.slamware.table import TABLE
-from roboglot.wire.slamware.chapters.system.system import BaseError, BaseHealthInfo, Level, Part, health_record
+from roboglot.wire.slamware.chapters.system.system import BaseError, BaseHealthInfo, HealthPart, Level, health_record
 
 API = "/api/core/system/v1/robot/health"
 STOP = "emergency stop"  # the fault
 LEVELS = {FaultLevel.WARNING: Level.WARN, FaultLevel.ERROR: Level.ERROR, FaultLevel.FATAL: Level.FATAL}
 # Level, component, code and the number within the component, by the model's name of the fault, where known from robots.
 NUMBERS = {
-    STOP: (Level.ERROR, Part.SYSTEM, 0x0100, 1),
-    "brake released": (Level.ERROR, Part.SYSTEM, 0x0700, 7),
-    "not localized": (Level.ERROR, Part.SYSTEM, 0x0900, 9),
-    "battery low": (Level.WARN, Part.POWER, 0x0100, 2),
-    "motor alarm": (Level.ERROR, Part.MOTION, 0x0100, 1),
-    "bumper stuck": (Level.ERROR, Part.SENSOR, 0x0100, 1),
+    STOP: (Level.ERROR, HealthPart.SYSTEM, 0x0100, 1),
+    "brake released": (Level.ERROR, HealthPart.SYSTEM, 0x0700, 7),
+    "not localized": (Level.ERROR, HealthPart.SYSTEM, 0x0900, 9),
+    "battery low": (Level.WARN, HealthPart.POWER, 0x0100, 2),
+    "motor alarm": (Level.ERROR, HealthPart.MOTION, 0x0100, 1),
+    "bumper stuck": (Level.ERROR, HealthPart.SENSOR, 0x0100, 1),
 }
 # All others have numbers of our own: code 0x70xx, counted here.
 OWN = (
@@ -32,14 +32,14 @@ OWN = (
     "motor hot", "network slow", "depth camera lost", "range sensor lost", "navigation unavailable",
 )  # fmt: skip
 OWN_PARTS = {
-    "battery": Part.POWER,
-    "base": Part.MOTION,
-    "motors": Part.MOTION,
-    "jack": Part.MOTION,
-    "lidar": Part.SENSOR,
-    "cliff": Part.SENSOR,
-    "depth camera": Part.SENSOR,
-    "range sensors": Part.SENSOR,
+    "battery": HealthPart.POWER,
+    "base": HealthPart.MOTION,
+    "motors": HealthPart.MOTION,
+    "jack": HealthPart.MOTION,
+    "lidar": HealthPart.SENSOR,
+    "cliff": HealthPart.SENSOR,
+    "depth camera": HealthPart.SENSOR,
+    "range sensors": HealthPart.SENSOR,
 }
 OWN_CODE, UNKNOWN_CODE = 0x7000, 0x70FF
 
@@ -50,7 +50,7 @@ def record_of(fault: Fault) -> BaseError:
         level, part, code, kind = NUMBERS[fault.name]
         return health_record(level, part, code, kind, fault.message)
     code = OWN_CODE + OWN.index(fault.name) if fault.name in OWN else UNKNOWN_CODE
-    part = OWN_PARTS.get(fault.component, Part.SYSTEM)
+    part = OWN_PARTS.get(fault.component, HealthPart.SYSTEM)
     return health_record(LEVELS[fault.level], part, code, code & 0xFF, fault.message)
 
 

@@ -65,7 +65,7 @@ class Level(IntEnum):
     UNKNOWN = 255
 
 
-class Part(IntEnum):
+class HealthPart(IntEnum):
     """Component of a health record."""
 
     USER = 0
@@ -80,7 +80,7 @@ class BaseError(msgspec.Struct, rename="camel"):
     """One health record. The last three fields come from real robots, not from the manual."""
 
     id: int
-    component: Part
+    component: HealthPart
     error_code: int
     level: Level
     message: str
@@ -117,12 +117,12 @@ class LaserScan(msgspec.Struct):
     laser_points: msgspec.Raw
 
 
-def error_code(level: Level, part: Part, code: int) -> int:
+def error_code(level: Level, part: HealthPart, code: int) -> int:
     """The 32-bit number of a health record: level, component and the component's own code in one."""
     return level << 24 | part << 16 | code
 
 
-def health_record(level: Level, part: Part, code: int, error_type: int, message: str) -> BaseError:
+def health_record(level: Level, part: HealthPart, code: int, error_type: int, message: str) -> BaseError:
     """A record with its numbers worked out; ``error_type`` counts within the component, from 1."""
     number = error_code(level, part, code)
     return BaseError(0, part, number, level, message, code, 1024 * (part + 1) + error_type)
