@@ -10,7 +10,7 @@ from roboglot.model.components.interaction.blaster import Blaster
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.gimbal import FollowMode, Gimbal
 from roboglot.model.errors import Busy, InvalidGoal, NotFound, Refused
-from roboglot.model.events import ArmorHit, BeadFired
+from roboglot.model.events import ArmorHit, BeadFired, BumperPressed
 from roboglot.model.geometry import Pose, Twist, Vector3
 
 
@@ -181,3 +181,12 @@ async def test_two_robots_that_collide_feel_it_both(duel):
     await duel.clock.advance(2.0)
     assert (PlatePlace.FRONT, HitKind.COLLISION) in {(hit.place, hit.kind) for hit in duel.hits.drain()}
     assert (PlatePlace.FRONT, HitKind.COLLISION) in {(hit.place, hit.kind) for hit in own.drain()}
+
+
+async def test_a_collision_presses_the_bumper_before_it_hits_a_plate(duel):
+    with duel.robot.events.subscribe(ArmorHit, BumperPressed) as events:
+        duel.robot[Base].set_velocity(Twist(x=1.0))
+        await duel.clock.advance(3.0)
+        found = events.drain()
+    hit = next(event for event in found if isinstance(event, ArmorHit))
+    assert [type(event) for event in found if event.stamp == hit.stamp] == [BumperPressed, ArmorHit]

@@ -176,7 +176,7 @@ PART = Part(
     interface=Armor,
     section=ArmorSection,
     fit=_fit,
-    after=("gimbal",),
+    after=("gimbal", "bumper"),
     sense=SimulatedArmor.sense,
     duty=lambda armor: armor.duty,
 )
