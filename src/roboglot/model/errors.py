@@ -9,7 +9,7 @@ class RobotError(Exception):
     """Anything the robot refuses or fails to do; the message is a plain sentence for the log."""
 
     def again(self) -> Self:
-        """The same to be raised once more: each raise hangs its stack, with all that lives there, on what is raised."""
+        """Return a copy to raise again: each raise adds its stack, with all objects on it, to the raised error."""
         copied = type(self).__new__(type(self), *self.args)
         copied.args = self.args
         copied.__dict__.update(self.__dict__)
@@ -17,7 +17,7 @@ class RobotError(Exception):
 
 
 def forget_stack(error: BaseException | None) -> None:
-    """Let go of the frames that ``error`` and those behind it went through, and of what lives in them."""
+    """Release the stack frames of ``error`` and of its causes, with the objects they hold."""
     known: set[int] = set()
     waiting = [error]
     while waiting:

@@ -16,7 +16,7 @@ VIEWERS_MAX = 64
 class Viewer(Generic[T]):
     """One viewer's bounded queue: an async iterator that ends when the feed does. Close it, or use ``with``.
 
-    Who reads too slowly loses what is queued and goes on at the next item where one can join; ``dropped`` counts.
+    A slow reader loses its queue and continues at the next item where one can join; ``dropped`` counts.
     """
 
     def __init__(self, feed: Feed[T], maxlen: int) -> None:
@@ -57,7 +57,7 @@ class Viewer(Generic[T]):
         return items
 
     def close(self) -> None:
-        """Look away; what is queued can still be read."""
+        """Unsubscribe; queued items can still be read."""
         if not self.closed:
             self.closed = True
             self._wakeup.set()
@@ -97,11 +97,11 @@ class Feed(Generic[T]):
 
     @property
     def unread(self) -> bool:
-        """True while every viewer has something that it has not read yet."""
+        """True while every viewer has unread items."""
         return all(viewer.waiting for viewer in self._viewers)
 
     def subscribe(self) -> Viewer[T]:
-        """Look from now on. Raises Busy when VIEWERS_MAX look already."""
+        """Return a new viewer. Raises Busy beyond VIEWERS_MAX."""
         if len(self._viewers) >= VIEWERS_MAX:
             raise Busy(f"{VIEWERS_MAX} viewers already")
         viewer = Viewer(self, self._queue_max)
@@ -111,13 +111,13 @@ class Feed(Generic[T]):
         return viewer
 
     def push(self, item: T) -> None:
-        """Give ``item`` to every viewer."""
+        """Send ``item`` to every viewer."""
         joinable = self._joinable(item)
         for viewer in tuple(self._viewers):
             viewer._push(item, joinable)
 
     def close(self) -> None:
-        """End it for everybody."""
+        """End the feed for all viewers."""
         for viewer in tuple(self._viewers):
             viewer.close()
 

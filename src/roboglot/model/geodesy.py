@@ -1,4 +1,4 @@
-"""Place of a map on the globe: fitted to satellite fixes taken on the way, used to look for the robot in it.
+"""Georeference of a map: fitted to satellite fixes taken while driving, used to find the robot in it.
 
 A tangent plane, good for some kilometres. Knows no receiver and no map format.
 """
@@ -23,7 +23,7 @@ SLACK = 2.0  # m added to a search: the robot's own size, a slightly bent map
 
 @dataclass(frozen=True, slots=True)
 class GlobeAnchor:
-    """``point`` of the map (m) lies at these degrees (WGS-84), give or take ``accuracy`` (m, one standard deviation).
+    """``point`` of the map (m) lies at these degrees (WGS-84), within ``accuracy`` (m, one standard deviation).
 
     ``north`` is the direction of north in the map (rad, counter-clockwise from x); None while it is not known.
     """
@@ -35,7 +35,7 @@ class GlobeAnchor:
     north: float | None = None
 
     def around(self, fix: GpsReading) -> Region:
-        """Return where in the map the robot can be that has this fix: a square that holds the place with its error."""
+        """Return the square of the map in which a robot with this fix can be, errors included."""
         east, north = offset(self.latitude, self.longitude, fix.latitude, fix.longitude)
         reach = self._reach(fix)
         x, y = self.point.x, self.point.y
@@ -70,19 +70,19 @@ class Sky:
         return self.anchor.around(self.fix)
 
     def allows(self, place: Point) -> bool:
-        """True if it can be there."""
+        """Return whether the robot can be at ``place``."""
         return self.anchor.allows(self.fix, place)
 
 
 def sky_over(anchor: GlobeAnchor | None, robot: Robot) -> Sky | None:
-    """By the newest fix; None where there is none, or the map's place on the globe is unknown."""
+    """Return the latest fix in its map; None without a fix, or without a georeference."""
     if anchor is None or Gps not in robot or robot[Gps].reading.fix is GpsFix.NONE:
         return None
     return Sky(anchor, robot[Gps].reading)
 
 
 def offset(latitude: float, longitude: float, to_latitude: float, to_longitude: float) -> tuple[float, float]:
-    """Metres (east, north) from the first place to the second; all in degrees."""
+    """Return metres (east, north) from the first place to the second, both in degrees."""
     east, north = metres_a_degree(latitude)
     return math.remainder(to_longitude - longitude, 360.0) * east, (to_latitude - latitude) * north
 
@@ -97,7 +97,7 @@ def metres_a_degree(latitude: float) -> tuple[float, float]:
 
 
 def anchor(samples: Iterable[tuple[Point, GpsReading]]) -> GlobeAnchor | None:
-    """From places in the map and the fixes taken there; None without a fix.
+    """Fit an anchor to places in the map and the fixes taken there; None without a fix.
 
     North is known once the fixes lie BASELINE accuracies apart: the turn that fits the two sets of places best.
     """
@@ -121,5 +121,5 @@ def anchor(samples: Iterable[tuple[Point, GpsReading]]) -> GlobeAnchor | None:
 
 
 def _east_of(first: GpsReading, fix: GpsReading) -> float:
-    """Degrees, also across the date line."""
+    """Return degrees east of ``first``, also across the date line."""
     return math.remainder(fix.longitude - first.longitude, 360.0)

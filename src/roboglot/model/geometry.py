@@ -16,7 +16,7 @@ POSITION_MAX = 10_000.0  # m from the origin of its map to a place that is asked
 
 
 def wrap_angle(angle: float) -> float:
-    """The same direction as ``angle`` (rad) in (-pi, pi]."""
+    """Return the same direction as ``angle`` (rad) in (-pi, pi]."""
     if -math.pi < angle <= math.pi:
         return angle
     wrapped = math.remainder(angle, math.tau)
@@ -34,7 +34,7 @@ class Point(Struct, frozen=True, gc=False):
         return math.hypot(other.x - self.x, other.y - self.y)
 
     def bearing_to(self, other: Point | Pose) -> float:
-        """Direction towards ``other``, in rad, 0 along +x."""
+        """Return the direction towards ``other``, rad, 0 along +x."""
         return math.atan2(other.y - self.y, other.x - self.x)
 
 
@@ -47,23 +47,23 @@ class Pose(Struct, frozen=True, gc=False):
 
     @property
     def point(self) -> Point:
-        """The position alone."""
+        """Position of the pose."""
         return Point(self.x, self.y)
 
     def compose(self, local: Pose) -> Pose:
-        """``local``, given in the frame of this pose, in the frame that this pose is given in."""
+        """Transform ``local`` from the frame of this pose to the parent frame."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         return Pose(
             self.x + c * local.x - s * local.y, self.y + s * local.x + c * local.y, wrap_angle(self.yaw + local.yaw)
         )
 
     def inverse(self) -> Pose:
-        """The origin of this pose's frame as seen from this pose."""
+        """Return the inverse transform: the parent frame's origin in the frame of this pose."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         return Pose(-c * self.x - s * self.y, s * self.x - c * self.y, wrap_angle(-self.yaw))
 
     def relative_to(self, origin: Pose) -> Pose:
-        """This pose in the frame of ``origin``; both given in one frame."""
+        """Return this pose in the frame of ``origin``; both share a parent frame."""
         c, s = math.cos(origin.yaw), math.sin(origin.yaw)
         x, y = self.x - origin.x, self.y - origin.y
         return Pose(c * x + s * y, c * y - s * x, wrap_angle(self.yaw - origin.yaw))
@@ -86,7 +86,7 @@ class Twist(Struct, frozen=True, gc=False):
         return math.hypot(self.x, self.y)
 
     def clamped(self, limit: Twist) -> Twist:
-        """This twist with its translation cut to ``limit.x`` and its rotation to ``limit.yaw``, directions kept."""
+        """Return the twist, translation limited to ``limit.x`` and rotation to ``limit.yaw``, directions kept."""
         scale = min(1.0, limit.x / self.speed) if self.speed > 0 else 1.0
         return Twist(self.x * scale, self.y * scale, max(-limit.yaw, min(limit.yaw, self.yaw)))
 
@@ -129,5 +129,5 @@ class Path:
 
     @classmethod
     def through(cls, points: Iterable[tuple[float, float]]) -> Path:
-        """The polyline through (x, y) pairs."""
+        """Return the polyline through (x, y) pairs."""
         return cls(tuple(Point(x, y) for x, y in points))

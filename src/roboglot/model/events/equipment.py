@@ -20,7 +20,7 @@ class BeadFired(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spoke(Event):
-    """The loudspeaker has said ``text``, which took ``seconds``; not ``audible``: no voice was there to be heard."""
+    """The loudspeaker has said ``text``, which took ``seconds``; not ``audible``: there was no voice to speak it."""
 
     text: str
     seconds: float

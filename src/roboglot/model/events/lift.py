@@ -1,4 +1,4 @@
-"""The lift that the robot rides."""
+"""Events of the lift that the robot rides."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from roboglot.model.events.stream import Event
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LiftCalled(Event):
-    """The lift took a call of this robot to ``floor``."""
+    """The lift accepted this robot's call to ``floor``."""
 
     floor: int
 
@@ -37,6 +37,6 @@ class LiftDoorClosed(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LiftFailed(Event):
-    """The lift cannot do what it was asked: ``reason`` is "out of service", "door blocked" or "overloaded"."""
+    """The lift cannot serve a call: ``reason`` is "out of service", "door blocked" or "overloaded"."""
 
     reason: str

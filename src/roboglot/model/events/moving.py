@@ -1,4 +1,4 @@
-"""Actions and what gets in their way."""
+"""Events of actions and of obstacles in their way."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class PostureChanged(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PathBlocked(Event):
-    """Something unexpected stands in the way of the action, near ``at`` (map; None: nowhere in particular)."""
+    """An unexpected obstacle stands in the action's way, near ``at`` (map; None: unknown)."""
 
     action: Action
     at: Point | None = None
@@ -36,7 +36,7 @@ class PathBlocked(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CorridorEntered(Event):
-    """The action drives between two walls with little room, ``width`` m apart."""
+    """The action drives into a narrow corridor, ``width`` m wide."""
 
     action: Action
     width: float
@@ -52,7 +52,7 @@ class RobotBlocked(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ObstacleBraked(Event):
-    """Automatic emergency braking cut in, ``distance`` m before something."""
+    """Automatic emergency braking intervened, ``distance`` m from an obstacle."""
 
     distance: float
 
@@ -66,6 +66,6 @@ class EmergencyStopChanged(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BrakeChanged(Event):
-    """The wheels were let run free, or are held again."""
+    """The brake was released or applied."""
 
     released: bool

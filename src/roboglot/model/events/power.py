@@ -1,4 +1,4 @@
-"""Charge, charging, sleep, restarts."""
+"""Events of power: charge, charging, sleep, restarts."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from roboglot.model.events.stream import Event
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BatteryChanged(Event):
-    """The charge moved by a whole percent, or charging began or ended."""
+    """The charge changed by a whole percent, or charging began or ended."""
 
     percentage: float
     charging: bool
@@ -31,7 +31,7 @@ class PowerModeChanged(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rebooting(Event):
-    """The robot restarts: everything under way is cancelled, its doors close and stay away for ``seconds``."""
+    """The robot restarts: all actions are cancelled, and its doors stay closed for ``seconds``."""
 
     seconds: float
 
@@ -43,7 +43,7 @@ class Rebooted(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModuleRestarted(Event):
-    """A part of the robot is up again, the rest never went down (a ``Module`` value)."""
+    """A module (a ``Module`` value) has restarted; the rest stayed up."""
 
     module: str
 

@@ -21,7 +21,7 @@ class BumperPressed(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BumperReleased(Event):
-    """Hull is no longer touched at ``zone``."""
+    """The hull is no longer touched at ``zone``."""
 
     zone: str
 

@@ -22,7 +22,7 @@ E_ = TypeVar("E_", bound=Event)
 
 
 class _Receiver(Protocol):
-    """Anything that takes events of some types."""
+    """Receiver of events of some types."""
 
     @property
     def types(self) -> tuple[type[Event], ...]: ...
@@ -65,7 +65,7 @@ class Subscription(Generic[E_]):
         return events
 
     async def next(self) -> E_:
-        """The next event, when it has come."""
+        """Wait for the next event and return it."""
         while not self._queue:
             self._wakeup.clear()
             await self._wakeup.wait()
@@ -97,14 +97,14 @@ class EventStream:
         return (*listeners, *(s.push for s in self._subscriptions if issubclass(kind, s.types)))
 
     def subscribe(self, *types: type[E_], maxlen: int = QUEUE_MAX) -> Subscription[E_]:
-        """A queue of all events of these types from now on; close it (or use ``with``)."""
+        """Return a queue of further events of these types; close it (or use ``with``)."""
         subscription = Subscription(self, types, maxlen)
         self._subscriptions.append(subscription)
         self._receivers.clear()
         return subscription
 
     def listen(self, kind: type[E_], listener: Callable[[E_], None]) -> Callable[[], None]:
-        """Call ``listener`` on every event of ``kind``, in place; returns what ends it. Listeners must be quick."""
+        """Call ``listener`` on every event of ``kind``, synchronously; return a function that unsubscribes it."""
         entry = (kind, cast(Callable[[Event], None], listener))
         self._listeners.append(entry)
         self._receivers.clear()

@@ -1,4 +1,4 @@
-"""Faults, devices, people and software that the robot knows."""
+"""Events of faults, devices, members and software."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultRaised(Event):
-    """Something is wrong now."""
+    """A fault began."""
 
     fault: Fault
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultCleared(Event):
-    """The fault has ended, or was dismissed."""
+    """A fault ended, or was dismissed."""
 
     fault: Fault
 
@@ -39,7 +39,7 @@ class BluetoothConnected(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BluetoothLost(Event):
-    """The device went out of reach or off; without a request."""
+    """The device went out of range or off, without a request."""
 
     device: BluetoothDevice
 
@@ -65,7 +65,7 @@ class NetworkChanged(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FirmwareChanged(Event):
-    """An update went on by a percent or reached another state."""
+    """An update advanced by a percent or reached another state."""
 
     progress: FirmwareProgress
 
@@ -87,7 +87,7 @@ class ControlChanged(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ControlRefused(Event):
-    """``client`` was refused to move the robot, or stopped, because another one has control (``reason``)."""
+    """``client`` may not move the robot, or was stopped, because another has control (``reason``)."""
 
     client: str
     doing: str

@@ -11,7 +11,7 @@ FILE_BYTES_MAX = 256 << 20
 
 
 class FileStore(Component):
-    """Bytes by name ("slamware/map.stcm"). What was acknowledged survives a crash."""
+    """Bytes by name ("slamware/map.stcm"). An acknowledged change survives a crash."""
 
     @abstractmethod
     async def names(self) -> Sequence[str]:
@@ -19,12 +19,12 @@ class FileStore(Component):
 
     @abstractmethod
     async def read(self, name: str) -> bytes:
-        """The file, or NotFound."""
+        """Return a file's bytes. Raises NotFound."""
 
     @abstractmethod
     async def write(self, name: str, data: bytes) -> None:
-        """Keep it, in place of one of that name; returns when it is safe on disk. InvalidGoal if it is too long."""
+        """Store a file, replacing one of that name; return once it is on disk. Raises InvalidGoal if too long."""
 
     @abstractmethod
     async def remove(self, name: str) -> None:
-        """Forget it, or NotFound."""
+        """Delete a file. Raises NotFound."""

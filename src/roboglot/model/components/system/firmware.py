@@ -38,7 +38,7 @@ class FirmwareState(StrEnum):
 class FirmwarePackage:
     """An update: ``modules`` are the versions that it brings, ``size`` in bytes, ``digest`` its MD5 in hex.
 
-    ``url``: where it lies; "" for one that was handed over and needs no download.
+    ``url``: its address; "" for one that was handed over and needs no download.
     """
 
     version: str
@@ -51,7 +51,7 @@ class FirmwarePackage:
 
 @dataclass(frozen=True, slots=True)
 class FirmwareProgress:
-    """``share`` 0..1 of the present step; ``error`` in plain words after a failure."""
+    """``share`` 0..1 of the current step; ``error`` in plain words after a failure."""
 
     state: FirmwareState = FirmwareState.IDLE
     share: float = 0.0
@@ -60,7 +60,7 @@ class FirmwareProgress:
 
 
 class Firmware(Component):
-    """Every change publishes ``FirmwareChanged``, a whole percent at a time.
+    """Updates and reboots; every change publishes ``FirmwareChanged``, percent by percent.
 
     A reboot publishes ``Rebooting``: the runtime closes the robot's doors then and opens them again at
     ``Rebooted``. The restart of a module publishes ``ModuleRestarted`` at its end. Installed versions survive a crash;
@@ -70,12 +70,12 @@ class Firmware(Component):
     @property
     @abstractmethod
     def version(self) -> str:
-        """Running version of the whole."""
+        """Running version of the firmware as a whole."""
 
     @property
     @abstractmethod
     def modules(self) -> Mapping[str, str]:
-        """Versions of the parts, as they run now."""
+        """Running version of each module."""
 
     @property
     @abstractmethod
@@ -85,16 +85,16 @@ class Firmware(Component):
     @property
     @abstractmethod
     def available(self) -> FirmwarePackage | None:
-        """The newest package that the maker offers, if newer than what runs; None otherwise."""
+        """Package that the manufacturer offers, if newer than the running version; else None."""
 
     @property
     @abstractmethod
     def automatic(self) -> bool:
-        """True if the robot updates itself when it stands on its dock and has nothing to do."""
+        """True if the robot updates itself while idle on its dock."""
 
     @abstractmethod
     async def set_automatic(self, on: bool) -> None:
-        """Returns when it is safe on disk."""
+        """Switch ``automatic``; return once it is on disk."""
 
     @property
     @abstractmethod
@@ -103,31 +103,31 @@ class Firmware(Component):
 
     @abstractmethod
     def download(self, package: FirmwarePackage, *, source: str = "") -> Action:
-        """Fetch it. Raises InvalidGoal for a package that makes no sense; aborts with Refused when the disk is full.
+        """Download a package. Raises InvalidGoal for a malformed one; aborts with Refused when the disk is full.
 
         Feedback of all three actions: ``FirmwareProgress``.
         """
 
     @abstractmethod
     def install(self, digest: str, *, source: str = "") -> Action:
-        """Install what was downloaded. Aborts with NotFound for another digest, Refused with a low battery."""
+        """Install the downloaded package. Aborts with NotFound for another digest, Refused with a low battery."""
 
     @abstractmethod
     async def discard(self) -> None:
-        """Throw away what was downloaded, or the memory of a failure; returns when that is safe on disk.
+        """Delete the downloaded package, or the record of a failure; return once that is on disk.
 
-        Raises Refused while anything is under way, and for what is installed already.
+        Raises Refused while an update is under way, and for an installed one.
         """
 
     @abstractmethod
     def reboot(self, *, source: str = "", after: float = 0.0) -> Action:
-        """Restart in ``after`` s: everything under way is cancelled, what was installed becomes the version."""
+        """Restart in ``after`` s: all actions are cancelled, and the installed version becomes the running one."""
 
     @property
     @abstractmethod
     def restarting(self) -> Module | None:
-        """Module that restarts while the rest stays up; None if there is none."""
+        """Module that is restarting while the rest stays up, or None."""
 
     @abstractmethod
     def restart(self, module: Module, *, source: str = "") -> Action:
-        """Restart this module only: what moves is cancelled, and nothing moves until it is up again."""
+        """Restart one module: motions are cancelled, and the robot stands until it is up again."""

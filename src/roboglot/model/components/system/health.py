@@ -32,16 +32,16 @@ class Health(Component):
         return [fault for name, fault in self._faults.items() if name not in self._dismissed]
 
     def has(self, name: str) -> bool:
-        """True if this is wrong now, dismissed or not."""
+        """Return whether this fault is present, dismissed or not."""
         return name in self._faults
 
     @property
     def worst(self) -> FaultLevel | None:
-        """The highest level among them; None if all is well."""
+        """Highest level of the faults; None without faults."""
         return max((fault.level for fault in self.faults), default=None)
 
     def set(self, name: str, present: bool, component: str, level: FaultLevel, message: str = "") -> None:
-        """Set whether this is wrong; for components. Cheap when nothing changed."""
+        """Raise or clear a fault; called by components. Cheap when nothing changed."""
         if present == (name in self._faults):
             return
         if not present:
@@ -57,7 +57,7 @@ class Health(Component):
             self._events.publish(FaultRaised(stamp=now, fault=self._faults[name]))
 
     def dismiss(self, id: int) -> None:
-        """Hide a fault, or NotFound; it is raised again after a while if its cause persists."""
+        """Hide a fault; it is raised again after REMINDER if its cause persists. Raises NotFound."""
         fault = next((fault for fault in self.faults if fault.id == id), None)
         if fault is None:
             raise NotFound(f"there is no fault {id}")

@@ -1,8 +1,8 @@
-"""The control lease: who moves the robot, who alone may, and how that is handed over. Knows no door and no driver.
+"""The control lease: the client that moves the robot, exclusive control, and its transfer. Knows no door and no driver.
 
-Without a controller the newest command has the robot, and the one before ends, braked. A controller (a person at the
-terminal, or a named client) has it alone until control is released. A real robot that is moved from elsewhere, by the
-vendor's app for example, is left alone until that ends or control is taken.
+Without a controller the newest command wins, and the one before is braked and ends. A controller (a person at the
+terminal, or a named client) has exclusive control until it is released. A real robot that is moved by others, such as
+the vendor's app, is left alone until they stop or control is taken.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ LOG_PERIOD = 1.0  # s
 
 @dataclass(frozen=True, slots=True)
 class Holder:
-    """The one who moves the robot: a client's name, ``OTHERS`` or ``ITSELF``; by which action; since when, robot s."""
+    """Current mover: a client's name, ``OTHERS`` or ``ITSELF``; the action; its start, robot s."""
 
     who: str
     doing: str
@@ -71,7 +71,7 @@ class Lease(Component):
 
     @property
     def taken_by(self) -> str:
-        """The only client that may move the robot; empty: any client, the newest command counts."""
+        """Client with exclusive control; empty: any client may move it, the newest command wins."""
         return self._taken_by
 
     @property
@@ -87,11 +87,11 @@ class Lease(Component):
 
     @property
     def last(self) -> Holder:
-        """The client that moved it last, or moves it now; an empty name before the first."""
+        """Client that moves the robot, or moved it last; an empty name before the first."""
         return self._last
 
     def may_move(self, who: str) -> bool:
-        """True if control lets ``who`` move the robot."""
+        """Return whether ``who`` may move the robot."""
         taken = self._taken_by
         return not taken or who == taken or who.startswith((f"{taken} ", f"{taken}:"))
 
@@ -100,18 +100,18 @@ class Lease(Component):
         self._fence = why_not
 
     def halt(self, reason: str) -> None:
-        """End everything that moves the robot, no matter who has control."""
+        """Stop all motion, regardless of control."""
         for action in self._robot.actions.running():
             if moves(action):
                 action.cancel(reason)
 
     async def take(self, who: str = PERSON) -> None:
-        """From now on only ``who`` moves the robot: ``PERSON`` (no client at all), or a door or client, by its name:
+        """Give exclusive control to ``who``: ``PERSON`` (no client at all), or a door or client, by its name:
         "robomaster", "robomaster 10.0.0.7", "robomaster 10.0.0.7:4242".
 
-        Returns when what anybody else had it do has braked. What another client of a real robot has it do is stopped
-        where the protocol can (Refused if the robot does not obey, Unconnected without a link). It is kept over
-        restarts. Raises InvalidGoal, and what the disk raises if it cannot be kept: it counts until the end then.
+        Returns once motions of all others have braked. Those of another client of a real robot are stopped where the
+        protocol allows it (Refused if the robot does not obey, Unconnected without a link). Control survives
+        restarts. Raises InvalidGoal, and the disk's error if it cannot be stored: it then lasts until the program ends.
         """
         if not who.isprintable() or not 0 < len(who.strip()) <= NAME_MAX:
             raise InvalidGoal(f"a client's name has 1 to {NAME_MAX} printable characters")
@@ -130,15 +130,15 @@ class Lease(Component):
 
     @property
     def client(self) -> str:
-        """The client that control is taken by, without its door; empty for a whole door, a person, or none."""
+        """Name of the controlling client without its door; empty for a whole door, a person, or none."""
         return "" if self._taken_by == PERSON else self._taken_by.partition(" ")[2]
 
     def is_of(self, who: str) -> bool:
-        """Return whether control is taken by the client that showed to be ``who``, by whatever door."""
+        """Return whether the client with identity ``who`` has control, at any door."""
         return bool(who) and (self.client == who or self.client.startswith(f"{who}:"))
 
     async def release(self) -> None:
-        """Let every client move it again. Returns when that is stored."""
+        """Release control, so that every client may move the robot; return once that is stored."""
         if self._taken_by:
             log.warning("robot %s: %s released control", self._robot.id, self._taken_by)
             self._taken_by = ""
@@ -176,7 +176,7 @@ class Lease(Component):
             self._publish()
 
     def _log(self, holder: Holder) -> None:
-        """Log at most one line a second: clients that take it from each other all the time are no reason for more."""
+        """Log at most one line per second, even when clients keep taking control from each other."""
         if self._clock.time() - self._logged_at >= LOG_PERIOD:
             self._logged_at = self._clock.time()
             log.info("robot %s is moved by %s (%s)", self._robot.id, holder.who, holder.doing or "unknown motion")
@@ -210,7 +210,7 @@ class Lease(Component):
 
 
 def moves(action: Action) -> bool:
-    """True if control is needed for it."""
+    """Return whether the action needs control."""
     return any(resource in MOVING or resource.startswith(SERVO) for resource in action.resources)
 
 

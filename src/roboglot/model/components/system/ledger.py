@@ -1,4 +1,4 @@
-"""Documents that must not be forgotten: orders, templates, calls. Knows nothing of what is in them."""
+"""Durable documents: orders, templates, calls. Knows nothing of their content."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from roboglot.model.components.component import Component
 
 
 class Ledger(Component):
-    """JSON documents by kind ("order") and id. What was acknowledged survives a crash."""
+    """JSON documents by kind ("order") and id. An acknowledged change survives a crash."""
 
     @abstractmethod
     def all(self, kind: str) -> Sequence[tuple[str, object]]:
-        """Ids and documents of the kind, in the order in which their ids first came."""
+        """Return ids and documents of a kind, in the order of their first appearance."""
 
     @abstractmethod
     async def write(self, kind: str, documents: Mapping[str, object], *, forget: Sequence[str] = ()) -> None:
-        """Add or replace ``documents`` and drop the ids in ``forget``, all or nothing; returns when safe on disk."""
+        """Add or replace ``documents`` and delete the ids in ``forget``, atomically; return once on disk."""

@@ -1,4 +1,4 @@
-"""The link to a real robot: its state, the age of what was reported, who moves the robot. Drivers update it."""
+"""The link to a real robot: its state, the age of its reports, the mover of the robot. Drivers update it."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ STALE_AFTER = 0.5  # s without an update after which values count as old
 
 
 class Link(Component):
-    """Publishes ``LinkChanged``; while it is not up, Health has a fault, which is how every door shows it.
+    """Publishes ``LinkChanged``; while it is down, Health has a fault, by which every door shows it.
 
-    ``address`` is the URL that the robot was given by, ``name`` the name shown to clients: options may name files.
+    ``address``: URL of the robot; ``name``: shown to clients instead, since options of the URL may name files.
     """
 
     def __init__(self, address: str, clock: Clock, events: EventStream, health: Health) -> None:
@@ -48,16 +48,16 @@ class Link(Component):
 
     @property
     def since(self) -> float:
-        """Robot time when ``state`` began, s."""
+        """Start of ``state``, robot time, s."""
         return self._since
 
     @property
     def holder(self) -> str:
-        """The one who moves the robot: ``US``, ``OTHERS``, or empty."""
+        """Mover of the robot: ``US``, ``OTHERS``, or empty."""
         return self._holder
 
     def age(self, what: str = "") -> float:
-        """Seconds since the last update of ``what`` ("pose", "battery" …), or of anything; inf: never."""
+        """Return the seconds since the last update of ``what`` ("pose", "battery" …), or of anything; inf: never."""
         heard = self._heard.get(what) if what else max(self._heard.values(), default=None)
         return float("inf") if heard is None else self._clock.time() - heard
 
@@ -75,18 +75,18 @@ class Link(Component):
         return Unconnected(f"{self.name} is not connected: {self._reason or self._state}")
 
     def require(self) -> None:
-        """Raise Unconnected unless a command would reach the robot now: nothing ever queues for a dead link."""
+        """Raise Unconnected unless a command would reach the robot now: commands never queue for a dead link."""
         if (refusal := self.refusal) is not None:
             raise refusal
 
     def require_free(self) -> None:
-        """``require``, and Busy while another client moves the robot: what we begin would end what it does."""
+        """``require``, and raise Busy while another client moves the robot: a new action would end its motion."""
         self.require()
         if self._holder == OTHERS:
             raise Busy("another client moves the robot")
 
     async def take_back(self) -> None:
-        """End what another client has the robot do. Refused if it cannot be ended, Unconnected without a link."""
+        """Stop another client's motion. Raises Refused if that is impossible, Unconnected without a link."""
         if self._holder != OTHERS:
             return
         self.require()
@@ -112,13 +112,13 @@ class Link(Component):
         self._publish()
 
     def held_by(self, holder: str) -> None:
-        """Set the one who moves the robot, and publish a change."""
+        """Set the mover of the robot, and publish a change."""
         if holder != self._holder:
             self._holder = holder
             self._publish()
 
     def stop_others_by(self, stop: Callable[[], Awaitable[None]]) -> None:
-        """``stop`` ends what another client has the robot do, or raises RobotError."""
+        """Set the function that stops another client's motion, or raises RobotError."""
         self._stop_others = stop
 
     def _publish(self) -> None:
@@ -131,12 +131,12 @@ class Link(Component):
 
 
 def was_heard(robot: Robot) -> bool:
-    """Return False for a real robot that has reported nothing yet: what its components hold are no reports."""
+    """Return False for a real robot that has not reported yet: its components hold initial values only."""
     return Link not in robot or not math.isinf(robot[Link].age())
 
 
 def require_heard(robot: Robot) -> None:
-    """Raise Unconnected for a real robot that has reported nothing yet: neither its pose nor its battery is known.
+    """Raise Unconnected for a real robot that has not reported yet: neither pose nor battery is known.
 
     Reports from before the link was lost count; ``Link`` has their age.
     """

@@ -1,4 +1,4 @@
-"""The robot's way to others: its Wi-Fi card, as station or access point, and a mobile modem if there is one."""
+"""The robot's network: its Wi-Fi card, as station or access point, and a mobile modem if it has one."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Uplink(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class WifiNetwork:
-    """A network in the air; ``signal`` in dBm, of its strongest access point; ``secured``: asks for a password."""
+    """A Wi-Fi network in range; ``signal`` of its strongest access point, dBm; ``secured``: needs a password."""
 
     ssid: str
     signal: float
@@ -63,7 +63,7 @@ class NetworkState:
 
 @dataclass(frozen=True, slots=True)
 class MobileState:
-    """``signal`` in dBm; ``registered``: whether the operator lets the modem in with this access point name."""
+    """``signal`` in dBm; ``registered``: True if the operator accepts the modem with this access point name."""
 
     apn: str
     signal: float
@@ -74,7 +74,7 @@ class Network(Component):
     """State and settings of Wi-Fi card and modem. Settings survive restarts. Publishes ``NetworkChanged``. Settings
     survive restarts. Publishes ``NetworkChanged``.
 
-    Setting methods return when the setting is safe on disk; the link follows within seconds of robot time.
+    Setting methods return once the setting is on disk; the link follows within seconds of robot time.
     """
 
     signal_min: float = -88.0  # dBm below which every connection breaks
@@ -82,7 +82,7 @@ class Network(Component):
 
     @property
     def connected(self) -> bool:
-        """True if it is in a network as a station, and that network's signal is strong enough."""
+        """True if it has joined a network as a station and the signal is strong enough."""
         return self.signal >= self.signal_min
 
     @property
@@ -103,7 +103,7 @@ class Network(Component):
     @property
     @abstractmethod
     def known(self) -> Sequence[str]:
-        """The names of the networks that it joins by itself, the preferred one first."""
+        """Names of the networks that it joins by itself, preferred first."""
 
     @property
     @abstractmethod
@@ -113,27 +113,27 @@ class Network(Component):
     @property
     @abstractmethod
     def mobile(self) -> MobileState | None:
-        """The modem; None for robots without one."""
+        """State of the modem; None for robots without one."""
 
     @abstractmethod
     def join(self, ssid: str, password: str = "", *, source: str = "") -> Action:
-        """Become a station of this network and remember it. Takes some seconds.
+        """Join a network as a station and remember it; takes some seconds.
 
-        Raises InvalidGoal for impossible names or passwords; aborts with NotFound when it is not heard and Refused when
-        the password is wrong: the robot then is where it was before.
+        Raises InvalidGoal for impossible names or passwords; aborts with NotFound out of range and Refused for a wrong
+        password: the robot then stays in its previous network.
         """
 
     @abstractmethod
     async def forget(self, ssid: str) -> None:
-        """Leave this network and join it no more; NotFound if it isn't known."""
+        """Forget a network, leaving it if joined. Raises NotFound."""
 
     @abstractmethod
     async def be_station(self) -> None:
-        """Join what it knows, the preferred one first."""
+        """Become a station: join known networks, preferred first."""
 
     @abstractmethod
     async def be_access_point(self, ssid: str | None = None, password: str | None = None) -> None:
-        """Be a network; None: named and secured as last time, or as made. Raises InvalidGoal."""
+        """Become an access point; None: name and password as last time, or the factory's. Raises InvalidGoal."""
 
     @abstractmethod
     async def switch_off(self) -> None:
@@ -141,7 +141,7 @@ class Network(Component):
 
     @abstractmethod
     async def set_dhcp(self, on: bool) -> None:
-        """Off: the address that it has now (or had last) stays its address in every network."""
+        """Switch DHCP; off: the current (or last) address is used in every network."""
 
     @abstractmethod
     async def set_priority(self, priority: Uplink) -> None:
@@ -149,4 +149,4 @@ class Network(Component):
 
     @abstractmethod
     async def set_apn(self, apn: str) -> None:
-        """The mobile operator's access point name. Raises ComponentMissing without a modem, InvalidGoal."""
+        """Set the mobile operator's access point name. Raises ComponentMissing without a modem, InvalidGoal."""

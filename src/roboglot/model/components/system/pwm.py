@@ -1,4 +1,4 @@
-"""Pulse-width modulated outputs for things that users attach."""
+"""Pulse-width modulated outputs for devices that users attach."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ class PwmPorts(Component):
 
     @abstractmethod
     def signal(self, port: int) -> PwmSignal:
-        """Return what it puts out."""
+        """Return the output signal of a port."""
 
     @abstractmethod
     def set_duty(self, port: int, duty: float) -> None:
-        """Put out this share (0..1) from now on."""
+        """Set the duty cycle (0..1) of a port."""
 
     @abstractmethod
     def set_frequency(self, port: int, frequency: float) -> None:
-        """Pulse at this rate (Hz, above 0) from now on."""
+        """Set the frequency (Hz, above 0) of a port."""
 
     @abstractmethod
     def reset(self) -> None:
-        """All outputs as at power-on."""
+        """Reset all outputs to their state at power-on."""

@@ -13,15 +13,15 @@ log = logging.getLogger(__name__)
 
 
 class Settings(Component):
-    """JSON values by key ("slamware.language"). What was acknowledged survives a crash."""
+    """JSON values by key ("slamware.language"). An acknowledged change survives a crash."""
 
     @abstractmethod
     def get(self, key: str, default: Any = None) -> Any:
-        """The value, or ``default`` if never set."""
+        """Return the value, or ``default`` if never set."""
 
     @abstractmethod
     async def put(self, key: str, value: object) -> None:
-        """Set it; returns when it is safe on disk."""
+        """Set a value; return once it is on disk."""
 
     async def keep(self, key: str, value: object) -> None:
         """Set what no client waits for: where that fails, the log says so."""
