@@ -13,7 +13,7 @@ from roboglot.wire.slamware.chapters.motion import MoveByOptions, MoveOptions, M
 from roboglot.wire.slamware.chapters.system.system import (
     DockingStatus,
     Level,
-    Part,
+    HealthPart,
     PowerStatus,
     error_code,
     health_record,
@@ -40,8 +40,8 @@ def test_names_are_spelled_as_the_vendor_does() -> None:
 
 
 def test_error_numbers_are_composed_as_published() -> None:
-    assert error_code(Level.ERROR, Part.SYSTEM, 0x0700) == 33621760  # the manual's example
-    low = health_record(Level.WARN, Part.POWER, 0x0100, 2, "power low")
+    assert error_code(Level.ERROR, HealthPart.SYSTEM, 0x0700) == 33621760  # the manual's example
+    low = health_record(Level.WARN, HealthPart.POWER, 0x0100, 2, "power low")
     assert (low.error_code, low.component_error_type) == (0x01020100, 3074)
 
 
