@@ -181,7 +181,7 @@ class Life:
 
 
 def objects() -> int:
-    """Count the objects of this process, also those that were set aside since: each library that loads sets all aside."""
+    """Count the objects of this process, also those that a library's loading has set aside since."""
     gc.unfreeze()
     gc.collect()
     return len(gc.get_objects())

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import errno
+import io
 import struct
 import subprocess
 import sys
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 import zstandard
+from hypothesis import given
+from hypothesis import strategies as st
 from mcap.reader import make_reader
+from mcap.writer import Writer
 
 from roboglot.recording.entries import NANO, Entry
-from roboglot.recording.files import Attachment, Files, Limits, Origin, PartWriter
+from roboglot.recording.files import Attachment, Files, Limits, OpenChunk, Origin, PartWriter
 from roboglot.recording.mending import mend
 from roboglot.recording.reader import parts, read_messages, records
 from roboglot.recording.redaction import Redaction
@@ -283,3 +288,33 @@ def test_a_mended_file_keeps_them_too(tmp_path: Path) -> None:
     part.close()
     mend(tmp_path / "cut.mcap", tmp_path / "whole.mcap")
     assert Doctor((tmp_path / "whole.mcap").read_bytes()).examine() == []
+
+
+@given(
+    st.lists(
+        st.just("flush") | st.tuples(st.integers(0, 3), st.integers(0, 2**40), st.binary(max_size=90)), max_size=30
+    )
+)
+def test_chunks_are_the_librarys(messages: list[str | tuple[int, int, bytes]]) -> None:
+    files: list[bytes] = []
+    for ours in (False, True):
+        stream = io.BytesIO()
+        writer: Any = Writer(stream)
+        writer.start()
+        chunk = OpenChunk(writer)
+        schema = writer.register_schema("x", "jsonschema", b"{}")
+        channels = [writer.register_channel(f"/{number}", "json", schema) for number in range(3)]
+        for message in messages:
+            if isinstance(message, str) or message[0] == len(channels):
+                chunk.hand_over()
+                writer.flush()
+            if isinstance(message, str):
+                continue
+            number, at, data = message
+            if number == len(channels):
+                channels.append(writer.register_channel("/late", "json", schema))
+            (chunk.add if ours else writer.add_message)(channels[number], at, data, at + 5, number)
+        chunk.hand_over()
+        writer.finish()
+        files.append(stream.getvalue())
+    assert files[0] == files[1]

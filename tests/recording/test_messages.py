@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import json
+import math
+from typing import TYPE_CHECKING
 
+import numpy as np
+from foxglove_schemas_protobuf import FrameTransforms_pb2, LaserScan_pb2, PoseInFrame_pb2
 from hypothesis import given
 from hypothesis import strategies as st
 
+from roboglot.model.geometry import Pose
+from roboglot.model.sensing import LaserScan
 from roboglot.model.tap import Direction, Exchange
+from roboglot.recording import foxglove
 from roboglot.recording.messages import decode_exchange, encode_exchange, encode_plain
 from roboglot.recording.redaction import FIELDS, Redaction
+
+if TYPE_CHECKING:
+    from google.protobuf.timestamp_pb2 import Timestamp
 
 VALUES = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
@@ -83,3 +93,49 @@ def test_refusals_do_not_quote_names() -> None:
     )
     assert Redaction().exchange(refused).refusal == "no face of [redacted] is known"
     assert Redaction().exchange(refused._replace(operation="6004")).refusal == refused.refusal
+
+
+# Poses, transforms and scans whose bytes are put together by hand are those of the protobuf library.
+TIMES = st.integers(0, 4_000_000_000 * 10**9) | st.just(1_700_000_000 * 10**9)
+NUMBERS = st.floats() | st.sampled_from([0.0, -0.0])
+POSES = st.builds(Pose, NUMBERS, NUMBERS, st.floats(-4, 4) | st.sampled_from([0.0, -0.0, math.pi]))
+NAMES = st.text(max_size=200)
+
+
+def stamp(message: Timestamp, at: int) -> None:
+    message.seconds, message.nanos = divmod(at, 10**9)
+
+
+@given(TIMES, NAMES, POSES)
+def test_poses_are_the_librarys(at: int, frame: str, pose: Pose) -> None:
+    message = PoseInFrame_pb2.PoseInFrame(frame_id=frame)
+    stamp(message.timestamp, at)
+    place = message.pose
+    place.position.x, place.position.y, place.position.z = pose.x, pose.y, 0.0
+    place.orientation.z, place.orientation.w = math.sin(pose.yaw / 2), math.cos(pose.yaw / 2)
+    assert foxglove.encode_pose(at, (frame, pose)) == message.SerializeToString()
+
+
+@given(TIMES, st.lists(st.tuples(NAMES, NAMES, POSES), max_size=4).map(tuple))
+def test_transforms_are_the_librarys(at: int, value: tuple[tuple[str, str, Pose], ...]) -> None:
+    message = FrameTransforms_pb2.FrameTransforms()
+    for parent, child, pose in value:
+        transform = message.transforms.add(parent_frame_id=parent, child_frame_id=child)
+        stamp(transform.timestamp, at)
+        transform.translation.x, transform.translation.y = pose.x, pose.y
+        transform.rotation.z, transform.rotation.w = math.sin(pose.yaw / 2), math.cos(pose.yaw / 2)
+    assert foxglove.encode_transforms(at, value) == message.SerializeToString()
+
+
+@given(TIMES, NAMES, st.lists(st.floats(width=32), min_size=1, max_size=400), NUMBERS, st.floats(-4, 4))
+def test_scans_are_the_librarys(at: int, frame: str, ranges: list[float], start: float, step: float) -> None:
+    scan = LaserScan(0.0, np.array(ranges, np.float32), start, step, 0.1, 30.0)
+    with np.errstate(over="ignore"):
+        rounded = np.round(scan.ranges * 1024.0).astype(np.float64) / 1024.0
+        found = foxglove.encode_scan(at, (frame, scan))
+    message = LaserScan_pb2.LaserScan(
+        frame_id=frame, start_angle=start, end_angle=start + step * (len(ranges) - 1), ranges=rounded
+    )
+    message.pose.orientation.w = 1.0
+    stamp(message.timestamp, at)
+    assert found == message.SerializeToString()

@@ -7,8 +7,12 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from struct import Struct, pack
 from typing import IO, Any
 
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import MessageIndex
 from mcap.writer import CompressionType, Writer
 
 from roboglot.recording.entries import KINDS, NANO, Entry, encoded
@@ -18,6 +22,7 @@ from roboglot.recording.standing import REPEATED, Standing
 log = logging.getLogger(__name__)
 LIBRARY = "roboglot"
 SUFFIX = ".mcap"
+_message = Struct("<BQHIQQ").pack
 CHUNK_BYTES = 4 << 20  # of a second's messages before compression; more go into further chunks
 
 
@@ -47,6 +52,52 @@ class Limits:
     total_bytes: int = 4 << 30
 
 
+class OpenChunk:
+    """Messages that wait to be handed over to the library's writer at once: that takes a fifth of the time."""
+
+    def __init__(self, writer: Writer) -> None:
+        inside = vars(writer)
+        self._chunk, self._figures = inside["_Writer__chunk_builder"], inside["_Writer__statistics"]
+        self._records: list[bytes] = []
+        self._index: dict[int, list[int]] = {}  # of each channel: time, offset, time, offset, …
+        self.size = 0  # bytes
+
+    def add(self, channel: int, at: int, data: bytes, wall: int, sequence: int) -> None:
+        """Take a message along."""
+        self._index.setdefault(channel, []).extend((at, self.size))
+        size = len(data)
+        self._records += (_message(Opcode.MESSAGE, size + 22, channel, sequence, at, wall), data)
+        self.size += size + 31
+
+    def hand_over(self) -> None:
+        """Hand all of them over; the writer's next ``flush`` or ``finish`` writes them."""
+        if not self._records:
+            return
+        chunk, figures = self._chunk, self._figures
+        before = chunk.count  # channels and schemas that are new
+        chunk.record_writer.write(b"".join(self._records))
+        times: list[int] = []
+        for channel, index in self._index.items():
+            at = index[::2]
+            offsets = [before + offset for offset in index[1::2]]
+            chunk.message_indices[channel] = _PackedIndex(channel, list(zip(at, offsets, strict=True)))
+            figures.channel_message_counts[channel] += len(at)
+            times += at
+        first, last = min(times), max(times)
+        chunk.message_start_time, chunk.message_end_time, chunk.num_messages = first, last, len(times)
+        figures.message_start_time = min(first, figures.message_start_time) if figures.message_count else first
+        figures.message_end_time = max(last, figures.message_end_time)
+        figures.message_count += len(times)
+        self._records, self._index, self.size = [], {}, 0
+
+
+class _PackedIndex(MessageIndex):
+    def write(self, stream: RecordBuilder) -> None:
+        flat = [number for pair in self.records for number in pair]
+        size = 8 * len(flat)
+        stream.write(pack(f"<BQHI{len(flat)}Q", Opcode.MESSAGE_INDEX, size + 6, self.channel_id, size, *flat))
+
+
 class PartWriter:
     """One MCAP file. What ``flush`` has returned from survives the death of the process."""
 
@@ -55,6 +106,7 @@ class PartWriter:
         self._file: IO[bytes] = path.open("xb", buffering=1 << 20)
         os.fchmod(self._file.fileno(), 0o600)
         self._writer: Any = Writer(self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+        self._chunk = OpenChunk(self._writer)
         self._writer.start(profile="", library=LIBRARY)
         self._writer.add_metadata("roboglot", {**origin.facts, "part": str(part)})
         for attachment in origin.attachments:
@@ -78,7 +130,10 @@ class PartWriter:
     def _add(self, entry: Entry, sequence: int) -> None:
         channel = self._channels.get((entry.topic, entry.kind)) or self._channel(entry)
         data = encoded(entry, self._redaction)
-        self._writer.add_message(channel, entry.at, data, entry.wall, sequence)
+        self._chunk.add(channel, entry.at, data, entry.wall, sequence)
+        if self._chunk.size > CHUNK_BYTES:
+            self._chunk.hand_over()
+            self._writer.flush()
 
     def _channel(self, entry: Entry) -> int:
         kind = KINDS[entry.kind]
@@ -92,12 +147,14 @@ class PartWriter:
 
     def flush(self) -> None:
         """Close the chunk and hand everything to the system. Raises OSError."""
+        self._chunk.hand_over()
         self._writer.flush()
         self.size = self._file.tell()
 
     def close(self) -> None:
         """Write the summary. Raises OSError."""
         try:
+            self._chunk.hand_over()
             self._writer.finish()
         finally:
             self._file.close()

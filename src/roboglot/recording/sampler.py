@@ -109,10 +109,11 @@ class Sampler:
         self._send("inputs", "input", given, self._stamps.at(given.stamp), time.time_ns())
 
     def _note_event(self, event: Event) -> None:
+        if isinstance(event, ScanTaken):
+            self._note_scan(event.scan, time.time_ns())
+            return
         at, wall = self._stamps.now()
         match event:
-            case ScanTaken():
-                self._note_scan(event.scan, wall)
             case ActionChanged():
                 self._send("actions", "action", _action(event), at, wall)
             case _:

@@ -39,7 +39,8 @@ class WriterThread:
         self._sink, self._patient = sink, patient
         self._queue: deque[Entry] = deque()
         self._weight = 0
-        self._room = threading.Condition()
+        self._lock = threading.Lock()
+        self._room = threading.Condition(self._lock)
         self._wake = threading.Event()
         self._settled = threading.Event()
         self._ending = False
@@ -51,7 +52,7 @@ class WriterThread:
     def put(self, entry: Entry) -> bool:
         """Have it written soon; False: it is lost."""
         weight = entry.weight
-        with self._room:
+        with self._lock:  # without the way through Python of a condition
             while self._patient and not self.failure and not self._ending and self._full(weight):
                 self._wake.set()
                 self._room.wait(PERIOD)
