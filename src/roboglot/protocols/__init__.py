@@ -1,4 +1,4 @@
-"""The doors: one package for each vendor's protocol, each described by its ``DOOR``. Another door is one more line."""
+"""Doors: one package per protocol, each described by its ``DOOR``. A further door is one more line."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ class Browsers:
             )
 
     def refusal(self, headers: Headers) -> str:
-        """Return why the request is refused, in words for its sender; empty if it may pass."""
+        """Return the reason for a refusal, worded for the sender; empty if the request may pass."""
         why = self._verdict(headers)
         if why:
             new = why not in self._warned and len(self._warned) < WARNINGS_MAX
@@ -113,30 +113,30 @@ class Browsers:
 
 
 def _is_this_machine(page: str) -> bool:
-    """Return whether a page's host is this machine; other loopback addresses belong to robots, tunnels to strangers."""
+    """Return whether a page's host is this machine; other loopback addresses are robots or tunnels, so untrusted."""
     return page in ("127.0.0.1", "::1", "localhost") or page.endswith(".localhost")
 
 
 def own_names() -> set[str]:
-    """Names under which this machine is known to itself and, by mDNS, to its neighbours."""
+    """Return the names of this machine, locally and by mDNS."""
     name = socket.gethostname().lower()
     return {"localhost", name, f"{name.partition('.')[0]}.local"}
 
 
 def host_name(text: str) -> str | None:
-    """The name or address in a Host header, without port and brackets, in lower case; None if it is malformed."""
+    """Return the name or address in a Host header, lower case, without port and brackets; None if malformed."""
     match = _HOST.fullmatch(text)
     return (match[1] or match[2]).lower().rstrip(".") if match else None
 
 
 def of_rows(rows: Iterable[tuple[bytes, bytes]], method: str) -> Headers:
-    """Return what an ASGI request's header rows (names in lower case) say."""
+    """Read the header rows (names in lower case) of an ASGI request."""
     found = {name: value for name, value in rows if name in _NAMES}
     return of_texts({name.decode(): value.decode("latin-1") for name, value in found.items()}, method)
 
 
 def of_texts(found: dict[str, str], method: str) -> Headers:
-    """Return what headers by their names in lower case say."""
+    """Read headers given by name in lower case."""
     opens_page = (
         method == "GET" and found.get("sec-fetch-mode") == "navigate" and found.get("sec-fetch-dest") == "document"
     )
@@ -160,13 +160,13 @@ def _is_address(host: str) -> bool:
 
 
 def _origin_of(referer: str | None) -> str:
-    """The origin of the page in a Referer; "null" if it is hidden."""
+    """Return the origin of the page in a Referer; "null" if it is hidden."""
     match = _ORIGIN.match(referer or "")
     return match[0] if match else "null"
 
 
 def _checked(setting: str, origin: str) -> str:
-    """An origin of the configuration as browsers send it."""
+    """Return an origin of the configuration in the form that browsers send."""
     text = origin.lower().rstrip("/")
     if text not in (ANY, "null") and not _ORIGIN.fullmatch(text):
         raise ValueError(f'{setting} origins: {origin!r} is no origin; write it as "https://studio.example", or "*"')

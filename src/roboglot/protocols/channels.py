@@ -18,19 +18,19 @@ class Carrier(Protocol):
 
     @property
     def name(self) -> str:
-        """The other end's address with its port."""
+        """Address and port of the other end."""
 
     @property
     def who(self) -> str:
-        """The client in words, as control has it."""
+        """Name of the client, as in control leases."""
 
     @property
     def subprotocol(self) -> str:
-        """The one of the channel's that was agreed on; empty: none."""
+        """Negotiated subprotocol; empty: none."""
 
     @property
     def unsent(self) -> int:
-        """Bytes that wait for the client to read."""
+        """Number of bytes that the client has yet to read."""
 
     def send(self, message: str | bytes) -> None:
         """Send one message, a text or bytes; disconnect a client that does not read."""
@@ -43,10 +43,10 @@ class Session(Protocol):
     """One client at one path, from its opening to its end."""
 
     async def receive(self, message: str | bytes) -> None:
-        """Answer one message; calls come in the order of the messages, and run beside each other where they wait."""
+        """Handle one message; calls begin in the order of the messages, and run concurrently where they wait."""
 
     def close(self) -> None:
-        """The client is gone."""
+        """Handle the client's departure."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,9 +64,9 @@ class Channel:
 
 
 class TextSession:
-    """A session by two functions: ``subscribe`` gets what sends a text and what waits until the client has caught up.
+    """A session made of two functions: ``subscribe`` gets a function to send a text and one to await the client.
 
-    It returns what ends it; ``receive`` answers a text.
+    It returns a function that unsubscribes; ``receive`` handles a text.
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class TextSession:
         self.close = subscribe(connection.send, connection.room)
 
     async def receive(self, message: str | bytes) -> None:
-        """Hand it on."""
+        """Pass the message on."""
         await self._receive(str(message), self._send)
 
 
@@ -93,20 +93,20 @@ def texts(
 
 
 class _Noted:
-    """A session whose end is an input."""
+    """A session whose end is noted as an input."""
 
     def __init__(self, inner: Session, note: Callable[[], None]) -> None:
         self._inner, self._note = inner, note
         self.receive = inner.receive
 
     def close(self) -> None:
-        """Note it first: what follows from it comes after."""
+        """Note the end before its consequences."""
         self._note()
         self._inner.close()
 
 
 def noted(channel: Channel, outside: Outside, door: str, path: str) -> Channel:
-    """Return the channel; that its clients come and go is noted as the robot's inputs."""
+    """Return the channel with its clients' arrivals and departures noted as the robot's inputs."""
 
     def open_noted(carrier: Carrier) -> Session:
         session = channel.open(carrier)

@@ -52,23 +52,23 @@ class Door(Protocol):
 
 
 class CloudLink(Protocol):
-    """The way to a cloud that keeps programs."""
+    """Connection to a cloud that stores programs."""
 
     async def post(self, frame: str) -> CloudAnswer:
         """Send one frame and return its answer; raises ``Clouds.failures`` where none came."""
 
 
 class Outbox(Protocol):
-    """Documents that wait to be sent, in order; kept across a crash."""
+    """Ordered queue of documents to send; survives a crash."""
 
     async def put(self, document: str) -> None:
-        """Add one at the end. Raises StoreError (`roboglot.programs.errors`)."""
+        """Append a document. Raises StoreError (`roboglot.programs.errors`)."""
 
     async def first(self) -> tuple[int, str] | None:
-        """Return the oldest with its number, None if nothing waits."""
+        """Return the oldest document with its number, or None."""
 
     async def remove(self, number: int) -> None:
-        """Delete one that was sent or never will be."""
+        """Delete a document that was sent, or given up."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +115,7 @@ class PortKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class PortSetting:
-    """A port of the protocol: what people call it, and the setting that holds its number."""
+    """A port of the protocol: its label, and the setting that holds its number."""
 
     label: str
     setting: str
@@ -136,10 +136,10 @@ class Implementation(Protocol):
     """Implemented rows of a contract; a module that has these functions is one."""
 
     def implemented(self) -> set[str]:
-        """Return the keys of rows that are wholly there."""
+        """Return the keys of complete rows."""
 
     def partly(self) -> dict[str, str]:
-        """Return the keys of rows that are there in part, with what they cannot do yet."""
+        """Return the keys of partial rows, with what they cannot do yet."""
 
 
 @dataclass(frozen=True, slots=True)

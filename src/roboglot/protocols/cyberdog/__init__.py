@@ -29,7 +29,7 @@ def _table() -> OperationTable[int]:
 
 
 def _notes() -> Sequence[str]:
-    """Say what real dogs answer that their text leaves out."""
+    """Return notes on answers of real dogs that the manual omits."""
     from roboglot.protocols.cyberdog import table
 
     extras = table.extras()

@@ -1,4 +1,4 @@
-"""One connection from a robot to an app, and what its calls come to in a word. Knows no robot."""
+"""One connection from a robot to an app, with one-word outcomes of its calls. Knows no robot."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ Credentials = Callable[[], grpc.ChannelCredentials] | None
 
 
 class AppLine:
-    """Made without work; the first call connects."""
+    """A connection to an app; the first call connects."""
 
     def __init__(self, target: str, credentials: Credentials) -> None:
         self._target, self._credentials = target, credentials
         self._channel: grpc.aio.Channel | None = None
 
     async def heartbeat(self, ticks: pb.Ticks) -> str:
-        """Say how the robot is."""
+        """Send a heartbeat with the robot's state."""
         stub = self._stub()
         return await self._outcome(_one(stub.heartbeat(ticks)), "heartbeat")
 
     async def push(self, code: int, text: str) -> str:
-        """Send one message; return when it is acknowledged."""
+        """Send one message; return once it is acknowledged."""
         stub = self._stub()
         return await self._outcome(_read_to_the_end(stub.sendMsg(pb.SendRequest(nameCode=code, params=text))), code)
 
     async def close(self) -> str:
-        """Hang up."""
+        """Close the connection."""
         if self._channel is not None:
             await self._channel.close()
         return DONE
@@ -72,7 +72,7 @@ class AppLine:
 
 
 def delivery(outcome: str) -> Delivery:
-    """Return what became of a push: an app that answered with an error has it; where the line broke it may not."""
+    """Return the delivery of a push: an error answer proves that it arrived; a broken line leaves it open."""
     return Delivery.FAILED if outcome in BROKEN else Delivery.DONE
 
 
@@ -81,6 +81,6 @@ async def _one(call: Coroutine[None, None, object]) -> None:
 
 
 async def _read_to_the_end(call: AsyncIterable[object]) -> None:
-    """The app may answer; real robots read that and ignore it."""
+    """Read the app's answers and ignore them, as real robots do."""
     async for _ in call:
         pass

@@ -1,4 +1,4 @@
-"""The robot as a client of the phone app: heartbeats, loss, dialling again, pushes. Knows no message by name.
+"""The robot as a client of the phone app: heartbeats, loss, redialling, pushes. Knows no message by name.
 
 Real robots learn the app's address from a QR code. Here it is configured, or it is where the last request came from;
 the app that was connected last is dialled again after a restart.
@@ -43,12 +43,12 @@ class AppRoute:
 
 
 def early_share(address: str) -> float:
-    """Return the share of a period by which the second heartbeat comes early, so that not all dogs beat at once."""
+    """Return the share of a period by which the second heartbeat is early, to spread the heartbeats of many dogs."""
     return EARLY_MAX * zlib.crc32(address.encode()) / 0xFFFFFFFF
 
 
 class AppLink:
-    """Dials, keeps and loses the app; ``connected`` while heartbeats come through."""
+    """Dials the app and keeps the connection; ``connected`` while heartbeats get through."""
 
     def __init__(
         self,
@@ -85,11 +85,11 @@ class AppLink:
         self._asking: list[asyncio.Future[bool]] = []  # waiting for the next heartbeat
 
     def start(self) -> None:
-        """Begin to dial whatever address is known."""
+        """Start dialling the known address."""
         self._task = asyncio.get_running_loop().create_task(self._run(), name="app link")
 
     async def close(self) -> None:
-        """Hang up; nothing is sent any more."""
+        """Close the connection and stop sending."""
         self._ended = True
         if self._task:
             self._task.cancel()
@@ -98,7 +98,7 @@ class AppLink:
             await outbox.close()
 
     def seen(self, peer: str) -> None:
-        """A request came from ``peer`` (as gRPC writes it): the app may be there."""
+        """Record a request from ``peer`` (as gRPC writes it): the app may be there."""
         if self.connected and self._target:
             return  # calls of other clients must not take the app's place
         if self._configured:
@@ -114,7 +114,7 @@ class AppLink:
         self._news.set()
 
     async def alive(self) -> bool:
-        """Return whether a heartbeat that is sent from now on gets through; the app is lost if none does."""
+        """Return whether a heartbeat sent from now on gets through; if none does, the app is lost."""
         if not self.connected:
             return False
         answer: asyncio.Future[bool] = asyncio.get_running_loop().create_future()
@@ -122,7 +122,7 @@ class AppLink:
         return await answer
 
     def push(self, push: Push, payload: object) -> None:
-        """Send ``payload`` when its turn comes; dropped unless the app is connected. Never waits."""
+        """Queue ``payload``; dropped unless the app is connected. Never waits."""
         if not self.connected:
             return
         text = write(payload)
@@ -155,7 +155,7 @@ class AppLink:
         self._news.clear()
 
     async def _keep(self, target: str) -> bool:
-        """Dial ``target`` and send heartbeats until it is lost or has another address; whether one got through."""
+        """Dial ``target`` and send heartbeats until it is lost or moves; return whether one got through."""
         self._line = line = AppLine(target, self._credentials)
         try:
             return await self._beat(target, line)
@@ -197,7 +197,7 @@ class AppLink:
             return False
 
     def _note(self, ticks: pb.Ticks) -> None:
-        """Report a heartbeat that an app gets to the tap."""
+        """Report a delivered heartbeat to the tap."""
         if self._tap is None or not self._tap.watched:
             self._beats.forget()
         elif news := self._beats.news(ticks):
@@ -231,7 +231,7 @@ class AppLink:
             self._on_host(host)
 
     async def send(self, code: int, text: str) -> Delivery:
-        """One push; its failure affects no other. Returns when it is acknowledged or given up."""
+        """Send one push, independently of others; return once it is acknowledged or given up."""
         if (line := self._line) is None:
             return Delivery.FAILED
         key = str(int(code))
@@ -253,7 +253,7 @@ def host_of(peer: str) -> str:
 
 
 async def _route_to(target: str) -> str:
-    """The address of this machine that ``target`` (host:port) can reach; empty if there is no way there."""
+    """Return the local address that ``target`` (host:port) can reach; empty without a route."""
     host, _, port = target.rpartition(":")
     loop = asyncio.get_running_loop()
     try:

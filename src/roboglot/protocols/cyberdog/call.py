@@ -1,4 +1,4 @@
-"""One request under way, and answers that go on as a stream."""
+"""One request under way, and its streamed answers."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ Answer = TypeVar("Answer")
 class Call:
     """One request under way.
 
-    A handler returns what is answered (a dict as JSON, a str as it is, None for nothing more); what takes longer
-    answers by ``reply`` as often as it likes first.
+    A handler returns the answer (a dict as JSON, a str as it is, None for nothing more); longer work may send any
+    number of answers by ``reply`` before.
     """
 
     code: int
@@ -35,9 +35,9 @@ class Call:
 
 
 async def follow(call: Call, stream: Stream, seconds: float) -> object:
-    """Answer everything from acceptance to the result; cut short when another call joins or the app is lost.
+    """Stream the answers from acceptance to result; ends early when another call joins or the app is lost.
 
-    After ``seconds`` without the end the last answer is a time-out.
+    If the result takes longer than ``seconds``, the last answer is a time-out.
     """
     reader = stream.attach()
 

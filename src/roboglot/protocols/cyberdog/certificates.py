@@ -42,7 +42,7 @@ class BadCertificates(OSError):
 class Certificates:
     """PEM texts: what the robot trusts, and what it proves itself with in both roles.
 
-    ``callers``: whose certificates let a client in: those of ``ca``, and of the apps that have one each.
+    ``callers``: CAs whose certificates admit a client: ``ca``, and that of apps with certificates of their own.
     """
 
     ca: bytes
@@ -52,9 +52,9 @@ class Certificates:
 
 
 def ensure_certificates(folder: Path) -> Certificates:
-    """Return those in ``folder``/tls; made first if there are none. Raises BadCertificates, or OSError from the disk.
+    """Return the certificates in ``folder``/tls, making missing ones. Raises BadCertificates, or the disk's OSError.
 
-    All files appear at once or not at all, so two robots starting together agree on one CA.
+    All files appear at once or not at all, so robots that start together agree on one CA.
     """
     tls = folder / "tls"
     if not tls.exists():
@@ -74,7 +74,7 @@ def ensure_certificates(folder: Path) -> Certificates:
 
 
 class CertificateStore:
-    """The certificates in ``folder``/tls as they are now: what is put in their place counts at the next connection."""
+    """Current certificates in ``folder``/tls: replaced files take effect at the next connection."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -165,7 +165,7 @@ def _serves(path: Path, names: Collection[str]) -> bool:
 
 
 def _apps_ca(apps: Path) -> ec.EllipticCurvePrivateKey:
-    """The key that signs apps' certificates; made at the first."""
+    """Return the key that signs apps' certificates; made on first use."""
     if not (apps / CA_KEY).exists():
         apps.mkdir(parents=True, exist_ok=True, mode=0o700)
         issuer = ec.generate_private_key(ec.SECP256R1())
@@ -183,7 +183,7 @@ def _pem(key: ec.EllipticCurvePrivateKey) -> bytes:
 
 
 def _make(tls: Path) -> None:
-    """A CA and both pairs, in a folder that is renamed to its place when it is complete."""
+    """Make a CA and both pairs in a folder that is renamed into place once complete."""
     tls.parent.mkdir(parents=True, exist_ok=True)
     ca_key = ec.generate_private_key(ec.SECP256R1())
     ca = _certificate("roboglot cyberdog CA", ca_key, "roboglot cyberdog CA", ca_key)
@@ -245,7 +245,7 @@ def _name(common: str) -> x509.Name:
 
 
 def _write(path: Path, data: bytes, *, private: bool = False) -> None:
-    """The whole file or none; never readable by others for a moment if ``private``."""
+    """Write a file atomically; if ``private``, it is never readable by others."""
     descriptor, draft = tempfile.mkstemp(dir=path.parent)  # made with mode 0600
     try:
         with os.fdopen(descriptor, "wb") as file:

@@ -13,8 +13,8 @@ from roboglot.config import Port
 class CyberDogConfig:
     """gRPC door. ``app`` is "host:port" of the phone app to dial; empty: the peer of the last call at ``app_port``.
 
-    ``profile``: where the text and real robots disagree, the door answers as in the text (``spec``) or as robots with
-    the open-source firmware do (``robot``). ``plaintext`` is for tests: no TLS, and only allowed on a loopback address.
+    ``profile``: where manual and real robots disagree, the door answers as the manual (``spec``) or as robots with
+    the open-source firmware (``robot``). ``plaintext`` is for tests: no TLS, and only allowed on a loopback address.
     ``reflection`` is for tools.
     """
 

@@ -27,7 +27,7 @@ from roboglot.wire.visual.relay import FrameRelay
 
 @dataclass(slots=True)
 class Context:
-    """The context of every handler. ``stored_map`` is the name under which the map in use was saved, if it was."""
+    """Context of every handler. ``stored_map``: name under which the current map was saved, if it was."""
 
     robot: Robot
     app: AppLink
@@ -54,17 +54,17 @@ class Context:
     pursuit: Pursuit | ThingPursuit | None = None  # while a person or an object is followed or to be chosen
 
     def map_replaced(self) -> None:
-        """Another map is in use now, no matter who began it: neither its name nor localization in it is known."""
+        """Handle a change of the map by any client: neither its name nor localization in it is known."""
         self.stored_map, self.map_deleted = "", False
         self.tasks.leave()
 
     def map_gone(self) -> None:
-        """The map in use was deleted."""
+        """Handle the deletion of the current map."""
         self.stored_map, self.map_deleted = "", True
         self.tasks.leave()
 
     async def close(self) -> None:
-        """End what the chapters have under way, then the app's link."""
+        """End the chapters' work, then the app's link."""
         await self.tasks.close()
         self.gaits.close()
         self.voice.close()

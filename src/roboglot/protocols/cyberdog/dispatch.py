@@ -39,12 +39,12 @@ KNOWN = (_NAMES.keys() | UNPUBLISHED) - TEXT_ONLY
 
 
 def error(code: InBandError) -> dict[str, int]:
-    """The answer that carries ``code``."""
+    """Return the answer that carries ``code``."""
     return {"error_code": int(code)}
 
 
 async def answer(call: Call) -> object | None:
-    """Run the request; returns its last answer (None: there is none). Raises NotJson, and nothing else."""
+    """Run the request; return its last answer, or None. Raises NotJson, and nothing else."""
     tap = call.context.robot.tap
     if not tap.watched:
         last = await _outcome(call)
@@ -66,7 +66,7 @@ async def answer(call: Call) -> object | None:
 
 
 async def _outcome(call: Call) -> object | None:
-    """Return the last answer, of the robot or its stand-in."""
+    """Return the last answer of the robot or its stand-in."""
     if (stand_in := call.context.robot.stand_in) is None:
         return await _answered(call)
     try:
@@ -78,7 +78,7 @@ async def _outcome(call: Call) -> object | None:
 
 
 async def _ask_stand_in(call: Call, stand_in: StandIn) -> object | None:
-    """Have another answer in the robot's place: all but the last answer at once."""
+    """Let the stand-in answer; send all but the last answer."""
     operation = TABLE.get(call.code)
     if call.context.robot.admission.asks:
         call.context.robot.admission.check(DOOR, str(int(call.code)), operation.right if operation else Right.ADMIN)
@@ -129,14 +129,14 @@ async def _answered(call: Call) -> object | None:
 
 
 def _logged(call: Call, last: object) -> object:
-    """Log why the handler's answer says no, if it does; return the answer."""
+    """Log the reason if the answer is a refusal; return the answer."""
     if call.why:
         log.info("%d: %s", call.code, call.why)
     return last
 
 
 def _status(answered: object) -> str:
-    """The error code of an answer; "ok" if it is none."""
+    """Return the error code of an answer; "ok" without one."""
     if isinstance(answered, str) and '"error_code"' in answered:
         with contextlib.suppress(NotJson):
             answered = read_params(answered)

@@ -11,7 +11,7 @@ from roboglot.wire.cyberdog.codes import Feedback, InBandError
 
 @dataclass(frozen=True, slots=True)
 class ErrorCodes:
-    """One error as an answer's ``error_code``, as a motion's ``code``, as navigation's ``feedback_code``."""
+    """Codes of one error: ``error_code`` of answers, ``code`` of motions, ``feedback_code`` of navigation."""
 
     in_band: InBandError
     motion: MotionCode

@@ -1,6 +1,6 @@
-"""Program frames on their way to the app: none is lost, answers go first, programs wait for a slow app.
+"""Queue of program frames to the app: lossless, answers first; programs wait for a slow app.
 
-Knows no gRPC and no frame's contents. An outbox drops its oldest message; this queue drops nothing an app waits for.
+Knows neither gRPC nor the frames' contents. Unlike an outbox, this queue drops nothing that an app waits for.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class _Frame:
 
 
 class FrameQueue:
-    """``send`` is one push; ``open`` when the app is there, ``shut`` when it is lost. A ``FrontEnd`` of the relay."""
+    """A ``FrontEnd`` of the relay; ``send`` is one push. ``open`` when the app is there, ``shut`` when it is lost."""
 
     def __init__(self, send: Callable[[str], Awaitable[Delivery]], clock: Clock, longest: int) -> None:
         self.longest = longest
@@ -72,38 +72,38 @@ class FrameQueue:
         self._update_room()
 
     def answer(self, text: str) -> None:
-        """Send an answer, before all news; kept for a while if its client is being dialled."""
+        """Send an answer ahead of news; kept for a while if its client is being dialled."""
         if self._there or self._clock.time() < self._wanted_until:
             self._put(_Rank.ANSWER, text)
 
     def publish(self, text: str) -> None:
-        """Send what a task does, in order; an app that is not there misses it."""
+        """Send news of a task, in order; an absent app misses it."""
         if self._there:
             self._put(_Rank.NEWS, text)
 
     async def room(self) -> None:
-        """Wait until the app has caught up; not for one that is lost or acknowledges nothing."""
+        """Wait for the app to catch up; returns at once if it is lost or acknowledges nothing."""
         await self._has_room.wait()
 
     async def room_for_answers(self) -> None:
-        """Wait until another request may be answered, which makes its answers wanted."""
+        """Wait until another request may be answered."""
         await self._has_room_for_answers.wait()
         self._wanted_until = self._clock.time() + KEPT_SECONDS
 
     def open(self) -> None:
-        """The app is there: what waits for it goes out, unless it is too old."""
+        """Handle the app's arrival: send what is queued and not too old."""
         self._there, self._silent, self._holding = True, False, False
         self._forget(lambda frame: frame.stamp < self._clock.time() - KEPT_SECONDS, "is too old for the app")
         self._go_on()
 
     def shut(self) -> None:
-        """The app is lost: nothing waits for it any more, but answers are kept for a while."""
+        """Handle the app's loss: drop the queue, but keep answers for a while."""
         self._there = False
         self._forget(lambda frame: frame.rank is _Rank.NEWS, "is for an app that was lost")
         self._update_room()
 
     def close(self) -> None:
-        """Send nothing more."""
+        """Stop sending."""
         self._there = False
         for task in self._sending:
             task.cancel()
@@ -144,7 +144,7 @@ class FrameQueue:
             self._waiting = sorted(frame for frame in self._waiting if not unwanted(frame))  # a sorted list is a heap
 
     def _go_on(self) -> None:
-        """Send as much as may be under way, and let the waiting sender go on."""
+        """Send as much as may be in flight, and wake the waiting sender."""
         while self._waiting and self._may_send(self._waiting[0]):
             frame = heappop(self._waiting)
             self._count(frame, -1)
@@ -179,7 +179,7 @@ class FrameQueue:
         self._go_on()
 
     def _keep(self, frame: _Frame) -> None:
-        """Put back what may not have arrived, at its old place; nothing overtakes it meanwhile."""
+        """Requeue a frame of uncertain delivery at its old place, so that nothing overtakes it."""
         frame.tries += 1
         if frame.tries >= TRIES_MAX:
             log.warning("the app refused a program frame %d times: it is dropped", frame.tries)

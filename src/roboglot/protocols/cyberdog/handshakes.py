@@ -1,7 +1,7 @@
-"""A line in the log for connections that were refused: gRPC itself says nothing of a TLS handshake that failed.
+"""Log lines for refused connections: gRPC itself does not report a failed TLS handshake.
 
-At each handshake the kernel's table of connections tells who is there. Who is gone a moment later and never asked for
-anything was refused, or gave up. Linux alone; elsewhere nothing is logged.
+At each handshake the kernel's table of connections shows the peers. A peer that is gone a moment later without any
+request was refused, or gave up. On Linux only; elsewhere nothing is logged.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Handshakes:
         self._looks: set[asyncio.TimerHandle] = set()
 
     def begun(self) -> None:
-        """A handshake begins. Those in a flood are not looked at: the table is long then."""
+        """Record the start of a handshake; skipped in a flood, when the table is long."""
         now = self._loop.time()
         if now - self._looked < LOOK_PERIOD:
             return
@@ -51,14 +51,14 @@ class Handshakes:
             self._loop.call_soon_threadsafe(self._watch, peers)
 
     def asked(self, peer: str) -> None:
-        """A request came from ``peer``, as gRPC writes it: its handshake was good."""
+        """Record a request from ``peer`` (in gRPC's form): its handshake succeeded."""
         if peer not in self._asked:
             self._asked[peer] = None
             if len(self._asked) > ASKED_MAX:
                 del self._asked[next(iter(self._asked))]
 
     def close(self) -> None:
-        """Watch no more."""
+        """Stop watching."""
         for look in self._looks:
             look.cancel()
 
@@ -94,7 +94,7 @@ class Handshakes:
 
 
 def _own(address: str) -> IPAddress | None:
-    """``address`` where the port is open; None: any."""
+    """Return the ``address`` at which the port is open; None: any."""
     try:
         own = ipaddress.ip_address(address)
     except ValueError:
@@ -103,7 +103,7 @@ def _own(address: str) -> IPAddress | None:
 
 
 def _peers(own: IPAddress | None, port: int) -> dict[str, str]:
-    """Return the peer of that connection, also a recent one, in gRPC's form, and the connection's state."""
+    """Return the peers of open and recent connections, in gRPC's form, with their states."""
     peers: dict[str, str] = {}
     for table in TABLES:
         try:
@@ -126,7 +126,7 @@ def _peers(own: IPAddress | None, port: int) -> dict[str, str]:
 
 
 def _address(text: str) -> IPAddress:
-    """An address as the kernel writes it, in words of 32 bits of this machine's order."""
+    """Parse an address as the kernel writes it: 32-bit words in this machine's byte order."""
     words = [int(text[start : start + 8], 16).to_bytes(4, sys.byteorder) for start in range(0, len(text), 8)]
     address = ipaddress.ip_address(b"".join(words))
     return getattr(address, "ipv4_mapped", None) or address

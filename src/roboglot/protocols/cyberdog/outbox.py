@@ -1,4 +1,4 @@
-"""Messages of one code on their way to the app: a short queue that drops its oldest, and one sender. Knows no gRPC."""
+"""Outbox of messages of one code: a short queue that drops its oldest, and one sender. Knows no gRPC."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable
 
 
 class Outbox:
-    """Order is kept within it; a slow or silent receiver delays nothing else."""
+    """Keeps the order of its messages; a slow or silent receiver delays nothing else."""
 
     def __init__(self, code: int, depth: int, send: Callable[[int, str], Awaitable[object]]) -> None:
         self.dropped = 0
@@ -25,11 +25,11 @@ class Outbox:
         self._wakeup.set()
 
     def clear(self) -> None:
-        """Forget what waits: its receiver is gone."""
+        """Drop the queue: its receiver is gone."""
         self._waiting.clear()
 
     async def close(self) -> None:
-        """End the sender, in the middle of a message if need be."""
+        """Stop the sender, even in the middle of a message."""
         self._task.cancel()
         await asyncio.gather(self._task, return_exceptions=True)
 

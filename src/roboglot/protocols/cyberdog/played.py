@@ -1,8 +1,8 @@
-"""Pushes of a recorded dog on their way to the app: in their order within a code, kept for a while until it is there.
+"""Recorded pushes to the app: in order within a code, and kept for a while until the app is there.
 
-Its heartbeats say what they said then.
+Heartbeats are the recorded ones.
 
-A live dog sends several at once; in a recording their order is known, so each waits until the one before has arrived.
+A live dog sends several at once; in a recording their order is known, so each waits for the delivery of the one before.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ class PlayedPushes:
         app.on_found.append(self._go_on)
 
     def ticks(self, address: str) -> pb.Ticks | None:
-        """Return the heartbeat as it was at this moment; None: none was recorded."""
+        """Return the heartbeat recorded for this moment, or None."""
         return None if self._beat is None else ticks_of(self._beat.decode("utf-8", "replace"), address)
 
     def put(self, operation: str, message: bytes) -> None:
-        """Send it when it is its turn; never waits."""
+        """Queue a message; never waits."""
         if operation == HEARTBEAT:
             self._beat = message
             return
@@ -55,7 +55,7 @@ class PlayedPushes:
         self._go_on()
 
     def close(self) -> None:
-        """Send nothing more."""
+        """Stop sending."""
         for line in self._lines.values():
             line.waiting.clear()
             if line.sending is not None:

@@ -1,4 +1,4 @@
-"""Profiles: the text or the open-source robot, for points where they disagree and no answer serves both.
+"""Profiles: the manual or the open-source robot, where they disagree and no answer serves both.
 
 Fields that only one of them has are sent in both profiles: clients ignore fields that they do not know.
 """

@@ -1,6 +1,6 @@
-"""gRPC server reflection, for tools like grpcurl: which services there are and what their messages look like.
+"""gRPC server reflection, for tools like grpcurl: the services and the types of their messages.
 
-A description of our own of the few messages that takes, so that no further package is needed. Knows no handler.
+Describes the few messages needed for it here, to avoid a further package. Knows no handler.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def _answer(question: Any, answer: Any) -> Any:
 
 
 def _ours(symbol: str, service: str) -> bool:
-    """Return whether the service, one of its methods or a message has that name."""
+    """Return whether ``symbol`` names the service, one of its methods or a message."""
     package, _, name = symbol.rpartition(".")
     return (
         symbol == service
@@ -91,7 +91,7 @@ def _ours(symbol: str, service: str) -> bool:
 
 
 def _kinds(package: str) -> dict[str, Any]:
-    """The classes of MESSAGES, in a pool of their own."""
+    """Return the classes of MESSAGES, in a pool of their own."""
     file = descriptor_pb2.FileDescriptorProto(name=f"{package}.proto", package=package, syntax="proto3")
     for name, fields in MESSAGES.items():
         message = file.message_type.add(name=name)

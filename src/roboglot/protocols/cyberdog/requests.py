@@ -1,4 +1,4 @@
-"""Requests as gRPC reads them. Bytes that are none reach the door too, so that it answers them in the protocol's form.
+"""Decoding of requests for gRPC. Malformed bytes reach the door too, which answers them in the protocol's form.
 
 gRPC's own answer to them would be the status UNKNOWN with the name of a Python class, and no line in the log.
 """
@@ -16,7 +16,7 @@ SERVICE = "grpcapi.GrpcApp"
 
 
 class Calls(Protocol):
-    """Handlers of the calls. A request is None where its bytes are no message, or its text is not UTF-8."""
+    """Handlers of the calls. A request is None if its bytes are malformed or its text is not UTF-8."""
 
     async def sendMsg(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext, /) -> None: ...  # noqa: N802 - the service's name
     async def getFile(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext, /) -> None: ...  # noqa: N802

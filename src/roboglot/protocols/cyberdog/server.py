@@ -132,7 +132,7 @@ class CyberDogDoor:
         return [Endpoint("CyberDog 2 gRPC", where, line, None if self._config.plaintext else tls)]
 
     def _assemble(self, certificates: CertificateStore | None) -> Context:
-        """The parts of the door, wired to one another."""
+        """Make the parts of the door and wire them."""
         robot = self._robot
         app = AppLink(
             robot.clock,
@@ -165,7 +165,7 @@ class CyberDogDoor:
         return context
 
     def _parts(self, app: AppLink) -> Context:
-        """Return what the chapters keep."""
+        """Return the state of the chapters."""
         robot, gaits, updates = self._robot, Gaits(self._robot), Updates(self._robot, app)
         files = CameraFiles(robot, self._data / FOLDER / "camera" / robot.id)
         voice = Voice(robot, gaits, lambda code, id: app.push(TRAINED, {"code": code, "voiceprint_id": id}))
@@ -191,7 +191,7 @@ class CyberDogDoor:
         )
 
     def _keep_app(self, host: str) -> None:
-        """Find the app again after a restart: an update reports its result then without being asked."""
+        """Remember the app across restarts: an update reports its result then without a request."""
         if Settings in self._robot:
             task = asyncio.get_running_loop().create_task(self._robot[Settings].keep(APP, host), name="keep the app")
             self._writing.add(task)
@@ -227,13 +227,13 @@ def _reads() -> set[str]:
 
 
 class _Service:
-    """The three calls of the service as the robot serves them."""
+    """The three calls of the gRPC service."""
 
     def __init__(self, context: Context, handshakes: Handshakes) -> None:
         self._context, self._handshakes = context, handshakes
 
     async def sendMsg(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext) -> None:  # noqa: N802 - the service's name
-        """One request: any number of answers; the status is always OK."""
+        """Serve one request with any number of answers; the status is always OK."""
         peer = rpc.peer()
         self._handshakes.asked(peer)
         await self._enter(rpc, peer)
@@ -263,7 +263,7 @@ class _Service:
             await self._say(rpc, _answer(code, last))
 
     async def getFile(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext) -> None:  # noqa: N802
-        """Photos and recordings in chunks; errors are chunks, too."""
+        """Serve photos and recordings in chunks; errors are chunks, too."""
         peer, tap = rpc.peer(), self._context.robot.tap
         self._handshakes.asked(peer)
         await self._enter(rpc, peer)
@@ -288,18 +288,18 @@ class _Service:
         outside.note_client(CALLED_OFF, "cyberdog", peer, operation=str(int(code)), asked=asked)
 
     async def _say(self, rpc: grpc.aio.ServicerContext, message: object) -> None:
-        """Write to a client; how long that takes the machine is none of the robot's time."""
+        """Write to a client; the time that this takes is not robot time."""
         with self._context.robot.clock.holding():
             await rpc.write(message)
 
     async def _count(self, peer: str, size: int) -> None:
-        """Bytes to or from a client; one that has had too many waits."""
+        """Count bytes to or from a client; delay one beyond its share."""
         admission = self._context.robot.admission
         if admission.asks:
             await pay(admission.spend(identity() or host_of(peer), size))
 
     async def _enter(self, rpc: grpc.aio.ServicerContext, peer: str) -> None:
-        """Act for the caller from here on; only one with the right to see becomes the robot's app."""
+        """Set the caller as the current client; only one with the right to see becomes the robot's app."""
         admission, app = self._context.robot.admission, self._context.app
         if not admission.asks:
             app.seen(peer)
@@ -317,7 +317,7 @@ class _Service:
             self._context.owner = who
 
     async def heartbeat(self, _request: None, rpc: grpc.aio.ServicerContext) -> None:
-        """Only the app serves heartbeats."""
+        """Refuse: only apps serve heartbeats."""
         await rpc.abort(grpc.StatusCode.UNIMPLEMENTED, "the robot sends heartbeats, it takes none")
 
 
@@ -326,13 +326,13 @@ def _note_unreadable(peer: str) -> None:
 
 
 def _as_client(store: CertificateStore) -> object:
-    """Return how the robot proves itself to the app it dials."""
+    """Return the robot's credentials as a client of the app."""
     proof = store.newest()
     return grpc.ssl_channel_credentials(proof.callers, proof.key, proof.certificate)
 
 
 def _as_server(store: CertificateStore, handshakes: Handshakes) -> object:
-    """Return its certificates and those that it accepts; read again at every connection."""
+    """Return the server's credentials; certificates are read again at every connection."""
 
     def configured(proof: Certificates) -> object:
         return grpc.ssl_server_certificate_configuration(((proof.key, proof.certificate),), proof.callers)
@@ -349,7 +349,7 @@ def _as_server(store: CertificateStore, handshakes: Handshakes) -> object:
 
 
 def _answer(code: int, value: object) -> pb.RecResponse:
-    """One message to the app."""
+    """Return a message to the app."""
     text = write(value)
     if len(text) > CHARACTERS_MAX and len(text.encode()) > MESSAGE_MAX - FRAME:
         log.warning("the answer to %d is too long for a message: %d characters", code, len(text))
@@ -358,13 +358,13 @@ def _answer(code: int, value: object) -> pb.RecResponse:
 
 
 def _once(action: Callable[[], None]) -> Callable[[], None]:
-    """``action`` at the first call, nothing at the others."""
+    """Return a function that calls ``action`` once, on its first call."""
     left = [action]
     return lambda: left.pop()() if left else None
 
 
 def _greet(context: Context) -> None:
-    """A dog that lies about gets up when its app connects for the first time, unless it hangs on a cable."""
+    """Let a lying dog stand up when its app connects for the first time, unless it charges by cable."""
     robot = context.robot
     if Legs in robot and robot[Legs].posture is Posture.LYING and not status_of(context).wired_charging:
         with contextlib.suppress(RobotError):  # it gets up on the next command
@@ -372,5 +372,5 @@ def _greet(context: Context) -> None:
 
 
 def _leave_stairs(robot: Robot) -> None:
-    """Stop the robot, as no client is left that could; actions of other clients continue."""
+    """Stop the alignment with stairs, as no client is left to do so; actions of other clients continue."""
     call_off(robot, "the app is lost", SOURCE)

@@ -9,7 +9,7 @@ Reader = asyncio.Queue[object]  # None ends it
 
 
 class Stream:
-    """Stream of feedback with at most one reader; one who joins later takes it over.
+    """Stream of feedback with at most one reader; a later reader takes it over.
 
     The same feedback twice in a row is sent once.
     """
@@ -19,13 +19,13 @@ class Stream:
         self._reader: Reader | None = None
 
     def tell(self, feedback: object) -> None:
-        """Send to the reader; one that joins later gets it first."""
+        """Send feedback to the reader; a later reader gets the latest first."""
         if feedback != self._last:
             self._last = feedback
             self._pass_on(feedback)
 
     def end(self, result: object) -> None:
-        """Send the result and let the reader go."""
+        """Send the result and release the reader."""
         self._pass_on(result)
         self.unbind()
 
@@ -35,7 +35,7 @@ class Stream:
         self._reader = None
 
     def attach(self) -> Reader:
-        """Take over: the latest feedback, then all further ones up to the result."""
+        """Take over the stream: yield the latest feedback, then all further ones up to the result."""
         self.unbind()
         self._reader = asyncio.Queue(UNREAD_MAX)
         if self._last is not None:

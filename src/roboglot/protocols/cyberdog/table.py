@@ -13,9 +13,9 @@ TABLE: OperationTable[int] = OperationTable("cyberdog")
 
 @dataclass(frozen=True, slots=True)
 class Push:
-    """A message from the robot to the app; ``depth`` may wait, then the oldest is dropped.
+    """A message from the robot to the app; beyond ``depth`` queued ones, the oldest is dropped.
 
-    ``partial`` says in plain words what it cannot report yet; empty when it is whole.
+    ``partial``: what it cannot report yet, in plain words; empty when complete.
     """
 
     code: int
@@ -29,7 +29,7 @@ unread: set[int] = set()  # requests whose params another module parses, JSON or
 
 
 def push(code: int, *, depth: int = 10, partial: str = "") -> Push:
-    """Declare, beside the code that sends it, that ``code`` is pushed."""
+    """Declare that ``code`` is pushed, beside the code that sends it."""
     if code in pushes:
         raise ValueError(f"cyberdog: push {code} is declared twice")
     pushes[code] = Push(int(code), depth, partial)
@@ -37,23 +37,23 @@ def push(code: int, *, depth: int = 10, partial: str = "") -> Push:
 
 
 def implemented() -> set[str]:
-    """The rows of the contract that are wholly there."""
+    """Return the rows of the contract that are complete."""
     return {key for key, partial in _rows().items() if not partial}
 
 
 def partly() -> dict[str, str]:
-    """The rows that are there in part, with what they cannot do yet."""
+    """Return the partial rows, with what they cannot do yet."""
     return {key: partial for key, partial in _rows().items() if partial}
 
 
 def extras() -> dict[int, bool]:
-    """Codes of real robots that the text leaves out, and whether they are there."""
+    """Return codes of real robots that the manual omits, with True if served."""
     there = {int(operation.key) for operation in TABLE} | pushes.keys() | files
     return {code: code in there for code in sorted(UNPUBLISHED)}
 
 
 def _rows() -> dict[str, str]:
-    """Return what each row that is there cannot do; one row may be a request and a push."""
+    """Return each served row with what it cannot do; one row may be a request and a push."""
     whys: dict[str, list[str]] = {}
     for key, partial in (
         [(op.key, op.partial) for op in TABLE]

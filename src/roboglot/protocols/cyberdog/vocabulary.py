@@ -1,4 +1,4 @@
-"""The model's values in this protocol's words, units and structures. Knows no message and no component."""
+"""Translation of the model's values to this protocol's words, units and structures. Knows no message or component."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ LASER_MIN = 0.05  # m: closer returns are from the body itself and are omitted
 
 
 def wifi_strength(signal: float) -> int:
-    """0..100 from dBm: full at -50, nothing at -100."""
+    """Return 0..100 from dBm: 100 at -50, 0 at -100."""
     return round(max(0.0, min(100.0, 2.0 * (signal + 100.0))))
 
 
 def percent(share: float) -> int:
-    """0..100 from 0..1."""
+    """Return 0..100 from 0..1."""
     return round(100.0 * max(0.0, min(1.0, share)))
 
 
 def pose_of(pose: Pose) -> dict[str, float]:
-    """px, py, pz, qx, qy, qz, qw: metres, and the heading as a quaternion about z."""
+    """Return px, py, pz (m), and the heading as a quaternion qx, qy, qz, qw about z."""
     return {
         "px": pose.x,
         "py": pose.y,
@@ -51,7 +51,7 @@ def pose_of(pose: Pose) -> dict[str, float]:
 
 
 def points_of(points: Iterable[Point]) -> list[dict[str, float]]:
-    """A list of {px, py} in metres."""
+    """Return a list of {px, py}, m."""
     return [{"px": point.x, "py": point.y} for point in points]
 
 
@@ -64,12 +64,12 @@ def grid_of(grid: OccupancyGrid) -> dict[str, object]:
 
 
 def no_grid() -> dict[str, object]:
-    """The map structure of an answer that has no map."""
+    """Return the map structure of an answer without a map."""
     return {**dict.fromkeys(("resolution", "width", "height", *pose_of(Pose())), 0), "data": []}
 
 
 def laser_of(scan: LaserScan, pose: Pose) -> list[dict[str, float]]:
-    """The scan's returns as points in the map, with base_link at ``pose`` (map)."""
+    """Return the scan as points in the map, with base_link at ``pose`` (map)."""
     seen = np.isfinite(scan.ranges) & (scan.ranges >= max(LASER_MIN, scan.range_min))
     lidar = pose.compose(scan.mount)
     ranges, angles = scan.ranges[seen].astype(float), scan.angles[seen] + lidar.yaw
@@ -79,12 +79,12 @@ def laser_of(scan: LaserScan, pose: Pose) -> list[dict[str, float]]:
 
 
 def label_of(label: Label) -> dict[str, object]:
-    """A label as 6002 and 6003 have it."""
+    """Return a label in the form of 6002 and 6003."""
     return {"labelName": label.name, "physicX": label.point.x, "physicY": label.point.y}
 
 
 def twist_of(motion: int, vel_des: Sequence[float]) -> Twist:
-    """``vel_des`` [x, y, yaw] cut to what the walk ``motion`` can do; another length counts as standing still."""
+    """Return ``vel_des`` [x, y, yaw] limited to what the walk ``motion`` can do; any other length: standing still."""
     x, y, yaw = vel_des if len(vel_des) == 3 else (0.0, 0.0, 0.0)
     return GAITS[WALKS.get(motion, Gait.TROT_SLOW)].clamp(Twist(x, y, yaw))  # a user-defined gait counts as a slow walk
 
@@ -97,12 +97,12 @@ def body_of(pos_des: Sequence[float], rpy_des: Sequence[float]) -> BodyPose:
 
 
 def feet_of(contact: int) -> frozenset[Foot]:
-    """The feet on the ground: a bit each from the lowest, right front, left front, right rear, left rear; 0: all."""
+    """Return the feet on the ground, from bits: right front (lowest), left front, right rear, left rear; 0: all."""
     return frozenset(foot for bit, foot in enumerate(Foot) if (contact & ALL_FEET or ALL_FEET) & (1 << bit))
 
 
 def lift_of(step_height: Sequence[float], value: int = STRAIGHT_DOWN) -> FootLift | None:
-    """``step_height`` [front, rear] in m cut to what legs can do; None for the usual one.
+    """Return the foot lift for ``step_height`` [front, rear] (m), limited to what legs can do; None: default.
 
     ``value`` 0: the feet come down nearer to the middle; 2: straight below the hips.
     """

@@ -25,7 +25,7 @@ def queue_to(app: AppLink, clock: Clock) -> FrameQueue:
 
 @TABLE.on(Code.PROGRAM_TO_ROBOT, right=Right.SEE)
 async def receive_frame(call: Call) -> None:
-    """Pass the frame on, JSON or not; whatever is answered comes as push 2001. Without a relay it goes nowhere."""
+    """Pass the frame on, JSON or not; answers are pushes 2001. Without a relay it is dropped."""
     if call.context.relay and call.context.frames:
         await call.context.frames.room_for_answers()
         await call.context.relay.receive(call.text)

@@ -30,7 +30,7 @@ files.add(Code.SAVED_FILE)
 def get_file(
     context: Context, code: int, fields: Mapping[str, object], params: str = ""
 ) -> AsyncGenerator[pb.FileChunk, None]:
-    """The chunks that answer a ``getFile``; ``params`` is the text of which ``fields`` were read."""
+    """Yield the chunks that answer a ``getFile``; ``params``: the text that ``fields`` were read from."""
     if (stand_in := context.robot.stand_in) is not None:
         return _played(context, stand_in, code, params)
     if Camera not in context.robot or Recorder not in context.robot:
@@ -60,7 +60,7 @@ def _may_fetch(context: Context, code: int) -> bool:
 
 
 async def _played(context: Context, stand_in: StandIn, code: int, params: str) -> AsyncGenerator[pb.FileChunk, None]:
-    """The chunks of a file that was fetched when the robot was recorded."""
+    """Yield the chunks of a file that was fetched in the recording."""
     if not _may_fetch(context, code):
         yield pb.FileChunk(error_code=FileError.CAMERA_SILENT)
         return
@@ -82,7 +82,7 @@ async def _refused(error: FileError) -> AsyncGenerator[pb.FileChunk, None]:
 
 @TABLE.on(Code.CAMERA, right=Right.DRIVE, needs=(Camera, Recorder))
 async def camera(call: Call, *, command: Int32) -> dict[str, int]:
-    """2 begins a recording; 1 and 3 take a photo and end a recording that stay on the robot until they are fetched."""
+    """Take a photo (1), begin (2) or end (3) a recording; files stay on the robot until they are fetched."""
     robot, kept = call.context.robot, call.context.files
     robot[Camera], robot[Recorder]
     try:

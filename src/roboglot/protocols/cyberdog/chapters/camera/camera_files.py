@@ -1,6 +1,6 @@
-"""Photos and recordings on the robot: taken, kept until an app has fetched them. Knows no message.
+"""Photos and recordings on the robot, kept until an app has fetched them. Knows no message.
 
-The names of the files are robot time, as cameras name them; a folder of its own for each robot.
+Files are named by robot time, as on cameras; each robot has a folder of its own.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ FILES_MAX = 500
 
 
 class CameraFiles:
-    """Takes pictures into ``folder``; what lies there after a restart is still to be fetched."""
+    """Stores pictures in ``folder``; files found there after a restart are still to be fetched."""
 
     def __init__(self, robot: Robot, folder: Path) -> None:
         self._robot, self._folder = robot, folder
@@ -31,7 +31,7 @@ class CameraFiles:
             self._take(name)
 
     def names(self) -> list[str]:
-        """Return what is to be fetched, oldest first; not what is being recorded."""
+        """Return the files to fetch, oldest first, without the current recording."""
         if not self._folder.is_dir():
             return []
         return sorted(path.name for path in self._folder.iterdir() if path.suffix in (".jpg", ".mp4"))
@@ -43,7 +43,7 @@ class CameraFiles:
         return self._folder / name
 
     async def photograph(self) -> Path:
-        """Take a picture of now. Raises Refused when there is no room."""
+        """Take a photo. Raises Refused without disk space."""
         frame = await self._robot[Camera].capture()
         picture = await beside(self._robot.clock, lambda: jpeg(frame))
         path = self._new(".jpg")
@@ -52,13 +52,13 @@ class CameraFiles:
         return path
 
     def record(self) -> None:
-        """Record from now on. Raises Busy while that is done already, Refused when there is no room."""
+        """Start recording. Raises Busy while recording, Refused without disk space."""
         path = self._new(".mp4")
         self._robot[Recorder].start(path)
         self._recording = path.name
 
     async def stop(self, *, at_once: bool = False) -> Path:
-        """End the recording, ``at_once``: without waiting for a picture. Raises Refused if there is none of ours."""
+        """End the recording, ``at_once`` without waiting for a picture. Raises Refused unless this door records."""
         if not self._recording:
             raise Refused("nothing is being recorded")
         self._recording = ""
@@ -72,13 +72,13 @@ class CameraFiles:
         return bool(self._recording)
 
     def remove(self, path: Path) -> None:
-        """Remove a file that was fetched whole."""
+        """Remove a file that was fetched completely."""
         path.unlink(missing_ok=True)
         if Disk in self._robot:
             self._robot[Disk].release(_use(path.name))
 
     def _new(self, suffix: str) -> Path:
-        """A name that is free; in the same second as another with a number."""
+        """Return a free name, numbered within the same second."""
         if len(self.names()) >= FILES_MAX or self._free() <= 0:
             raise Refused("the disk is full")
         self._folder.mkdir(parents=True, exist_ok=True)
@@ -90,16 +90,16 @@ class CameraFiles:
         return path
 
     def _free(self) -> int:
-        """Bytes."""
+        """Return the free space, bytes."""
         if Disk in self._robot:
             return self._robot[Disk].free
         ours = next(folder for folder in (self._folder, *self._folder.parents) if folder.is_dir())
         return shutil.disk_usage(ours).free - LOW
 
     def _take(self, name: str) -> None:
-        """Take its room on the simulated disk; raises Refused, and drops the file, when there is none.
+        """Reserve space on the simulated disk; without space, delete the file and raise Refused.
 
-        What a real robot sees is kept on our disk, which counts by itself.
+        Pictures of a real robot are on this machine's disk, which keeps its own account.
         """
         if Disk not in self._robot:
             return

@@ -1,4 +1,4 @@
-"""Between the camera's picture and the room in front of it: what a region of the picture shows, where a thing appears.
+"""Projection between the camera's picture and the space in front of it, in both directions.
 
 The camera is a pinhole. Boxes are shares of the picture; places are base_link, m.
 """
@@ -35,7 +35,7 @@ class CameraView:
         self._down = self._across * camera.width / camera.height
 
     def nearest(self, box: Box, scan: LaserScan) -> Point | None:
-        """The nearest return of the lidar in the middle half of the box, seen from above; None without one."""
+        """Return the nearest lidar return within the middle half of the box, seen from above; None without one."""
         angles, ranges = scan.angles, scan.ranges.astype(float)
         seen = np.isfinite(ranges) & (ranges >= scan.range_min) & (ranges <= scan.range_max)
         lidar = scan.mount.relative_to(self._at)
@@ -52,7 +52,7 @@ class CameraView:
         return self._at.compose(Pose(float(x[index]), float(y[index]))).point
 
     def extent(self, box: Box, place: Point) -> Extent:
-        """Return how large what fills ``box`` is if it stands at ``place``."""
+        """Return the extent of an object that fills ``box`` at ``place``."""
         away = max(0.1, Pose(place.x, place.y).relative_to(self._at).x)
         c, s = math.cos(self._pitch), math.sin(self._pitch)
 
@@ -64,7 +64,7 @@ class CameraView:
         return Extent(away * box.width / (2.0 * self._across), low, high)
 
     def box(self, extent: Extent, place: Point) -> Box:
-        """Return where in the picture a thing at ``place`` appears; empty behind the camera."""
+        """Return the region of the picture of an object at ``place``; empty behind the camera."""
         seen = Pose(place.x, place.y).relative_to(self._at)
         if seen.x <= 0.1:
             return Box(0.0, 0.0, 0.0, 0.0)

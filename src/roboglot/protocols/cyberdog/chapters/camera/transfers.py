@@ -1,4 +1,4 @@
-"""Files on their way to the app: sent in chunks, offered again when the app is back (pushes 4003 and 4005)."""
+"""File transfers to the app: sent in chunks, offered again when the app is back (pushes 4003 and 4005)."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ ERRORS: tuple[tuple[type[RobotError], FileError], ...] = (
 
 
 class Transfers:
-    """Sends files in chunks; removes what arrived whole, offers the rest when the app is back.
+    """Sends files in chunks; removes those delivered, and offers the rest when the app is back.
 
-    That the last bytes were written says nothing of a network that broke under them, so an app's heartbeat must get
-    through afterwards. Of clients that serve none, robots can know no more than that the call was not cancelled.
+    Written bytes may still be lost on the network, so a heartbeat to the app must get through afterwards. For clients
+    without heartbeats, an uncancelled call has to suffice.
     """
 
     def __init__(self, robot: Robot, files: CameraFiles, app: AppLink) -> None:
@@ -50,7 +50,7 @@ class Transfers:
         app.on_lost.append(self._lost)
 
     async def send(self, command: Callable[[], Awaitable[Path]]) -> AsyncGenerator[pb.FileChunk, None]:
-        """The file that ``command`` yields, or one chunk that tells the error."""
+        """Yield the chunks of the file of ``command``, or one chunk with the error."""
         if self._under_way >= TRANSFERS_MAX:
             yield pb.FileChunk(error_code=FileError.TOO_MANY)
             return
@@ -78,7 +78,7 @@ class Transfers:
             self._files.remove(path)
 
     async def close(self) -> None:
-        """Keep what is being recorded, and what may not have arrived."""
+        """Keep the current recording and files whose delivery is uncertain."""
         self._leave()
         for task in self._proving:
             task.cancel()
@@ -100,7 +100,7 @@ class Transfers:
             self._app.push(LEFT_FILES, {"file_name": names})
 
     def _lost(self) -> None:
-        """A recording ends and waits for the app."""
+        """End the recording, which waits for the app."""
         if self._offering:
             self._offering.cancel()
         self._keeping = asyncio.get_running_loop().create_task(self._keep(), name="keep the recording")

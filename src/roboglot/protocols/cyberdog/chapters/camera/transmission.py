@@ -1,6 +1,6 @@
 """Chapter "image transmission": the camera live by WebRTC (4001): signalling as requests and pushes, a peer per uid.
 
-The peers' time is the network's: a way to the app takes as long as it takes, whatever the robot's clock does.
+Peers run on real time: the network's delays do not follow the robot's clock.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ PLACES = {Alignment.TOP: 0.0, Alignment.MIDDLE: 0.5, Alignment.BOTTOM: 1.0}
 
 
 class Transmission:
-    """Every app that looks, by its uid."""
+    """Video calls of all viewing apps, by uid."""
 
     def __init__(self, robot: Robot, app: AppLink) -> None:
         self._robot, self._app = robot, app
@@ -54,11 +54,11 @@ class Transmission:
 
     @property
     def viewers(self) -> int:
-        """Number of apps that view, or are about to."""
+        """Number of apps that view or are connecting."""
         return sum(peer.offered for peer in self._peers.values())
 
     def take(self, signal: Signal) -> None:
-        """A message of the app. Never waits; answers are pushed."""
+        """Handle a message of the app. Never waits; answers are pushed."""
         match signal:
             case End(uid):
                 if peer := self._peers.pop(uid, None):
@@ -80,7 +80,7 @@ class Transmission:
         await asyncio.gather(*self._running, *(peer.close() for peer in peers), return_exceptions=True)
 
     def _peer(self, uid: str) -> _Peer | None:
-        """Return that app's peer; a new one if there is room."""
+        """Return the app's peer, or a new one if there is room."""
         if uid not in self._peers:
             if len(self._peers) >= PEERS_MAX:
                 log.warning("refused pictures to %r: %d apps have some", uid, PEERS_MAX)
@@ -93,14 +93,14 @@ class Transmission:
         self._fail(peer, VideoError.NO_CONNECTION, "ICE connection timeout")
 
     def _fail(self, peer: _Peer, code: VideoError, message: str) -> None:
-        """Tell it, and let the peer go."""
+        """Report a failure to the app and drop the peer."""
         if self._forget(peer):
             if peer.offered:
                 self._push(Failure(peer.uid, code, message))
             self._begin(peer.close())
 
     def _forget(self, peer: _Peer) -> bool:
-        """Return whether it was still there."""
+        """Drop the peer; return whether it was still known."""
         peer.give_up.cancel()
         if self._peers.get(peer.uid) is not peer:
             return False
@@ -130,7 +130,7 @@ class Transmission:
         await peer.pass_on(webrtc.BadOffer)
 
     def _changed(self, peer: _Peer, state: str) -> None:
-        """The connection's state, as aiortc has it."""
+        """Handle a change of the connection's state, as aiortc words it."""
         log.info("pictures for %r: %s", peer.uid, state)
         match state:
             case "connected":
@@ -176,7 +176,7 @@ class Transmission:
 
 
 class _Peer:
-    """One app: its call, and the candidates that came before there was one."""
+    """One app: its call, and candidates that arrived before it."""
 
     def __init__(self, uid: str) -> None:
         self.uid = uid
@@ -187,13 +187,13 @@ class _Peer:
         self._more = asyncio.Event()
 
     def put(self, candidate: str, mid: str | None, index: int | None) -> None:
-        """One address of the app."""
+        """Add an ICE candidate of the app."""
         if len(self._waiting) < EARLY_MAX:
             self._waiting.append((candidate, mid, index))
             self._more.set()
 
     async def pass_on(self, bad: type[Exception]) -> None:
-        """Candidates as they come, to the call; ends when it is closed."""
+        """Pass candidates on to the call as they arrive, until it is closed."""
         total = 0
         while self.call is not None and total < EARLY_MAX:
             while self._waiting and self.call is not None:
@@ -207,7 +207,7 @@ class _Peer:
             await self._more.wait()
 
     async def close(self) -> None:
-        """Hang up."""
+        """Close the call."""
         call, self.call = self.call, None
         self._more.set()
         if call is not None:

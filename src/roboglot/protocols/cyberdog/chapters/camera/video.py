@@ -1,6 +1,6 @@
 """Chapter "image transmission": the camera live by WebRTC (4001): signalling as requests and pushes, a peer per uid.
 
-The peers' time is the network's: a way to the app takes as long as it takes, whatever the robot's clock does.
+Peers run on real time: the network's delays do not follow the robot's clock.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 
 @TABLE.on(Code.VIDEO, right=Right.SEE, needs=(Camera, VideoStream))
 async def signal(call: Call) -> str:
-    """Offers, candidates and stops of the app; the robot's own come as pushes of the same code."""
+    """Handle the app's offers, candidates and stops; the robot's own are pushes of the same code."""
     call.context.robot[Camera], call.context.robot[VideoStream]
     try:
         call.context.video.take(read_signal(read_params(call.text)))

@@ -1,4 +1,4 @@
-"""Chapter "charging": going home to the dock as a task of 6004; the dock that belongs to the stored map."""
+"""Chapter "charging": docking as a task of 6004; the dock of the stored map."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ MOVED = 0.05  # m from the dock's place on the stored map beyond which the map i
 
 
 async def dock(context: Context, task: Task) -> TaskResult:
-    """Drive onto the charging contacts; the text leaves the feedback open, robots in the field send these two.
+    """Drive onto the charging contacts; the manual leaves the feedback open, real robots send these two.
 
-    A dock whose place is unknown is looked for nearby. ``feedback_msg`` says why the robot does not charge.
+    A dock at an unknown place is searched nearby. ``feedback_msg`` gives the reason why the robot does not charge.
     """
     task.feedback(Feedback.ACTIVATING)
     try:
@@ -40,7 +40,7 @@ async def dock(context: Context, task: Task) -> TaskResult:
 
 
 async def keep_dock(context: Context) -> None:
-    """Store with the map in use where the robot learnt that its dock stands."""
+    """Store the learnt place of the dock with the map in use."""
     robot = context.robot
     if not context.stored_map or (home := known_dock(robot)) is None:
         return

@@ -1,4 +1,4 @@
-"""Chapter "labels": maps with the named points on them: get (6003), set, delete (6002)."""
+"""Chapter "labels": stored maps and their named points: get (6003), set, delete (6002)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ NAME_MAX = 128  # characters
 
 
 class WireLabel(msgspec.Struct):
-    """A label as it comes: its name and its place in m (map)."""
+    """A label on the wire: name and place (map, m)."""
 
     labelName: str  # noqa: N815 - the wire's name
     physicX: float = 0.0  # noqa: N815
@@ -36,7 +36,7 @@ class WireLabel(msgspec.Struct):
 
     @property
     def valid(self) -> bool:
-        """True if the label can be stored."""
+        """Return whether the label can be stored."""
         named = 0 < len(self.labelName) <= NAME_MAX
         return named and math.isfinite(self.physicX) and math.isfinite(self.physicY)
 
@@ -46,9 +46,8 @@ async def newest_map(
 ) -> StoredMap | None:
     """The stored map: the one of that ``number``, else ``wanted``, else the one in use, else the newest.
 
-    Of ``wanted`` real robots take no notice while they have another one: they keep one map. In the text a name that
-    was never given, or no longer, means no map. Only maps of one kind, if ``outdoor`` says which; None if there is
-    none.
+    Real robots keep one map and ignore ``wanted`` while they have another. In the manual an unknown name means no map.
+    ``outdoor`` restricts the kind of map. None if there is none.
     """
     if MapLibrary not in context.robot:
         return None
@@ -70,7 +69,7 @@ async def get_labels(
     mapName: str = "",  # noqa: N803 - the wire's name
     map_id: int = 0,
 ) -> dict[str, object]:
-    """The stored map and its labels; as long as none is stored, and none is asked for by name, the one in memory.
+    """Return the stored map with its labels; without a stored map or a name, the one in memory.
 
     A map found is pushed (6001), too.
     """
@@ -135,7 +134,7 @@ async def set_labels(
 
 
 async def _numbered(library: MapLibrary, number: int) -> str:
-    """The name of the map of that number; NotFound."""
+    """Return the name of the map with that number. Raises NotFound."""
     names = await library.names(number=number) if number else ()
     if not names:
         raise NotFound(f"no map of the number {number}")
@@ -143,7 +142,7 @@ async def _numbered(library: MapLibrary, number: int) -> str:
 
 
 async def _take_number(library: MapLibrary, name: str, number: int) -> None:
-    """A number means one map: whichever had it before ``name`` has none."""
+    """Give a map its number, taking it from any other: a number means one map."""
     for other in await library.names(number=number) if number else ():
         if other != name:
             await library.put(replace(await library.get(other), number=0))

@@ -19,9 +19,9 @@ FIX_PERIOD = 1.0  # s between two checks for satellites
 
 
 async def build_map(context: Context, task: Task, *, outdoor: bool) -> TaskResult:
-    """Begin an empty map where the robot stands and add what the lidar sees, until the task is stopped.
+    """Start an empty map where the robot stands and add scans until the task is stopped.
 
-    Outdoors the satellites' fixes on the way are kept with it: they give its place on the globe.
+    Outdoors, satellite fixes on the way are kept with it, to georeference it.
     """
     mapping = context.robot[Mapping]
     enabled = mapping.enabled
@@ -38,7 +38,7 @@ async def build_map(context: Context, task: Task, *, outdoor: bool) -> TaskResul
 
 
 async def keep_map(context: Context, name: str) -> bool:
-    """Save the map under ``name``, on disk when this returns; without a name throw it away. False if that failed."""
+    """Save the map under ``name`` (on disk on return), or discard it without one. False on failure."""
     mapping = context.robot[Mapping]
     if not name:
         mapping.clear()

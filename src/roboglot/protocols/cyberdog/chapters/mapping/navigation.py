@@ -43,10 +43,10 @@ class Goal:
 
 
 async def relocalize(context: Context, task: Task, *, outdoor: bool) -> TaskResult:
-    """Find the robot in the stored map of that kind, or in the one in its head; localization goes on afterwards.
+    """Find the robot in the stored map of that kind, or in the current one; localization continues afterwards.
 
-    A robot whose newest scan fits where it believes to be is not moved elsewhere; any other one is searched in the
-    whole map, or, in an outdoor map while satellites are seen, around where they say it is.
+    If the latest scan fits the believed pose, that is kept; otherwise the whole map is searched, or, outdoors with a
+    satellite fix, the area around the fix.
     """
     robot = context.robot
     task.feedback(Feedback.LOCALIZATION_CHECKING_MAP)
@@ -75,7 +75,7 @@ async def relocalize(context: Context, task: Task, *, outdoor: bool) -> TaskResu
 
 
 async def _has_begun_map(robot: Robot) -> bool:
-    """Return whether anything is known of the surroundings, after the first scan of a robot just switched on."""
+    """Return whether the map has any cells, after the first scan of a robot just switched on."""
     deadline = robot.clock.time() + FIRST_SCAN_MAX
     while not has_map(robot) and not robot[Localization].started and robot.clock.time() < deadline:
         await robot.clock.sleep(FIRST_SCAN_PERIOD)
@@ -83,7 +83,7 @@ async def _has_begun_map(robot: Robot) -> bool:
 
 
 async def _still_there(robot: Robot, task: Task, place: GlobeAnchor | None) -> bool:
-    """Return whether the newest scan fits the believed pose; earlier quality proves nothing.
+    """Return whether the latest scan fits the believed pose; earlier quality proves nothing.
 
     The robot may have been carried away a moment ago.
     """
@@ -105,7 +105,7 @@ async def _still_there(robot: Robot, task: Task, place: GlobeAnchor | None) -> b
 
 
 async def _search(robot: Robot, task: Task, place: GlobeAnchor | None) -> bool:
-    """Look at the map until a place fits; every time that none did, the user is asked to drive a bit."""
+    """Search the map until a place fits; after each failure ask the user to drive a bit."""
     deadline = robot.clock.time() + GIVE_UP_AFTER
     while robot.clock.time() < deadline:
         sky = sky_over(place, robot)
@@ -183,5 +183,5 @@ async def _arrive(context: Context, task: Task, action: Action) -> TaskResult:
 
 
 def has_map(robot: Robot) -> bool:
-    """Return whether anything is known of the surroundings."""
+    """Return whether the map has any cells."""
     return robot[Mapping].grid.width > 0

@@ -38,7 +38,7 @@ WITH_POSE = WITH_LASER | MAPPING
 
 
 class MapReports:
-    """Runs only while the task's state asks for reports."""
+    """Periodic reports, only in those states of the task that need them."""
 
     def __init__(self, robot: Robot, app: AppLink) -> None:
         self._robot = robot
@@ -49,7 +49,7 @@ class MapReports:
         self._task: asyncio.Task[None] | None = None
 
     def follow(self, state: TaskState) -> None:
-        """The task's state changed."""
+        """Start or stop reports after a change of the task's state."""
         self._state = state
         if state not in WITH_POSE:
             self.stop()
@@ -58,29 +58,29 @@ class MapReports:
             self._task = asyncio.get_running_loop().create_task(self._run(), name="map reports")
 
     def stop(self) -> None:
-        """No more reports."""
+        """Stop reports."""
         if self._task:
             self._task.cancel()
             self._task = None
 
     async def close(self) -> None:
-        """Stop, and wait for it."""
+        """Stop reports and wait for the end."""
         task = self._task
         self.stop()
         if task:
             await asyncio.gather(task, return_exceptions=True)
 
     def forget_app(self) -> None:
-        """Another app knows no map yet."""
+        """Forget what the app has received: another app has no map yet."""
         self._revision = -1
 
     def show_map(self, grid: OccupancyGrid) -> None:
-        """Push ``grid`` (6001); not even made into text if no app could take it."""
+        """Push ``grid`` (6001); not encoded if no app is there."""
         if self._app.connected and grid.width * grid.height <= CELLS_MAX:
             self._app.push(MAP, grid_of(grid))
 
     def show_path(self, path: Path) -> None:
-        """Push the planned path (6006); an empty one takes it off the screen."""
+        """Push the planned path (6006); an empty one clears the app's screen."""
         self._app.push(PATH, {"path_point": points_of(path.points)})
 
     async def _run(self) -> None:
@@ -103,7 +103,7 @@ class MapReports:
             self._app.push(LASER, {"laser_point": laser_of(scan, pose)})
 
     def _show_growth(self) -> None:
-        """A localized app has the map already; one that maps sees it grow."""
+        """Push the growing map while mapping; when localized, the app has it already."""
         revision = self._robot[Mapping].revision
         if self._revision < 0 or (self._state in MAPPING and revision != self._revision):
             self._revision = revision

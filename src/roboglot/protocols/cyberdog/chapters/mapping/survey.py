@@ -14,14 +14,14 @@ SAMPLES_MAX = 1800
 
 
 class Survey:
-    """Kind of a map being made, and the satellites' fixes on the way."""
+    """Kind of a map being built, and satellite fixes on the way."""
 
     def __init__(self, outdoor: bool = False) -> None:
         self.outdoor = outdoor
         self._samples: deque[tuple[Point, GpsReading]] = deque(maxlen=SAMPLES_MAX)
 
     def look(self, robot: Robot) -> None:
-        """Keep where in the map the newest fix was taken; indoors nothing."""
+        """Record the pose of the latest fix; indoors nothing."""
         if self.outdoor and Gps in robot and (fix := robot[Gps].reading).fix is not GpsFix.NONE:
             self._samples.append((robot[Localization].pose.point, fix))
 

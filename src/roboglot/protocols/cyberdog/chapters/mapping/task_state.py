@@ -44,12 +44,12 @@ class TaskRequest:
     thing: bool = False
 
     def there(self, state: TaskState) -> TaskState:
-        """``state`` as it is called where the order is for."""
+        """Return the variant of ``state`` for this request's kind of map."""
         return OUTDOORS.get(state, state) if self.outdoor else state
 
     @property
     def running(self) -> TaskState:
-        """The state while it is carried out."""
+        """State while the task runs."""
         if self.thing:
             return TaskState.THING_FOLLOWING
         return self.there(RUNS_AS[self.kind])
@@ -58,7 +58,7 @@ class TaskRequest:
     def begins_in(self) -> Set[TaskState]:
         """Tasks exclude each other; navigation needs a robot that was localized before, in that kind of map.
 
-        Charging begins localized or not: a map that is in use may know the dock.
+        Charging may begin without localization: the current map may know the dock.
         """
         match self.kind:
             case TaskType.NAVIGATION:
@@ -93,7 +93,7 @@ class Task:
 
 
 class Tasks:
-    """The running task, and the state that its end leaves behind."""
+    """The running task, and the state after its end."""
 
     def __init__(self) -> None:
         self.state = self._rest = TaskState.IDLE  # now, and when no task runs
@@ -104,13 +104,13 @@ class Tasks:
 
     @property
     def last_feedback(self) -> int:
-        """Last feedback of the task under way; 0 without."""
+        """Last feedback of the task under way; 0 without one."""
         return int(self.current.last or 0) if self.current else 0
 
     def start(
         self, order: TaskRequest, run: Callable[[Task], Awaitable[TaskResult]], *, then: Mapping[TaskResult, TaskState]
     ) -> Task:
-        """Run it from now on; its result decides the state that follows (``then``; IDLE for what is not there)."""
+        """Run a task; its result selects the next state from ``then`` (default IDLE)."""
         kind = order.kind
         task = self.current = Task(kind)
         self._set_state(order.running)
@@ -136,7 +136,7 @@ class Tasks:
         return task
 
     async def stop(self) -> None:
-        """Cancel the task under way, if any; returns when what it moved stands still."""
+        """Cancel the task under way, if any; return once the robot stands."""
         task, running = self.current, self._running
         if task is None or running is None:
             return
@@ -149,26 +149,26 @@ class Tasks:
         await asyncio.gather(running, return_exceptions=True)
 
     async def close(self) -> None:
-        """Cancel without waiting for what moves to stand still."""
+        """Cancel the task without waiting for the robot to stand."""
         if running := self._running:
             running.cancel()
             await asyncio.gather(running, return_exceptions=True)
 
     def leave(self) -> None:
-        """Be idle: localization, or its failure, counts no longer."""
+        """Become idle: an earlier localization, or its failure, no longer counts."""
         self._rest, self._found_again = TaskState.IDLE, None
         if self.current is None:
             self._set_state(self._rest)
 
     def lose_place(self, reason: str) -> None:
-        """The robot no longer knows where it is: localization has failed, until ``find_place``."""
+        """Enter the state of failed localization, until ``find_place``."""
         if self._rest not in FAILED:
             return
         self._found_again, self._rest = self._rest, FAILED[self._rest]
         self._tell_place(Feedback.LOCALIZATION_TRYING, reason)
 
     def find_place(self) -> None:
-        """The robot knows again where it is."""
+        """Leave the state of failed localization."""
         if self._found_again is None or FAILED[self._found_again] is not self._rest:
             return
         self._rest, self._found_again = self._found_again, None
@@ -181,7 +181,7 @@ class Tasks:
             self.current.feedback(code, message)
 
     def unbind(self) -> None:
-        """The app is gone: streams end, the task continues."""
+        """End the app's streams; the task continues."""
         if self.current:
             self.current.stream.unbind()
 

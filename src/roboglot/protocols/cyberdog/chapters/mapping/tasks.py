@@ -98,7 +98,7 @@ async def start_task(
 
 
 def _hindrance(context: Context, order: TaskRequest) -> str:
-    """Return why the task cannot begin now; "" if it can."""
+    """Return the reason why the task cannot begin now, or ""."""
     if context.gaits.state is MachineState.LOW_POWER:
         return "the robot is in low power"
     state = context.tasks.state
@@ -112,7 +112,7 @@ def _hindrance(context: Context, order: TaskRequest) -> str:
 
 
 def _run(context: Context, order: TaskRequest, goal: Goal, manner: Manner) -> Callable[[Task], Awaitable[TaskResult]]:
-    """Return what does the work of a task."""
+    """Return the coroutine that carries out a task."""
     match order.kind:
         case TaskType.NAVIGATION:
             return partial(navigate, context, goal=goal)
@@ -130,7 +130,7 @@ def _run(context: Context, order: TaskRequest, goal: Goal, manner: Manner) -> Ca
 
 @TABLE.on(Code.JOIN_TASK, right=Right.SEE)
 async def join_task(call: Call, *, type: Int32) -> object:
-    """Take the stream of a running task over, from its latest feedback on."""
+    """Take over the stream of a running task, from its latest feedback on."""
     task = call.context.tasks.current
     if task is None or task.kind != _kind_of(call.context, type):
         return call.refused({"accepted": int(Accepted.NOTHING_TO_JOIN)}, f"no task of type {type} is under way")
@@ -139,9 +139,9 @@ async def join_task(call: Call, *, type: Int32) -> object:
 
 @TABLE.on(Code.STOP_TASK, right=Right.DRIVE, needs=(MapLibrary, MappingComponent))
 async def stop_task(call: Call, *, type: Int32, map_name: object = "") -> dict[str, object]:
-    """Stop the task of that type (nothing to do if it does not run); 0 stops every task, localisation too.
+    """Stop the task of that type, if it runs; 0 stops every task, localization included.
 
-    A map that was being built is saved as ``map_name``. Without a name 5 throws it away; 0 keeps it in memory.
+    A map under construction is saved as ``map_name``. Without a name, 5 discards it and 0 keeps it in memory.
     """
     if not isinstance(map_name, str):
         raise BadParameters("map_name is a text")  # taken as absent, it would discard the map
@@ -153,9 +153,9 @@ async def stop_task(call: Call, *, type: Int32, map_name: object = "") -> dict[s
 
 
 async def _keep_map(context: Context, name: str) -> bool:
-    """Save the map that is built, or throw it away without a name; whether that was done.
+    """Save the new map, or discard it without a name; return whether that succeeded.
 
-    A map that was saved is a success in the text (0); robots end the stream as one that was stopped (5).
+    In the manual a saved map is a success (0); real robots end the stream as stopped (5).
     """
     task = context.tasks.current
     if not await keep_map(context, name):
@@ -166,7 +166,7 @@ async def _keep_map(context: Context, name: str) -> bool:
 
 
 def _kind_of(context: Context, type: int) -> int:
-    """Following a thing goes by the number of its state, too."""
+    """Return the kind of a task type; following an object also goes by its state's number."""
     following_a_thing = context.tasks.state is TaskState.THING_FOLLOWING
     return TaskType.VISION_FOLLOWING if following_a_thing and type == TaskState.THING_FOLLOWING else type
 

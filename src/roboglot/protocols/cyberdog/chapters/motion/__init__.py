@@ -1,1 +1,1 @@
-"""Chapters "motion" and "stairs": servo frames, motions with a result, standing before stairs."""
+"""Chapters "motion" and "stairs": servo frames, motions with a result, alignment with stairs."""

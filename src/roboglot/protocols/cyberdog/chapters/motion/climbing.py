@@ -1,4 +1,4 @@
-"""Walks that look where they go: how high the feet must be lifted for what lies ahead. Knows no motion by number."""
+"""Walks with terrain sensing: foot lift for obstacles ahead. Knows no motion by number."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ Points = NDArray[np.float32]
 
 
 def sees(robot: Robot) -> bool:
-    """Return whether it has eyes for its way."""
+    """Return whether the robot has sensors for the ground ahead."""
     return DepthCamera in robot or TimeOfFlight in robot
 
 
 class WayAhead:
-    """Height of the ground ahead, and a body's length back: that may still be under the feet."""
+    """Height of the ground ahead, and a body length behind, where the feet may still be."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -38,7 +38,7 @@ class WayAhead:
         self._seen_at = Pose()  # odom
 
     def lift(self, wanted: FootLift | None) -> FootLift:
-        """Return ``wanted``, raised over what is in the way if the legs can be lifted so high."""
+        """Return ``wanted``, raised above obstacles as far as the legs can."""
         wanted, height = wanted or FootLift(), _height_ahead(self._robot)
         here = self._robot[Odometry].reading.pose if Odometry in self._robot else Pose()
         if FLOOR < height >= self._height or here.distance_to(self._seen_at) > PASSED:
@@ -50,7 +50,7 @@ class WayAhead:
 
 
 def _height_ahead(robot: Robot) -> float:
-    """Return the height of the highest thing right ahead, m."""
+    """Return the height of the tallest obstacle ahead, m."""
     points = _seen(robot)
     x, y, z = points.T
     ahead = z[(x > AHEAD[0]) & (x < AHEAD[1]) & (np.abs(y) < BESIDE)]

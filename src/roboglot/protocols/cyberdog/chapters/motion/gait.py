@@ -73,17 +73,17 @@ class Gaits:
 
     @property
     def state(self) -> MachineState:
-        """State of the machine, by charge, power mode and updates."""
+        """State of the robot, by charge, power mode and updates."""
         return machine_state(self._robot)
 
     @property
     def posture(self) -> Posture:
-        """A body without legs always stands."""
+        """Current posture; a body without legs always stands."""
         return posture_of(self._robot)
 
     @property
     def motion(self) -> int:
-        """The number of the body's present motion, no matter who commanded it."""
+        """Number of the current motion, no matter which client commanded it."""
         if Legs in self._robot and (figure := self._robot[Legs].performing):
             return NUMBERS.get(figure, int(Motion.STAND_UP))
         if self.posture is not Posture.CHANGING and (state := entered(self._robot)):
@@ -107,9 +107,9 @@ class Gaits:
         return Motion.WALK_STAND if self._last in WALKS else Motion.STAND_UP
 
     def servo(self, motion: int, wish: Wish) -> Executed:
-        """One frame of a walk: keep the velocity until the next, or for WATCHDOG seconds.
+        """Execute one servo frame: keep its velocity until the next, or for WATCHDOG seconds.
 
-        A robot that does not stand gets up first; frames that come meanwhile are taken, but not walked.
+        A robot that does not stand gets up first; frames in the meantime are accepted without effect.
         """
         if refusal := refusal_of(self._robot, motion):
             status = SwitchStatus.EMERGENCY_STOPPED if refusal is MotionCode.EMERGENCY_STOPPED else SwitchStatus.NORMAL
@@ -150,20 +150,20 @@ class Gaits:
         return max(0.0, min(0.99, (self._robot[Legs].body_height - self._low) / way)) if way > 0.01 else 0.0
 
     def end_servo(self) -> Executed:
-        """The last frame: brake and stand."""
+        """Handle the last frame: brake and stand."""
         if self._servo:
             self._servo.cancel()
         return Executed(MotionCode.DONE)
 
     async def _leave_servo(self) -> None:
-        """Give up walking by frames, and return when the robot has braked."""
+        """Leave servo mode; return once the robot has braked."""
         servo = self._servo
         if servo is not None and under_way(servo):
             servo.cancel("a motion with a result follows")
             await servo.done()
 
     def calibrate(self) -> Executed:
-        """Lie down and let the motors go, in the background; the frames that ask for it meanwhile change nothing."""
+        """Lie down and release the motors in the background; repeated frames change nothing."""
         if Legs not in self._robot:
             return Executed(MotionCode.UNSUPPORTED)
         if self.posture is Posture.LIMP or self.busy:
@@ -179,7 +179,7 @@ class Gaits:
         return code
 
     async def carry_out(self, motion: int, wish: Wish) -> MotionCode:
-        """A motion to its end, and what must come before it; goes on without a waiting client."""
+        """Perform a motion to its end, with the motions that must precede it; continues without a waiting client."""
         if refusal := self.check(motion, wish):
             return refusal
         if motion == Motion.EMERGENCY_STOP:
@@ -193,7 +193,7 @@ class Gaits:
         return task
 
     def close(self) -> None:
-        """Stop the servo; what was begun with a result ends by itself, but nothing follows it."""
+        """Stop the servo; a motion with a result ends by itself, and no further one follows."""
         self.end_servo()
         for sequence in self._sequences:
             sequence.cancel()
@@ -219,7 +219,7 @@ class Gaits:
         return code
 
     def _leading_to(self, motion: int) -> list[int]:
-        """Return what must come first in the present posture: standing up, sitting down."""
+        """Return the motions needed first from the current posture: standing up, sitting down."""
         posture, first = self.posture, []
         if begins_in(motion) == {Posture.SITTING} and posture is not Posture.SITTING:
             first = [int(Motion.SIT_DOWN)]
@@ -236,7 +236,7 @@ class Gaits:
         return codes_of(action.error).motion if action.error else MotionCode.EXECUTION
 
     def check(self, motion: int, wish: Wish) -> MotionCode | None:
-        """Return why ``carry_out`` would refuse; None if it would not."""
+        """Return the code with which ``carry_out`` would refuse; None if it would not."""
         if refusal := refusal_of(self._robot, motion):
             return refusal
         if motion not in KNOWN or (motion in ON_LEGS and Legs not in self._robot):
@@ -263,7 +263,7 @@ class Gaits:
         return under_way(self._performing) or any(not task.done() for task in self._sequences)
 
     def _begin(self, motion: int, wish: Wish) -> Action | None:
-        """Begin a motion and note it; None: it was done at once."""
+        """Begin a motion and record it; None: it was done at once."""
         action = self._start.begin(motion, wish)
         if action is not None:
             self._last, self._performing = motion, action
@@ -271,6 +271,6 @@ class Gaits:
 
 
 def _asks_too_much(motion: int, wish: Wish) -> bool:
-    """Return whether a relative pose leaves its range; the legs check absolute ones."""
+    """Return whether a relative pose is out of range; the legs check absolute ones."""
     relative, _ = POSES.get(motion, (False, False))
     return relative and not may_be_added(wish.body)

@@ -34,9 +34,9 @@ async def servo(
     value: Int32 = 0,
     cmd_id: Int32 | None = None,
 ) -> str:
-    """One frame of the joystick: ``vel_des`` [x m/s, y m/s, yaw rad/s], kept for 200 ms. Answered by push 1003.
+    """Execute one joystick frame: ``vel_des`` [x m/s, y m/s, yaw rad/s], kept for 200 ms. Answered by push 1003.
 
-    ``value``: 0 feet toed in, 2 straight below the hips, 4 calibration: lie down and let the motors go.
+    ``value``: 0 feet toed in, 2 straight below the hips, 4 calibration: lie down and release the motors.
     """
     gaits = call.context.gaits
     if cmd_type == CommandType.END:
@@ -73,7 +73,7 @@ async def motion(
     contact: Int32 = ALL_FEET,
     duration: Int32 = 0,
 ) -> dict[str, object]:
-    """A motion that ends by itself; ``duration`` in ms (walks, poses). Answered when it has ended, within 20 s."""
+    """Perform a motion that ends by itself; ``duration`` in ms (walks, poses). Answered at its end, within 20 s."""
     walks, poses = motion_id in WALKS or motion_id == Motion.USER_GAIT, motion_id in POSES
     wish = Wish(
         twist_of(motion_id, vel_des) if walks else STILL,

@@ -1,4 +1,4 @@
-"""Begins one motion on the model: walks, poses, dances, standing still. Knows neither what came before nor its end."""
+"""Start of one motion on the model: walks, poses, dances, standing still. Knows neither its predecessor nor its end."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Wish:
 
 
 class MotionStart:
-    """The motions of one robot, begun."""
+    """Starts motions of one robot."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -46,7 +46,7 @@ class MotionStart:
         self.standing = 0.0  # m: the belly's height when the robot last stood
 
     def walk(self, motion: int, wish: Wish, seconds: float, source: str) -> Action:
-        """Walk at the wished velocity for so many seconds."""
+        """Walk at the requested velocity for ``seconds``."""
         if Legs in self._robot:
             self._robot[Legs].walk(WALKS[motion], self._lift(motion, wish))
             if self._body == UPRIGHT:
@@ -62,13 +62,13 @@ class MotionStart:
             self._robot[Legs].walk(WALKS[motion], self._lift(motion, wish))
 
     def hold(self, body: BodyPose, *, relative: bool = False) -> None:
-        """Walk, or stand, so held; a frame that wants what the last one wanted changes nothing."""
+        """Walk or stand with the body in this pose; a repeated frame changes nothing."""
         if (relative or body != self._body) and Legs in self._robot:
             self._robot[Legs].hold(body, duration=WATCHDOG, relative=relative, source=SOURCE)
             self._body = body
 
     def looking(self, motion: int, wish: Wish) -> asyncio.Task[None] | None:
-        """Return what looks where the feet go, for motions that see; None for all others."""
+        """Return the terrain sensing of a motion that needs it; None for all others."""
         if motion not in SEEING or Legs not in self._robot:
             return None
         return asyncio.get_running_loop().create_task(self._look_ahead(motion, wish), name="look ahead")
@@ -101,7 +101,7 @@ class MotionStart:
         return action
 
     def _posture(self, motion: int) -> Action | None:
-        """Begin a motion that takes no parameters; None if ``motion`` does."""
+        """Begin a motion without parameters; None if ``motion`` takes some."""
         robot = self._robot
         if motion == Motion.STAND_UP:
             self._body = UPRIGHT
@@ -115,7 +115,7 @@ class MotionStart:
         return None
 
     def _raise_foot(self, wish: Wish) -> Action:
-        """Hold the body by so much otherwise with the feet in the air that are not ``down``, then stand straight."""
+        """Shift the body with the feet that are not ``down`` in the air, then stand straight."""
         legs, now = self._robot[Legs], self._robot[Legs].attitude
         by = wish.body
         turned = Orientation(now.roll + by.attitude.roll, now.pitch + by.attitude.pitch, now.yaw + by.attitude.yaw)
@@ -125,7 +125,7 @@ class MotionStart:
         return self._dance(step, [Footfall(wish.seconds, wish.down)])
 
     def _dance(self, step: Step, footfalls: Sequence[Footfall]) -> Action:
-        """Dance one step; the choreography that 400 repeats stays what it was."""
+        """Dance one step; the choreography that 400 repeats stays unchanged."""
         legs = self._robot[Legs]
         users = legs.choreography
         try:
@@ -134,7 +134,7 @@ class MotionStart:
             legs.choreography = users
 
     def stop(self) -> None:
-        """Without legs to give way, standing still at once is the nearest to it."""
+        """Stop at once: the equivalent of going limp for a body without legs."""
         if Legs in self._robot:
             self._robot[Legs].go_limp()
         else:

@@ -22,7 +22,7 @@ def begins_in(motion: int) -> Set[Posture]:
 
 
 def entered(robot: Robot) -> Motion | None:
-    """The state that the body is in without having been asked."""
+    """Return the state of a body that no client commands."""
     flags = robot[MotionStatus].flags if MotionStatus in robot else MotionFlags()
     if flags.rolled_over:
         return Motion.ON_ITS_BACK
@@ -30,10 +30,10 @@ def entered(robot: Robot) -> Motion | None:
 
 
 def under_way(action: Action | None) -> bool:
-    """Return whether there is an action that has not ended."""
+    """Return whether ``action`` is given and has not ended."""
     return action is not None and not action.status.ended
 
 
 def of_another(action: Action | None) -> bool:
-    """Return whether ``action`` is under way for another client than the one that asks now."""
+    """Return whether ``action`` is under way for a client other than the current one."""
     return action is not None and not action.status.ended and action.client != client()

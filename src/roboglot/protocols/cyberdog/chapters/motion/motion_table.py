@@ -1,4 +1,4 @@
-"""The dog's motions by number: which of the model's walks, figures and body poses each is. Knows no robot.
+"""The dog's motions by number, as walks, figures and body poses of the model. Knows no robot.
 
 Numbers that are not here are no motions of the dog's.
 """
@@ -44,7 +44,7 @@ ON_LEGS = FIGURES.keys() | POSES.keys() | USERS | PRESETS | STATES
 
 
 def may_be_added(by: BodyPose) -> bool:
-    """Return whether a relative pose may ask for so much; NaN may not. The legs do as much of it as they can."""
+    """Return whether a relative pose may be this large; NaN may not. The legs follow as far as they can."""
     shift, turn = (by.shift.x, by.shift.y, by.height or 0.0), by.attitude
     turns = all(abs(angle) <= RELATIVE_TURN_MAX for angle in (turn.roll, turn.pitch, turn.yaw))
     return turns and all(abs(value) <= most for value, most in zip(shift, RELATIVE_SHIFT_MAX, strict=True))

@@ -19,7 +19,7 @@ UPDATING = frozenset({FirmwareState.INSTALLING, FirmwareState.INSTALLED, Firmwar
 
 
 def machine_state(robot: Robot) -> MachineState:
-    """Return what charge, power mode and updates allow."""
+    """Return the state of the robot by charge, power mode and updates."""
     mode = robot[Power].mode if Power in robot else PowerMode.AWAKE
     if mode is PowerMode.OFF:
         return MachineState.SHUT_DOWN
@@ -34,12 +34,12 @@ def machine_state(robot: Robot) -> MachineState:
 
 
 def posture_of(robot: Robot) -> Posture:
-    """A body without legs always stands."""
+    """Return the posture; a body without legs always stands."""
     return robot[Legs].posture if Legs in robot else Posture.STANDING
 
 
 def refusal_of(robot: Robot, motion: int) -> MotionCode | None:
-    """Return why the robot's state forbids ``motion``; None if it does not."""
+    """Return the reason why the robot's state forbids ``motion``, or None."""
     if posture_of(robot) is Posture.LIMP and motion not in ALLOWED_WHEN_STOPPED:
         return MotionCode.EMERGENCY_STOPPED
     if motion in ALLOWED_ON_LOW_BATTERY:
@@ -53,7 +53,7 @@ def refusal_of(robot: Robot, motion: int) -> MotionCode | None:
 
 
 def _unfit(robot: Robot) -> MotionCode | None:
-    """Return why the body should not jump or dance; None if it may."""
+    """Return the reason why the body must not jump or dance, or None."""
     if Battery in robot and robot[Battery].state.supply is Supply.WIRE:
         return MotionCode.CHARGING
     if Motors in robot and robot[Motors].hottest > robot[Motors].hot:

@@ -1,4 +1,4 @@
-"""Chapter "stairs": standing square before a flight (1100, 1101), two services that the text leaves out."""
+"""Chapter "stairs": alignment with a flight (1100, 1101), two services that the manual omits."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ BEGUN = (AlignmentStage.ALIGNING, AlignmentStage.ALIGNED)
 
 @TABLE.on(Code.ALIGN_WITH_STAIRS, right=Right.DRIVE, needs=(StairAlignment,))
 async def align_with_stairs(call: Call, *, data: bool) -> dict[str, object]:
-    """``data``: true for a flight that leads up, false for one that leads down. Answered as soon as it moves.
+    """Align with a flight that leads up (``data`` true) or down (false). Answered once it moves.
 
-    ``success`` is false where no step is seen, and while the robot's state or another motion does not let it walk.
+    ``success`` is false where no step is seen, and while the robot's state or another motion prevents walking.
     """
     robot, gaits = call.context.robot, call.context.gaits
     alignment = robot[StairAlignment]
@@ -49,7 +49,7 @@ async def align_with_stairs(call: Call, *, data: bool) -> dict[str, object]:
 
 @TABLE.on(Code.END_STAIR_ALIGNMENT, right=Right.DRIVE, needs=(StairAlignment,))
 async def end_stair_alignment(call: Call) -> dict[str, bool]:
-    """Stand still, no matter which client had it align; nothing to do if it does not. Answered when it stands."""
+    """Stop the alignment of any client, if there is one. Answered once the robot stands."""
     call.context.robot[StairAlignment]
     for action in call_off(call.context.robot, "stopped by the app"):
         await action.done()

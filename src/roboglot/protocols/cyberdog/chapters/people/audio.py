@@ -43,7 +43,7 @@ async def audio_token(
     token_fresh: str = "",
     token_expires_in: str | int = "",
 ) -> dict[str, bool]:
-    """Activate the voice board for ``uid`` until the token expires (s from now); false for a token that cannot hold."""
+    """Activate the voice board for ``uid`` until the token expires (s from now); false for an expired token."""
     call.context.robot[Hearing]
     lasts = _seconds(token_expires_in)
     account = str(uid)
@@ -56,7 +56,7 @@ async def audio_token(
 
 
 def activated(robot: Robot, uid: str | None = None) -> bool:
-    """Return whether the voice board has an account (``uid``'s, if given) whose token still holds."""
+    """Return whether the voice board has an account (``uid``'s, if given) with a valid token."""
     account: object = kept(robot, ACCOUNT, None)
     if Hearing not in robot or not isinstance(account, dict) or account["until"] <= robot.clock.epoch():
         return False
@@ -65,7 +65,7 @@ def activated(robot: Robot, uid: str | None = None) -> bool:
 
 @TABLE.on(Code.TRAIN_VOICE, right=Right.EDIT, needs=(Members,))
 async def train_voice(call: Call, *, nick_name: str, voiceprint_id: str = "") -> dict[str, object]:
-    """Learn the next speaker's voice as that member's; push 3013 reports the outcome within 30 s."""
+    """Learn the next speaker's voice for a member; push 3013 reports the outcome within 30 s."""
     call.context.robot[Hearing]
     call.context.voice.train(nick_name, voiceprint_id[:ID_MAX])
     return {}
@@ -81,7 +81,7 @@ async def cancel_voice(call: Call) -> dict[str, object]:
 
 @TABLE.on(Code.VOICEPRINTS, right=Right.EDIT, needs=(Hearing, Settings))
 async def voiceprints(call: Call, *, voiceprints_data: str = "") -> str:
-    """The app's answer to push 3014: kept as it is. Robots know people by what they learned themselves."""
+    """Store the app's answer to push 3014. Robots recognise people by voices that they learned themselves."""
     call.context.robot[Hearing]
     if len(voiceprints_data) > VOICEPRINTS_MAX:
         raise BadParameters(f"voiceprints_data has up to {VOICEPRINTS_MAX} characters")

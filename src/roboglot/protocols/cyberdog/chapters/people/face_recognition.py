@@ -1,4 +1,4 @@
-"""Enters and recognises members' faces, and pushes how that went (7003, 7004)."""
+"""Enrols and recognises members' faces, and pushes the outcomes (7003, 7004)."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class FaceResult(IntEnum):
 
 
 class Faces:
-    """Enters one face or recognises, not both at once. Lives as long as the door is open."""
+    """Enrols one face or recognises faces, not both at once. Lives as long as the door is open."""
 
     def __init__(self, robot: Robot, app: AppLink) -> None:
         self.entering = ""  # the member whose face is expected
@@ -48,11 +48,11 @@ class Faces:
 
     @property
     def busy(self) -> bool:
-        """True while a face is being entered or recognized."""
+        """True while enrolling or recognising."""
         return self._looking is not None and not self._looking.done()
 
     def enter(self, name: str) -> None:
-        """Take the next face for that member's; push 7003 tells the outcome."""
+        """Enrol the next face for a member; push 7003 reports the outcome."""
         self.entering = name
         self._begin(self._enter(name))
 
@@ -61,7 +61,7 @@ class Faces:
         self._begin(self._recognise(name, id, seconds))
 
     def stop(self) -> None:
-        """Look no more, tell nothing."""
+        """Stop without a report."""
         if self._looking:
             self._looking.cancel()
         self._looking, self.entering = None, ""

@@ -1,4 +1,4 @@
-"""Chapter "faces": entering members' faces (7001, push 7003), recognising them (7002, push 7004)."""
+"""Chapter "faces": enrolling members' faces (7001, push 7003), recognising them (7002, push 7004)."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ async def enter_face(
 
 
 def _check_face(members: Members, name: str) -> None:
-    """Raise NotFound unless that member's face is known."""
+    """Raise NotFound unless the member has a face."""
     if members.get(name).face is None:
         raise NotFound(f"no face of {name!r} is known")
 

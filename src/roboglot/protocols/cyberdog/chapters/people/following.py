@@ -1,4 +1,4 @@
-"""Chapter "following": whom the app chooses in the picture (6008), or who wears the bracelet: tasks of 6004."""
+"""Chapter "following": a person chosen in the picture (6008), or the wearer of the bracelet: tasks of 6004."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ class Region(msgspec.Struct):
 
 @dataclass(frozen=True, slots=True)
 class Manner:
-    """Manner of following: at which side of the person, and how far away (m)."""
+    """Manner of following: side of the person, and distance (m)."""
 
     side: FollowSide
     distance: float
 
 
 def manner_of(relative_pos: int, keep_distance: float) -> Manner:
-    """Return the manner by the wire's numbers; 0 m is no wish. Raises BadParameters for an unknown side."""
+    """Return the manner for the wire's numbers; 0 m: default. Raises BadParameters for an unknown side."""
     if relative_pos not in SIDES:
         raise BadParameters("relative_pos is 200 to 203")
     distance = keep_distance if keep_distance > 0.0 else DISTANCE
@@ -55,14 +55,14 @@ def manner_of(relative_pos: int, keep_distance: float) -> Manner:
 
 
 async def follow_person(context: Context, task: Task, manner: Manner) -> TaskResult:
-    """Show whom the camera sees, wait for the app's choice, and follow until stopped or the person is lost."""
+    """Push the people in sight, wait for the app's choice, and follow until stopped or the person is lost."""
     pursuit = Pursuit(context.robot, context.app)
     follow = partial(context.robot[Following].follow, side=manner.side, distance=manner.distance, source=SOURCE)
     return await _pursue(context, task, pursuit, follow)
 
 
 async def follow_thing(context: Context, task: Task, manner: Manner) -> TaskResult:
-    """Wait until the app has chosen a region of the picture, and follow what the lidar sees there."""
+    """Wait for the app to choose a region of the picture, and follow the lidar's object there."""
     pursuit = ThingPursuit(context.robot, context.app)
     follow = partial(context.robot[Following].follow_thing, side=manner.side, distance=manner.distance, source=SOURCE)
     return await _pursue(context, task, pursuit, follow)
@@ -92,7 +92,7 @@ async def _pursue(
 
 
 async def follow_tag(context: Context, task: Task, manner: Manner) -> TaskResult:
-    """Follow the wearer of the connected bracelet until stopped or it is heard no more."""
+    """Follow the wearer of the connected bracelet until stopped or out of range."""
     task.feedback(Feedback.ACTIVATING)
     try:
         action = task.action = context.robot[Following].follow_tag(
@@ -134,7 +134,7 @@ async def _report(context: Context, task: Task, action: Action, followed: Feedba
 
 @TABLE.on(Code.CHOOSE_TARGET, right=Right.DRIVE)
 async def choose_target(call: Call, *, roi: object) -> dict[str, bool]:
-    """Follow who or what is in that region of the picture (push 6007); false before 501, or if nothing is there."""
+    """Follow the person or object in a region of the picture (push 6007); false before 501, or if it is empty."""
     try:
         region = msgspec.convert(roi, Region)
     except msgspec.ValidationError as error:

@@ -1,6 +1,6 @@
-"""Chapter "members": the people whom the robot knows (1020 to 1024).
+"""Chapter "members": people whom the robot knows (1020 to 1024).
 
-``success`` is true or false as in the text; in the profile of real robots it is a number, 0 for done.
+``success`` is true or false as in the manual; in the profile of real robots it is a number, 0 for success.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from roboglot.wire.cyberdog.codes import AccountCode, Code, PrintState
 
 @TABLE.on(Code.ADD_MEMBER, right=Right.ADMIN, needs=(Members,))
 async def add_member(call: Call, *, member: str) -> dict[str, int | bool]:
-    """A member without face and voice yet; 122 if the name is taken or cannot be kept."""
+    """Add a member without face and voice; 122 if the name is taken or invalid."""
     members = call.context.robot[Members]
     try:
         await members.add(member)
@@ -28,7 +28,7 @@ async def add_member(call: Call, *, member: str) -> dict[str, int | bool]:
 
 @TABLE.on(Code.FIND_MEMBERS, right=Right.SEE, needs=(Members,))
 async def find_members(call: Call, *, account: str = "") -> dict[str, object]:
-    """All members, or the named one with ``code``: 0, or 121 and nothing else."""
+    """Return all members, or the named one with ``code`` 0; an unknown one: ``code`` 121 only."""
     members = call.context.robot[Members]
     if not account:
         return {"code": int(AccountCode.DONE), "accounts": [_account(call.context, member) for member in members.all()]}
@@ -41,7 +41,7 @@ async def find_members(call: Call, *, account: str = "") -> dict[str, object]:
 
 @TABLE.on(Code.DELETE_MEMBER, right=Right.ADMIN, needs=(Members,))
 async def delete_member(call: Call, *, member: str) -> dict[str, int | bool]:
-    """With face and voice."""
+    """Delete a member with face and voice."""
     members = call.context.robot[Members]
     try:
         await members.remove(member)
@@ -52,7 +52,7 @@ async def delete_member(call: Call, *, member: str) -> dict[str, int | bool]:
 
 @TABLE.on(Code.RENAME_MEMBER, right=Right.ADMIN, needs=(Members,))
 async def rename_member(call: Call, *, pre_name: str, new_name: str) -> dict[str, int | bool]:
-    """Face and voice stay with the member."""
+    """Rename a member, who keeps face and voice."""
     members = call.context.robot[Members]
     try:
         await members.rename(pre_name, new_name)
@@ -65,13 +65,13 @@ async def rename_member(call: Call, *, pre_name: str, new_name: str) -> dict[str
 
 @TABLE.on(Code.SYNCHRONISE_MEMBERS, right=Right.SEE, needs=(Members,))
 async def synchronise_members(call: Call) -> dict[str, object]:
-    """The text has the number and nothing else: answered with all members, as 1021 does, for the app to copy."""
+    """Return all members, as 1021 does, for the app to copy; the manual gives only the number."""
     accounts = [_account(call.context, member) for member in call.context.robot[Members].all()]
     return {"code": int(AccountCode.DONE), "accounts": accounts}
 
 
 def _done(context: Context, code: AccountCode) -> dict[str, int | bool]:
-    """Return success or failure in the words of the profile."""
+    """Return success or failure in the profile's form."""
     return {"success": int(code) if context.profile is Profile.ROBOT else code is AccountCode.DONE}
 
 

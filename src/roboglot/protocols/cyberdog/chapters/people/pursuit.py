@@ -23,7 +23,7 @@ OVERLAP_MIN = 0.1  # overlap, as a share of the union, from which two boxes mean
 
 
 class Pursuit:
-    """Watches from ``watch`` on; ``chosen`` is done when the app has chosen a person: their number."""
+    """Pushes boxes from ``watch`` on; ``chosen``: number of the person that the app has chosen."""
 
     def __init__(self, robot: Robot, app: AppLink) -> None:
         self.chosen: asyncio.Future[int] = asyncio.get_running_loop().create_future()
@@ -41,7 +41,7 @@ class Pursuit:
                     self._app.push(TRACKING, self._boxes())
 
     def choose(self, x: int, y: int, width: int, height: int) -> bool:
-        """The person whose box fits this one best (pixels) is the one; False if none does, or one is chosen."""
+        """Choose the person whose box fits this one best (pixels); False if none does, or one is chosen already."""
         if self.chosen.done() or width <= 0 or height <= 0:
             return False
         box = _box(x, y, width, height)
@@ -59,7 +59,7 @@ class Pursuit:
 
 
 class ThingPursuit:
-    """The same for things of any kind: no boxes until the app has chosen a region; then its place in base_link (m)."""
+    """Choice of an object: no boxes until the app has chosen a region; ``chosen``: its place in base_link (m)."""
 
     def __init__(self, robot: Robot, app: AppLink) -> None:
         self.chosen: asyncio.Future[Point] = asyncio.get_running_loop().create_future()
@@ -80,7 +80,7 @@ class ThingPursuit:
         return True
 
     async def watch(self) -> None:
-        """Push where in the picture it is, until cancelled."""
+        """Push the object's place in the picture until cancelled."""
         async for _ in self._robot.clock.every(PERIOD):
             place = self._robot[Following].place if self.chosen.done() else None
             if place is not None:
@@ -94,7 +94,7 @@ def _box(x: int, y: int, width: int, height: int) -> Box:
 
 
 def _edges(box: Box) -> tuple[float, float, float, float]:
-    """Left, top, right, bottom, cut to the picture."""
+    """Return left, top, right, bottom, clipped to the picture."""
     x, y = box.width / 2, box.height / 2
     left, top, right, bottom = (max(0.0, min(1.0, e)) for e in (box.x - x, box.y - y, box.x + x, box.y + y))
     return left, top, right, bottom
@@ -111,7 +111,7 @@ def _region(box: Box) -> dict[str, int]:
 
 
 def _overlap(a: Box, b: Box) -> float:
-    """Intersection over union."""
+    """Return intersection over union."""
     one, other = _edges(a), _edges(b)
     wide, high = min(one[2], other[2]) - max(one[0], other[0]), min(one[3], other[3]) - max(one[1], other[1])
     both = max(0.0, wide) * max(0.0, high)

@@ -1,4 +1,4 @@
-"""The voice board: hears its wake word and does what is said then; learns members' voices. Knows no message.
+"""The voice board: listens for its wake word and obeys commands; learns members' voices. Knows no message.
 
 Hears only while a feature needs it and the microphone is on.
 """
@@ -52,16 +52,16 @@ class Voice:
 
     @property
     def microphone(self) -> bool:
-        """True if the robot hears."""
+        """True if the microphone is on."""
         return Hearing in self._robot and bool(kept(self._robot, MICROPHONE, True))
 
     @property
     def controlled(self) -> bool:
-        """True if the robot answers to its wake word."""
+        """True if voice control is on."""
         return Hearing in self._robot and bool(kept(self._robot, VOICE_CONTROL, False))
 
     def adapt(self) -> None:
-        """Listen, or stop listening, as the settings say now."""
+        """Start or stop listening, according to the settings."""
         if self.microphone and self.controlled:
             if self._listening is None:
                 self._listening = asyncio.get_running_loop().create_task(self._listen(), name="voice control")
@@ -84,7 +84,7 @@ class Voice:
         self._learning, self.training = None, ""
 
     def close(self) -> None:
-        """Hear nothing more."""
+        """Stop listening for good."""
         self.stop_training()
         if self._listening:
             self._listening.cancel()

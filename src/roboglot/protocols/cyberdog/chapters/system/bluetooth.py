@@ -39,9 +39,9 @@ class WireDevice(msgspec.Struct):
 
 @TABLE.on(Code.SCAN_BLUETOOTH, right=Right.EDIT, needs=(Bluetooth,))
 async def scan(call: Call, *, scan_seconds: float = 0.0) -> dict[str, object]:
-    """Return devices heard in ``scan_seconds`` and never connected before; 0: those connected before.
+    """Return new devices found in ``scan_seconds``; 0: devices connected before.
 
-    While a device is connected nothing is scanned: the last scan's devices are returned.
+    While a device is connected, the results of the last scan are returned.
     """
     radio = call.context.robot[Bluetooth]
     here = radio.connected.address if radio.connected else ""
@@ -58,13 +58,13 @@ async def scan(call: Call, *, scan_seconds: float = 0.0) -> dict[str, object]:
 
 
 def _under_way(robot: Robot) -> Action | None:
-    """The scan of another request: later requests wait for that one."""
+    """Return the running scan of another request, which later requests join."""
     return next((action for action in robot.actions.running(BLUETOOTH) if isinstance(action.goal, float)), None)
 
 
 @TABLE.on(Code.CONNECT_BLUETOOTH, right=Right.EDIT, needs=(Bluetooth,))
 async def connect(call: Call, *, selected_device: object = None) -> dict[str, int]:
-    """Connect the device (0, or 1: it does not answer); without one let go of the present one (0, or 3: none)."""
+    """Connect a device (0, or 1: no answer); without one, disconnect the current device (0, or 3: none)."""
     robot = call.context.robot
     radio = robot[Bluetooth]
     if selected_device is None:
@@ -89,7 +89,7 @@ async def connect(call: Call, *, selected_device: object = None) -> dict[str, in
 
 @TABLE.on(Code.BLUETOOTH_CONNECTED, right=Right.SEE, needs=(Bluetooth,))
 async def connected(call: Call) -> dict[str, object]:
-    """Connected device, as a list of none or one."""
+    """Return the connected device, as a list of none or one."""
     device = call.context.robot[Bluetooth].connected
     return _listed([device] if device else [])
 
@@ -103,14 +103,14 @@ async def firmware_version(call: Call) -> dict[str, object]:
 
 @TABLE.on(Code.BLUETOOTH_BATTERY, right=Right.SEE, needs=(Bluetooth,))
 async def battery_level(call: Call) -> dict[str, object]:
-    """0 to 1; the key is spelt as in the text, the value a number as there."""
+    """Return the device's battery, 0 to 1; key and type are the manual's."""
     device = call.context.robot[Bluetooth].connected
     return {"connected": device is not None, "persentage": (device.battery or 0.0) if device else 0.0}
 
 
 @TABLE.on(Code.FORGET_BLUETOOTH, right=Right.EDIT, needs=(Bluetooth,))
 async def forget(call: Call, *, mac: str = "") -> dict[str, bool]:
-    """Strike a device from the history; without ``mac`` all but the connected one."""
+    """Delete a device from the history; without ``mac``, all but the connected one."""
     try:
         await call.context.robot[Bluetooth].forget(mac or None)
     except NotFound as error:
@@ -120,7 +120,7 @@ async def forget(call: Call, *, mac: str = "") -> dict[str, bool]:
 
 @TABLE.on(Code.UPDATE_BLUETOOTH, right=Right.ADMIN, needs=(Bluetooth,))
 async def update_device(call: Call) -> dict[str, object]:
-    """Begin to bring the newer firmware to the connected device; push 8010 reports the progress."""
+    """Start the firmware update of the connected device; push 8010 reports the progress."""
     radio = call.context.robot[Bluetooth]
     if radio.connected is None:
         return {"success": False, "message": "no device is connected"}
@@ -134,7 +134,7 @@ async def update_device(call: Call) -> dict[str, object]:
 
 @TABLE.on(Code.SET_GEAR, right=Right.EDIT, needs=(RemoteControl,))
 async def set_gear(call: Call, *, data: int) -> str:
-    """0 low, 1 middle, 2 high: how fast the remote control's stick drives. Nothing else is a gear."""
+    """Set the gear of the remote control's stick: 0 low, 1 middle, 2 high; anything else is refused."""
     if data not in list(Gear):
         raise BadParameters("a gear is 0, 1 or 2")
     await call.context.robot[RemoteControl].set_gear(Gear(data))
@@ -143,7 +143,7 @@ async def set_gear(call: Call, *, data: int) -> str:
 
 @TABLE.on(Code.GEAR, right=Right.SEE, needs=(RemoteControl,))
 async def gear(call: Call) -> dict[str, int]:
-    """The present one."""
+    """Return the current gear."""
     return {"data": int(call.context.robot[RemoteControl].gear)}
 
 

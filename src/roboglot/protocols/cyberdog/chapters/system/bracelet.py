@@ -49,7 +49,7 @@ class Bracelet:
         self._update, self._pushed = update, -1.0
 
     def offer(self) -> None:
-        """Report newer firmware, if there is a device for it."""
+        """Report newer firmware for the connected device, if there is any."""
         if Bluetooth not in self._robot:
             return
         radio = self._robot[Bluetooth]
@@ -57,7 +57,7 @@ class Bracelet:
             self._app.push(OFFERED, {"data": f"{radio.connected.firmware} {radio.update_available}"})
 
     def close(self) -> None:
-        """Say no more."""
+        """Stop reporting."""
         for leave in self._leave:
             leave()
 

@@ -1,4 +1,4 @@
-"""Chapter "ota": download (5003), install (5004), how it stands (5001, 5005, 5006), goals (5010, 5011)."""
+"""Chapter "ota": download (5003), install (5004), progress (5001, 5005, 5006), goals (5010, 5011)."""
 
 from __future__ import annotations
 
@@ -34,20 +34,20 @@ NO_TIME = -2  # s
 
 @TABLE.on(Code.UPDATE_STATUS, right=Right.SEE, needs=(Firmware,))
 async def update_status(call: Call) -> dict[str, object]:
-    """Idle, download or update."""
+    """Return the state: idle, download or update."""
     state = call.context.robot[Firmware].progress.state
     return {"status": WORDS.get(state, "idle"), "code": FAILED if state is FirmwareState.FAILED else GOOD}
 
 
 @TABLE.on(Code.UPDATE_VERSION, right=Right.SEE, needs=(Firmware,))
 async def update_version(call: Call) -> dict[str, object]:
-    """Return the running firmware version (not in the text)."""
+    """Return the running firmware version (not in the manual)."""
     return {"version": call.context.robot[Firmware].version, "code": GOOD}
 
 
 @TABLE.on(Code.DOWNLOAD_UPDATE, right=Right.ADMIN, needs=(Firmware,))
 async def download_update(call: Call, *, modules: object) -> dict[str, object]:
-    """Fetch the files of some modules; push 5005 reports the progress."""
+    """Download the files of modules; push 5005 reports the progress."""
     firmware = call.context.robot[Firmware]
     try:
         package, digests = package_of(modules)
@@ -61,7 +61,7 @@ async def download_update(call: Call, *, modules: object) -> dict[str, object]:
 
 @TABLE.on(Code.INSTALL_UPDATE, right=Right.ADMIN, needs=(Firmware,))
 async def install_update(call: Call, *, md5: str) -> dict[str, object]:
-    """Install what was downloaded and restart; the text spells the key "reponse", clients read either."""
+    """Install the download and restart; the manual spells the key "reponse", clients read either."""
     call.context.robot[Firmware]
     code = call.context.updates.obstacle(md5)
     if code == GOOD:
@@ -71,14 +71,14 @@ async def install_update(call: Call, *, md5: str) -> dict[str, object]:
 
 @TABLE.on(Code.UPDATE_PROGRESS, right=Right.SEE, needs=(Firmware,))
 async def update_progress(call: Call) -> dict[str, int]:
-    """Percent of download and installation; -1 failed, -2 too little room."""
+    """Return the progress of download and installation, percent; -1 failed, -2 too little space."""
     call.context.robot[Firmware]
     return call.context.updates.progress()
 
 
 @TABLE.on(Code.UPDATE_TIME, right=Right.SEE, needs=(Firmware,))
 async def update_time(call: Call) -> dict[str, int]:
-    """Seconds that the update under way will still take; -2 when there is none."""
+    """Return the remaining seconds of the update under way; -2 without one."""
     remaining = call.context.robot[Firmware].remaining
     return {"time": NO_TIME if remaining is None else round(remaining)}
 
@@ -96,7 +96,7 @@ async def start_update(call: Call, *, operate: str = "", id: Id = "", data: obje
 
 @TABLE.on(Code.JOIN_UPDATE, right=Right.SEE, needs=(Firmware,))
 async def join_update(call: Call) -> object:
-    """Take the stream of the goal under way over, from its latest feedback on."""
+    """Take over the stream of the goal under way, from its latest feedback on."""
     call.context.robot[Firmware]
     stream = call.context.jobs.stream
     if stream is None:

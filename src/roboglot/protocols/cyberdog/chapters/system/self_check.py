@@ -1,6 +1,6 @@
-"""The self check of heartbeat and 10001: what of the robot has failed, in the words of ``SelfCheckStatus``.
+"""The self check of heartbeat and 10001: failed parts of the robot, in the words of ``SelfCheckStatus``.
 
-Warnings (a battery at a tenth, a step ahead) are no failures of parts: the charge and the sensors show them.
+Warnings (a battery at 10 %, a step ahead) are no failures: the charge and the sensors show them.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ OTHER = ("device", "others", BROKEN)
 
 
 def self_check(robot: Robot) -> tuple[SelfCheck, Errors]:
-    """The code of the whole, and a number for each part: 0 well, -1 not known yet, all else an error."""
+    """Return the overall code, and one for each part: 0 good, -1 unknown yet, anything else an error."""
     errors: Errors = {}
     for (group, part), component in SHOWN.items():
         if component in robot:

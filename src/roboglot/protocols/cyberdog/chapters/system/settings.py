@@ -1,6 +1,6 @@
 """Chapter "settings": nickname, volume, microphone, voice control, eye light, and silence (1010 to 1015, 1025).
 
-What is switched here is kept in the robot's settings; ``voice.py`` listens as they say.
+Settings are stored with the robot; ``voice.py`` follows them.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ Name = Annotated[str, msgspec.Meta(min_length=1, max_length=NAME_MAX)]
 
 @TABLE.on(Code.SWITCH_NICKNAME, right=Right.EDIT, needs=(Settings,))
 async def switch_nickname(call: Call, *, enable: bool) -> dict[str, bool]:
-    """Go by the nickname, or by the name from the factory."""
+    """Use the nickname, or the factory name."""
     await call.context.robot[Settings].put(NICKNAME_ON, enable)
     return {"success": True}
 
 
 @TABLE.on(Code.SET_NICKNAME, right=Right.EDIT, needs=(Settings,))
 async def set_nickname(call: Call, *, nick_name: Name, wake_name: str = "") -> dict[str, bool]:
-    """Another name and the word that wakes the robot; without that, a short name twice."""
+    """Set the nickname and the wake word; without one, the wake word is a short name said twice."""
     if len(wake_name) > NAME_MAX:
         return call.refused({"success": False}, f"wake_name has more than {NAME_MAX} characters")
     settings = call.context.robot[Settings]
@@ -54,7 +54,7 @@ async def set_nickname(call: Call, *, nick_name: Name, wake_name: str = "") -> d
 
 @TABLE.on(Code.SET_VOLUME, right=Right.EDIT, needs=(Speaker,))
 async def set_volume(call: Call, *, volume: Int32) -> dict[str, bool]:
-    """0 silent to 100."""
+    """Set the volume, 0 (silent) to 100."""
     if not 0 <= volume <= 100:
         return call.refused({"success": False}, "volume is 0 to 100")
     call.context.robot[Speaker].set_volume(volume / 100.0)
@@ -81,7 +81,7 @@ async def set_voice_control(call: Call, *, enable: bool) -> dict[str, bool]:
 
 @TABLE.on(Code.SET_EYE_LIGHT, right=Right.EDIT, needs=(Light,))
 async def set_eye_light(call: Call, *, eyelight: Int32) -> dict[str, bool]:
-    """Brightness of the eyes; the text gives no range: 0 dark to 100."""
+    """Set the brightness of the eyes, 0 (dark) to 100; the manual gives no range."""
     light = call.context.robot[Light]
     if EYES not in light.zones:
         raise ComponentMissing(Light)
@@ -93,7 +93,7 @@ async def set_eye_light(call: Call, *, eyelight: Int32) -> dict[str, bool]:
 
 @TABLE.on(Code.STOP_SOUND, right=Right.DRIVE, needs=(Speaker,))
 async def stop_sound(call: Call) -> dict[str, bool]:
-    """Be quiet, no matter which client let the robot speak."""
+    """Stop the sound of any client."""
     call.context.robot[Speaker]
     await call.context.robot.actions.cancel(resource=SPEAKER, reason="silenced by the app")
     return {}

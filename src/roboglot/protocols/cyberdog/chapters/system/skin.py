@@ -1,4 +1,4 @@
-"""Chapter "electronic skin", which the text leaves out: on and off (11001), what it shows (11002)."""
+"""Chapter "electronic skin", which the manual omits: on and off (11001), patterns (11002)."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ OVER_TIME = frozenset({SkinMode.REARWARD, SkinMode.FORWARD, SkinMode.FLASH, Skin
 
 @TABLE.on(Code.ENABLE_SKIN, right=Right.DRIVE, needs=(ElectronicSkin,))
 async def enable_skin(call: Call, *, data: bool) -> dict[str, object]:
-    """Switch the skin on or off; off, it is dark."""
+    """Switch the skin on, or off (dark)."""
     call.context.robot[ElectronicSkin].enable(data)
     return {"success": True, "message": ""}
 
 
 @TABLE.on(Code.SET_SKIN, right=Right.DRIVE, needs=(ElectronicSkin,))
 async def set_skin(call: Call, *, mode: Int32, wave_cycle_time: Int32) -> dict[str, bool]:
-    """Modes 0 to 6; the time, in ms, counts for 2 to 5, and for 6 chooses the shade of the legs on the floor."""
+    """Set the mode, 0 to 6; the time, in ms, applies to 2 to 5, and selects the shade of standing legs for 6."""
     skin = call.context.robot[ElectronicSkin]
     if mode not in tuple(SkinMode):
         return call.refused({"success": False}, f"there is no mode {mode}")

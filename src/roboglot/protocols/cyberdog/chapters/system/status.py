@@ -1,4 +1,4 @@
-"""Chapter "status": what the robot tells about itself: 1001, 10001, the heartbeat's Ticks; the test code 55001."""
+"""Chapter "status": the robot's state: 1001, 10001, the heartbeat's Ticks; the test code 55001."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Status:
 
 
 def status_of(context: Context) -> Status:
-    """Report the state of this moment, from the model."""
+    """Return the current state, from the model."""
     check, errors = self_check(context.robot)
     battery = context.robot[Battery].state if Battery in context.robot else None
     return Status(
@@ -62,7 +62,7 @@ def status_of(context: Context) -> Status:
 
 
 def ticks(context: Context, address: str) -> pb.Ticks:
-    """One heartbeat; ``address`` is where the app finds the robot."""
+    """Return one heartbeat; ``address``: the robot's, for the app."""
     if context.played is not None and (recorded := context.played.ticks(address)) is not None:
         return recorded
     status = status_of(context)
@@ -85,7 +85,7 @@ def ticks(context: Context, address: str) -> pb.Ticks:
 
 @TABLE.on(Code.STATUS, right=Right.SEE)
 async def query_status(call: Call) -> dict[str, object]:
-    """The states of the heartbeat, on request."""
+    """Return the states of the heartbeat."""
     status = status_of(call.context)
     return {
         "motion_status": {"motion_id": status.motion_id},
@@ -114,7 +114,7 @@ def _battery(context: Context) -> dict[str, object]:
 
 
 def _wifi(context: Context) -> dict[str, object]:
-    """Return its network in the simulated world, but the address where clients reach it."""
+    """Return the network of the simulated world, but the real address for clients."""
     if Network not in context.robot:
         return {"name": "", "ip": context.address, "mac": "", "strength": 0}
     network = context.robot[Network]
@@ -123,12 +123,12 @@ def _wifi(context: Context) -> dict[str, object]:
 
 
 def _strength(robot: Robot) -> int:
-    """0 to 100; what the card hears while it is in no network is nothing."""
+    """Return the signal strength, 0 to 100; 0 without a network."""
     return wifi_strength(robot[Network].signal) if Network in robot and robot[Network].connected else 0
 
 
 def _versions(context: Context) -> dict[str, object]:
-    """The whole, and the single boards' as the firmware knows them ("board.module")."""
+    """Return the overall version, and those of the boards ("board.module")."""
     robot = context.robot
     if Firmware not in robot:
         return {"new_version": robot.description.software_version}
@@ -190,7 +190,7 @@ async def device_information(
     is_lowpower_control: bool = False,
     uid: str | int = "",
 ) -> dict[str, object]:
-    """Only what was asked for, and always "non-standing", as robots in the field do."""
+    """Return what was asked for, and always "non-standing", as real robots do."""
     wanted = (
         is_version,
         is_sn,

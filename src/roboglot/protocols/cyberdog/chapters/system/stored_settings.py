@@ -16,17 +16,17 @@ UPDATE = "cyberdog.update"  # the version for which the robot restarts
 
 
 def kept(robot: Robot, key: str, default: object) -> object:
-    """Return what was set under ``key``; ``default`` for a robot that keeps no settings."""
+    """Return the setting ``key``; ``default`` for a robot without settings."""
     return robot[Settings].get(key, default) if Settings in robot else default
 
 
 def nickname(robot: Robot) -> str:
-    """The name that the robot goes by now."""
+    """Return the current name of the robot."""
     return str(kept(robot, NICKNAME, DEFAULT_NAME)) if kept(robot, NICKNAME_ON, False) else DEFAULT_NAME
 
 
 def wake_words(robot: Robot) -> tuple[str, ...]:
-    """Return what it listens to: its default name said twice, and the nickname's word while that is on."""
+    """Return the wake words: the default name said twice, and the nickname's word while that is on."""
     own = (DEFAULT_NAME * 2,)
     word = str(kept(robot, WAKE_WORD, ""))
     return (*own, word) if word and kept(robot, NICKNAME_ON, False) else own

@@ -1,6 +1,6 @@
-"""Goals of the newer form of "ota" that the text leaves out: one at a time (5010), its stream joined again (5011).
+"""Goals of the newer form of "ota", which the manual omits: one at a time (5010), its stream joined again (5011).
 
-What feedback and result say is published nowhere: the JSON here is our own. The work is that of ``updates.py``.
+Formats of feedback and result are published nowhere: the JSON here is our own. ``updates.py`` does the work.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ CODES: tuple[tuple[type[Exception], int], ...] = (  # first match wins
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """Request to update a module; ``data`` says which update, where that is asked for."""
+    """Request to update a module; ``data`` selects the update, where needed."""
 
     operate: str
     id: int | str = ""
@@ -54,7 +54,7 @@ class Goal:
 
 
 class Unable(Exception):
-    """``code``: why a goal is not reached."""
+    """A goal that cannot be reached; ``code``: the reason."""
 
     def __init__(self, code: int, words: str) -> None:
         super().__init__(words)
@@ -62,7 +62,7 @@ class Unable(Exception):
 
 
 class UpdateJobs:
-    """Jobs of updates: at most one goal is under way; it goes on when its stream breaks."""
+    """Jobs of updates: at most one goal is under way, which survives a broken stream."""
 
     def __init__(self, robot: Robot, updates: Updates) -> None:
         self.stream: Stream | None = None  # of the goal in progress
@@ -70,13 +70,13 @@ class UpdateJobs:
         self._running: asyncio.Task[None] | None = None
 
     def start(self, goal: Goal) -> Stream:
-        """Work on it from now on."""
+        """Start the goal."""
         self.stream = stream = Stream()
         self._running = asyncio.get_running_loop().create_task(self._run(goal, stream), name=f"5010 {goal.operate}")
         return stream
 
     def unbind(self) -> None:
-        """The app is gone: its stream ends, the work continues."""
+        """End the app's stream; the work continues."""
         if self.stream:
             self.stream.unbind()
 
@@ -86,7 +86,7 @@ class UpdateJobs:
             self._running.cancel()
 
     async def _run(self, goal: Goal, stream: Stream) -> None:
-        """Feedback on the firmware's progress, and the result of the goal."""
+        """Stream the firmware's progress, then the result of the goal."""
         named = {"id": goal.id, "operate": goal.operate}
         leave = self._robot.events.listen(
             FirmwareChanged, lambda event: stream.tell({**named, **_progress(event.progress)})
@@ -109,7 +109,7 @@ class UpdateJobs:
     # -- goals; each returns the result's data -------------------------------------------------------------------------
 
     async def inquire(self, _: Goal) -> dict[str, object]:
-        """Return what runs, what is downloaded, what the maker offers."""
+        """Return the running, the downloaded and the offered version."""
         firmware = self._robot[Firmware]
         offered, package = firmware.available, firmware.progress.package
         return {
@@ -121,7 +121,7 @@ class UpdateJobs:
         }
 
     async def download(self, goal: Goal) -> dict[str, object]:
-        """``data``: modules as 5003 has them; without them what the maker offers."""
+        """Download modules (``data``, as in 5003), by default those that the manufacturer offers."""
         firmware = self._robot[Firmware]
         if firmware.progress.state in UNDER_WAY:
             raise Unable(BUSY, "an update is under way")
@@ -135,7 +135,7 @@ class UpdateJobs:
         return {"version": package.version, "md5": package.digest}
 
     async def upgrade(self, goal: Goal) -> dict[str, object]:
-        """Install what was downloaded (``data``: its MD5, or nothing); it runs after the next restart."""
+        """Install the download (``data``: its MD5, or nothing); it runs after the next restart."""
         package = self._robot[Firmware].progress.package
         named = goal.data or (package.digest if package else "")
         if obstacle := self._updates.obstacle(str(named)):
@@ -144,13 +144,13 @@ class UpdateJobs:
         return {"version": package.version if package else ""}
 
     async def upgrade_and_reboot(self, goal: Goal) -> dict[str, object]:
-        """The same, and restart."""
+        """Install the download and restart."""
         done = await self.upgrade(goal)
         self._updates.restart()
         return {**done, "seconds": NOTICE}
 
     async def remove(self, _: Goal) -> dict[str, object]:
-        """Throw away what was downloaded."""
+        """Delete the download."""
         if self._robot[Firmware].progress.state is not FirmwareState.DOWNLOADED:
             raise Unable(STATE, "nothing is downloaded")
         await self._robot[Firmware].discard()
@@ -164,7 +164,7 @@ class UpdateJobs:
         return {"seconds": NOTICE}
 
     async def reset(self, _: Goal) -> dict[str, object]:
-        """Give up what is under way, and throw away what was downloaded."""
+        """Abort the update under way, and delete the download."""
         if self._robot[Firmware].progress.state in (FirmwareState.INSTALLED, FirmwareState.REBOOTING):
             raise Unable(BUSY, "what is installed is there to stay")
         await self._robot.actions.cancel(resource=FIRMWARE, reason="reset by the app")
@@ -172,7 +172,7 @@ class UpdateJobs:
         return {}
 
     async def disk(self, _: Goal) -> dict[str, object]:
-        """Return how much room there is, in bytes."""
+        """Return the free space, bytes."""
         disk = self._robot[Disk]
         return {"size": disk.size, "free": disk.free}
 

@@ -101,7 +101,7 @@ class Updates:
         return _progress(self._failed, 0, FAILED if self._failed else GOOD)
 
     def download(self, package: FirmwarePackage, digests: frozenset[str]) -> Action:
-        """Begin, ``digests`` are those of all files; raises InvalidGoal for a package that makes no sense."""
+        """Start a download; ``digests``: of all files. Raises InvalidGoal for a malformed package."""
         action = self._robot[Firmware].download(package, source=SOURCE)
         self.digests, self._failed = digests, 0
 
@@ -115,7 +115,7 @@ class Updates:
         return action
 
     def obstacle(self, md5: str) -> int:
-        """The ``code`` of why what was downloaded cannot be installed now, if ``md5`` names it; GOOD if it can."""
+        """Return the ``code`` of the obstacle to installing the download (if ``md5`` names it); GOOD without one."""
         progress = self._robot[Firmware].progress
         if progress.state in UNDER_WAY:
             return BUSY
@@ -124,7 +124,7 @@ class Updates:
         return GOOD if md5.lower() in self.digests | {progress.package.digest} else ARGUMENTS
 
     def install(self) -> None:
-        """Install what was downloaded and restart; the app hears the result when it is connected again."""
+        """Install the download and restart; the app gets the result when it is connected again."""
         self._working = asyncio.get_running_loop().create_task(self._install(), name="install")
 
     def close(self) -> None:
@@ -139,7 +139,7 @@ class Updates:
             self.restart()
 
     async def installed(self) -> None:
-        """Install what was downloaded; a failure is reported to the app, and raised as RobotError."""
+        """Install the download; a failure is reported to the app, and raised as RobotError."""
         firmware = self._robot[Firmware]
         package = firmware.progress.package
         if package is None:
@@ -155,7 +155,7 @@ class Updates:
             await self._robot[Settings].put(UPDATE, package.version)
 
     def restart(self) -> None:
-        """Notify the app, then go."""
+        """Notify the app, then restart."""
         self._app.push(REBOOTS, {})
         self._robot[Firmware].reboot(after=NOTICE, source=SOURCE)
 
@@ -188,7 +188,7 @@ def _progress(download: int, upgrade: int, code: int = GOOD) -> dict[str, int]:
 
 
 def package_of(modules: object) -> tuple[FirmwarePackage, frozenset[str]]:
-    """One package of a module or a list of them, and the sums of its files. Raises BadParameters, InvalidGoal."""
+    """Return one package of a module or a list of them, and its files' checksums. Raises BadParameters, InvalidGoal."""
     try:
         wanted = msgspec.convert(modules if isinstance(modules, list) else [modules], list[WireModule])
     except msgspec.ValidationError as error:

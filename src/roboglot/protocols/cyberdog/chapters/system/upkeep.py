@@ -27,7 +27,7 @@ LAST_WORDS = 1.0  # s between the answer and the shutdown
 
 @TABLE.on(Code.LEAVE_LOW_POWER, right=Right.DRIVE, needs=(Power,))
 async def leave_low_power(call: Call) -> dict[str, object]:
-    """Answered when the robot is awake; an empty battery keeps it in low power."""
+    """Leave low power; answered once awake. An empty battery prevents it."""
     power, clock = call.context.robot[Power], call.context.robot.clock
     waking = power.wake(source=SOURCE)
     try:
@@ -46,7 +46,7 @@ async def switch_automatic_low_power(call: Call, *, data: bool) -> dict[str, boo
 
 @TABLE.on(Code.WORK_ENVIRONMENT, right=Right.ADMIN, needs=(Settings,))
 async def set_work_environment(call: Call, *, data: str) -> dict[str, object]:
-    """Production ("pro") or "test": kept. Simulated robots have the same maker in both."""
+    """Set production ("pro") or "test"; stored only, as simulated robots have the same manufacturer in both."""
     if data not in ENVIRONMENTS:
         return {"success": False, "message": f"the environment is {' or '.join(ENVIRONMENTS)}"}
     await call.context.robot[Settings].put(ENVIRONMENT, data)
@@ -55,7 +55,7 @@ async def set_work_environment(call: Call, *, data: str) -> dict[str, object]:
 
 @TABLE.on(Code.UPLOAD_LOG, right=Right.ADMIN, needs=(SystemLog,))
 async def upload_log(call: Call) -> dict[str, object]:
-    """Hand the system's log to the maker; false when the internet is not reached."""
+    """Upload the system's log to the manufacturer; false without internet access."""
     action = call.context.robot[SystemLog].upload(source=SOURCE)
     try:
         await call.context.robot.clock.wait_for(action.succeeded(), UPLOAD_MAX)
@@ -69,14 +69,14 @@ async def upload_log(call: Call) -> dict[str, object]:
 
 @TABLE.on(Code.UPLOAD_MOTION_LOG, right=Right.ADMIN, needs=(SystemLog,))
 async def upload_motion_log(call: Call) -> dict[str, object]:
-    """The same for the log of the motion board (not in the text), which here is one with the system's."""
+    """Upload the motion board's log (not in the manual), which here is the system's."""
     answer = await upload_log(call)
     return answer if "error_code" in answer else {**answer, "message": ""}
 
 
 @TABLE.on(Code.SWITCH_POINT_CLOUD, right=Right.EDIT, needs=(DepthCamera,))
 async def switch_point_cloud(call: Call, *, data: bool) -> dict[str, object]:
-    """The depth camera, whose points are what is gone around (not in the text); not while a bracelet is followed."""
+    """Switch the depth camera, which detects obstacles (not in the manual); refused while a bracelet is followed."""
     camera = call.context.robot[DepthCamera]
     if call.context.tasks.state is TaskState.TAG_FOLLOWING:
         return {"success": False, "message": "the robot follows a bracelet"}
@@ -86,13 +86,13 @@ async def switch_point_cloud(call: Call, *, data: bool) -> dict[str, object]:
 
 @TABLE.on(Code.POINT_CLOUD, right=Right.SEE, needs=(DepthCamera,))
 async def point_cloud(call: Call) -> dict[str, object]:
-    """Return whether the depth camera is on (not in the text)."""
+    """Return whether the depth camera is on (not in the manual)."""
     return {"success": call.context.robot[DepthCamera].enabled, "message": ""}
 
 
 @TABLE.on(Code.UNLOCK, right=Right.ADMIN, needs=(Developer,))
 async def unlock(call: Call, *, httplink: str = "") -> dict[str, int]:
-    """Open developers' access with the key at that link. ``result`` in the text, ``unlock_result`` on robots."""
+    """Unlock developer access with the key at a link. ``result`` in the manual, ``unlock_result`` on robots."""
     result = UnlockResult.DONE
     try:
         await call.context.robot.clock.wait_for(call.context.robot[Developer].unlock(httplink), UNLOCK_MAX)
@@ -107,7 +107,7 @@ async def unlock(call: Call, *, httplink: str = "") -> dict[str, int]:
 
 @TABLE.on(Code.REBOOT, right=Right.ADMIN, needs=(Firmware,))
 async def reboot(call: Call) -> dict[str, int]:
-    """``result`` in the text, ``reboot_result`` on real robots: 0. The connection ends soon after the answer."""
+    """Reboot soon after the answer: ``result`` 0 in the manual, ``reboot_result`` 0 on real robots."""
     call.context.robot[Firmware].reboot(after=LAST_WORDS, source=SOURCE)
     return {"result": 0, "reboot_result": 0}
 
@@ -121,7 +121,7 @@ async def power_off(call: Call) -> dict[str, bool]:
 
 @TABLE.on(Code.CALIBRATE_LEGS, right=Right.ADMIN, needs=(Legs,))
 async def calibrate_legs(call: Call, *, data: bool) -> dict[str, object]:
-    """False: lie down and let the motors go; true: give them power again and stand."""
+    """Lie down and release the motors (false); power them again and stand (true)."""
     legs, clock = call.context.robot[Legs], call.context.robot.clock
     if not data and legs.posture is Posture.LIMP:
         return {"success": True, "message": ""}
