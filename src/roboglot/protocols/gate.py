@@ -1,6 +1,6 @@
-"""Before a robot's ports: counts and meters connections, lets in by address, and cuts off who may no more.
+"""Gate in front of a robot's ports: counts and meters connections, admits by address, and disconnects on revocation.
 
-With open access (``admission.asks`` is false), nothing stands before a port but TLS, if there is to be any.
+With open access (``admission.asks`` is false), only TLS, if configured, stands in front of a port.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Gate:
         self._leave: Callable[[], None] | None = None
 
     def before(self, factory: Factory, name: str, right: Right | None = None, most: int = OPEN_MAX) -> Factory:
-        """``factory``'s protocols for clients that have ``right``; the others are hung up on.
+        """Wrap ``factory``: only clients with ``right`` get its protocols; others are disconnected.
 
         None: the protocol itself asks who comes. ``most`` are open at once, half of them of one address.
         """
@@ -105,12 +105,12 @@ class Gate:
         return who or str(peer[0])
 
     def leave(self, transport: asyncio.Transport, port: Port, host: str) -> None:
-        """A connection that came in is gone."""
+        """Record the end of an admitted connection."""
         self._open.pop(transport, None)
         port.connections.leave(host)
 
     def spend(self, key: str, amount: int) -> float:
-        """Count bytes; returns the seconds to wait before the next."""
+        """Count bytes; return the seconds to wait before the next."""
         return self._admission.spend(key, amount)
 
     def _cut_off(self, who: str) -> None:
@@ -119,7 +119,7 @@ class Gate:
 
 
 class _Gatekeeper(asyncio.Protocol):
-    """Protocol until the client is known; then the port's own takes over."""
+    """Protocol until the client is identified; then the port's own takes over."""
 
     def __init__(self, gate: Gate, factory: Factory, port: Port) -> None:
         self._gate, self._factory, self._port = gate, factory, port

@@ -1,4 +1,4 @@
-"""Control desk of the machine's owner: shows who moves each robot, gives and takes control, stops and resets.
+"""Control desk of the machine's owner: shows the mover of each robot, gives and takes control, stops and resets.
 
 A socket in the data folder that only its owner can open; a line of JSON comes, a line of JSON goes. Knows no door.
 """
@@ -33,9 +33,9 @@ class Request(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class Control(msgspec.Struct):
-    """Of one robot: who moves it now and by what, who alone may (empty: any client), who moved it last.
+    """Control of one robot: current mover and action, exclusive controller (empty: any client), last mover.
 
-    ``link`` is how the link to a real robot is; empty for a simulated one. ``seconds`` are robot time.
+    ``link``: state of the link to a real robot; empty for a simulated one. ``seconds``: robot time.
     """
 
     robot: str
@@ -48,7 +48,7 @@ class Control(msgspec.Struct):
 
 
 class Answer(msgspec.Struct):
-    """State of all robots, and why the request was refused (empty: it was granted)."""
+    """State of all robots, and the reason of a refusal (empty: granted)."""
 
     robots: list[Control]
     error: str = ""
@@ -62,7 +62,7 @@ class LeaseDesk:
         self._server = LocalServer(folder / NAME, "roboglot lease", self._answer)
 
     async def open(self) -> None:
-        """Listen. Where that cannot be the robots can still be used, and a warning says so."""
+        """Listen; if that fails, log a warning: the robots work without it."""
         await self._server.open()
 
     async def close(self) -> None:
@@ -93,7 +93,7 @@ class LeaseDesk:
         await self.do(request, robot)
 
     async def do(self, request: Request, robot: Robot) -> None:
-        """Do it with one robot. Raises LookupError where that cannot be."""
+        """Execute a request for one robot. Raises LookupError if that is impossible."""
         with robot.outside.noting(LEASE, request.do, {"who": request.who}):
             await self._do(request, robot)
 

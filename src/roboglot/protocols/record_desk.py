@@ -25,7 +25,7 @@ class Request(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class Answer(msgspec.Struct):
-    """State of the recording, and why the request was refused (empty: it was granted)."""
+    """State of the recording, and the reason of a refusal (empty: granted)."""
 
     on: bool = False
     path: str = ""
@@ -39,7 +39,7 @@ class Answer(msgspec.Struct):
 
 
 class RecordDesk:
-    """Recording desk of one program; ``recorder`` makes its recorder when it is needed first."""
+    """Recording desk of one program; ``recorder`` makes its recorder on first use."""
 
     def __init__(self, folder: Path, recorder: Callable[[], Recorder]) -> None:
         self._recorder = recorder

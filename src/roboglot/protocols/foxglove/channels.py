@@ -37,7 +37,7 @@ class Channel:
 
 @dataclass(frozen=True, slots=True)
 class Wish:
-    """Playback that a client wants: ``play`` or pause, speed, position to ``seek`` (ns), and its request's name."""
+    """Request of a client for playback: ``play`` or pause, speed, position to ``seek`` (ns), and its id."""
 
     play: bool
     speed: float
@@ -46,7 +46,7 @@ class Wish:
 
 
 class Listener(Protocol):
-    """A client."""
+    """A client that receives channels and messages."""
 
     def advertise(self, channels: Sequence[Channel]) -> None:
         """Announce further topics."""
@@ -61,7 +61,7 @@ class Listener(Protocol):
         """Advance with robot time; ``seldom``: about once a second."""
 
     def played(self, state: Playback) -> None:
-        """A recording is played so from now on."""
+        """Report a new state of the playback."""
 
 
 class Source(Protocol):
@@ -72,19 +72,19 @@ class Source(Protocol):
         """Known channels."""
 
     def join(self, listener: Listener) -> None:
-        """Let a client in: it gets all topics that are known, and those to come."""
+        """Add a client: it gets all known topics, and further ones."""
 
     def leave(self, listener: Listener) -> None:
-        """Forget a client; the last one ends the looking."""
+        """Remove a client; after the last one, sampling ends."""
 
     def close(self) -> None:
-        """Look no more."""
+        """Stop sampling."""
 
     def show_last(self, listener: Listener, channel: int, subscription: int) -> None:
-        """Send a newcomer what was said last, so that it need not wait for a change."""
+        """Send a new subscriber the last message, so that it need not wait for a change."""
 
     def look_at_camera(self) -> None:
-        """Film if someone has subscribed to the camera; else do not."""
+        """Film only while a client has subscribed to the camera."""
 
     def control(self, listener: Listener, wish: Wish) -> None:
-        """Play on, pause or jump, as a client wants it. Raises NotFound: it is live, InvalidGoal."""
+        """Play, pause or seek for a client. Raises NotFound if live, InvalidGoal."""

@@ -11,7 +11,7 @@ from roboglot.config import Port
 class FoxgloveConfig:
     """The WebSocket's ``port``. ``origins`` and ``hosts`` are as in [slamware]: the vendor's web app has to be named.
 
-    ``dead_man``: so long (s) a velocity counts; the Teleop panel sends one a second unless it is set otherwise.
+    ``dead_man``: validity of a velocity, s; the Teleop panel sends one per second by default.
     """
 
     enabled: bool = True

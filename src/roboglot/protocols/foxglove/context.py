@@ -1,4 +1,4 @@
-"""One client: what it has subscribed to and publishes, and what it has the robot do. Given to every handler."""
+"""One client: its subscriptions, its published topics and its actions. Given to every handler."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class Context:
         )
 
     def close(self) -> None:
-        """The client is gone: what it had the robot do ends."""
+        """Handle the client's departure: its actions end."""
         if self.topics is not None:
             self.topics.leave(self)
         for action in self.robot.actions.running():
@@ -87,11 +87,11 @@ class Context:
         self._carrier.send(data)
 
     def status(self, level: Level, text: str) -> None:
-        """Report a status in words."""
+        """Send a status message."""
         self.send(message("status", level=int(level), message=text))
 
     def follow(self, action: Action) -> None:
-        """Report how an action that the client started ends, unless all is well."""
+        """Report an action of the client that fails."""
 
         async def report() -> None:
             ask_for("")  # not on behalf of a client
@@ -122,7 +122,7 @@ class Context:
             self.send(message_data(subscription, at, data))
 
     def beat(self, at: int, *, seldom: bool) -> None:
-        """Send the time; seldom also parameters that changed, and what was dropped."""
+        """Send the time; if ``seldom``, also changed parameters and the number of dropped messages."""
         if self._carrier.unsent <= UNSENT_MAX:
             self.send(time_message(at))
         if not seldom:
@@ -135,12 +135,12 @@ class Context:
             self.report_parameters()
 
     def played(self, state: Playback) -> None:
-        """A recording is played so from now on; the older subprotocol has no word for it."""
+        """Report a new state of the playback, which the older subprotocol cannot express."""
         if self._carrier.subprotocol in PLAYS:
             self.send(playback_state(state))
 
     def report_parameters(self) -> None:
-        """Send what changed of the parameters that the client follows."""
+        """Send changed parameters that the client follows."""
         found = parameters(self.robot, list(self.watched))
         changed = [row for row in found if self.watched[row["name"]] != row["value"]]
         if changed:

@@ -20,7 +20,7 @@ _HUMP = re.compile(r"(?<=[a-z])[A-Z]")
 
 
 async def answer(context: Context, message: str | bytes) -> None:
-    """Do what one message asks for."""
+    """Execute one message."""
     tap, began = context.robot.tap, None
     try:
         request = read_request(message)
@@ -41,7 +41,7 @@ async def answer(context: Context, message: str | bytes) -> None:
 
 
 async def _do(context: Context, request: Request) -> tuple[Level, str]:
-    """Carry it out; returns why not, empty if it was done."""
+    """Execute a request; return the reason of a refusal, empty on success."""
     operation = TABLE.get(request.key)
     if operation is None:
         return Level.ERROR, "this robot does not have that"

@@ -1,4 +1,4 @@
-"""The one place where the model's errors become the protocol's: a status, or what the message has of its own."""
+"""The one translation of the model's errors to the protocol: a status, or the message's own reply."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ LEVELS: dict[type[RobotError], Level] = {
 
 
 def level_of(error: RobotError) -> Level:
-    """Return how bad ``error``, or its nearest ancestor in the table, is."""
+    """Return the level of ``error``, by its nearest ancestor in the table."""
     return next(LEVELS[kind] for kind in type(error).__mro__ if kind in LEVELS)
 
 
 def refusal(request: Request, why: str, level: Level = Level.ERROR) -> str | bytes:
-    """Return what a client gets whose request is not done."""
+    """Return the reply to a refused request."""
     values = request.values
     match request.key:
         case "serviceCallRequest":

@@ -1,8 +1,8 @@
 """Plays a recorded robot's file to all clients of the door: its topics as recorded, with pause, speed and seek.
 
-It begins when the first client comes, so that viewers without playback controls see it too, and rewinds when the last
-one has left. A thread reads, one at a time: of many jumps at once only the last is looked up. A chunk's messages wait
-in memory for their time.
+It starts with the first client, so that viewers without playback controls see it too, and rewinds after the last one.
+A thread reads, one job at a time: of many seeks at once only the last is executed. A chunk's messages wait in memory
+for their time.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ STATES = frozenset(
 
 
 class Player:
-    """One file's. Time is the clock's, so a clock that is faster or stands still plays so, too."""
+    """Player of one file, on the clock's time: a faster or stopped clock plays faster or stops."""
 
     def __init__(self, robot: Robot, recorded: Recorded, reel: Reel) -> None:
         self._clock, self._reel, self._recorded = robot.clock, reel, recorded
@@ -63,7 +63,7 @@ class Player:
         return tuple(self._channels.values())
 
     def join(self, listener: Listener) -> None:
-        """Let a client in; the first one starts the recording."""
+        """Add a client; the first one starts the playback."""
         self._listeners.append(listener)
         listener.advertise(self.channels)
         if len(self._listeners) == 1:
@@ -72,14 +72,14 @@ class Player:
         listener.played(self._state())
 
     def leave(self, listener: Listener) -> None:
-        """Forget a client; after the last one it is wound back."""
+        """Remove a client; after the last one, rewind."""
         if listener in self._listeners:
             self._listeners.remove(listener)
         if not self._listeners:
             self.close()
 
     def close(self) -> None:
-        """Play no more."""
+        """Stop playing."""
         for task in (self._beating, self._playing, self._showing):
             if task is not None:
                 task.cancel()
@@ -88,10 +88,10 @@ class Player:
         self._rewind()
 
     def look_at_camera(self) -> None:
-        """Do nothing: it was filmed then, or not."""
+        """Do nothing: the recording has video or not."""
 
     def show_last(self, listener: Listener, channel: int, subscription: int) -> None:
-        """Send a newcomer how things stood at this moment of the recording, where the topic says that."""
+        """Send a new subscriber the state at this moment of the recording, for topics that hold one."""
         self._newcomers.append((listener, channel, subscription))
         if self._showing is None or self._showing.done():
             self._showing = self._begin(self._show_newcomers(), "foxglove newcomers")
@@ -99,7 +99,7 @@ class Player:
     # -- their requests ------------------------------------------------------------------------------------------------
 
     def control(self, listener: Listener, wish: Wish) -> None:
-        """Play on, pause, jump. Raises NotReady: the file has become unreadable."""
+        """Play, pause or seek. Raises NotReady if the file has become unreadable."""
         if self._broken:
             raise NotReady(f"the recording cannot be read: {self._broken}")
         self._at = self._now()
@@ -122,7 +122,7 @@ class Player:
         self._since = self._clock.time()
 
     def _now(self) -> int:
-        """The moment of the recording that is played now, ns since 1970."""
+        """Return the current position in the recording, ns since 1970."""
         if self._status is not PlayStatus.PLAYING:
             return self._at
         return min(self._at + round((self._clock.time() - self._since) * self._speed * NANO), self._recorded.last)
@@ -131,7 +131,7 @@ class Player:
         return Playback(self._status, self._now(), self._speed)
 
     def _go(self, status: PlayStatus, *, sought: bool = False) -> None:
-        """Go on from where it stands now, or stay there."""
+        """Continue from the current position, or stay there."""
         if self._playing is not None:
             self._playing.cancel()
         self._status, self._since = status, self._clock.time()
@@ -165,11 +165,11 @@ class Player:
                 self._next = shot.at + 1
 
     async def _read(self, batches: Iterator[Sequence[Shot]]) -> Sequence[Shot]:
-        """Return the next messages; none: it is over."""
+        """Return the next messages; none at the end."""
         return await self._beside(partial(next, batches, ()))
 
     async def _beside(self, read: Callable[[], Sequence[Shot]]) -> Sequence[Shot]:
-        """Read in a thread when the one before has ended: it goes on although no one waits for it any more."""
+        """Read in a thread after the previous job has ended, which continues even if no longer awaited."""
         with self._clock.holding():
             while self._reading is not None and not self._reading.done():
                 await asyncio.wait([self._reading])
@@ -193,7 +193,7 @@ class Player:
     # -- the state at a moment -----------------------------------------------------------------------------------------
 
     async def _show(self, at: int) -> None:
-        """Send all clients how things stood just before that moment."""
+        """Send all clients the state just before a moment."""
         wanted = {
             place
             for place, channel in self._channels.items()
@@ -223,7 +223,7 @@ class Player:
 
 
 async def open_source(robot: Robot) -> Player:
-    """Return the recording's of a robot that is played back. Raises BadRecording, OSError."""
+    """Return the source of a robot that is played back. Raises BadRecording, OSError."""
     assert robot.stand_in is not None
     recorded = robot.stand_in.recorded
     assert recorded is not None

@@ -1,4 +1,4 @@
-"""The door: a WebSocket at which Foxglove, Lichtblick and their kin see the robot's topics, and drive it."""
+"""The door: a WebSocket for Foxglove, Lichtblick and similar viewers, which show the robot's topics and drive it."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ LIVE, RECORDED = "roboglot.protocols.foxglove.topics", "roboglot.protocols.foxgl
 
 
 class Session:
-    """One client's messages, in their order."""
+    """Messages of one client, in order."""
 
     def __init__(self, door: FoxgloveDoor, carrier: Carrier) -> None:
         self._door = door
@@ -39,18 +39,18 @@ class Session:
         self._turn = asyncio.Lock()
 
     async def receive(self, message: str | bytes) -> None:
-        """Answer one message."""
+        """Handle one message."""
         async with self._turn:
             await answer(self.context, message)
 
     def close(self) -> None:
-        """The client is gone."""
+        """Handle the client's departure."""
         self._joining.cancel()
         self._door.forget(self)
         self.context.close()
 
     async def _join(self) -> None:
-        """Show the client all topics; what they need is loaded in a thread the first time."""
+        """Advertise all topics to the client; their modules are loaded in a thread the first time."""
         try:
             with self._door.robot.clock.holding():  # lockstep time does not count how long a library loads
                 topics = self.context.topics = await self._door.topics()
@@ -64,7 +64,7 @@ class Session:
 
 
 class FoxgloveDoor:
-    """One robot's."""
+    """Foxglove door of one robot."""
 
     name = DOOR
 
@@ -87,7 +87,7 @@ class FoxgloveDoor:
             await self._socket.start()
 
     async def close(self) -> None:
-        """Hang up; what clients had the robot do ends."""
+        """Close all connections; the clients' actions end."""
         if self._socket is not None:
             await self._socket.close()
         for session in tuple(self._sessions):
@@ -113,7 +113,7 @@ class FoxgloveDoor:
         return self._topics
 
     def forget(self, session: Session) -> None:
-        """A client is gone."""
+        """Remove a client."""
         self._sessions.discard(session)
 
     def _open(self, carrier: Carrier) -> Session:

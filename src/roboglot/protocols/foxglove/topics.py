@@ -1,6 +1,6 @@
-"""One robot's topics for all clients: what a recording would have, as long as someone is there to look.
+"""Topics of one robot for all clients: those of a recording, sampled while there are clients.
 
-Values become bytes only for topics that someone has subscribed to, once for all of them.
+Values are encoded only for subscribed topics, once for all clients.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def _channel(number: int, topic: str, kind: str) -> LiveChannel:
 
 
 class Topics:
-    """Looks at the robot while there are listeners."""
+    """Samples the robot while there are listeners."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -55,7 +55,7 @@ class Topics:
         return list(self._channels.values())
 
     def join(self, listener: Listener) -> None:
-        """Let a client in: it gets all topics that are known, and those to come."""
+        """Add a client: it gets all known topics, and further ones."""
         if self._sampler is None:
             self._sampler = Sampler(self._robot, self._put)
             if VideoStream in self._robot:
@@ -66,7 +66,7 @@ class Topics:
         listener.advertise(self.channels)
 
     def leave(self, listener: Listener) -> None:
-        """Forget a client; the last one ends the looking."""
+        """Remove a client; after the last one, sampling ends."""
         if listener in self._listeners:
             self._listeners.remove(listener)
         self.look_at_camera()
@@ -74,7 +74,7 @@ class Topics:
             self.close()
 
     def close(self) -> None:
-        """Look no more."""
+        """Stop sampling."""
         if self._sampler is not None:
             self._sampler.close()
             self._sampler = None
@@ -84,18 +84,18 @@ class Topics:
         self._last.clear()
 
     def show_last(self, listener: Listener, channel: int, subscription: int) -> None:
-        """Send a newcomer what was said last, so that it need not wait for a change."""
+        """Send a new subscriber the last message, so that it need not wait for a change."""
         if (entry := self._last.get(channel)) is not None:
             listener.deliver(subscription, entry.at, encoded(entry, self._redaction))
 
     def look_at_camera(self) -> None:
-        """Film if someone has subscribed to the camera; else do not."""
+        """Film only while a client has subscribed to the camera."""
         if self._sampler is not None:
             camera = next((channel.id for channel in self.channels if channel.kind == "video"), -1)
             self._sampler.film(any(listener.wants(camera) is not None for listener in self._listeners))
 
     def control(self, _listener: Listener, _wish: Wish) -> None:
-        """Refuse: nothing is played back here. Raises NotFound."""
+        """Raise NotFound: a live robot has no playback."""
         raise NotFound("this robot is live; one of a recording (--robot a=recording:FILE) can be played back")
 
     async def _sample(self) -> None:
@@ -131,5 +131,5 @@ class Topics:
 
 
 async def open_source(robot: Robot) -> Topics:
-    """Return the robot's."""
+    """Return the live source of a robot."""
     return Topics(robot)

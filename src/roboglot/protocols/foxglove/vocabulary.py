@@ -1,4 +1,4 @@
-"""The protocol's words for robots: what is published to them, in ROS's messages as JSON, and parameters by name."""
+"""Vocabulary of the protocol: ROS messages as JSON that clients publish, and parameters by name."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ PARAMETERS: Mapping[str, Parameter] = {
 
 
 def parameters(robot: Robot, names: list[str] | None = None) -> list[dict[str, Any]]:
-    """Return those of these names (None or none: all) that this robot has."""
+    """Return the named parameters (None or none: all) that this robot has."""
     found = []
     for name in names or PARAMETERS:
         parameter = PARAMETERS.get(name)

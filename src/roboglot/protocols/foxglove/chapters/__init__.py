@@ -1,1 +1,1 @@
-"""Handlers, by what they are about."""
+"""Handlers, by topic."""

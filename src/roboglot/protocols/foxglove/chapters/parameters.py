@@ -24,14 +24,14 @@ class Value(msgspec.Struct):
 
 @TABLE.on("getParameters", right=Right.SEE)
 async def get_parameters(context: Context, *, parameter_names: list[str] | None = None, id: str | None = None) -> None:
-    """Return those of these names that the robot has, without names all."""
+    """Return the named parameters that the robot has; without names, all."""
     names = _checked(parameter_names or [])
     context.send(message("parameterValues", parameters=parameters(context.robot, names), id=id))
 
 
 @TABLE.on("setParameters", right=Right.SEE)
 async def set_parameters(context: Context, *, parameters: list[Value], id: str | None = None) -> None:
-    """Set parameters; each asks for its own right. With an ``id`` their values now come back."""
+    """Set parameters, each with its own right; with an ``id``, return their new values."""
     names = _checked([value.name for value in parameters])
     try:
         for value in parameters:
@@ -44,14 +44,14 @@ async def set_parameters(context: Context, *, parameters: list[Value], id: str |
 
 @TABLE.on("subscribeParameterUpdates", right=Right.SEE)
 async def follow_parameters(context: Context, *, parameter_names: list[str] | None = None) -> None:
-    """Send their values whenever they change; without names all."""
+    """Send parameters whenever they change; without names, all."""
     for row in parameters(context.robot, _checked(parameter_names or [])):
         context.watched[row["name"]] = row["value"]
 
 
 @TABLE.on("unsubscribeParameterUpdates", right=Right.SEE)
 async def unfollow_parameters(context: Context, *, parameter_names: list[str] | None = None) -> None:
-    """Send them no more; without names none."""
+    """Stop sending parameters; without names, all."""
     for name in _checked(parameter_names or []) or list(context.watched):
         context.watched.pop(name, None)
 

@@ -1,4 +1,4 @@
-"""Playing a recording: on, paused, faster, from another moment."""
+"""Playback of a recording: play, pause, speed, seek."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SPEED_MIN, SPEED_MAX = 0.01, 100.0
 
 @TABLE.on("playbackControlRequest", right=Right.SEE)
 async def control(context: Context, *, command: int, speed: float, seek: int | None = None, request: str = "") -> None:
-    """Play, or pause, at this speed; with ``seek`` (ns since 1970) from there. All clients see the same."""
+    """Play or pause, at this speed, from ``seek`` (ns since 1970) if given; for all clients at once."""
     await context.joined.wait()
     if context.topics is None:
         raise NotReady("there are no topics to play")

@@ -26,7 +26,7 @@ MESSAGE_MAX = 65536  # bytes
 
 @TABLE.on("advertise", right=Right.DRIVE)
 async def advertise(context: Context, *, channels: list[Published]) -> None:
-    """Begin to publish: ``cmd_vel``, ``goal_pose``, ``move_base_simple/goal`` and ``initialpose``, as JSON."""
+    """Register topics to publish: ``cmd_vel``, ``goal_pose``, ``move_base_simple/goal``, ``initialpose``, as JSON."""
     for channel in channels:
         if channel.encoding != "json":
             raise InvalidGoal(f"{channel.topic[:80]} comes as {channel.encoding[:20]}; JSON is understood")
@@ -39,7 +39,7 @@ async def advertise(context: Context, *, channels: list[Published]) -> None:
 
 @TABLE.on("unadvertise", right=Right.DRIVE)
 async def unadvertise(context: Context, *, channel_ids: list[int]) -> None:
-    """Publish them no more."""
+    """Unregister published topics."""
     missing = [number for number in channel_ids if context.published.pop(number, None) is None]
     if missing:
         raise NotFound(f"there is no published channel {missing[0]}")
@@ -47,7 +47,7 @@ async def unadvertise(context: Context, *, channel_ids: list[int]) -> None:
 
 @TABLE.on("messageData", right=Right.DRIVE)
 async def publish(context: Context, *, channel: int, data: bytes) -> None:
-    """Do what a published message wants."""
+    """Execute a published message."""
     published = context.published.get(channel)
     if published is None:
         raise NotFound(f"channel {channel} is not advertised")
@@ -65,19 +65,19 @@ def _name(context: Context, topic: str) -> str:
 
 
 def _drive(context: Context, data: bytes) -> None:
-    """geometry_msgs/Twist: drive so until the next one, or for as long as the dead-man's time."""
+    """Drive (geometry_msgs/Twist) until the next velocity, or for the dead-man time."""
     wish = twist(msgspec.json.decode(data, type=RosTwist))
     ros_commands.drive(context.robot, wish, context.config.dead_man, context.source)
 
 
 def _go(context: Context, data: bytes) -> None:
-    """geometry_msgs/PoseStamped: go there; a status reports if that fails."""
+    """Navigate to a goal (geometry_msgs/PoseStamped); a status reports a failure."""
     goal = msgspec.json.decode(data, type=PoseStamped)
     context.follow(ros_commands.go(context.robot, goal.header.frame_id, pose(goal.pose), context.source))
 
 
 def _place(context: Context, data: bytes) -> None:
-    """geometry_msgs/PoseWithCovarianceStamped: the robot is there."""
+    """Set the robot's pose (geometry_msgs/PoseWithCovarianceStamped)."""
     there = msgspec.json.decode(data, type=PoseWithCovarianceStamped)
     ros_commands.place(context.robot, there.header.frame_id, pose(there.pose.pose))
 

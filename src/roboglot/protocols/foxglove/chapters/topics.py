@@ -1,4 +1,4 @@
-"""Following topics."""
+"""Subscriptions to topics."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Subscription(msgspec.Struct, rename="camel"):
 
 @TABLE.on("subscribe", right=Right.SEE)
 async def subscribe(context: Context, *, subscriptions: list[Subscription]) -> None:
-    """Follow topics from now on; of those that hold a state, the last one comes at once."""
+    """Subscribe to topics; those that hold a state send their last message at once."""
     topics = context.topics
     known = {channel.id for channel in topics.channels} if topics is not None else set()
     for wish in subscriptions:
@@ -42,7 +42,7 @@ async def subscribe(context: Context, *, subscriptions: list[Subscription]) -> N
 
 @TABLE.on("unsubscribe", right=Right.SEE)
 async def unsubscribe(context: Context, *, subscription_ids: list[int]) -> None:
-    """Follow them no more."""
+    """Unsubscribe from topics."""
     gone = set(subscription_ids)
     kept = {channel: number for channel, number in context.subscriptions.items() if number not in gone}
     missing = gone - set(context.subscriptions.values())
