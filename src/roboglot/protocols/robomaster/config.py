@@ -12,8 +12,8 @@ from roboglot.config import Port
 class RoboMasterConfig:
     """Ports of the text protocol: TCP control, video, audio, event; UDP push and discovery (on the client's side).
 
-    ``profile`` is the build whose habits the robot has: ``spec`` (the manual's), ``fw60`` or ``fw70``. ``lenient`` also
-    runs text that came without its ``;``. ``uart``: path of a pseudo-terminal to be made, "-" and the robot's name are
+    ``profile``: behaviour of the manual (``spec``) or of a firmware build (``fw60``, ``fw70``). ``lenient`` also runs
+    text without its ``;``. ``uart``: path of a pseudo-terminal to be made, "-" and the robot's name are
     appended; empty: none. ``explanation_port`` gives teaching tools the reasons of refusals, ``pilot_port`` takes the
     pilot's keyboard and mouse as text; None: it is closed.
     """

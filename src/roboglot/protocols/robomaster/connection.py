@@ -1,4 +1,4 @@
-"""One client on the control port: reads commands, answers each in order with one write, notices that it is gone."""
+"""One client on the control port: reads commands, answers each in order with one write, detects a hang-up."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ log = logging.getLogger(__name__)
 
 
 class ControlConnection(asyncio.Protocol):
-    """The client's end is seen even while a command takes its time, and while nothing more is read."""
+    """A hang-up is detected even during a long command, and while reading is paused."""
 
     transport: asyncio.Transport
     host: str
@@ -111,9 +111,9 @@ class ControlConnection(asyncio.Protocol):
         self._writable.set()
 
     def _throttle(self) -> None:
-        """Read on only while few commands wait: a client that sends faster than they are done is slowed down by TCP.
+        """Read only while few commands are queued: TCP slows down a client that sends faster than they are executed.
 
-        Who is not read from cannot be seen to leave either, so the kernel is asked.
+        A paused connection does not report a hang-up, so the kernel is asked.
         """
         if self._resting is None and len(self._commands) >= COMMANDS_MAX:
             self.transport.pause_reading()
@@ -125,14 +125,14 @@ class ControlConnection(asyncio.Protocol):
                 self.transport.resume_reading()
 
     def _look(self) -> None:
-        """Drop the pending answers of a client that is not being read from, if it has hung up."""
+        """Drop the pending answers of a paused client that has hung up."""
         if hung_up(self.transport):
             self.transport.abort()
         else:
             self._resting = asyncio.get_running_loop().call_later(LEFT_PERIOD, self._look)
 
     def _go_on(self, finished: asyncio.Task[None] | None = None) -> None:
-        """Do what waits; a task goes on with commands that have to wait for something."""
+        """Execute queued commands; those that must wait continue in a task."""
         if finished is not None:
             self._worker = None
         if not self._commands or self._worker is not None or self.transport.is_closing():
@@ -144,7 +144,7 @@ class ControlConnection(asyncio.Protocol):
             asyncio.get_running_loop().call_soon(self._go_on)
 
     async def _work(self) -> None:
-        """Answer waiting commands, a bounded number at a stretch; then others have their turn."""
+        """Answer queued commands, a bounded number at a time, so that other clients get their turn."""
         speak_as(self._name, self._context.robot.admission.known(self._name) or "")
         for _ in range(BATCH_MAX):
             if not self._commands:
@@ -171,6 +171,6 @@ class ControlConnection(asyncio.Protocol):
         return f"{self._shown} asked {shown}: {result.reply.decode()} ({result.why})"
 
     def _join(self) -> None:
-        """A command while the robot is in SDK mode keeps it there."""
+        """Join the session: a command in SDK mode keeps the robot there."""
         if self._context.active:
             self._context.join(self, self.host)

@@ -1,7 +1,7 @@
 """The SDK session: one per robot, begun by ``command``, shared by every control connection that uses it.
 
-It ends with ``quit`` or with its last connection; then the robot stops what the session commanded and every setting
-that it changed goes back. Knows no sockets: connections are whatever joins and leaves.
+It ends with ``quit`` or with its last connection; then the robot stops the session's motions and every setting that
+it changed is restored. Knows no sockets: connections are members that join and leave.
 """
 
 from __future__ import annotations
@@ -48,13 +48,13 @@ def speak_as(name: str, identity: str = "") -> None:
 
 
 class Outlets(Protocol):
-    """Outlets for a session's media and pushes; the server's business."""
+    """Outlets for a session's media and pushes; implemented by the server."""
 
     video: MediaPort
     audio: MediaPort
 
     def push(self, datagram: bytes, host: str) -> None:
-        """A datagram for the client at ``host``."""
+        """Send a datagram to the client at ``host``."""
 
     def tell(self, event: bytes) -> None:
         """Send an event to all readers of the event port."""
@@ -84,7 +84,7 @@ class Context:
 
     @property
     def source(self) -> str:
-        """Source of the actions that the command under way starts: this session, and the connection that sent it."""
+        """Source of actions of the current command: this session, and the connection that sent it."""
         return f"{self._name} {_speaker.get()}"
 
     @property
@@ -93,13 +93,13 @@ class Context:
         return self.robot[Gimbal].mode if Gimbal in self.robot else self._mode
 
     def set_mode(self, mode: FollowMode) -> None:
-        """Raises ComponentMissing for GIMBAL_LEAD without a gimbal; the other two ask nothing of a chassis alone."""
+        """Set the follow mode. Raises ComponentMissing for GIMBAL_LEAD without a gimbal."""
         if mode is FollowMode.GIMBAL_LEAD or Gimbal in self.robot:
             self.robot[Gimbal].set_mode(mode)
         self._mode = mode
 
     def begin(self) -> None:
-        """Enter SDK mode with everything at its default; not without the robot. Raises Unconnected."""
+        """Enter SDK mode with everything at its default. Raises Unconnected for a lost real robot."""
         self.set_mode(FollowMode.CHASSIS_LEAD)
         self.active = True
         self._name = f"robomaster#{next(self._numbers)}"
@@ -107,7 +107,7 @@ class Context:
             self.origin = self.robot[Odometry].reading.pose
 
     def end(self, reason: str, *, hard: bool = False) -> list[Action]:
-        """Leave SDK mode; returns the actions that were cancelled and may still be braking (``hard``: all they can)."""
+        """Leave SDK mode; return the cancelled actions, which may still be braking (``hard``: at full force)."""
         if not self.active:
             return []
         stopping = [action for action in self.robot.actions.running() if action.source.startswith(f"{self._name} ")]
@@ -128,7 +128,7 @@ class Context:
         return stopping
 
     def moves(self, name: str) -> bool:
-        """Return whether anything runs that ``name`` commanded."""
+        """Return whether an action commanded by ``name`` is running."""
         return any(action.source == f"{self._name} {name}" for action in self.robot.actions.running())
 
     def stop_speaker(self, name: str) -> None:
@@ -138,26 +138,26 @@ class Context:
                 action.cancel("its client is gone", hard=True)
 
     def part(self, kind: type[P]) -> P:
-        """The chapter's own part, made when it is first needed."""
+        """Return the chapter's state, made on first use."""
         if kind not in self._parts:
             self._parts[kind] = kind(self)
         part: P = self._parts[kind]
         return part
 
     def at_end(self, what: str, undo: Callable[[], object]) -> None:
-        """Call ``undo`` when the session ends; once, however often ``what`` is changed."""
+        """Call ``undo`` once at the end of the session, no matter how often ``what`` is changed."""
         self._undo[what] = undo
 
     def join(self, member: Hashable, host: str) -> None:
-        """``member`` uses the session from ``host``: it keeps the session alive and gets the pushes."""
+        """Add ``member`` from ``host``: it keeps the session alive and gets the pushes."""
         self._members[member] = host
 
     def leave(self, member: Hashable) -> None:
-        """``member`` is gone; the last one ends the session."""
+        """Remove ``member``; the last one ends the session."""
         if self._members.pop(member, None) is not None and not self._members:
             self.end("its client is gone", hard=True)
 
     def send(self, datagram: bytes) -> None:
-        """A push to every client's host."""
+        """Send a push to every client's host."""
         for host in set(self._members.values()):
             self.outlets.push(datagram, host)

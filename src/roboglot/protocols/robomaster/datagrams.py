@@ -1,4 +1,4 @@
-"""Outgoing UDP, all from the robot's own address: clients check where a datagram comes from."""
+"""Outgoing UDP, all from the robot's own address: clients check the sender of a datagram."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ class Datagrams:
             raise OSError(error.errno, f"cannot send from {address}: {error.strerror}") from None
 
     def send(self, datagram: bytes, host: str, port: int) -> None:
-        """Send to ``host``; lost without a word when the network doesn't take it, as datagrams are."""
+        """Send to ``host``; silently lost if the network does not take it, like any datagram."""
         try:
             self._socket.sendto(datagram, (host, port))
         except OSError as error:
             log.debug("robomaster: datagram to %s:%d lost: %s", host, port, error)
 
     def close(self) -> None:
-        """Close the socket; nothing can be sent afterwards."""
+        """Close the socket."""
         self._socket.close()
 
 

@@ -47,9 +47,9 @@ KEPT_MAX = 128  # command lines whose meaning is kept
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """The bytes for the client and, if it was refused, why, in plain words for the log.
+    """Bytes for the client and, of a refusal, the reason in plain words for the log.
 
-    ``explain`` is called only when a listener needs it: to look for what was meant takes longer than all the rest.
+    ``explain`` is called only when a listener needs it: the search for the intended command is slow.
     """
 
     reply: bytes
@@ -57,7 +57,7 @@ class Answer:
 
     @property
     def why(self) -> str:
-        """Empty if it was done."""
+        """Reason of a refusal; empty on success."""
         return self.explain() if self.explain else ""
 
 
@@ -70,7 +70,7 @@ class _Asked:
 
 
 class _Refusal(Exception):
-    """Anything that isn't done: the fixed answer, and the reason."""
+    """Refusal: the fixed answer, and the reason."""
 
     def __init__(self, reply: Reply, why: Callable[[], str]) -> None:
         super().__init__(reply)
@@ -79,7 +79,7 @@ class _Refusal(Exception):
 
 
 async def answer(context: Context, text: str | None) -> Answer:
-    """Run one command (None: it was too long to be kept) and word its answer; never raises but when cancelled."""
+    """Run one command (None: too long) and word its answer; raises nothing but cancellation."""
     asked, tap = _Asked(), context.robot.tap
     stand_in = context.robot.stand_in
     result = await (_answered(context, text, asked) if stand_in is None else _stood_in(context, stand_in, text, asked))
@@ -126,7 +126,7 @@ async def _answered(context: Context, text: str | None, asked: _Asked) -> Answer
 
 
 async def _stood_in(context: Context, stand_in: StandIn, text: str | None, asked: _Asked) -> Answer:
-    """Have another answer in the robot's place."""
+    """Let the stand-in answer."""
     seq = None
     try:
         if text is None:
@@ -141,7 +141,7 @@ async def _stood_in(context: Context, stand_in: StandIn, text: str | None, asked
 
 
 async def _ask_stand_in(context: Context, stand_in: StandIn, command: Command, text: str, asked: _Asked) -> Answer:
-    """Return the first answer. Raises _Refusal where there is none."""
+    """Return the stand-in's first answer. Raises _Refusal without one."""
     operation = next((found for key, _ in command.keys if (found := TABLE.get(key))), None)
     asked.key = operation.key if operation else ""
     if context.robot.tap.watched:
@@ -159,13 +159,13 @@ async def _ask_stand_in(context: Context, stand_in: StandIn, command: Command, t
 
 @lru_cache(KEPT_MAX)
 def _parsed(text: str) -> Command:
-    """Take a line apart. Most clients say the same few again and again, so what they mean is kept."""
+    """Parse a line. Clients repeat few lines again and again, so results are cached."""
     return parse(text)
 
 
 @lru_cache(KEPT_MAX)
 def _meant(text: str, active: bool) -> tuple[str, Sequence[str]]:
-    """Return the key of what is meant, in SDK mode or outside of it, and the words left for its parameters."""
+    """Return the key of the command, in SDK mode or outside of it, and the words of its parameters."""
     command = _parsed(text)
     for key, words in command.keys:
         if not active and key not in OUTSIDE_SDK_MODE:
@@ -177,7 +177,7 @@ def _meant(text: str, active: bool) -> tuple[str, Sequence[str]]:
 
 @lru_cache(KEPT_MAX)
 def _checked(text: str, active: bool, as_robots: bool) -> Mapping[str, object]:
-    """Return the handler's parameters; not to be changed."""
+    """Return the handler's parameters; read only, as they are cached."""
     key, words = _meant(text, active)
     shape = shape_of(TABLE[key], as_robots)
     values = _values(key, shape, words)
@@ -194,7 +194,7 @@ def _unknown(command: Command) -> str:
 
 
 def _values(key: str, shape: Shape, words: Sequence[str]) -> dict[str, Value]:
-    """The values by name; a command whose words are missing is answered like an unknown one."""
+    """Return the values by name; a command with missing words is answered like an unknown one."""
     values = shape.values(words)
     if words and not values and key.endswith((" push", " event")):
         raise _Refusal(

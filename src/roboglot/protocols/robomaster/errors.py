@@ -1,4 +1,4 @@
-"""The one place where the model's errors become the EP's answers."""
+"""The one translation of the model's errors to the EP's answers."""
 
 from roboglot.model.errors import RobotError
 from roboglot.wire.robomaster.replies import Reply
@@ -8,5 +8,5 @@ REPLIES: dict[type[RobotError], Reply] = {RobotError: Reply.FAIL}
 
 
 def reply_to(error: RobotError) -> Reply:
-    """The answer for ``error`` or its nearest ancestor in the table."""
+    """Return the answer for ``error`` or its nearest ancestor in the table."""
     return next(REPLIES[kind] for kind in type(error).__mro__ if kind in REPLIES)

@@ -1,4 +1,4 @@
-"""Switches of the events that go out on the event port (manual 3.2.6.3, 3.2.7.1, 3.2.10.4), and their words."""
+"""Switches of the events on the event port (manual 3.2.6.3, 3.2.7.1, 3.2.10.4), and their text."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ CLAPS_MIN = 2  # one bang is not applause
 
 
 class EventSwitches:
-    """Off by default; each one listens only while it is on. Twice on is no matter."""
+    """Switches, off by default; each one listens only while it is on. Idempotent."""
 
     def __init__(self, context: Context) -> None:
         self._context, self._robot = context, context.robot
         self._stops: dict[str, Callable[[], object]] = {}
 
     def armor(self, on: bool) -> None:
-        """``armor event hit``: which plate, and what hit it."""
+        """Switch ``armor event hit``: plate and cause."""
         _ = self._robot[Armor]
         self._switch("armor", on, lambda: self._robot.events.listen(ArmorHit, self._on_hit))
 
     def adapters(self, on: bool) -> None:
-        """``sensor_adapter event io_level``: an input's level changed."""
+        """Switch ``sensor_adapter event io_level``: changed level of an input."""
         _ = self._robot[SensorAdapters]
         self._switch("adapters", on, lambda: self._robot.events.listen(AdapterLevelChanged, self._on_level))
 
     def applause(self, on: bool) -> None:
-        """``sound event applause``: how often hands were clapped in a row."""
+        """Switch ``sound event applause``: number of claps in a row."""
         _ = self._robot[Hearing]
         self._switch("applause", on, self._listen)
 
     def reset(self) -> None:
-        """All off."""
+        """Switch all off."""
         for name in tuple(self._stops):
             self._stops.pop(name)()
 

@@ -19,20 +19,20 @@ EXCLUSIVE_STEP = 0.1  # distance of a suggested number from an excluded bound
 
 
 def nearest_command(command: Command, keys: typing.Iterable[str]) -> str:
-    """The known command most alike, with the words that came behind it, or nothing."""
+    """Return the most similar known command with the given words, or ""."""
     meant = " ".join((*command.words[:2], *((QUERY,) if command.query else ())))
     found = difflib.get_close_matches(meant, tuple(keys), n=1, cutoff=0.6)
     return f"did you mean `{_spelt(found[0], command.words[2:])}`?" if found else ""
 
 
 def _spelt(key: str, words: typing.Iterable[str]) -> str:
-    """The command's text: a query's mark comes last."""
+    """Return the command's text: the mark of a query comes last."""
     name = key.removesuffix(f" {QUERY}")
     return " ".join((name, *words, *((QUERY,) if name != key else ())))
 
 
 def nearest_values(name: str, shape: Shape, values: Mapping[str, Value]) -> str:
-    """Return which values are wrong, what they may be, and the command with the nearest ones that are right."""
+    """Return the wrong values, their valid ranges, and the command with the nearest valid values."""
     wrong: list[str] = []
     better = dict(values)
     for parameter, value in values.items():
@@ -52,7 +52,7 @@ def nearest_values(name: str, shape: Shape, values: Mapping[str, Value]) -> str:
 
 
 def completed(name: str, shape: Shape, values: Mapping[str, Value]) -> str:
-    """The command with something valid for what it lacks: all that it must have, or else the first that it may."""
+    """Return the command completed by valid values: all required ones, or else the first optional one."""
     lacking = [parameter for parameter in shape.required if parameter not in values] or list(shape.kinds)[:1]
     fillers = {parameter: _nearest(_bare(shape.kinds[parameter]), "") for parameter in lacking}
     words = [str(v) if key in shape.bare else f"{key} {v}" for key, v in {**values, **fillers}.items()]
@@ -60,13 +60,13 @@ def completed(name: str, shape: Shape, values: Mapping[str, Value]) -> str:
 
 
 def _only(shape: Shape, parameter: str, value: Value) -> dict[str, Value | None]:
-    """This value with something valid for whatever else is required."""
+    """Return this value together with valid values for other required parameters."""
     fillers = {name: _nearest(_bare(shape.kinds[name]), "") for name in shape.required}
     return fillers | {parameter: value}
 
 
 def _bare(kind: object) -> object:
-    """``kind`` without its ``| None``."""
+    """Return ``kind`` without its ``| None``."""
     if get_origin(kind) in (types.UnionType, typing.Union):
         return next(part for part in get_args(kind) if part is not type(None))
     return kind
@@ -98,7 +98,7 @@ def _worded(kind: Any) -> str:
 
 
 def _nearest(kind: Any, value: Value) -> Value | None:
-    """Return what is valid and nearest to ``value``; None if nothing can be said."""
+    """Return the valid value nearest to ``value``; None if unknown."""
     if choices := _choices(kind):
         if isinstance(value, int | float) and all(isinstance(choice, int) for choice in choices):
             nearest: int = min(choices, key=lambda choice: abs(choice - value))

@@ -1,4 +1,4 @@
-"""Notices within seconds that a peer has vanished without a word."""
+"""Detection, within seconds, of a peer that has vanished silently."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _ENDED = (7, 8)  # of enum tcp_state: TCP_CLOSE, TCP_CLOSE_WAIT
 
 
 def probe_for_life(transport: asyncio.Transport) -> None:
-    """Have the kernel ask a silent peer whether it is still there, and give it up if it isn't."""
+    """Enable the kernel's keep-alive probes: a dead peer is disconnected."""
     connection = transport.get_extra_info("socket")
     if connection is None:
         return  # a serial line, or a tunnel, which monitors its clients itself
@@ -24,7 +24,7 @@ def probe_for_life(transport: asyncio.Transport) -> None:
 
 
 def hung_up(transport: asyncio.Transport) -> bool:
-    """Return whether the peer has ended its side, read or not. False without a connection, and for a closed one."""
+    """Return whether the peer has closed its side, even with unread data. False for a closed or missing connection."""
     connection = transport.get_extra_info("socket")
     if connection is None:
         return bool(transport.get_extra_info("hung_up", False))

@@ -1,4 +1,4 @@
-"""Every bound of this door in one place. Beyond a bound a client is refused or cut off; others don't notice."""
+"""All limits of this door. A client beyond a limit is refused or disconnected, without effect on others."""
 
 CONTROL_CONNECTIONS_MAX = 32
 EVENT_CONNECTIONS_MAX = 32

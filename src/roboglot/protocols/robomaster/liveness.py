@@ -1,4 +1,4 @@
-"""Notices that a driving client has vanished without a word, and stops what it commanded.
+"""Detection of a driving client that has vanished silently; its motions are stopped.
 
 While a client's motion runs, its host is asked ten times and more a second for a sign of life: by echo requests (ICMP)
 where the kernel lets ordinary programs send them, and always by the kernel's own probes of the control connection,
@@ -29,7 +29,7 @@ GREETINGS = 3  # requests sent to a host before its client drives
 
 
 class Echoes:
-    """Asks hosts whether they are there; ``heard`` lists those that answered since the last call."""
+    """Echo requests to hosts; ``heard`` lists those that answered since the last call."""
 
     def __init__(self) -> None:
         self._heard: set[str] = set()
@@ -38,13 +38,13 @@ class Echoes:
             self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK, socket.IPPROTO_ICMP)
 
     def ask(self, host: str) -> None:
-        """Send one request."""
+        """Send one echo request."""
         if self._socket:
             with contextlib.suppress(OSError):
                 self._socket.sendto(_ECHO, (host, 0))
 
     def heard(self) -> set[str]:
-        """Hosts that answered since the last call."""
+        """Return the hosts that answered since the last call."""
         if self._socket:
             with contextlib.suppress(OSError):
                 for _ in range(REPLIES_MAX):
@@ -53,13 +53,13 @@ class Echoes:
         return heard
 
     def close(self) -> None:
-        """No more questions."""
+        """Close the socket."""
         if self._socket:
             self._socket.close()
 
 
 class DrivingClient:
-    """A client at the other end of ``connection`` (None: a line that cannot be asked) and its signs of life."""
+    """A client at the other end of ``connection`` (None: a line that cannot be probed) and its signs of life."""
 
     def __init__(self, name: str, host: str, connection: socket.socket | None) -> None:
         self.name, self.host = name, host
@@ -83,9 +83,9 @@ class DrivingClient:
         return self._greetings > 0
 
     def missing(self, echoed: bool, elapsed: float) -> bool:
-        """Count one look, ``elapsed`` s after the last; True once VIGIL_MISSES_MAX of them had no sign of life.
+        """Count one check, ``elapsed`` s after the last; return True after VIGIL_MISSES_MAX without a sign of life.
 
-        Only what was asked and not answered is a miss: silence alone is none.
+        A miss is an unanswered probe: silence alone is none.
         """
         assert self._connection
         try:
@@ -104,7 +104,7 @@ class DrivingClient:
 
 
 class Vigil:
-    """Looks after all drivers of one robot; ``drives`` says whether one has anything in motion, ``gone`` ends that."""
+    """Watches all drivers of one robot; ``drives``: whether one has a motion under way, ``gone``: stops its motions."""
 
     def __init__(
         self,
@@ -118,13 +118,13 @@ class Vigil:
         self._looked = 0.0
 
     def begin(self) -> None:
-        """A connection is there: look from now on, until none is left."""
+        """Watch from now on, until no connection is left."""
         if self._timer is None:
             self._echoes = self._echoes or Echoes()
             self._plan()
 
     def close(self) -> None:
-        """Look no more."""
+        """Stop watching."""
         if self._timer:
             self._timer.cancel()
             self._timer = None

@@ -1,4 +1,4 @@
-"""The AI chapter: what the robot makes out in its picture, pushed as often as it looks (manual 3.2.15)."""
+"""The AI chapter: recognition in the camera's pictures, pushed at its own rate (manual 3.2.15)."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Ai:
         self.marker_distance = 0.0  # m; closer markers do not count
 
     def switch(self, wanted: dict[str, bool]) -> None:
-        """All of it or nothing. Raises Refused if two of a group would be on, ComponentMissing without vision."""
+        """Switch kinds, all or nothing. Raises Refused for two of a group, ComponentMissing without vision."""
         after = {name for name in WORDED if wanted.get(name, name in self._open)}
         for group in GROUPS:
             if len(rivals := [name for name in group if name in after]) > 1:
@@ -58,7 +58,7 @@ class Ai:
             self.reset()
 
     def reset(self) -> None:
-        """Look at nothing; colours and distance stay until the session ends."""
+        """Switch everything off; colours and distance stay until the session ends."""
         if self._task:
             self._task.cancel()
             self._task = None
@@ -83,25 +83,25 @@ class Ai:
                     self._context.send(profile.push("AI", attribute))
 
     def _numbers(self, name: str, seen: Sequence[object]) -> Numbers:
-        """Return how many, then the numbers of each."""
+        """Return the count, then the numbers of each."""
         targets = [target for target in (WORDED[name](self, each) for each in seen) if target is not None]
         kept = targets[:TARGETS_MAX]
         return (len(kept), *(number for target in kept for number in target))
 
     def gesture(self, seen: GestureSeen) -> Numbers | None:
-        """Only three of them have numbers."""
+        """Return the numbers of a gesture; None for those without."""
         info = GESTURES.get(seen.gesture)
         return None if info is None else (info, *_box(seen.box))
 
     def marker(self, seen: MarkerSeen) -> Numbers | None:
-        """Return whether a marker has the colour asked for and is not too near."""
+        """Return the numbers of a marker; None if filtered out by colour or distance."""
         info = MARKERS.get(seen.symbol)
         if info is None or seen.colour != self.marker_colour or seen.distance < self.marker_distance:
             return None
         return (info, *_box(seen.box))
 
     def line(self, seen: LineSeen) -> Numbers | None:
-        """Ten points of x, y, tangent in degrees, curvature 0 to 10."""
+        """Return ten points of x, y, tangent in degrees, curvature 0 to 10."""
         if self.line_colour not in (None, seen.colour):
             return None
         return tuple(
@@ -147,7 +147,7 @@ async def set_attribute(
     marker_color: MarkerColour | None = None,
     marker_dist: MarkerDistance | None = None,
 ) -> None:
-    """Choose the lines and markers that count: colour, and from how many m on (3.2.15.1)."""
+    """Filter lines and markers by colour, and markers by distance, m (3.2.15.1)."""
     _ = context.robot[Vision]
     ai = context.part(Ai)
     ai.line_colour = line_color or ai.line_colour
@@ -169,7 +169,7 @@ async def push(
 ) -> None:
     """Switch kinds on and off: one of person, gesture, marker, robot, and line beside it (3.2.15.2).
 
-    people and pose are robots' words for person and gesture. All is done or, if two exclude each other, nothing.
+    people and pose are real robots' words for person and gesture. All or nothing, as some exclude each other.
     """
     words = {"person": person or people, "gesture": gesture or pose, "marker": marker, "robot": robot, "line": line}
     if {person, people} == {"on", "off"} or {gesture, pose} == {"on", "off"}:

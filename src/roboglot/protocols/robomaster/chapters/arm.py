@@ -1,6 +1,6 @@
 """The robotic arm chapter (manual 3.2.13).
 
-Text and robots measure differently: the text in cm from where the arm was at power-on, robots in mm from the shoulder.
+The manual measures in cm from the position at power-on, real robots in mm from the shoulder.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ CENTIMETRE, MILLIMETRE = 0.01, 0.001
 
 
 def _scale(context: Context) -> tuple[float, ArmPosition]:
-    """Metres per unit, and the origin."""
+    """Return metres per unit, and the origin."""
     if context.profile.as_robots:
         return MILLIMETRE, ArmPosition()
     return CENTIMETRE, context.robot[Arm].home  # its position at power-on
@@ -64,19 +64,19 @@ async def move_to(context: Context, *, x: ArmDistance, y: ArmDistance, wait_for_
 
 @TABLE.on("robotic_arm recenter", right=Right.DRIVE, needs=(Arm,))
 async def recenter(context: Context, *, wait_for_complete: bool = False) -> None:
-    """Back to where it was at power-on (3.2.13.3)."""
+    """Return to the position at power-on (3.2.13.3)."""
     await _finish(context, context.robot[Arm].recenter(source=context.source), wait_for_complete)
 
 
 @TABLE.on("robotic_arm stop", right=Right.DRIVE, needs=(Arm,))
 async def stop(context: Context) -> None:
-    """Stay where it is (3.2.13.4)."""
+    """Stop and hold the position (3.2.13.4)."""
     context.robot[Arm].stop()
 
 
 @TABLE.on("robotic_arm position ?", right=Right.SEE, needs=(Arm,))
 async def get_position(context: Context) -> tuple[float | int, ...]:
-    """x y of the end point (3.2.13.5); whole mm from robots."""
+    """Return x y of the end point (3.2.13.5); real robots: whole mm."""
     unit, origin = _scale(context)
     now = context.robot[Arm].position
     x, y = (now.x - origin.x) / unit, (now.z - origin.z) / unit

@@ -14,7 +14,7 @@ SENSITIVITY = 5  # the default, restored when the session ends
 
 @TABLE.on("armor sensitivity", right=Right.DRIVE, needs=(Armor,))
 async def set_sensitivity(context: Context, value: Sensitivity) -> None:
-    """Set the sensitivity to blows: 1 hard ones only, 10 every touch (3.2.6.1)."""
+    """Set the sensitivity: 1 hard hits only, 10 every touch (3.2.6.1)."""
     armor = context.robot[Armor]
     armor.set_sensitivity(value)
     context.at_end("armor sensitivity", lambda: armor.set_sensitivity(SENSITIVITY))
@@ -22,11 +22,11 @@ async def set_sensitivity(context: Context, value: Sensitivity) -> None:
 
 @TABLE.on("armor sensitivity ?", right=Right.SEE, needs=(Armor,))
 async def get_sensitivity(context: Context) -> tuple[int, ...]:
-    """The same, asked (3.2.6.2)."""
+    """Return the sensitivity (3.2.6.2)."""
     return (context.robot[Armor].sensitivity,)
 
 
 @TABLE.on("armor event", right=Right.SEE, needs=(Armor,))
 async def switch_events(context: Context, *, hit: OnOff) -> None:
-    """Tell hits on the event port, or stop (3.2.6.3)."""
+    """Switch reports of hits on the event port (3.2.6.3)."""
     context.part(EventSwitches).armor(hit == "on")

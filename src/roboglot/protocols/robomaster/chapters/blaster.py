@@ -19,13 +19,13 @@ async def set_beads(context: Context, num: Beads) -> None:
 
 @TABLE.on("blaster bead ?", right=Right.SEE, needs=(Blaster,))
 async def get_beads(context: Context) -> tuple[int, ...]:
-    """The same, asked (3.2.5.3)."""
+    """Return the number of beads that a shot fires (3.2.5.3)."""
     return (context.robot[Blaster].beads,)
 
 
 @TABLE.on("blaster fire", right=Right.DRIVE, needs=(Blaster,))
 async def fire(context: Context) -> None:
-    """Fire a shot, one bead after the other; `fail` with an empty magazine or during a shot (3.2.5.2)."""
+    """Fire a shot, bead by bead; `fail` with an empty magazine or during a shot (3.2.5.2)."""
     blaster = context.robot[Blaster]
     blaster.fire()
     context.at_end("blaster fire", blaster.cease)

@@ -20,25 +20,25 @@ async def expose(context: Context, ev_level: Exposure) -> None:
 
 @TABLE.on("stream on", right=Right.SEE)
 async def stream_on(context: Context) -> None:
-    """Let the video port send H.264 to all who are connected (3.2.17.1); twice is no matter."""
+    """Start H.264 to all clients of the video port (3.2.17.1); no effect if started."""
     context.outlets.video.switch(True)
     context.at_end("stream", lambda: context.outlets.video.switch(False))
 
 
 @TABLE.on("stream off", right=Right.SEE)
 async def stream_off(context: Context) -> None:
-    """Stop it; connections stay (3.2.17.2)."""
+    """Stop the video; connections stay open (3.2.17.2)."""
     context.outlets.video.switch(False)
 
 
 @TABLE.on("audio on", right=Right.SEE)
 async def audio_on(context: Context) -> None:
-    """Let the audio port send Opus to all who are connected (3.2.18.1); twice is no matter."""
+    """Start Opus to all clients of the audio port (3.2.18.1); no effect if started."""
     context.outlets.audio.switch(True)
     context.at_end("audio", lambda: context.outlets.audio.switch(False))
 
 
 @TABLE.on("audio off", right=Right.SEE)
 async def audio_off(context: Context) -> None:
-    """Stop it; connections stay (3.2.18.2)."""
+    """Stop the audio; connections stay open (3.2.18.2)."""
     context.outlets.audio.switch(False)

@@ -1,4 +1,4 @@
-"""The chassis chapter: speeds, wheels, moves, queries and what to push (manual 3.2.3)."""
+"""The chassis chapter: speeds, wheels, moves, queries and pushes (manual 3.2.3)."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ LET_GO_AFTER = 0.5  # s for which a stop command keeps the base, so that a joyst
 
 
 def _drive(context: Context, command: Twist | WheelSpeeds) -> None:
-    """Keep ``command`` until another comes, the session ends or another door takes over."""
+    """Drive at ``command`` until the next one, the end of the session or a command of another door."""
     still = command in (STILL, WheelSpeeds())
     context.robot[Driving].drive(command, lifetime=LET_GO_AFTER if still else None, source=context.source)
 
@@ -43,7 +43,7 @@ def _drive(context: Context, command: Twist | WheelSpeeds) -> None:
 async def set_speed(context: Context, *, x: SpeedXY = 0.0, y: SpeedXY = 0.0, z: SpeedZ = 0.0) -> None:
     """Drive at x, y m/s and z degrees/s until the next command; a missing axis is 0 (3.2.3.1).
 
-    In gimbal_lead z is ignored: the chassis turns after the gimbal.
+    In gimbal_lead z is ignored: the chassis follows the gimbal.
     """
     _drive(context, twist_of(x, y, 0.0 if context.mode is FollowMode.GIMBAL_LEAD else z))
 
@@ -52,9 +52,9 @@ async def set_speed(context: Context, *, x: SpeedXY = 0.0, y: SpeedXY = 0.0, z: 
 async def set_wheels(
     context: Context, *, w1: WheelSpeed = 0.0, w2: WheelSpeed = 0.0, w3: WheelSpeed = 0.0, w4: WheelSpeed = 0.0
 ) -> None:
-    """Turn the wheels (front right, front left, rear right, rear left) at so many rpm (3.2.3.2).
+    """Turn the wheels (front right, front left, rear right, rear left) at these rpm (3.2.3.2).
 
-    In gimbal_lead without what would turn the chassis; robots refuse it then.
+    In gimbal_lead the turning component is removed; real robots refuse the command then.
     """
     as_robots = context.profile.as_robots
     speeds = wheels_of(round(w1), round(w2), round(w3), round(w4), as_robots)
@@ -76,7 +76,7 @@ async def move(
     vz: TopSpeedZ = 30.0,
     wait_for_complete: bool = False,
 ) -> None:
-    """Move by x, y m and z degrees; answers at once, or with ``wait_for_complete true`` at the end (3.2.3.3)."""
+    """Move by x, y m and z degrees; answers at once, or at the end if ``wait_for_complete`` is true (3.2.3.3)."""
     turn = 0.0 if context.mode is FollowMode.GIMBAL_LEAD else z  # there the chassis follows the gimbal
     action = context.robot[Driving].move_by(
         offset_of(x, y, turn), speed=vxy, yaw_speed=math.radians(vz), source=context.source
@@ -87,31 +87,31 @@ async def move(
 
 @TABLE.on("chassis stop", right=Right.DRIVE, needs=(Driving,))
 async def stop(context: Context) -> None:
-    """Stand still; in no manual, but real robots and their users know it."""
+    """Stop; in no manual, but real robots and their users know it."""
     _drive(context, STILL)
 
 
 @TABLE.on("chassis speed ?", right=Right.SEE, needs=(Base, Odometry))
 async def get_speed(context: Context) -> tuple[float | int, ...]:
-    """x y m/s, z degrees/s and four wheels in rpm (3.2.3.4)."""
+    """Return x y m/s, z degrees/s and four wheels in rpm (3.2.3.4)."""
     return readings.speed(context)
 
 
 @TABLE.on("chassis position ?", right=Right.SEE, needs=(Odometry,))
 async def get_position(context: Context) -> tuple[float, ...]:
-    """x y m and z degrees since power-on (3.2.3.5)."""
+    """Return x y m and z degrees since power-on (3.2.3.5)."""
     return readings.position(context)
 
 
 @TABLE.on("chassis attitude ?", right=Right.SEE, needs=(Imu,))
 async def get_attitude(context: Context) -> tuple[float, ...]:
-    """pitch roll yaw in degrees (3.2.3.6)."""
+    """Return pitch roll yaw in degrees (3.2.3.6)."""
     return readings.attitude(context.robot)
 
 
 @TABLE.on("chassis status ?", right=Right.SEE, needs=(MotionStatus,))
 async def get_status(context: Context) -> tuple[int, ...]:
-    """Eleven flags of 0 or 1 (3.2.3.7)."""
+    """Return eleven flags of 0 or 1 (3.2.3.7)."""
     return readings.status(context.robot)
 
 

@@ -1,4 +1,4 @@
-"""Keyboard and mouse of the pilot, as the competition system passes them on (manual 3.2.20)."""
+"""The pilot's keyboard and mouse, as the competition system passes them on (manual 3.2.20)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ KEYS = {"space": 8, "tab": 9, "shift": 16, "ctrl": 17, "alt": 18, "caps": 20}
 
 
 def numbers(state: Input, seq: int) -> list[int]:
-    """cmd_id, count of what follows, buttons, mouse x and y in [-100, 100], seq, count of keys, keys."""
+    """Return cmd_id, number of values that follow, buttons, mouse x and y in [-100, 100], seq, number of keys, keys."""
     keys = [KEYS.get(key) or ord(key.upper()) for key in state.keys[:KEYS_MAX]]
     x, y = round(state.x * 100), round(state.y * 100)
     data = [sum(BUTTONS[button] for button in state.buttons), x, y, seq, len(keys), *keys]
@@ -27,7 +27,7 @@ def numbers(state: Input, seq: int) -> list[int]:
 
 
 class GamePushes:
-    """Sends what the pilot does while it is on."""
+    """Pushes of the pilot's input while switched on."""
 
     def __init__(self, context: Context) -> None:
         self._context, self._robot = context, context.robot
@@ -36,7 +36,7 @@ class GamePushes:
         self._deafen: Callable[[], None] | None = None
 
     def switch(self, on: bool) -> None:
-        """Twice is no matter. Raises ComponentMissing if the robot has no pilot's keyboard."""
+        """Switch the pushes; idempotent. Raises ComponentMissing for a robot without a pilot's keyboard."""
         if on and self._task is None:
             self._deafen = self._robot[InputDevice].listen(self._send)
             self._task = asyncio.get_running_loop().create_task(self._beat(), name="push game msg")
@@ -47,7 +47,7 @@ class GamePushes:
                 self._deafen()
 
     def reset(self) -> None:
-        """Off."""
+        """Switch off."""
         self.switch(False)
 
     def _send(self, state: Input) -> None:
@@ -67,5 +67,5 @@ async def game_on(context: Context) -> None:
 
 @TABLE.on("game_msg off", right=Right.SEE)
 async def game_off(context: Context) -> None:
-    """No more (3.2.20.2)."""
+    """Stop pushing keys and mouse (3.2.20.2)."""
     context.part(GamePushes).switch(False)

@@ -1,6 +1,6 @@
 """The gimbal chapter (manual 3.2.4). Pitch is positive upwards, yaw to the right; angles in degrees.
 
-Pitch is measured against the horizon, yaw is the joint's angle to the chassis, whose travel the manual's range is.
+Pitch is relative to the horizon; yaw is the joint's angle to the chassis, whose travel is the manual's range.
 """
 
 from __future__ import annotations
@@ -49,9 +49,9 @@ async def move(
     vy: GimbalTopSpeed = 30.0,
     wait_for_complete: bool = True,
 ) -> None:
-    """Turn by p and y from where it is, at up to vp and vy degrees/s (3.2.4.2).
+    """Turn by p and y degrees, at up to vp and vy degrees/s (3.2.4.2).
 
-    Answers at the end unless ``wait_for_complete`` is false, as robots do. In chassis_lead y does nothing.
+    Answers at the end unless ``wait_for_complete`` is false, as real robots do. In chassis_lead y has no effect.
     """
     turn = 0.0 if context.mode is FollowMode.CHASSIS_LEAD else y
     action = context.robot[Gimbal].move_by(
@@ -74,7 +74,7 @@ async def move_to(
     vy: GimbalTopSpeed = 30.0,
     wait_for_complete: bool = True,
 ) -> None:
-    """Turn to p against the horizon and y against the chassis (3.2.4.3); the rest as ``gimbal move``."""
+    """Turn to p relative to the horizon and y relative to the chassis (3.2.4.3); otherwise as ``gimbal move``."""
     gimbal = context.robot[Gimbal]
     pitch = None if p is None else -math.radians(p)
     yaw = None if y is None or context.mode is FollowMode.CHASSIS_LEAD else -math.radians(y)
@@ -101,7 +101,7 @@ async def recenter(context: Context, *, wait_for_complete: bool = True) -> None:
 
 @TABLE.on("gimbal stop", right=Right.DRIVE, needs=(Gimbal,))
 async def stop(context: Context) -> None:
-    """Hold where it is; in no manual, but real robots know it."""
+    """Stop and hold the angles; in no manual, but real robots know it."""
     context.robot[Gimbal].set_speed(0.0, 0.0, source=context.source)
 
 
@@ -115,13 +115,13 @@ async def suspend(context: Context) -> None:
 
 @TABLE.on("gimbal resume", right=Right.DRIVE, needs=(Gimbal,))
 async def resume(context: Context) -> None:
-    """Wake it (3.2.4.5)."""
+    """Power the motors again (3.2.4.5)."""
     context.robot[Gimbal].resume()
 
 
 @TABLE.on("gimbal attitude ?", right=Right.SEE, needs=(Gimbal,))
 async def get_attitude(context: Context) -> tuple[float, ...]:
-    """pitch yaw, in the same frame as ``gimbal moveto`` (3.2.4.7)."""
+    """Return pitch yaw, in the frame of ``gimbal moveto`` (3.2.4.7)."""
     return readings.gimbal_attitude(context.robot)
 
 
@@ -129,7 +129,7 @@ async def get_attitude(context: Context) -> tuple[float, ...]:
 async def push(
     context: Context, *, attitude: Switch | None = None, afreq: Rate | None = None, freq: Rate | None = None
 ) -> None:
-    """Push the attitude or stop it, at afreq Hz (3.2.4.8); rates without the attribute and its switch are refused."""
+    """Switch pushes of the attitude, at afreq Hz (3.2.4.8); rates without the attribute's switch are refused."""
     _ = context.robot[Gimbal]
     if not attitude:
         raise InvalidGoal("say which attribute, and on or off: `gimbal push attitude on afreq 10`")
@@ -137,12 +137,12 @@ async def push(
 
 
 def _near(goal: float | None, now: float) -> bool:
-    """Return whether an axis has nowhere to go; then it needs no speed either."""
+    """Return whether an axis is at its goal already, and so needs no speed."""
     return goal is not None and abs(goal - now) <= THERE
 
 
 def _top(name: str, speed: float) -> float:
-    """rad/s."""
+    """Return a top speed in rad/s. Raises InvalidGoal for 0."""
     if not speed:
         raise InvalidGoal(f"with {name} 0 it never gets there; did you mean `{name} 30`?")
     return math.radians(speed)

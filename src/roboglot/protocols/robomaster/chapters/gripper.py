@@ -12,7 +12,7 @@ from roboglot.protocols.robomaster.vocabulary import GRIPPER, GRIPPER_OF_ROBOTS
 
 @TABLE.on("robotic_gripper open", right=Right.DRIVE, needs=(Gripper,))
 async def open_(context: Context, level: Level = 1) -> None:
-    """Open the jaws; ``open 1``, ``open leve 1`` and ``open level 1`` are the same (3.2.14.1). Answers at once."""
+    """Open the jaws; ``open 1``, ``open leve 1`` and ``open level 1`` are equivalent (3.2.14.1). Answers at once."""
     context.robot[Gripper].open(level, source=context.source)
 
 
@@ -24,11 +24,11 @@ async def close(context: Context, level: Level = 1) -> None:
 
 @TABLE.on("robotic_gripper stop", right=Right.DRIVE, needs=(Gripper,))
 async def stop(context: Context) -> None:
-    """Keep the jaws where they are; in no manual, but robots know it."""
+    """Stop the jaws; in no manual, but real robots know it."""
     context.robot[Gripper].stop()
 
 
 @TABLE.on("robotic_gripper status ?", right=Right.SEE, needs=(Gripper,))
 async def get_status(context: Context) -> tuple[int, ...]:
-    """0 closed, 1 between, 2 open (3.2.14.3); robots count 0 between, 1 open, 2 closed."""
+    """Return 0 closed, 1 between, 2 open (3.2.14.3); real robots: 0 between, 1 open, 2 closed."""
     return ((GRIPPER_OF_ROBOTS if context.profile.as_robots else GRIPPER)[context.robot[Gripper].status],)

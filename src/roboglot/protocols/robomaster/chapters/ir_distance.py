@@ -14,7 +14,7 @@ from roboglot.protocols.robomaster.table import TABLE
 
 @TABLE.on("ir_distance_sensor measure", right=Right.SEE, needs=(RangeSensors,))
 async def measure(context: Context, switch: OnOff) -> None:
-    """Switch all sensors (3.2.11.1); off again when the session ends."""
+    """Switch all sensors (3.2.11.1); off at the end of the session."""
     sensors = context.robot[RangeSensors]
     sensors.measure(switch == "on")
     context.at_end("ir measure", lambda: sensors.measure(False))
@@ -22,9 +22,9 @@ async def measure(context: Context, switch: OnOff) -> None:
 
 @TABLE.on("ir_distance_sensor distance ?", right=Right.SEE, needs=(RangeSensors,))
 async def get_distance(context: Context, id: RangeSensorId) -> tuple[float, ...]:
-    """mm to what sensor id (front, left, rear, right) sees (3.2.11.2); robots tell cm.
+    """Return the distance at sensor id (front, left, rear, right), mm (3.2.11.2); real robots: cm.
 
-    0 while nothing is measured, the end of the sensor's range when nothing is within it.
+    0 while switched off; the end of the sensor's range if nothing is within it.
     """
     sensors = context.robot[RangeSensors]
     if id > len(sensors.names):

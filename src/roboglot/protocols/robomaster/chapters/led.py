@@ -25,8 +25,8 @@ async def control(
 ) -> None:
     """Light the lamps of comp (several joined by ``|``) in a colour with an effect (3.2.9.1).
 
-    scrolling goes to the gimbal's rings only, and fails where none is meant. blink_freq (Hz) and single_led_index (one
-    lamp of a ring, solid or off) are in no manual.
+    scrolling applies to the gimbal's rings only, and fails without one. blink_freq (Hz) and single_led_index (one lamp
+    of a ring, solid or off) are in no manual.
     """
     light, kind = context.robot[Light], EFFECTS[effect]
     zones = [zone for zone in _zones(comp, light) if zone in light.zones]
@@ -42,7 +42,7 @@ async def control(
 
 
 def _zones(comp: str, light: Light) -> dict[str, None]:
-    """The zones meant, each once; ``all`` are those that the robot has, whatever it is."""
+    """Return the named zones, each once; ``all``: all zones that the robot has."""
     if strangers := [name for name in comp.split("|") if name not in ZONES]:
         raise InvalidGoal(f"comp is one of {', '.join(ZONES)}, not {strangers[0]!r}")
     names = comp.split("|")

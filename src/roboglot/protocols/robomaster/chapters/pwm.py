@@ -12,7 +12,7 @@ ROBOTS_DUTY = 0.075  # the robot's outputs after a session
 
 
 def _ports(context: Context, mask: int) -> list[int]:
-    """The outputs that the mask names: bit n-1 is output n; bits without an output are ignored."""
+    """Return the outputs of a mask: bit n-1 is output n; bits without an output are ignored."""
     pwm = context.robot[PwmPorts]
     context.at_end("pwm", lambda: _restore(context))
     return [number for number in range(1, pwm.count + 1) if mask >> (number - 1) & 1]
@@ -27,13 +27,13 @@ def _restore(context: Context) -> None:
 
 @TABLE.on("pwm value", right=Right.DRIVE, needs=(PwmPorts,))
 async def set_value(context: Context, port: PortMask, data: Percent) -> None:
-    """Duty of the masked outputs in percent: ``pwm value 1 50``, or by name as robots have it (3.2.8.1)."""
+    """Set the duty of the masked outputs, percent: ``pwm value 1 50``, or by name as on real robots (3.2.8.1)."""
     for number in _ports(context, port):
         context.robot[PwmPorts].set_duty(number, data / 100)
 
 
 @TABLE.on("pwm freq", right=Right.DRIVE, needs=(PwmPorts,))
 async def set_frequency(context: Context, port: PortMask, data: Hertz) -> None:
-    """Frequency of the masked outputs in Hz (3.2.8.2)."""
+    """Set the frequency of the masked outputs, Hz (3.2.8.2)."""
     for number in _ports(context, port):
         context.robot[PwmPorts].set_frequency(number, float(data))

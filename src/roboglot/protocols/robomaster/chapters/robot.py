@@ -12,21 +12,21 @@ from roboglot.protocols.robomaster.table import TABLE
 
 @TABLE.on("robot mode", right=Right.DRIVE)
 async def set_mode(context: Context, mode: FollowMode) -> None:
-    """Choose who follows whom in yaw (3.2.2.1).
+    """Set the coupling of gimbal and chassis in yaw (3.2.2.1).
 
-    Without a gimbal the chassis turns by itself in chassis_lead and in free, which is what both ask for.
+    Without a gimbal the chassis turns by itself in chassis_lead and in free.
     """
     context.set_mode(mode)
 
 
 @TABLE.on("robot mode ?", right=Right.SEE)
 async def get_mode(context: Context) -> tuple[str, ...]:
-    """The motion mode (3.2.2.2)."""
+    """Return the motion mode (3.2.2.2)."""
     return (context.mode,)
 
 
 @TABLE.on("robot battery ?", right=Right.SEE, needs=(Battery,))
 async def battery(context: Context) -> tuple[int, ...]:
-    """Charge left in whole percent, 1 to 100 (3.2.2.3)."""
+    """Return the charge in whole percent, 1 to 100 (3.2.2.3)."""
     require_heard(context.robot)
     return (min(100, max(1, round(context.robot[Battery].state.percentage * 100))),)

@@ -24,7 +24,7 @@ async def command(context: Context) -> Reply | None:
 
 @TABLE.on("quit", right=Right.DRIVE)
 async def quit_(context: Context) -> Reply | None:
-    """Leave SDK mode, stop and reset everything; answers when the robot stands (3.2.1.2)."""
+    """Leave SDK mode, stop and reset everything; answers once the robot stands (3.2.1.2)."""
     if not context.active:
         return Reply.QUIT_FAILED
     for action in context.end("quit"):
@@ -34,5 +34,5 @@ async def quit_(context: Context) -> Reply | None:
 
 @TABLE.on("version", "version ?", right=Right.SEE)
 async def version(context: Context) -> str:
-    """The version of the text SDK: ``version 00.00.00.70``."""
+    """Return the version of the text SDK: ``version 00.00.00.70``."""
     return f"version {context.profile.version}"

@@ -22,7 +22,7 @@ async def set_angle(context: Context, *, id: ServoId, angle: ServoAngle, wait_fo
 
 @TABLE.on("servo recenter", right=Right.DRIVE, needs=(Servos,))
 async def recenter(context: Context, *, id: ServoId, wait_for_complete: bool = False) -> None:
-    """Turn a servo to 0; in no manual, but robots know it."""
+    """Turn a servo to 0; in no manual, but real robots know it."""
     await set_angle(context, id=id, angle=0.0, wait_for_complete=wait_for_complete)
 
 

@@ -12,5 +12,5 @@ from roboglot.protocols.robomaster.table import TABLE
 
 @TABLE.on("sound event", right=Right.SEE, needs=(Hearing,))
 async def switch_events(context: Context, *, applause: OnOff) -> None:
-    """Tell applause on the event port, or stop (3.2.7.1)."""
+    """Switch reports of applause on the event port (3.2.7.1)."""
     context.part(EventSwitches).applause(applause == "on")
