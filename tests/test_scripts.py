@@ -108,7 +108,7 @@ def open_file(url: str, **_: object) -> BinaryIO:
 
 
 @pytest.mark.parametrize("words", [[], ["nonsense"], ["run", "dev"]])
-def test_wrong_usage_of_the_set_up_is_answered_so(words: list[str]) -> None:
+def test_wrong_usage_of_set_up_ends_with_2(words: list[str]) -> None:
     script = Path(bootstrap.__file__)
     done = subprocess.run([sys.executable, script, *words], capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stdout) == (2, "")

@@ -40,8 +40,8 @@ def guard_of(runtime: Runtime):
     return runtime.guard
 
 
-async def status(auth: object = None, **headers: str) -> int:
-    async with httpx.AsyncClient(base_url=REST, auth=auth, headers=headers) as client:  # type: ignore[arg-type]
+async def status(auth: httpx.Auth | tuple[str, str] | None = None, **headers: str) -> int:
+    async with httpx.AsyncClient(base_url=REST, auth=auth, headers=headers) as client:
         return (await client.get(POSE)).status_code
 
 
@@ -164,7 +164,7 @@ async def test_another_program_revokes_within_a_second(runtime: Runtime, data: P
     assert await open_frames(CALLERS[1].address) is None
 
 
-def test_a_change_is_found_at_the_next_look(data: Path) -> None:
+def test_a_change_is_found_at_the_next_look(data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Counts looks instead of seconds: the one after a change finds it, and two are less than a second apart."""
     guard, other = Guard(data, AccessConfig(on=True), {}), open_store(data)
     looks: list[float] = []
@@ -185,7 +185,7 @@ def test_a_change_is_found_at_the_next_look(data: Path) -> None:
             found_at.append(len(looks))
             reload()
 
-    guard._ended = Ended()  # type: ignore[assignment]
+    monkeypatch.setattr(guard, "_ended", Ended())
     loop: Any = Loop()
     guard._follow(loop)
     assert found_at == [3]

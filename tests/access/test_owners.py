@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import pytest
+
 from roboglot.access.store import AccessStore
 from roboglot.clients.visual import TextLink
 from roboglot.model.client_context import identity
 from roboglot.model.clock import LockstepClock
+from roboglot.operations import Right
 from roboglot.runtime import Runtime
 from tests.access.matrix import CALLERS, frame_states, open_frames
 
@@ -22,7 +25,9 @@ async def each_minute(link: TextLink) -> None:
     assert [state for state, _ in states] == [0, 0], states
 
 
-async def test_task_has_its_owners_rights_until_they_end(runtime: Runtime, store: AccessStore) -> None:
+async def test_task_has_its_owners_rights_until_they_end(
+    runtime: Runtime, store: AccessStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
     clock, robot = runtime.clock, runtime.fleet.robots["a"]
     assert isinstance(clock, LockstepClock)
     link = await open_frames(OWNER.address)
@@ -35,11 +40,11 @@ async def test_task_has_its_owners_rights_until_they_end(runtime: Runtime, store
     asked: list[str] = []
     check = robot.admission.check
 
-    def note(door: str, operation: str, right: object) -> None:
+    def note(door: str, operation: str, right: Right) -> None:
         asked.append(identity())
-        check(door, operation, right)  # type: ignore[arg-type]
+        check(door, operation, right)
 
-    robot.admission.check = note  # type: ignore[method-assign]
+    monkeypatch.setattr(robot.admission, "check", note)
     while not asked:
         await clock.advance(1.0)
     assert set(asked) == {OWNER.address}

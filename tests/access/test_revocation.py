@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import asynccontextmanager
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from pathlib import Path
 
 import grpc
@@ -132,11 +132,14 @@ async def hold(page: ClientConnection) -> None:
 
 @pytest.mark.parametrize("way", [by_rest, by_text, by_gait, by_program, by_hand])
 async def test_what_a_revoked_client_does_stops(
-    way: Callable[[Runtime, Path], object], runtime: Runtime, store: AccessStore, data: Path
+    way: Callable[[Runtime, Path], AbstractAsyncContextManager[tuple[str, Gone]]],
+    runtime: Runtime,
+    store: AccessStore,
+    data: Path,
 ) -> None:
     clock, robot = runtime.clock, runtime.fleet.robots["a"]
     assert isinstance(clock, LockstepClock)
-    async with way(runtime, data) as (who, gone), asyncio.timeout(60.0):  # type: ignore[attr-defined]
+    async with way(runtime, data) as (who, gone), asyncio.timeout(60.0):
         while not any(action.identity == who for action in robot.actions.running()):
             await clock.advance(0.05)
             await asyncio.sleep(0.005)

@@ -16,9 +16,11 @@ from roboglot.model.components.motion.stair_alignment import AlignmentStage, Sta
 from roboglot.model.errors import EmergencyStopped, Expired, NotFound, Refused
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
+from roboglot.simulation.components.motion.base import SimulatedBase
 from roboglot.simulation.world.world import RobotPlacement, World
 from roboglot.simulation.world.world_files import load_world
 from roboglot.testing import assert_pose
+from tests.narrowing import of_kind
 
 FOOT, TOP, MIDDLE = 4.0, 4.9, 4.0  # m: x of the first riser and of the landing's edge, y of the flight's middle
 BEFORE = 0.55  # m from base_link to the edge
@@ -257,7 +259,7 @@ async def test_who_lies_gets_up_first(stand: Make) -> None:
 async def test_base_that_would_not_drive_refuses_at_once(stand: Make) -> None:
     dog = await stand()
     await dog.put(0.7, 10.0, 0.0)
-    dog.robot[Base].locks.lock("test", "a cable")  # type: ignore[attr-defined]
+    of_kind(dog.robot[Base], SimulatedBase).locks.lock("test", "a cable")
     with pytest.raises(Refused):
         dog.alignment.align(UP)
 

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 from typing import Any
 from urllib.request import urlopen
 
+import av
 import numpy as np
 import pytest
 from aiortc import RTCConfiguration, RTCPeerConnection, RTCSessionDescription
@@ -18,6 +19,7 @@ from roboglot.model.components.interaction.speaker import Speaker
 from roboglot.model.sound import SAMPLE_RATE, Sound
 from roboglot.wire.ice import offer_loopback
 from tests.console.conftest import Shown
+from tests.narrowing import of_kind
 
 PITCH = 1000  # Hz
 
@@ -57,7 +59,7 @@ async def test_a_page_hears_what_the_robot_hears(shown: Shown) -> None:
         async with asyncio.timeout(60):
             while abs(heard - PITCH) > PITCH / 20:
                 frame = await receiver.track.recv()
-                heard = pitch_of(frame.to_ndarray().reshape(-1, 2)[:, 0].astype(float))  # type: ignore[union-attr]
+                heard = pitch_of(of_kind(frame, av.AudioFrame).to_ndarray().reshape(-1, 2)[:, 0].astype(float))
     finally:
         passing.cancel()
         await peer.close()

@@ -61,9 +61,11 @@ async def run(code: str, clock: LockstepClock, **names: Any) -> None:
 async def test_cameras_and_sounds(
     robot: Robot, world: World, clock: LockstepClock, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    names = {kind.__name__: kind for kind in (Camera, VideoStream, Recorder, AudioStream, Speaker, Point)}
+    names: dict[str, object] = {
+        kind.__name__: kind for kind in (Camera, VideoStream, Recorder, AudioStream, Speaker, Point)
+    }
     monkeypatch.chdir(tmp_path)
-    names |= {"claps": claps, "Path": Path}  # type: ignore[dict-item]
+    names |= {"claps": claps, "Path": Path}
     await run(snippet("worlds/camera.md", "capture()"), clock, robot=robot, world=world, **names)
     assert (tmp_path / "tour.mp4").exists()
 
@@ -76,7 +78,7 @@ async def test_what_robots_see(robot: Robot, clock: LockstepClock) -> None:
 
 @pytest.mark.world("playground")
 async def test_people_do_as_asked(robot: Robot, world: World, clock: LockstepClock) -> None:
-    names = {kind.__name__: kind for kind in (Gesture, Sport, Emotion)}
+    names: dict[str, object] = {kind.__name__: kind for kind in (Gesture, Sport, Emotion)}
     await run(snippet("worlds/perception.md", "hands.person"), clock, world=world, **names)
 
 
@@ -88,7 +90,7 @@ async def test_hands_on_a_delivery_robot(robot: Robot, world: World, clock: Lock
 
 
 async def test_an_engine_by_hand() -> None:
-    names = {kind.__name__: kind for kind in (Prelude, Engine, Output, Call, Finished, Failed)}
+    names: dict[str, object] = {kind.__name__: kind for kind in (Prelude, Engine, Output, Call, Finished, Failed)}
     printed: list[Any] = []
     code = compile(snippet("programs/programs.md", "Engine()"), "page", "exec", ast.PyCF_ALLOW_TOP_LEVEL_AWAIT)
     await eval(code, {"print": lambda *words, **_: printed.extend(words), **names})

@@ -19,6 +19,7 @@ from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
+from roboglot.testing import Forward
 from roboglot.testing.addresses import free_port
 from tests.drivers.chain import EP_ADDRESS
 from tests.drivers.link_proxy import Fault, Proxy, UdpProxy
@@ -127,13 +128,13 @@ async def rig(back: str, robot: Robot, folder: Path) -> AsyncIterator[Rig]:
 
 
 @asynccontextmanager
-async def time_passes(forward: object, *, step: float = 0.02, threads: bool = True) -> AsyncIterator[None]:
+async def time_passes(forward: Forward, *, step: float = 0.02, threads: bool = True) -> AsyncIterator[None]:
     """Robot time passes by itself, ``step`` s after the other; waits for ``threads``, which keep no robot time."""
     over = False
 
     async def pass_time() -> None:
         while not over:
-            await forward(seconds=step)  # type: ignore[operator]
+            await forward(seconds=step)
             await (settle() if threads else asyncio.sleep(0))
 
     task = asyncio.ensure_future(pass_time())

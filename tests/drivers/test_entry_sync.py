@@ -94,7 +94,8 @@ async def test_walls_and_areas_are_heeded_by_the_robot(
 
     def drawn(there: MapAnnotations) -> set[tuple[str, float, float]]:
         now = there.current
-        return {(str(each.kind), each.start.x, each.end.y) for each in (*now.lines, *now.areas)}  # type: ignore[attr-defined]
+        lines = {(str(each.kind), each.start.x, each.end.y) for each in now.lines}
+        return lines | {(str(each.kind), each.start.x, each.end.y) for each in now.areas}
 
     dashboard = await rest(driven)
     asked = asyncio.ensure_future(dashboard.add_lines(LineUsage.WALLS, [Line(GPoint(1.0, -1.0), GPoint(1.0, 1.0))]))

@@ -80,8 +80,8 @@ async def test_a_browser_shows_moving_pictures(tmp_path: Path) -> None:
             page = example.serve(dog, 0, seen)
             profile = f"--user-data-dir={tmp_path / 'profile'}"
             command = [str(CHROMIUM), *OPTIONS, profile, f"http://127.0.0.1:{page.server_port}/"]
-            quiet = {"stdout": asyncio.subprocess.DEVNULL, "stderr": asyncio.subprocess.DEVNULL}
-            browser = await asyncio.create_subprocess_exec(*command, **quiet)  # type: ignore[arg-type]
+            quiet = asyncio.subprocess.DEVNULL
+            browser = await asyncio.create_subprocess_exec(*command, stdout=quiet, stderr=quiet)
             try:
                 async with asyncio.timeout(PATIENCE), dog.servo(Motion.TROT_SLOW) as joystick:
                     joystick.set(0.0, 0.0, 0.5)

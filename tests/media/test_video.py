@@ -11,12 +11,13 @@ import numpy as np
 from roboglot.media.h264 import H264Encoder
 from roboglot.media.video import VideoStream
 from tests.media.conftest import HEIGHT, WIDTH, number_of, picture
+from tests.narrowing import of_kind
 
 
 def decoded(data: bytes) -> list[int]:
     """The numbers of the pictures in an Annex B stream, as a player reads it."""
-    with av.open(io.BytesIO(data), format="h264") as file:
-        return [number_of(frame.to_ndarray()[:HEIGHT]) for frame in file.decode(video=0)]  # type: ignore[union-attr]
+    with av.open(io.BytesIO(data), mode="r", format="h264") as file:
+        return [number_of(of_kind(frame, av.VideoFrame).to_ndarray()[:HEIGHT]) for frame in file.decode(video=0)]
 
 
 def units(data: bytes) -> list[int]:

@@ -39,7 +39,12 @@ async def test_error_of_loading_is_raised_to_who_waits() -> None:
 
 async def test_cancelled_loading_ends_without_a_word(caplog: pytest.LogCaptureFixture) -> None:
     go, gone = threading.Event(), threading.Event()
-    loading = asyncio.ensure_future(load(lambda: (go.wait(), gone.set())))  # type: ignore[func-returns-value]
+
+    def wait() -> None:
+        go.wait()
+        gone.set()
+
+    loading = asyncio.ensure_future(load(wait))
     await asyncio.sleep(0)
     loading.cancel()
     go.set()

@@ -23,10 +23,12 @@ from roboglot.model.clock import LockstepClock, RealClock
 from roboglot.model.inputs.outside import CALLED_OFF, GONE, Input
 from roboglot.model.tap import Direction, Exchange
 from roboglot.protocols import sections
+from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.runtime import Runtime
 from roboglot.testing.addresses import free_port
 from roboglot.wire.slamware.chapters.motion import MoveOptions, MoveToOptions
 from roboglot.wire.slamware.geometry import Location
+from tests.narrowing import of_kind
 
 WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
 ADDRESS = f"127.0.194.{101 + WORKER}"
@@ -88,7 +90,7 @@ class Session:
         self.heard[key] = self.heard.get(key, 0) + 1
 
     def new_app(self) -> DogLink:
-        port = int(self.config.doors["cyberdog"].app_port)  # type: ignore[attr-defined]
+        port = int(of_kind(self.config.doors["cyberdog"], CyberDogConfig).app_port)
         return DogLink(
             ADDRESS, 50052, None, RealClock(), app_port=port, pushed=lambda code, text: self.pushed.append((code, text))
         )

@@ -25,6 +25,7 @@ from roboglot.recording.files import PartWriter
 from roboglot.recording.reader import pair, read_messages, read_recording
 from roboglot.runtime import Runtime
 from roboglot.testing.addresses import free_addresses
+from tests.narrowing import known
 
 ADDRESS = free_addresses(1)
 
@@ -197,7 +198,7 @@ async def test_full_disk_is_the_only_reason_given(
     monkeypatch.setattr(PartWriter, "flush", full)
     monkeypatch.setattr("mcap.writer.Writer.finish", full)
     for _ in range(3):  # long enough for two warnings, if there were some
-        await asyncio.to_thread(recorder._thread.settle)  # type: ignore[union-attr]
+        await asyncio.to_thread(known(recorder._thread).settle)
         await advance(started, 12.0)
     ended = await recorder.stop()
     await started.close()

@@ -62,7 +62,12 @@ async def test_drawings_are_new_at_once_and_after_start(database: Database) -> N
     new = Replacement(Drawings([NEW], drawn), {"k": [1]}, {"f": b"2", "gone": None})
     before = Drawings(here.places.all(), here.annotations.current)
     reported: list[Drawings] = []
-    await here.memory.replace(lambda now: reported.append(now) or new)  # type: ignore[func-returns-value]
+
+    def edit(now: Drawings) -> Replacement:
+        reported.append(now)
+        return new
+
+    await here.memory.replace(edit)
     assert reported == [before]
     for seen in (here, parts(database)):
         assert list(seen.places.all()) == [NEW]

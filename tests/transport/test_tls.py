@@ -15,6 +15,7 @@ import pytest
 from roboglot.protocols.cyberdog.certificates import ensure_site
 from roboglot.transport import tls as layer
 from roboglot.transport.tls import Tls, TlsPort, server_context
+from tests.narrowing import of_kind
 
 BIG = 3_000_000  # bytes: far more than all buffers on the way
 
@@ -25,7 +26,7 @@ class Echo(asyncio.Protocol):
     opened = 0
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        self.transport: asyncio.Transport = transport  # type: ignore[assignment]
+        self.transport = of_kind(transport, asyncio.Transport)
         Echo.opened += 1
 
     def data_received(self, data: bytes) -> None:

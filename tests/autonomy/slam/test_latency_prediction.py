@@ -19,7 +19,7 @@ class _Base(Base):
 
 
 @pytest.fixture
-def base() -> Base:
+def base() -> _Base:
     return _Base()
 
 
@@ -35,8 +35,8 @@ async def test_what_was_sent_within_the_delay_is_added(base: Base, clock: Lockst
     assert_pose(foresight.ahead(Pose(yaw=0.5)), x=0.0, y=0.0, deg=math.degrees(0.5 + math.pi * 0.3), within=1e-6)
 
 
-async def test_a_base_that_is_here_needs_none(clock: LockstepClock, base: Base) -> None:
-    base.delay = 0.0  # type: ignore[misc]
+async def test_a_base_that_is_here_needs_none(clock: LockstepClock, base: _Base) -> None:
+    base.delay = 0.0
     foresight = Foresight(base, clock)
     foresight.sent(Twist(x=1.0))
     await clock.advance(0.5)

@@ -25,6 +25,7 @@ from roboglot.wire.robomaster.telemetry import (
     TargetsSeen,
 )
 from tests.drivers.pace import settle
+from tests.narrowing import of_kind
 
 ADDRESS = "127.0.0.9"
 BUILDS = pytest.mark.parametrize("profile", ["spec", "fw60", "fw70"], indirect=True)
@@ -54,7 +55,7 @@ async def test_pushes_of_every_kind(client, run, forward, robot) -> None:
     )
     assert kinds.count(ChassisPosition) == pytest.approx(10, abs=1)
     assert heard == [each for each in reported if isinstance(each, ChassisStatus)]
-    assert heard[-1].static  # type: ignore[attr-defined]
+    assert of_kind(heard[-1], ChassisStatus).static
     assert next(each for each in reversed(reported) if isinstance(each, GameInput)).data[0] == 2
     assert {each.kind for each in reported if isinstance(each, TargetsSeen)} == {"marker"}
 

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from msgspec import Struct
 
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
 from roboglot.drivers.robomaster.capabilities import APPROXIMATIONS
@@ -37,9 +38,9 @@ from tests.drivers.chain import OpenRest
 pytestmark = pytest.mark.world("empty", body="robomaster_ep")
 
 
-async def do(client: SlamwareClient, forward: Forward, name: str, options: object) -> None:
+async def do(client: SlamwareClient, forward: Forward, name: str, options: Struct) -> None:
     """An action of the REST API, to its end."""
-    action = await client.begin(name, options)  # type: ignore[arg-type]
+    action = await client.begin(name, options)
     waiting = asyncio.ensure_future(action.succeeded())
     for _ in range(100):
         await forward(seconds=0.1)

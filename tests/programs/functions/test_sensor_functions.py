@@ -13,6 +13,7 @@ from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import ComponentMissing
 from roboglot.model.sensing import BatteryState, Supply
 from roboglot.programs.functions.records import RECORDS
+from roboglot.programs.worker.values import Record
 from tests.narrowing import known
 from tests.programs.functions.calling import Caller, field
 
@@ -144,8 +145,8 @@ async def test_a_scan_is_whole(caller: Caller) -> None:
 
 async def test_results_have_no_fields_that_their_types_lack(caller: Caller) -> None:
     def check(value: object) -> None:
-        if hasattr(value, "fields"):
-            assert set(value.fields) <= set(RECORDS[value.type].fields), value  # type: ignore[attr-defined]
+        if isinstance(value, Record):
+            assert set(value.fields) <= set(RECORDS[value.type].fields), value
             for inner in value.fields.values():
                 check(inner)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import stat
-from datetime import UTC, datetime
+from datetime import UTC, datetime, tzinfo
 from pathlib import Path
 
 import grpc
@@ -88,8 +88,8 @@ def test_broken_and_expired_ones_are_not_replaced_silently(tmp_path: Path, monke
 
     class Later(datetime):
         @classmethod
-        def now(cls, _tz: object = None) -> datetime:  # type: ignore[override]
-            return datetime(2090, 1, 1, tzinfo=UTC)
+        def now(cls, tz: tzinfo | None = None) -> Later:
+            return cls(2090, 1, 1, tzinfo=tz or UTC)
 
     with monkeypatch.context() as patched:
         patched.setattr(certificates, "datetime", Later)

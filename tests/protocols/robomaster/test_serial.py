@@ -24,8 +24,10 @@ async def heard(line: int) -> str:
 
 @pytest.mark.world("empty", body="robomaster_ep")
 async def test_commands_answers_pushes_and_events_on_one_line(robot, world, forward, tmp_path: Path) -> None:
-    ports = dict.fromkeys(("control_port", "event_port", "video_port", "audio_port"), 0)
-    door = RoboMasterDoor(robot, "127.0.0.9", RoboMasterConfig(**ports, uart=str(tmp_path / "ep"), profile="fw70"))  # type: ignore[arg-type]
+    config = RoboMasterConfig(
+        control_port=0, event_port=0, video_port=0, audio_port=0, uart=str(tmp_path / "ep"), profile="fw70"
+    )
+    door = RoboMasterDoor(robot, "127.0.0.9", config)
     await door.start()
     line = os.open(tmp_path / "ep-a", os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
     try:

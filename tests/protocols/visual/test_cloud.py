@@ -213,8 +213,8 @@ def coded(code: CloudCode, *items: Any) -> CloudAnswer:
 
 
 async def test_temporary_failures_are_retried_at_growing_distances(database: Database, clock: LockstepClock) -> None:
-    failures = [LinkLost("away"), TimedOut("slow"), coded(CloudCode.BROKEN), coded(CloudCode.REFUSED)]
-    link = Scripted(clock, *failures, coded(CloudCode.OK), coded(CloudCode.MISSING))  # type: ignore[arg-type]
+    failures = (LinkLost("away"), TimedOut("slow"), coded(CloudCode.BROKEN), coded(CloudCode.REFUSED))
+    link = Scripted(clock, *failures, coded(CloudCode.OK), coded(CloudCode.MISSING))
     mirror = CloudMirror(link, Outbox(database, "a"), clock, ClientError)
     mirror.start()
     for number in range(3):

@@ -183,7 +183,7 @@ async def test_two_robots_that_collide_feel_it_both(duel):
     assert (PlatePlace.FRONT, HitKind.COLLISION) in {(hit.place, hit.kind) for hit in own.drain()}
 
 
-async def test_a_collision_presses_the_bumper_before_it_hits_a_plate(duel):
+async def test_a_collision_presses_bumper_before_plate(duel):
     with duel.robot.events.subscribe(ArmorHit, BumperPressed) as events:
         duel.robot[Base].set_velocity(Twist(x=1.0))
         await duel.clock.advance(3.0)

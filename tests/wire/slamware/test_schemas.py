@@ -12,8 +12,8 @@ from roboglot.wire.slamware.chapters.artifact import PoseEntry, metadata_text
 from roboglot.wire.slamware.chapters.motion import MoveByOptions, MoveOptions, MoveToOptions
 from roboglot.wire.slamware.chapters.system.system import (
     DockingStatus,
-    Level,
     HealthPart,
+    Level,
     PowerStatus,
     error_code,
     health_record,

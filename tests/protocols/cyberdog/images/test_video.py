@@ -124,12 +124,17 @@ async def test_two_apps_share_one_encoder_and_one_stops(watch, client, app, robo
     assert not two.signals("is_closed")
 
 
-async def test_lost_pictures_are_answered_by_the_next_keyframe(watch, robot, forward) -> None:
+async def test_lost_pictures_are_answered_by_the_next_keyframe(watch, robot, forward, monkeypatch) -> None:
     watcher = watch()
     await watcher.connect()
     asked: list[float] = []
     real = robot[VideoStream].request_keyframe
-    robot[VideoStream].request_keyframe = lambda: (asked.append(1.0), real())  # type: ignore[func-returns-value, method-assign]
+
+    def ask() -> None:
+        asked.append(1.0)
+        real()
+
+    monkeypatch.setattr(robot[VideoStream], "request_keyframe", ask)
     async with time_passing(forward):
         await until(lambda: len(watcher.frames) >= 3, 4 * PATIENCE)
         asked.clear()
