@@ -7,6 +7,7 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pytest
 from foxglove_schemas_protobuf import FrameTransforms_pb2, LaserScan_pb2, PoseInFrame_pb2
 from hypothesis import given
 from hypothesis import strategies as st
@@ -15,6 +16,7 @@ from roboglot.model.geometry import Pose
 from roboglot.model.sensing import LaserScan
 from roboglot.model.tap import Direction, Exchange
 from roboglot.recording import foxglove
+from roboglot.recording.entries import Entry, encoded
 from roboglot.recording.messages import decode_exchange, encode_exchange, encode_plain
 from roboglot.recording.redaction import FIELDS, Redaction
 
@@ -93,6 +95,26 @@ def test_refusals_do_not_quote_names() -> None:
     )
     assert Redaction().exchange(refused).refusal == "no face of [redacted] is known"
     assert Redaction().exchange(refused._replace(operation="6004")).refusal == refused.refusal
+
+
+def test_refusals_do_not_quote_networks() -> None:
+    body = b'{"error": "there is no network \'HomeNet\' here"}'
+    refused = exchange(body)._replace(
+        operation="PUT /api/core/system/v1/network/status", refusal="there is no network 'HomeNet' here"
+    )
+    found = Redaction().exchange(refused)
+    assert (found.payload, found.refusal) == (
+        b'{"error": "there is no network [redacted] here"}',
+        "there is no network [redacted] here",
+    )
+
+
+@pytest.mark.parametrize("name", ["join network", "join a network"])
+def test_actions_do_not_name_networks(name: str) -> None:
+    state = {"name": name, "goal": "HomeNet", "reason": "HomeNet refuses this password", "status": "aborted"}
+    data = encoded(Entry("/a/actions", "action", 0, 0, state), Redaction())
+    assert b"HomeNet" not in data
+    assert b"[redacted] refuses this password" in data
 
 
 # Poses, transforms and scans whose bytes are put together by hand are those of the protobuf library.

@@ -102,10 +102,15 @@ def test_redacted_requests_are_not_sent_again() -> None:
 
 
 @pytest.mark.parametrize("kind", ["personnel", "face", "voiceprint"])
-@pytest.mark.parametrize("name", ["Xanthippe", 'X "Y} Z'])
-def test_people_in_lists_of_programming_have_no_names(kind: str, name: str) -> None:
+@pytest.mark.parametrize("name", ["Xanthippe", 'X "Y} Z', ""])
+@pytest.mark.parametrize("backwards", [False, True])
+def test_people_in_lists_of_programming_have_no_names(kind: str, name: str, backwards: bool) -> None:
     person = {"id": "1", "mode": kind, "style": "0", "condition": "1", "describe": name}
+    if backwards:
+        person = dict(reversed(person.items()))
+    task = {"describe": "line 3", "mode": "single"}
     (frame,) = responses(kind="AI", id="x", items=[person, {**person, "id": "2"}])
+    frame = json.dumps([task, *([person] * 2), task]) if backwards else frame
     for payload in (frame, json.dumps({"data": frame})):
         found = Redaction()(payload.encode()).decode()
         assert found.count("[redacted]") == 2

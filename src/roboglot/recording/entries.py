@@ -75,5 +75,7 @@ def encoded(entry: Entry, redaction: Redaction) -> bytes:
     kind, value = KINDS[entry.kind], entry.value
     if entry.kind == "exchange":
         value = redaction.exchange(value)
+    elif entry.kind == "action":
+        value = redaction.action(value)
     data = kind.encode(entry.at, value)
     return data if kind.is_protobuf or entry.kind == "exchange" else redaction(data)

@@ -52,12 +52,26 @@ FIELDS_OF = {
     ("cyberdog", "1021"): ("name",),  # of members
     ("cyberdog", "1023"): ("name",),
 }
-# Operations whose refusals quote a person's name.
-QUOTING = {("cyberdog", code) for code in ("1020", "1021", "1022", "1024", "3011", "7001", "7002")}
+# Operations whose refusals quote a person's name, or the Wi-Fi's.
+QUOTING = {("cyberdog", code) for code in ("1020", "1021", "1022", "1024", "3011", "7001", "7002")} | {
+    ("slamware", "PUT /api/core/system/v1/network/status")
+}
+# Actions whose goal is the name of a Wi-Fi, which their reason may say again.
+NAMING = ("join network", "join a network")
 _quoted = re.compile(r"(['\"]).*\1", re.DOTALL)
+_quoted_in_json = re.compile(rb"'[^\"]*'|\\\".*\\\"", re.DOTALL)
 # People in the lists of visual programming, at its own door and inside a dog's 2001: the name is what describes each.
+# \2 is the quote in its form; the fields come in any order.
+_MODE = rb"mode\2\s*:\s*\2(?:personnel|face|voiceprint)\2"
+_VALUE = rb"(?:(?!(?<!\\)\2).)*"
 _listed = re.compile(
-    rb'((\\*")mode\2\s*:\s*\2(?:personnel|face|voiceprint)\2[^{}]*?\2describe\2\s*:\s*\2).*?((?<!\\)\2)', re.DOTALL
+    rb'((\\*")' + _MODE + rb"[^{}]*?\2describe\2\s*:\s*\2)" + _VALUE + rb"((?<!\\)\2)"
+    rb'|((\\*")describe\5\s*:\s*\5)'
+    + _VALUE.replace(rb"\2", rb"\5")
+    + rb"((?<!\\)\5\s*,[^{}]*?\5"
+    + _MODE.replace(rb"\2", rb"\5")
+    + rb")",
+    re.DOTALL,
 )
 
 
@@ -82,7 +96,7 @@ class Redaction:
         """Return ``payload`` without what must stay secret."""
         low = payload.lower()
         if self._names and b"describe" in low:
-            payload = _listed.sub(rb"\1" + REDACTED + rb"\3", payload)
+            payload = _listed.sub(rb"\1\4" + REDACTED + rb"\3\6", payload)
         for name in self._names:
             if name in low:
                 return self._without(payload)
@@ -105,8 +119,17 @@ class Redaction:
         """Return an exchange without what must stay secret."""
         payload = self.of(exchange.door, exchange.operation)(exchange.payload)
         if exchange.refusal and (exchange.door.removeprefix(DRIVER), exchange.operation) in QUOTING:
+            payload = _quoted_in_json.sub(REDACTED, payload)  # a REST refusal says it in its body, too
             return exchange._replace(payload=payload, refusal=_quoted.sub(REDACTED.decode(), exchange.refusal))
         return exchange._replace(payload=payload)
+
+    def action(self, value: dict[str, object]) -> dict[str, object]:
+        """Return an action's state without the name of a Wi-Fi."""
+        goal, reason = str(value["goal"]), str(value["reason"])
+        if value["name"] not in NAMING or not goal:
+            return value
+        hidden = REDACTED.decode()
+        return value | {"goal": hidden, "reason": reason.replace(goal, hidden)}
 
 
 def without_picture(exchange: Exchange) -> Exchange:
