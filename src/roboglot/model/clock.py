@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator, Sized
 from contextvars import copy_context
 from functools import partial
 
-from roboglot.model.clock_base import HOLD_MAX, Clock, Timer
+from roboglot.model.clock_base import HOLD_MAX, Clock, RealTimers, Timer
 
 __all__ = ["LEAD", "LOCKSTEP_EPOCH", "Clock", "LockstepClock", "PatientClock", "RealClock", "Timer"]
 YIELD_AFTER = 0.5  # s of lockstep time
@@ -25,36 +25,6 @@ LEAD = 0.1  # s by which a patient clock may be ahead of the world
 STANDING = 0.002  # real s between two checks of a patient clock that stands still
 SLICE = 0.0015  # real s of jobs after which the loop sees to its sockets
 LOCKSTEP_EPOCH = 1_767_225_600.0  # 2026-01-01T00:00:00Z: lockstep traces contain no real date
-
-
-class _RealTimer:
-    """One entry of a real clock; armed in the event loop while the clock runs."""
-
-    __slots__ = ("_armed", "_callback", "_clock", "when")
-
-    def __init__(self, clock: RealClock, when: float, callback: Callable[[], None]) -> None:
-        self._clock, self.when, self._callback = clock, when, callback
-        self._armed: asyncio.TimerHandle | None = None
-        self.arm()
-
-    def arm(self) -> None:
-        """Arm again after a change of the clock's pace."""
-        if self._armed is not None:
-            self._armed.cancel()
-        delay = self._clock.real_seconds_until(self.when)
-        self._armed = None if delay is None else asyncio.get_running_loop().call_later(delay, self._fire)
-
-    def cancel(self) -> None:
-        self._clock.forget(self)
-        if self._armed is not None:
-            self._armed.cancel()
-
-    def _fire(self) -> None:
-        if self._clock.late(self.when):
-            self.arm()
-            return
-        self._clock.forget(self)
-        self._callback()
 
 
 class RealClock(Clock):
@@ -67,7 +37,7 @@ class RealClock(Clock):
         self._anchor = time.monotonic(), 0.0  # a real instant and the corresponding robot time
         self._epoch = time.time()
         self._until = math.inf  # robot time at which the clock stops
-        self._timers: set[_RealTimer] = set()
+        self._timers = RealTimers(self.real_seconds_until, self._is_due)
         self._speed = 1.0
         self._jobs: deque[Callable[[], None]] = deque()
         self._turn: asyncio.Handle | None = None  # of the next of them, or of the one under way
@@ -92,9 +62,7 @@ class RealClock(Clock):
         return self._epoch + self.time()
 
     def call_at(self, when: float, callback: Callable[[], None]) -> Timer:
-        timer = _RealTimer(self, when, callback)
-        self._timers.add(timer)
-        return timer
+        return self._timers.add(when, callback)
 
     def in_turn(self, job: Callable[[], None], *, first: bool = False) -> None:
         entry = partial(copy_context().run, job)
@@ -159,19 +127,13 @@ class RealClock(Clock):
         real, robot = self._anchor
         return real + (stamp - robot) / self._speed
 
-    def late(self, _when: float) -> bool:
-        """Return whether a timer woke too early because the clock stood still after it was armed."""
-        return False
-
-    def forget(self, timer: _RealTimer) -> None:
-        """Drop a timer that fired or was cancelled."""
-        self._timers.discard(timer)
+    def _is_due(self, when: float) -> bool:
+        return self.time() >= when
 
     def _change(self, speed: float, until: float) -> None:
         self._anchor = time.monotonic(), self.time()
         self._speed, self._until = speed, until
-        for timer in tuple(self._timers):
-            timer.arm()
+        self._timers.arm()
 
 
 class PatientClock(RealClock):
@@ -191,9 +153,6 @@ class PatientClock(RealClock):
         if super().time() > self._reach:  # it stood there and continues from there
             self._anchor = time.monotonic(), self._reach
         self._reach = stamp + LEAD
-
-    def late(self, when: float) -> bool:
-        return self.time() < when
 
     def real_seconds_until(self, when: float) -> float | None:
         seconds = super().real_seconds_until(when)
