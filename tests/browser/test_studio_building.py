@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.browser.served import shows, until
-from tests.browser.test_studio import Open, Page, loaded, phase, put_down, studio
+from tests.browser.test_studio import AXE, Open, Page, loaded, phase, put_down, studio
 
 __all__ = ["studio"]  # the fixture
 pytestmark = pytest.mark.asyncio(loop_scope="session")
@@ -115,6 +115,36 @@ async def test_block_is_joined_by_mouse(studio: Open) -> None:
     await page.mouse.move(below["x"] + 16, below["bottom"] + 12, steps=4)
     await page.mouse.up()
     await until(page, f"{STACKS} === 1")
+    assert page.errors == []
+
+
+FOUND = "studio.editor.workspace.getToolbox().getFlyout().getWorkspace().getTopBlocks().map(b => b.type)"
+
+
+async def test_language_blocks_are_found_in_both_languages(studio: Open) -> None:
+    page = await studio(language="zh")
+    wanted = {"如果": "controls_if", "循环": "forever", "变量": "variables_set", "函数": "procedures_defnoreturn"}
+    for words, block in (wanted | {"while": "controls_whileUntil", "sleep": "wait"}).items():
+        await page.fill("input[type=search]", words)
+        await until(page, f"{FOUND}.includes({block!r})")
+    await page.fill("input[type=search]", "if")
+    await until(page, f"{FOUND}[0] === 'controls_if' && !{FOUND}.some(type => type.includes('lift'))")
+    await page.evaluate(AXE)
+    found = await page.evaluate("axe.run({ resultTypes: ['violations'] })")
+    assert [v["id"] for v in found["violations"] if v["impact"] in ("serious", "critical")] == []
+    assert page.errors == []
+
+
+async def test_help_and_menu_need_no_internet(studio: Open) -> None:
+    page = await loaded(await studio(), APART)
+    block = page.locator("[data-id=first] > .blocklyPath").first
+    await block.click(button="right", position={"x": 8, "y": 8})
+    await page.evaluate(AXE)
+    found = await page.evaluate("axe.run({ resultTypes: ['violations'] })")
+    assert [v["id"] for v in found["violations"] if v["impact"] in ("serious", "critical")] == []
+    await page.locator(".blocklyMenuItem", has_text="Help").click()
+    await page.wait_for_selector("dialog >> text=print('first')")
+    assert len(page.context.pages) == 1
     assert page.errors == []
 
 

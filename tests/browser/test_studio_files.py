@@ -44,6 +44,27 @@ async def test_program_of_blocks_comes_back_from_its_file(studio: Open) -> None:
     assert page.errors == []
 
 
+async def test_going_back_to_a_version_loses_nothing(studio: Open) -> None:
+    page = await loaded(await studio(), COUNTING)
+    times = "studio.editor.workspace.getBlockById('loop').getInputTargetBlock('TIMES').setFieldValue(5, 'NUM')"
+    kept = "JSON.parse(localStorage['studio.versions.' + studio.program.value.id] ?? '[]').length"
+    await until(page, f"{kept} === 1")
+    await page.evaluate(times)
+    await until(page, "studio.editor.code.value.includes('range(5)')")
+    await page.click("text=Programs")
+    await page.click("dialog >> text=Compare")
+    await shows(
+        page, "document.querySelector('.changes').innerText", "− for count in range(3):\n+ for count in range(5):"
+    )
+    await page.locator("dialog li", has_text="Compare").get_by_role("button", name="Open").click()
+    await until(page, "studio.editor.code.value.includes('range(3)')")
+    await until(page, f"{kept} === 2")
+    await page.click("text=Programs")
+    await page.locator("dialog li", has_text="Compare").first.get_by_role("button", name="Open").click()
+    await until(page, "studio.editor.code.value.includes('range(5)')")
+    assert page.errors == []
+
+
 async def comes_back(page: Page, wanted: str) -> None:
     """Save the program by the button ``wanted``, and open its file, and its frame."""
     code, state = await page.evaluate("[studio.editor.code.value, JSON.stringify(studio.editor.save())]")

@@ -89,14 +89,17 @@ async def test_a_module_is_opened_changed_and_deleted(studio: Open, opened: Serv
     await until(page, "studio.editor.code.value.includes('def double(x)')")
     await page.evaluate("studio.editor.workspace.getBlockById('sum').setFieldValue('MULTIPLY', 'OP')")
     await until(page, "studio.editor.code.value.includes('x * x')")
-    await kept_as_module(page)
+    await page.locator(".blocklyDraggable > .blocklyPath").first.click(button="right", position={"x": 12, "y": 12})
+    await page.click("text=Keep as a module")
+    await page.wait_for_selector(".notice >> text=is a module now")
+    assert await page.evaluate("studio.program.value.module") == "double"
     await page.click("text=Programs")
     await row.locator("text=Open").click()
     await until(page, "studio.editor.code.value.includes('x * x')")
     await page.click("text=Programs")
     page.on("dialog", lambda dialog: dialog.accept())
     await row.locator("text=Delete").click()
-    await page.wait_for_selector("text=is called by")  # used by the programs above
+    await page.wait_for_selector("text=is called by My program")  # the first of those above
     service = next(iter(opened.runtime._programs.values())).service
     for task in await service.tasks():
         await service.delete(task.id)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from tests.browser.served import becomes, until
-from tests.browser.test_studio import Open, Page, loaded, phase, prints, studio
+from tests.browser.served import Served, becomes, shows, until
+from tests.browser.test_studio import COUNTING, Open, Page, loaded, phase, prints, studio
 
 __all__ = ["studio"]  # the fixture
 pytestmark = pytest.mark.asyncio(loop_scope="session")
@@ -83,4 +83,24 @@ async def test_text_is_stepped_by_lines(studio: Open) -> None:
     await page.keyboard.press("F10")
     await phase(page, "idle")
     await prints(page, "hi", "there", "hi", "there", "end")
+    assert page.errors == []
+
+
+async def test_reopened_page_shows_its_run_s_values(studio: Open, opened: Served) -> None:
+    page = await loaded(await studio(), COUNTING)
+    await page.keyboard.press("F5")
+    await phase(page, "idle")
+    await prints(page, "6", "9", "12")
+    await opened.clock.advance(1.0)  # lines of an earlier run are known by their time
+    await page.evaluate("studio.editor.toggleBreak('say')")
+    for _ in range(2):
+        await page.keyboard.press("F5")
+        await at(page, "say")
+    await page.reload()
+    await until(page, "window.studio?.editor.workspace")
+    await at(page, "say")
+    await prints(page, "6")
+    await shows(page, "studio.runner.variables.value.n", "9")
+    await page.keyboard.press("Shift+F5")
+    await phase(page, "idle")
     assert page.errors == []

@@ -175,6 +175,19 @@ async def test_trial_begins_where_the_map_has_it(shown: Shown) -> None:
         assert shown.runtime.fleet.world.truth.pose_of("a").distance_to(believed) > 0.5
 
 
+async def test_a_page_tries_one_program_at_once(shown: Shown) -> None:
+    async with page(shown) as studio:
+        for number in (1, 2):
+            await studio.say(type="try", id=number, lesson="", body="import time\ntime.sleep(1000)\n")
+        assert "being tried already" in (await studio.kind("refused"))["why"]
+        await studio.until(lambda m: m.get("what") == "spot")
+        await studio.say(type="end_try")
+        assert "it was ended" in (await studio.kind("refused"))["why"]
+        for message in ({"type": "try", "id": 3, "lesson": "", "body": "x = 1\n"}, {"type": "end_try"}):
+            await studio.say(**message)  # ended while it is checked
+        assert "it was ended" in (await studio.kind("refused"))["why"]
+
+
 async def test_a_class_is_joined_seen_and_handed_in(shown: Shown) -> None:
     async with page(shown) as teacher, page(shown) as anna, page(shown) as other:
         await teacher.say(type="class", do="open", name="7b")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from roboglot.console.drawings import whereabouts
+from roboglot.console.studio.trial import map_origin
 from roboglot.console.views import RobotView
 from roboglot.fleet import Fleet
 from roboglot.model.components.mapping.localization import Localization
@@ -11,6 +13,7 @@ from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.system.health import Health
 from roboglot.model.components.system.link import Link, LinkState
 from roboglot.model.geometry import Pose
+from roboglot.programs.rehearsing import Scene
 from roboglot.protocols.vda5050.vocabulary import position, velocity
 from roboglot.recording.entries import Entry
 from roboglot.recording.sampler import Sampler
@@ -31,6 +34,9 @@ async def test_robot_without_localization_is_shown_by_its_odometry(fleet: Fleet,
     there = view.anchor.compose(Pose(0.5))
     assert fleet.world.truth.pose_of("a").distance_to(there) < 0.1
     view.end()
+    scene = Scene(world="empty", start=fleet.world.truth.pose_of("a"))
+    began = map_origin(robot, scene).compose(scene.start or Pose())
+    assert began.distance_to(whereabouts(robot) or Pose()) < 0.05  # what is simulated is drawn in the same map
 
 
 @pytest.mark.world("empty")

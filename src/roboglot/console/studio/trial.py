@@ -11,11 +11,11 @@ from typing import Annotated
 
 import msgspec
 
+from roboglot.console.drawings import whereabouts
 from roboglot.console.studio.checks import HULL, distance
 from roboglot.console.studio.lessons import Lesson, grade, no_program
 from roboglot.console.studio.mistakes import explain
 from roboglot.console.studio.programs import Programs, Studio
-from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.errors import Busy, NotFound
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
@@ -46,13 +46,21 @@ class Trial:
 
     def __init__(self, tell: Tell) -> None:
         self._send = tell
+        self._busy = self._ended = False  # from the wish on; while it is checked, too
         self._playing: asyncio.Task[Played] | None = None
         self._origin = Pose()  # of the world, in the frame that the page's map has
 
     async def take(self, wish: TrialWish, studio: Studio, programs: Programs) -> None:
         """Try it and report the result. Raises NotFound, Busy, ValueError, ProgramError."""
-        if self._playing is not None:
+        if self._busy:
             raise Busy("a program is being tried already")
+        self._busy, self._ended = True, False
+        try:
+            await self._try(wish, studio, programs)
+        finally:
+            self._busy = False
+
+    async def _try(self, wish: TrialWish, studio: Studio, programs: Programs) -> None:
         lesson = studio.lessons().get(wish.lesson) if wish.lesson else None
         if wish.lesson and lesson is None:
             raise NotFound(f"there is no mission {wish.lesson!r}")
@@ -60,7 +68,7 @@ class Trial:
             self._answer(wish, lesson, problems=problems)
             return
         scene = _scene(studio, programs, lesson)
-        self._origin = _origin(programs.robot, scene) if lesson is None else Pose()
+        self._origin = map_origin(programs.robot, scene) if lesson is None else Pose()
         played = await self._play(wish, scene, studio, programs)
         self._answer(wish, lesson, played)
 
@@ -68,6 +76,8 @@ class Trial:
         if studio.rehearse is None:
             raise NotFound("there is no simulation here to try it in")
         modules = await _modules(programs, wish.body)
+        if self._ended:
+            raise Busy("it was ended")
         play = studio.rehearse.play(wish.body, scene, modules=modules, speed=SPEED, notice=self._notice)
         self._playing = asyncio.ensure_future(play)
         try:
@@ -108,6 +118,7 @@ class Trial:
 
     def close(self) -> None:
         """End what is being tried."""
+        self._ended = True
         if self._playing is not None:
             self._playing.cancel()
 
@@ -120,11 +131,12 @@ def _scene(studio: Studio, programs: Programs, lesson: Lesson | None) -> Scene:
     return studio.scene_of(programs.robot.id)
 
 
-def _origin(robot: Robot, scene: Scene) -> Pose:
-    """Origin of the world in the robot's map, as the robot believes."""
-    if scene.start is None or Localization not in robot:
+def map_origin(robot: Robot, scene: Scene) -> Pose:
+    """Origin of the world in the map that the page draws, as the robot believes."""
+    believed = whereabouts(robot)
+    if scene.start is None or believed is None:
         return Pose()
-    return robot[Localization].pose.compose(scene.start.inverse())
+    return believed.compose(scene.start.inverse())
 
 
 async def _modules(programs: Programs, body: str) -> dict[str, str]:

@@ -53,6 +53,7 @@ async def answer(service: ProgramService, text: str) -> str:
     except ProgramError as error:
         why = str(error)
     where = dataclasses.asdict(await service.whereabouts(wish.target_id))
+    del where["began"], where["variables"]  # of the studio
     return json.dumps({"target_id": wish.target_id, "operate": wish.operate, "error": why} | where, ensure_ascii=False)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Generic, ParamSpec
 
 from roboglot.programs.errors import ProgramError
@@ -32,7 +32,8 @@ class TaskReport:
 class Whereabouts:
     """A task's state, the line it is at (in ``module``, or in its own text), and the block that is open.
 
-    ``watched``: whether it can be stepped through.
+    ``watched``: whether it can be stepped through. ``began``: its start in seconds since 1970, 0 for one that a crash
+    interrupted; its log entries are those since then. ``variables`` are those last reported.
     """
 
     state: TaskState
@@ -40,6 +41,8 @@ class Whereabouts:
     module: str = ""
     block: str = ""
     watched: bool = False
+    began: float = 0.0
+    variables: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

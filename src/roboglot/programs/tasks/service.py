@@ -123,7 +123,8 @@ class ProgramService:
     async def whereabouts(self, id: str) -> Whereabouts:
         """Return the current position of a task; line 0 and "" if it does not run."""
         if (run := self._runs.get(id)) is not None:
-            return Whereabouts(run.state, run.line, run.module, run.block, run.watched)
+            place = (run.line, run.module, run.block, run.watched)
+            return Whereabouts(run.state, *place, began=run.started, variables=run.variables)
         task = await self._store.get(id)
         return Whereabouts(TaskState(task.state) if task else TaskState.NULL)
 

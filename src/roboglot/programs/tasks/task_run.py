@@ -112,8 +112,15 @@ class TaskRun:
         run.calls.answered = journal.answered
         self._replay = Replay(self._session, self.host, replaying)
         self._block_stops = BlockStops(run.position, stops)
-        self._insights = insights = listeners.insights
-        run.noticed = lambda held: insights.publish(Variables(task.id, held))
+        self._insights = listeners.insights
+        self.started = 0.0 if replaying else robot.clock.epoch()  # its log since then is this run's
+        self.variables: dict[str, str] = {}
+
+        def notice(held: dict[str, str]) -> None:
+            self.variables = held
+            listeners.insights.publish(Variables(task.id, held))
+
+        run.noticed = notice
         self.control = ControlWatch(robot, f"visual {task.id}", lambda text: self.log.write("error", text))
         self.time = ProcessTime(robot.clock)
 

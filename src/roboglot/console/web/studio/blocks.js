@@ -9,7 +9,7 @@ const ALPHABET = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz
 const INLINE_MAX = 4; // values beside each other; more stand below each other
 /** @type {any} */
 export let table = null;
-export const asked = signal(/** @type {any} */ (null)); // the function that help is wanted of
+export const asked = signal(/** @type {any} */ (null)); // the function, or block, that help is wanted of
 
 /** The table's words in the language that is shown. @param {any} named */
 export const words = (named) => named[language.value] ?? named.en;
@@ -64,6 +64,14 @@ function defineFunction(f, value) {
     return value ? [code, f.attribute ? Order.MEMBER : Order.FUNCTION_CALL] : `${code}\n`;
   };
 }
+
+/** Help of the language's blocks is a window of ours, too: Blockly's leads to pages on the internet, in English. */
+Blockly.BlockSvg.prototype.showHelp = function () {
+  python.init(this.workspace);
+  const code = [python.blockToCode(this, true) ?? ""].flat()[0].replace(/^[ \t]*cyberdog\.task\.block\('[0-9A-Za-z]+'\)\n/gm, "").trim();
+  asked.value = { en: this.toString(60), about: { en: this.getTooltip() }, code, parameters: [] };
+};
+/** @type {any} */ (Blockly.ContextMenuRegistry.registry.getItem("blockHelp")).preconditionFn = () => "enabled";
 
 /** A module of one's own as blocks, without and with what it returns. @param {{id: string, condition: string, describe: string}} module @returns {string[]} */
 export function defineModule({ condition, describe }) {

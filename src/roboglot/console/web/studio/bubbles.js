@@ -15,9 +15,12 @@ const pythonic = (name) => encodeURI(name.replaceAll(" ", "_")).replace(/\W/g, "
 const SUCCESS = "(state (code 0, describe success)";
 const DONE = /^(, response \((motion_id -?\d+, )?result True, code 0(, order_process_bar -?\d+)?\))?\)$/;
 
+/** When and where it was measured: of that, pupils ask another block. */
+const HEADER = /header \(stamp \(sec \d+, nanosec \d+\), frame_id [^()]*\), /;
+
 /** An answer without what says only that it was done. @param {string} value */
 export function inWords(value) {
-  if (!value.startsWith(SUCCESS)) return value;
+  if (!value.startsWith(SUCCESS)) return value.replace(HEADER, "");
   const rest = value.slice(SUCCESS.length);
   return DONE.test(rest) ? t("studio.answer.done") : rest.replace(/^, (.*)\)$/s, "$1");
 }

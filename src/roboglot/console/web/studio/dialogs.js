@@ -6,8 +6,9 @@ import { asked, table, words } from "./blocks.js";
 import * as editor from "./editor.js";
 import { frame, listen } from "./link.js";
 import { openModule, removeModule } from "./modules.js";
-import { changed, download, fresh, list, listed, openStored, program, python, remove, saveFrame, show, upload, versions } from "./program.js";
-import { catchUp, operate } from "./runner.js";
+import { download, fresh, list, listed, openStored, program, python, remove, saveFrame, upload } from "./program.js";
+import { operate } from "./runner.js";
+import { Versions } from "./versions.js";
 
 const SOON = 150; // ms after news of a program until the list is asked for
 export const shown = signal("");
@@ -22,12 +23,12 @@ function Dialog({ title, children }) {
     <div class=${`notice ${notice.value.bad ? "bad" : ""}`} role="status" aria-live="polite">${notice.value.text}</div></dialog>`; // the page below says nothing meanwhile
 }
 
-async function opening(id) { try { await openStored(id); await catchUp(); close(); } catch (error) { say(error.message, true); } }
+async function opening(id) { try { await openStored(id); close(); } catch (error) { say(error.message, true); } }
 const STATES = ["error", "wait_run", "run_wait", "run", "suspend", "shutdown"];
 
 const runs = (/** @type {any} */ { operate: state }) => state === "run" || state === "suspend";
 /** @param {any[]} all */
-const runningFirst = (all) => [...all].sort((a, b) => Number(runs(b)) - Number(runs(a)));
+const runningFirst = (all) => [...all].sort((a, b) => Number(runs(b)) - Number(runs(a)) || (a.describe || a.id).localeCompare(b.describe || b.id, document.documentElement.lang, { numeric: true }));
 
 function Row({ item }) {
   const state = STATES.includes(item.operate) ? t(`studio.state.${item.operate}`) : item.operate;
@@ -46,20 +47,18 @@ export function Library() {
     look();
     return () => { clearTimeout(due); leave(); };
   }, []);
-  const old = versions();
   return html`<${Dialog} title=${t("studio.programs")}>
     <div class="buttons"><${Button} icon="plus" label=${t("studio.new.blocks")} onClick=${() => { fresh("blocks"); close(); }} /><${Button} icon="plus" label=${t("studio.new.text")} onClick=${() => { fresh("text"); close(); }} />
       <label class="button">${t("studio.file.open")}<input type="file" class="unseen" accept=".json,.py,.txt" onChange=${async (e) => { try { await upload(e.target.files[0]); close(); } catch (error) { say(t("studio.file.bad", { why: error.message }), true); } }} /></label></div>
+    <h3>${t("studio.file.save")}</h3>
+    <div class="buttons"><${Button} label=${t("studio.file.json")} onClick=${() => download("json")} /><${Button} label=${t("studio.file.py")} onClick=${() => download("py")} />
+      ${program.value.kind === "blocks" && html`<${Button} label=${t("studio.file.style")} onClick=${() => download("style")} />`}</div>
     <h3>${t("studio.on.robot")}</h3>
     ${listed.value.length ? html`<ul class="rows">${runningFirst(listed.value).map((item) => html`<${Row} key=${item.id} item=${item} />`)}</ul>` : html`<p class="muted">${t("studio.on.robot.none")}</p>`}
     ${editor.modules.value.length > 0 && html`<h3>${t("studio.toolbox.modules")}</h3><ul class="rows">${editor.modules.value.map((m) => html`<li><span class="grow"><b>${m.condition}</b><small>${m.describe}</small></span>
       <${Button} label=${t("studio.open")} onClick=${() => openModule(m).then(close, (error) => say(error.message, true))} />
       <${Button} kind="danger" label=${t("studio.delete")} onClick=${() => { if (confirm(t("studio.delete.sure", { name: m.condition }))) removeModule(m).catch((error) => say(error.message, true)); }} /></li>`)}</ul>`}
-    <h3>${t("studio.file.save")}</h3>
-    <div class="buttons"><${Button} label=${t("studio.file.json")} onClick=${() => download("json")} /><${Button} label=${t("studio.file.py")} onClick=${() => download("py")} />
-      ${program.value.kind === "blocks" && html`<${Button} label=${t("studio.file.style")} onClick=${() => download("style")} />`}</div>
-    ${old.length > 0 && html`<h3>${t("studio.versions")}</h3><ul class="rows">${old.map((v) => html`<li><span class="grow"><b>${new Date(v.saved).toLocaleString(document.documentElement.lang)}</b><small>${v.name}</small></span>
-      <${Button} label=${t("studio.open")} onClick=${() => { show(v); changed(); close(); }} /></li>`)}</ul>`}
+    <${Versions} done=${close} />
   <//>`;
 }
 
@@ -80,7 +79,7 @@ function again(when) {
   }
   if (!upTo(minute, 59) || !upTo(hour, 23)) return "";
   const at = clockTime(hour, minute);
-  return week === "*" ? t("studio.when.daily", { at }) : t("studio.when.weekly", { at, days: week.replace(/\d/g, (d) => t(`studio.day.${Number(d) % 7}`)) });
+  return week === "*" ? t("studio.when.daily", { at }) : t("studio.when.weekly", { at, days: week.replaceAll(",", t("studio.when.and")).replace(/\d/g, (d) => t(`studio.day.${Number(d) % 7}`)) });
 }
 
 /** What comes once, in words; "" for what has none. @param {string} when */
@@ -122,11 +121,12 @@ export function Schedule() {
     <div class="buttons"><${Button} kind="main" label=${t("studio.plan")} onClick=${() => { if (python().trim()) plan(true); else say(t("studio.empty")); }} /></div><//>`;
 }
 
-/** What a function does, and what it takes. */
+/** What a function does, and what it takes; what a block of the language does. */
 export function Help() {
   const f = asked.value;
+  const code = f.code ?? `${f.key}${f.attribute ? "" : `(${f.parameters.map((p) => p.name).join(", ")})`}`;
   const range = (p) => (p.kind === "choice" ? p.choices.map((name) => words(table.members[name])).join(", ") : p.minimum !== undefined ? `${p.minimum} … ${p.maximum} ${p.unit}` : p.unit);
-  return html`<${Dialog} title=${words(f)}><p>${words(f.about)}</p><pre class="printed">${f.key}${f.attribute ? "" : `(${f.parameters.map((p) => p.name).join(", ")})`}</pre>
+  return html`<${Dialog} title=${words(f)}><p>${words(f.about)}</p>${code && html`<pre class="printed">${code}</pre>`}
     <dl class="values">${f.parameters.map((p) => html`<div><dt>${words(p)} (${p.name})</dt><dd>${range(p)}</dd></div>`)}</dl><//>`;
 }
 effect(() => { if (asked.value) shown.value = "help"; });

@@ -4,7 +4,8 @@ import { effect, signal } from "@preact/signals";
 import { kept, keysUnder, language, say, t, theme as shade } from "../base.js";
 import { defineModule, newId, pythonOf } from "./blocks.js";
 import { inject, together } from "./speed.js";
-import { found, noteUse, recentBlocks, theme, toolbox, wanted } from "./toolbox.js";
+import "./spoken.js";
+import { found, noteUse, readyToSearch, recentBlocks, sought, theme, toolbox, wanted } from "./toolbox.js";
 
 export const look = kept("studio.look", "plain");
 effect(() => { document.documentElement.dataset.look = look.value; });
@@ -184,8 +185,9 @@ export function search(text) {
   wanted.text = text;
   const box = workspace.getToolbox(), item = box?.getToolboxItemById("found");
   if (!item) return 0;
+  if (text) readyToSearch(() => { if (wanted.text) box.refreshSelection(); });
   if (text) { item.show?.(); box.setSelectedItem(item); box.refreshSelection(); } else { box.clearSelection(); item.hide?.(); }
-  return found().filter((one) => one.kind === "block").length;
+  return text ? sought().count : 0;
 }
 
 /** Bring the keyboard to the first block that is found, or to the toolbox. @param {boolean} [first] */
@@ -194,14 +196,19 @@ export function toToolbox(first = false) {
   if (first) manager.focusNode(box.getFlyout().getContents()[0].getElement()); else manager.focusTree(box);
 }
 
-export function focus(id) { workspace.centerOnBlock(id); workspace.getBlockById(id)?.select?.(); }
+export function focus(id) {
+  const block = workspace.getBlockById(id);
+  if (!block) return;
+  workspace.centerOnBlock(id);
+  Blockly.getFocusManager().focusNode(block);
+}
 
 Blockly.ContextMenuRegistry.registry.register({
   id: "breakpoint", weight: 0, scopeType: Blockly.ContextMenuRegistry.ScopeType.BLOCK, preconditionFn: () => "enabled",
   displayText: (scope) => t(statementOf(scope.block)?.data === BREAK ? "studio.break.off" : "studio.break.on"), callback: (scope) => toggleBreak(scope.block.id),
 });
 Blockly.ShortcutRegistry.registry.register({
-  name: "breakpoint", keyCodes: [Blockly.utils.KeyCodes.F9 ?? 120], preconditionFn: (ws) => !ws.isFlyout, callback: () => { toggleBreak(); return true; },
+  name: "breakpoint", keyCodes: [Blockly.utils.KeyCodes.F9 ?? 120], preconditionFn: (ws) => !ws.isFlyout, callback: (_, event) => { event.preventDefault(); toggleBreak(); return true; },
 });
 for (const name of ["undo", "redo"]) {
   const { registry } = Blockly.ShortcutRegistry, was = registry.getRegistry()[name];

@@ -77,7 +77,7 @@ function Bar() {
     ${program.value.kind === "blocks" && html`<label class="search"><span class="unseen">${t("studio.search")}</span><input type="search" placeholder=${t("studio.search")} value=${sought.value} onInput=${(e) => { sought.value = e.target.value; hits.value = editor.search(e.target.value); }} onKeyDown=${(e) => { if (/^(Enter|ArrowDown)$/.test(e.key) && sought.value && hits.value) { e.preventDefault(); e.stopPropagation(); editor.toToolbox(true); } }} /></label>
       <span class="unseen" role="status" aria-live="polite">${sought.value && t("studio.search.count", { n: hits.value })}</span>`}
     <${Button} compact icon="undo" label=${t("studio.undo")} onClick=${() => editor.undo(false)} /><${Button} compact icon="redo" label=${t("studio.redo")} onClick=${() => editor.undo(true)} />
-    <${Button} icon="folder" label=${t("studio.programs")} title=${others ? t("studio.others", { n: others }) : t("studio.programs")} aria-label=${others ? `${t("studio.programs")}. ${t("studio.others", { n: others })}` : t("studio.programs")} onClick=${() => { shown.value = "library"; }}>${others > 0 && html`<b class="count">${others}</b>`}<//>
+    <${Button} icon="folder" label=${t("studio.programs")} title=${others ? t("studio.others", { n: others }) : t("studio.programs")} aria-label=${others ? `${t("studio.programs")}. ${t("studio.others", { n: others })}` : t("studio.programs")} onClick=${() => { shown.value = "library"; }}>${others > 0 && html`<b class="count" aria-hidden="true">${others}</b>`}<//>
     <${Button} compact icon="clock" label=${t("studio.schedule")} onClick=${() => { shown.value = "schedule"; }} />
     <${Button} compact icon="keys" label=${t("studio.keys")} onClick=${() => { shown.value = "keys"; }} />
   </div>`;
@@ -113,13 +113,14 @@ function Side() {
 const WINDOWS = { library: Library, schedule: Schedule, keys: Keys, help: Help };
 function App() {
   useEffect(() => {
-    const keys = { F5: () => runner.run(), F6: () => runner.pause(), F8: (e) => runner.step(e.shiftKey ? "out" : "step"), F10: () => runner.step("over") };
+    const keys = { F5: () => runner.run(), F6: () => runner.pause(), F8: (e) => runner.step(e.shiftKey ? "out" : "step"), F10: () => runner.step("over"),
+      F9: () => { if (program.value.kind === "blocks") editor.toggleBreak(); } };
     const key = (event) => {
       if (event.key === "Escape" && !event.repeat && !shown.value && !event.defaultPrevented && runner.phase.value !== "idle") { runner.stop(); command("stop"); return; }
       if (event.key === "F5" && event.shiftKey) { event.preventDefault(); runner.stop(); return; }
       if (/^[zy]$/i.test(event.key) && (event.ctrlKey || event.metaKey) && !event.defaultPrevented && program.value.kind === "blocks" && !shown.value
           && !event.target.closest?.("input, textarea, [contenteditable], .blocklyWidgetDiv")) { event.preventDefault(); editor.undo(event.shiftKey || event.key.toLowerCase() === "y"); return; }
-      if (keys[event.key] && !event.ctrlKey && !(event.key === "F10" && event.shiftKey)) { event.preventDefault(); keys[event.key](event); }
+      if (keys[event.key] && !event.defaultPrevented && !event.ctrlKey && !(event.key === "F10" && event.shiftKey)) { event.preventDefault(); keys[event.key](event); }
     };
     addEventListener("keydown", key);
     return () => removeEventListener("keydown", key);

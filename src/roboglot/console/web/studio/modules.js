@@ -1,11 +1,11 @@
 // Modules of one's own: kept from a function's blocks, opened again, and shown from inside while they run.
 import * as Blockly from "blockly";
 import { useEffect, useRef } from "preact/hooks";
-import { html, say, t } from "../base.js";
+import { html, say, t, translated } from "../base.js";
 import { defineModule } from "./blocks.js";
 import * as editor from "./editor.js";
 import { ask, frame } from "./link.js";
-import { list, show } from "./program.js";
+import { list, listed, program, show } from "./program.js";
 
 const DEFINITIONS = new Set(["procedures_defnoreturn", "procedures_defreturn"]);
 const CALLS = { procedures_callnoreturn: "module ", procedures_callreturn: "value module " };
@@ -58,6 +58,7 @@ async function keep(definition) {
     await list();
   } catch (error) { say(t("refused", { why: error.message }), true); return; }
   defineModule({ id, describe: called, ...made });
+  if (program.value.module) { await renamed(id, called); return; }
   Blockly.Events.setGroup(true);
   try {
     for (const caller of Blockly.Procedures.getCallers(called, editor.workspace)) replace(caller, called, made.condition);
@@ -66,6 +67,24 @@ async function keep(definition) {
   editor.showModules();
   say(t("studio.module.kept", { name: called }));
 }
+
+/** A module that was opened is kept: under a new name it is that module still, unless programs call it by the old one.
+ * @param {string} id @param {string} name */
+async function renamed(id, name) {
+  const old = editor.modules.value.find((module) => module.id === program.value.module);
+  program.value = { ...program.value, name, module: id };
+  if (!old || old.id === id) { editor.showModules(); say(t("studio.module.kept", { name })); return; }
+  const { feedback } = await frame({ type: "module", operate: "delete", target_id: [old.id] });
+  await list();
+  editor.showModules();
+  if (feedback.state) say(`${t("studio.module.kept", { name })} ${t("studio.module.used", { name: nameOf(old), by: callersOf(old) })}`); else say(t("studio.module.kept", { name }));
+}
+
+/** Names of what calls a module. @param {any} module */
+const callersOf = (module) => (module.be_depended ?? []).map((/** @type {string} */ id) => {
+  const task = listed.value.find((one) => one.id === id), other = editor.modules.value.find((one) => one.id === id);
+  return task?.describe || (other && nameOf(other)) || id;
+}).join(", ");
 
 /** Have a call of a function be one of the module. @param {any} caller @param {string} name @param {string} condition */
 function replace(caller, name, condition) {
@@ -91,14 +110,15 @@ function replace(caller, name, condition) {
 export async function openModule({ id }) {
   const found = await fetched(id), made = found && blocksOf(found);
   if (!made) throw new Error(t("studio.module.text"));
-  show({ name: found.describe, kind: "blocks", style: made });
+  show({ name: found.describe, kind: "blocks", style: made, module: id });
 }
 
-/** @param {{id: string}} module */
-export async function removeModule({ id }) {
-  const { feedback } = await frame({ type: "module", operate: "delete", target_id: [id] });
-  if (feedback.state) say(feedback.describe, true);
+/** @param {any} module */
+export async function removeModule(module) {
+  const { feedback } = await frame({ type: "module", operate: "delete", target_id: [module.id] });
   await list();
+  const now = editor.modules.value.find((one) => one.id === module.id);
+  if (feedback.state) say(now?.be_depended.length ? t("studio.module.used", { name: nameOf(now), by: callersOf(now) }) : translated(feedback.describe), true);
   editor.showModules();
 }
 

@@ -9,7 +9,7 @@ const PREFIX = "studio.program.", VERSIONS_MAX = 20, VERSION_EVERY = 60_000, SAV
 const FILE_MAX = 4_000_000, TEXT_MAX = 262_144, BLOCKS_MAX = 6000, NAME_MAX = 60; // bytes; characters; blocks of a file
 export const body = signal(""); // of a program that is text
 const opening = /** @type {any} */ (read(kept("studio.last", "").value));
-export const program = signal(/** @type {{id: string, name: string, kind: "blocks" | "text", lesson?: string}} */ (
+export const program = signal(/** @type {{id: string, name: string, kind: "blocks" | "text", lesson?: string, module?: string}} */ (
   opening ? pick(opening) : { id: `s${newIdSafe()}`, name: "", kind: "blocks" }));
 export const stored = signal(/** @type {"" | "browser" | "robot"} */ (""));
 export const listed = signal(/** @type {any[]} */ ([]));
@@ -17,7 +17,7 @@ const last = kept("studio.last", "");
 const UNSENT = "studio.unsent"; // ids of programs that the robot does not have as they stand here
 
 function newIdSafe() { return Math.random().toString(36).slice(2, 12); }
-function pick({ id, name, kind, lesson }) { return { id, name, kind, lesson }; }
+function pick({ id, name, kind, lesson, module }) { return { id, name, kind, lesson, module }; }
 function read(id) { try { return JSON.parse(localStorage.getItem(PREFIX + id) ?? "null"); } catch { return null; } }
 
 /** The Python of the program, whatever it is made of. */
@@ -36,7 +36,8 @@ export function restore() {
   if (found.kind === "text") body.value = found.body; else if (found.style) editor.load(found.style);
 }
 
-let timer = 0, versionAt = 0;
+let timer = 0;
+const versionAt = /** @type {Map<string, number>} */ (new Map()); // by program: when its newest version was kept
 /** Something was changed: keep it in the browser at once, on the robot soon. */
 export function changed() {
   keep();
@@ -58,12 +59,24 @@ function keep() {
   try {
     localStorage.setItem(PREFIX + now.id, JSON.stringify(now));
     stored.value = "browser";
-    if (Date.now() - versionAt > VERSION_EVERY) {
-      versionAt = Date.now();
-      const old = versions();
-      localStorage.setItem(`studio.versions.${now.id}`, JSON.stringify([now, ...old].slice(0, VERSIONS_MAX)));
-    }
+    if (!versionAt.has(now.id)) versionAt.set(now.id, versions()[0]?.saved ?? 0);
+    if (now.saved - (versionAt.get(now.id) ?? 0) > VERSION_EVERY) keepVersion(now);
   } catch { say(t("studio.storage.full"), true); }
+}
+
+/** @param {any} now as ``whole`` makes it */
+function keepVersion(now) {
+  const old = versions();
+  if (!now.body.trim() || (old[0]?.body === now.body && old[0].name === now.name)) return;
+  versionAt.set(now.id, now.saved);
+  localStorage.setItem(`studio.versions.${now.id}`, JSON.stringify([now, ...old].slice(0, VERSIONS_MAX)));
+}
+
+/** Back to an earlier version; what was there until now is a version, too. @param {any} version */
+export function back(version) {
+  try { keepVersion(whole()); } catch { say(t("studio.storage.full"), true); return; }
+  show(version);
+  changed();
 }
 
 export function versions() { try { return JSON.parse(localStorage.getItem(`studio.versions.${program.value.id}`) ?? "[]"); } catch { return []; } }
@@ -92,7 +105,7 @@ export async function saveNow() {
 
 async function saveToRobot(of = whole()) {
   if (!opened.value) return; // handed over when the robot is there
-  if (!of.body.trim()) { note(of.id, false); return; }
+  if (!of.body.trim() || of.module) { note(of.id, false); return; } // a module is kept by its own menu
   try {
     const { feedback } = await saveFrame(of);
     if (feedback.state !== 0 && feedback.state !== 23) return; // what is wrong is kept, too
@@ -123,10 +136,11 @@ export function fresh(/** @type {"blocks" | "text"} */ kind = "blocks", /** @typ
   last.value = program.value.id;
 }
 
-/** @param {{id?: string, name?: string, kind?: string, style?: any, body?: string, lesson?: string}} given */
+/** @param {{id?: string, name?: string, kind?: string, style?: any, body?: string, lesson?: string, module?: string}} given */
 export function show(given) {
-  const kind = given.kind ?? (given.style && (given.style.blocks || given.style.variables) ? "blocks" : "text");
-  program.value = { id: given.id ?? `s${newIdSafe()}`, name: given.name ?? "", kind: /** @type {any} */ (kind), lesson: given.lesson };
+  const { style: made } = given, empty = given.kind === "blocks" && !given.body; // blocks that are none yet
+  const kind = empty || (given.kind !== "text" && made && (made.blocks || made.variables)) ? "blocks" : "text";
+  program.value = { id: given.id ?? `s${newIdSafe()}`, name: given.name ?? "", kind, lesson: given.lesson, module: given.module };
   if (kind === "blocks") { body.value = ""; try { editor.load(given.style ?? {}); } catch (error) { asText(given.body ?? ""); say(t("studio.open.text", { why: error.message }), true); } }
   else asText(given.body ?? "");
   stored.value = "";
@@ -163,7 +177,7 @@ export async function remove(id) {
 /** Write a file. @param {"json" | "py" | "style"} form */
 export function download(form) {
   const name = (program.value.name || t("studio.untitled")).replace(/[^\p{L}\p{N}_-]+/gu, "_");
-  const text = form === "py" ? python() : form === "style" ? style() : JSON.stringify(whole(), null, 1);
+  const text = form === "py" ? plain(python()) : form === "style" ? style() : JSON.stringify(whole(), null, 1);
   const link = document.createElement("a");
   link.href = URL.createObjectURL(new Blob([text], { type: form === "py" ? "text/x-python" : "application/json" }));
   link.download = `${name}.${form === "py" ? "py" : form === "style" ? "style.json" : "roboglot.json"}`;
@@ -180,6 +194,7 @@ export async function upload(file) {
   const { made, named, kind, code } = contents(text);
   if ((JSON.stringify(made ?? null).match(/"type":/g) ?? []).length > BLOCKS_MAX || code.length > TEXT_MAX) throw new Error(t("studio.file.large"));
   show({ name: named || name, kind, style: made, body: code });
+  if (kind === "text" || !made) say(t("studio.open.python"));
   changed();
 }
 

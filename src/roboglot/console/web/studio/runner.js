@@ -141,12 +141,16 @@ export async function catchUp() {
   if (running.includes(program.value.id)) await rejoin(); else settle("idle");
 }
 
+const HELD = /** @type {Record<string, "running" | "paused">} */ ({ run: "running", suspend: "paused" });
 /** What was missed of the program while the page was away. */
 async function rejoin() {
   await learn(python());
   const { log, where } = await ask({ type: "fetch", program: program.value.id });
-  printed.value = log.slice(-LINES_MAX).map(entry);
-  phase.value = where.state === "suspend" ? "paused" : "running";
+  if (!HELD[where.state]) { settle("idle"); return; } // it ended meanwhile
+  printed.value = log.filter((/** @type {any} */ e) => e.stamp >= where.began).slice(-LINES_MAX).map(entry);
+  variables.value = where.variables;
+  bubbles.held(where.variables);
+  phase.value = HELD[where.state];
   place(where.block, where.line, where.module);
 }
 

@@ -2,8 +2,9 @@
 import * as Blockly from "blockly";
 import { kept, t } from "../base.js";
 import { formsOf, stateOf, table, typeOf, words } from "./blocks.js";
+import { find, prepare } from "./finding.js";
 
-const RECENT_MAX = 12, FOUND_MAX = 30;
+const RECENT_MAX = 12;
 const STATES_ONLY = new Set(["motion", "led", "audio", "task", "cyberdog", "follow", "dance", "navigation"]); // whose answers say little
 const recent = kept("studio.recent", "");
 export const wanted = { text: "" };
@@ -69,9 +70,14 @@ function shown(group) {
 
 const category = (name, style, contents, id) => ({ kind: "category", toolboxitemid: id, name, ...(style.startsWith("#") ? { colour: style } : { categorystyle: style }), contents });
 
+/** What a search may find. */
+let offered = { modules: /** @type {string[]} */ ([]), may: (/** @type {any} */ _) => true };
+
 /** @param {string[]} modules types of the blocks of modules @param {Set<string> | null} allowed types that a mission allows */
 export function toolbox(modules, allowed) {
-  const may = (item) => !allowed || allowed.has(item.type) || (item.type === "field_of" && allowed.has(item.inputs.VALUE?.block?.type));
+  const may = (item) => !allowed || allowed.has(item.type) || (item.type === "field_of" && allowed.has(item.inputs?.VALUE?.block?.type)
+    || (allowed.has("variables") && /^variables_|^math_change$/.test(item.type)) || (allowed.has("functions") && item.type.startsWith("procedures_")));
+  offered = { modules, may };
   const contents = /** @type {any[]} */ ([
     { kind: "category", name: t("studio.found"), custom: "FOUND", categorystyle: "found_category", toolboxitemid: "found", hidden: "true" },
     ...(allowed ? [] : [{ kind: "category", name: t("studio.recent"), custom: "RECENT", categorystyle: "found_category", toolboxitemid: "recent" }])]);
@@ -90,20 +96,12 @@ export function toolbox(modules, allowed) {
   return { kind: "categoryToolbox", contents };
 }
 
-/** Blocks whose name, Python name or explanation has the words. */
-export function found() {
-  const wishes = wanted.text.toLowerCase().split(/\s+/).filter(Boolean);
-  if (!wishes.length) return [{ kind: "label", text: t("studio.search.none") }];
-  const hits = table.functions.filter((f) => { const all = `${f.key} ${f.en} ${f.zh} ${f.about.en} ${f.about.zh}`.toLowerCase(); return wishes.every((wish) => all.includes(wish)); });
-  const rank = (f) => Math.min(...[f.en, f.zh].map((name) => (name.startsWith(wishes[0]) ? 0 : name.includes(wishes[0]) ? 1 : 2))); // named so, called so
-  hits.sort((a, b) => rank(a) - rank(b));
-  const own = Object.values(languageCategories()).flatMap(([, blocks]) => blocks).filter((item) => {
-    const made = `${item.type} ${t(`block.${item.type}`)}`.toLowerCase();
-    return wishes.every((wish) => made.includes(wish));
-  });
-  const list = [...own, ...hits.flatMap((f) => formsOf(f).map((value) => stateOf(f, value)))].slice(0, FOUND_MAX);
-  return list.length ? list : [{ kind: "label", text: t("studio.search.none") }];
-}
+/** Blocks that have the words, and how many there are. */
+export function sought() { return find(wanted.text, Object.values(languageCategories()).flatMap(([, blocks]) => blocks), offered.modules, offered.may); }
+export const found = () => sought().contents;
+
+/** Have both languages' words; `then` once they are there. @param {() => void} then */
+export const readyToSearch = (then) => prepare(then);
 
 /** Note that a block was taken. @param {string} type */
 export function noteUse(type) {
