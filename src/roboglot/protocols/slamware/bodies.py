@@ -1,4 +1,4 @@
-"""The bodies of requests as they come from the socket, bounded."""
+"""Bounded reading of request bodies from the socket."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ Receive = Callable[[], Awaitable[dict[str, Any]]]
 
 
 class ClientGone(Exception):
-    """The client left before its request was whole."""
+    """The client left before its request was complete."""
 
 
 async def read_body(scope: Scope, receive: Receive, most: int) -> bytes:
-    """The whole body."""
+    """Read and return the whole body."""
     body = bytearray()
     async for chunk in chunks(scope, receive, most):
         body += chunk
@@ -24,7 +24,7 @@ async def read_body(scope: Scope, receive: Receive, most: int) -> bytes:
 
 
 async def chunks(scope: Scope, receive: Receive, most: int) -> AsyncIterator[bytes]:
-    """The body as it comes. Raises HttpError 413 for what is too long, announced or not."""
+    """Yield the body in chunks. Raises HttpError 413 beyond the limit, announced or not."""
     too_long = HttpError(413, "Content Too Large", f"at most {most} bytes")
     for name, value in scope["headers"]:
         if name == b"content-length" and int(value) > most:

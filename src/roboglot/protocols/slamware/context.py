@@ -19,7 +19,7 @@ from roboglot.protocols.slamware.chapters.system.laser import Laser
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """One robot as the handlers see it: the model, and what this door keeps about it while it is open."""
+    """Context of one robot: the model, and this door's own state while it is open."""
 
     robot: Robot
     actions: ActionBook

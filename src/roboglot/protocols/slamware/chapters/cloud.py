@@ -1,7 +1,7 @@
-"""A cloud that has the robot in its care, played by a folder: ``map.stcm``, ``voice.json`` and ``tasks/*.json``.
+"""A cloud that manages the robot, simulated by a folder: ``map.stcm``, ``voice.json`` and ``tasks/*.json``.
 
-How the vendor's cloud talks to robots is not public; the folder stands for it, so that everything that only a cloud
-gives can happen. It is out of reach while the robot has no internet. Without a folder no cloud manages the robot.
+The vendor's cloud protocol is not public; the folder stands in for it, so that all that depends on a cloud can be
+tried. It is out of reach while the robot has no internet. Without a folder no cloud manages the robot.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ CLOUD_KINDS = {**KINDS, "STATION_TAKEOUT": OrderKind.STATION, "DISINFECT": Order
 
 
 class CloudFolder:
-    """One robot's."""
+    """Cloud folder of one robot."""
 
     def __init__(self, robot: Robot, folder: str) -> None:
         self._robot = robot
@@ -49,16 +49,16 @@ class CloudFolder:
         return self.managed and (Network not in self._robot or self._robot[Network].state.internet)
 
     async def leave(self) -> None:
-        """Leave the cloud for good: its map and tasks do not come any more."""
+        """Leave the cloud for good: no more maps and tasks from it."""
         if self._folder is not None:
             await self._robot[Settings].put(UNBOUND, True)
 
     def map(self) -> bytes | None:
-        """The composite map that it has for this robot; None without one, or out of reach."""
+        """Return the cloud's composite map for this robot; None without one, or out of reach."""
         return self._read("map.stcm", MAP_MAX) if self.reached else None
 
     def voices(self) -> list[VoicePackage]:
-        """Return its voice packages. InvalidGoal for a file that is none."""
+        """Return the cloud's voice packages. Raises InvalidGoal for a malformed file."""
         data = self._read("voice.json", VOICE_MAX)
         try:
             return msgspec.json.decode(data, type=list[VoicePackage]) if data else []
@@ -66,17 +66,17 @@ class CloudFolder:
             raise InvalidGoal(f"voice.json: {misfit(error, 'the list')}") from None
 
     def start(self) -> None:
-        """Look for tasks from now on."""
+        """Start polling for tasks."""
         if self.managed and Delivery in self._robot:
             self._looking = asyncio.get_running_loop().create_task(self._look(), name=f"cloud of {self._robot.id}")
 
     def close(self) -> None:
-        """Look no more."""
+        """Stop polling."""
         if self._looking is not None:
             self._looking.cancel()
 
     def _read(self, name: str, most: int) -> bytes | None:
-        """A file of the folder; None if it is not there or too long."""
+        """Read a file of the folder; None if it is missing or too long."""
         assert self._folder is not None
         path = self._folder / name
         try:
@@ -102,7 +102,7 @@ class CloudFolder:
             return []
 
     async def _take(self, path: Path) -> None:
-        """Queue one; its file is renamed, so that the cloud sees what became of it."""
+        """Queue a task and rename its file, so that the cloud sees the outcome."""
         try:
             data = self._read(f"tasks/{path.name}", TASK_MAX)
             request = request_of(msgspec.json.decode(data or b"", type=CloudTask), path.stem)
@@ -116,7 +116,7 @@ class CloudFolder:
 
 
 def _mark(path: Path, refused: str = "") -> None:
-    """The file's ending shows how the task ended."""
+    """Mark a task's outcome by its file's suffix."""
     try:
         if refused:
             path.with_suffix(".why").write_text(f"{refused}\n", encoding="utf-8")
@@ -126,7 +126,7 @@ def _mark(path: Path, refused: str = "") -> None:
 
 
 def request_of(task: CloudTask, name: str) -> OrderRequest:
-    """Return the order in the model's words; ``name`` if the cloud gave it no number. InvalidGoal for nonsense."""
+    """Return the model's order; ``name`` stands in for a missing number. Raises InvalidGoal."""
     number = task.order_id or name[:64]
     if task.type == "INDUSTRY":
         if not task.task_targets:

@@ -64,7 +64,7 @@ STAGES = {
 
 @TABLE.on(f"POST {TEMPLATES}", right=Right.EDIT, needs=(Industry,))
 async def create_task_template(context: Context, body: TemplateRequest) -> TaskTemplate:
-    """Keep it, in place of one with the same key; 404 for a place that is not on the map."""
+    """Store a template, replacing one with the same key; 404 for a place that is not on the map."""
     operations = tuple(Operation(entry.display_name, entry.action, entry.wait_time) for entry in body.action_list)
     template = RoundTemplate(body.key or str(uuid.uuid4()), body.name, operations)
     await context.robot[Industry].put_template(template)
@@ -73,13 +73,13 @@ async def create_task_template(context: Context, body: TemplateRequest) -> TaskT
 
 @TABLE.on(f"GET {TEMPLATES}", right=Right.SEE, needs=(Industry,))
 async def get_task_templates(context: Context) -> list[TaskTemplate]:
-    """Return the templates in the order in which they were made."""
+    """Return the templates in the order of their creation."""
     return [_template(context, template) for template in context.robot[Industry].templates]
 
 
 @TABLE.on(f"DELETE {TEMPLATES}/{{key_id}}", right=Right.EDIT, needs=(Industry,))
 async def delete_task_template(context: Context, key_id: str) -> CommonResponse:
-    """Forget it; 404 if there is none."""
+    """Delete a template; 404 if there is none."""
     await context.robot[Industry].remove_template(key_id)
     return CommonResponse(result=True, msg="", data={})
 
@@ -90,7 +90,7 @@ async def get_industry_tasks(
     type: Literal["carry_calling_by_template", "carry_calling", "industry"] | None = None,
     status: StatusFilter | None = None,
 ) -> list[IndustryTask]:
-    """Return the tasks ready and running, oldest first; with ``status`` all also those that ended."""
+    """Return ready and running tasks, oldest first; with ``status`` "all", ended ones, too."""
     calls = [
         _task(context, call)
         for call in context.robot[Industry].calls
@@ -104,7 +104,7 @@ async def get_industry_tasks(
 
 @TABLE.on("POST /api/industry/v1/generate_landing_pose", right=Right.SEE, needs=(Localization,))
 async def generate_landing_pose(context: Context, body: LandingRequest) -> LandingPose:
-    """Return the pose of the robot, and the pose ahead from which it would come back: MoveToTag's target.
+    """Return the robot's pose, and the pose ahead to approach it from: MoveToTag's target.
 
     Beyond the manual; real robots place it ``distance`` m straight ahead, headed as the robot or, ``reversed``, back.
     """
@@ -116,12 +116,12 @@ async def generate_landing_pose(context: Context, body: LandingRequest) -> Landi
 
 @TABLE.on(f"POST {TASKS}/events", right=Right.DRIVE, needs=(Industry,))
 async def post_task_event(context: Context, body: TaskEvent) -> None:
-    """The client that carries out a call says how it goes; 404 for an unknown one, 403 for one that has ended."""
+    """Report the progress of a call, by the client that carries it out; 404 if unknown, 403 if it has ended."""
     await context.robot[Industry].report(body.task_id, OrderStatus(body.status.lower()))
 
 
 def _template(context: Context, template: RoundTemplate) -> TaskTemplate:
-    """The scene is the map in use."""
+    """Return a template in the API's form; its scene is the current map."""
     entries = [TaskOperation(o.place, o.action, o.wait_seconds) for o in template.operations]
     device = device_id(context.robot.description.serial)
     return TaskTemplate(template.key, OWN_MADE, template.name, context.maps.current.map_id, device, entries)
@@ -137,7 +137,7 @@ def _task(context: Context, call: Call) -> IndustryTask:
 
 
 def _round(context: Context, order: Order) -> IndustryTask:
-    """A round that the cloud asked for and the robot carries out by itself."""
+    """Return a round of the cloud, which the robot carries out by itself."""
     request = order.request
     points = zip((*request.stops, request.target), request.tasks, request.waits, strict=True)
     targets = [IndustryTarget(place, action, round(wait)) for place, action, wait in points]
@@ -152,7 +152,7 @@ def _round(context: Context, order: Order) -> IndustryTask:
 
 
 def _stage_of(order: Order) -> str:
-    """Without a duration the robot waits until a client ends the operation."""
+    """Return the stage; without a duration the robot waits until a client ends the operation."""
     number = order.request.stops.index(order.stop) if order.stop in order.request.stops else len(order.request.stops)
     standing = order.stage in (OrderStage.AT_STOP, OrderStage.AT_TARGET)
     return "WAIT_OPERATION" if standing and not order.request.waits[number] else STAGES[order.stage]

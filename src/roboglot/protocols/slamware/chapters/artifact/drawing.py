@@ -1,4 +1,4 @@
-"""Lines and areas between the API's words and the model's. Knows no socket and no robot."""
+"""Translation of lines and areas between API and model. Knows no socket and no robot."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ AREA_USAGES = {kind: usage for usage, kind in AREA_KINDS.items()}
 
 
 def line_of(kind: LineKind, line: wire.Line) -> Line:
-    """The model's line. Raises InvalidGoal for control points that make no sense."""
+    """Return the model's line. Raises InvalidGoal for malformed control points."""
     metadata = wire.metadata_text(line.metadata)
     try:
         control = wire.control_points(metadata)
@@ -43,7 +43,7 @@ def wire_line(line: Line) -> wire.Line:
 
 
 def area_of(usage: AreaUsage, rectangle: wire.Strip, metadata: dict[str, str], id: int = 0) -> Area:
-    """The model's area, with what its metadata ask for. Raises InvalidGoal for values that make no sense."""
+    """Return the model's area, with the settings in its metadata. Raises InvalidGoal for malformed values."""
     try:
         robots = wire.number(metadata, "restricted_robots_number_limit", ROBOTS_MAX)
         return Area(
@@ -69,7 +69,7 @@ def wire_area(area: Area) -> wire.RectangleArea:
 
 
 def seen_from(origin: Point, drawn: Drawings) -> Drawings:
-    """Return all of it in the frame of the same map whose origin is moved to ``origin``."""
+    """Return all drawings in the map's frame after its origin has moved to ``origin``."""
     by = Pose(origin.x, origin.y)
 
     def point(p: Point) -> Point:

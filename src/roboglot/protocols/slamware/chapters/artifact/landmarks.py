@@ -24,7 +24,7 @@ API = "/api/core/artifact/v1/laser-landmarks"
 
 @TABLE.on(f"GET {API}", right=Right.SEE, needs=(MapAnnotations,))
 async def get_laser_landmarks(context: Context) -> list[PoseEntry]:
-    """Return the landmarks that the lidar found and those that were set."""
+    """Return landmarks found by the lidar and those that were set."""
     return [entry_of(mark) for mark in context.robot[MapAnnotations].current.landmarks]
 
 
@@ -32,7 +32,7 @@ async def get_laser_landmarks(context: Context) -> list[PoseEntry]:
 async def put_laser_landmarks(
     context: Context, body: Annotated[list[PoseEntry], msgspec.Meta(max_length=2000)]
 ) -> bool:
-    """These, and no others."""
+    """Replace all landmarks."""
     here = context.robot[Localization].pose
     marks = {e.id: PointOfInterest(e.id, pose_of(e.pose) if e.pose else here, metadata_text(e.metadata)) for e in body}
     await context.robot[MapAnnotations].change(lambda now: replace(now, landmarks=tuple(marks.values())))
@@ -41,20 +41,20 @@ async def put_laser_landmarks(
 
 @TABLE.on(f"GET {API}/:update", right=Right.SEE, needs=(LaserLandmarks,))
 async def get_laser_landmark_update(context: Context) -> bool:
-    """Return whether the robot adds landmarks that its lidar finds."""
+    """Return whether the robot adds landmarks found by its lidar."""
     return context.robot[LaserLandmarks].updating
 
 
 @TABLE.on(f"PUT {API}/:update", right=Right.EDIT, needs=(LaserLandmarks,))
 async def set_laser_landmark_update(context: Context, body: Switch) -> bool:
-    """Let it, or not."""
+    """Switch the adding of landmarks found by the lidar."""
     await context.robot[LaserLandmarks].set_updating(body.enable)
     return True
 
 
 @TABLE.on(f"DELETE {API}", right=Right.EDIT, needs=(MapAnnotations,))
 async def delete_laser_landmarks(context: Context) -> bool:
-    """Remove all."""
+    """Remove all landmarks."""
     await context.robot[MapAnnotations].change(lambda now: replace(now, landmarks=()))
     return True
 
@@ -63,7 +63,7 @@ async def delete_laser_landmarks(context: Context) -> bool:
 async def remove_laser_landmarks(
     context: Context, body: Annotated[list[Identifier | int], msgspec.Meta(max_length=2000)]
 ) -> bool:
-    """Remove some by id, all or none; 404 if one does not exist. The manual has numbers here and UUIDs elsewhere."""
+    """Remove landmarks by id, all or none; 404 if one does not exist. Ids are numbers here, UUIDs elsewhere."""
     ids = {str(id) for id in body}
 
     def edit(now: Annotations) -> Annotations:

@@ -26,13 +26,13 @@ LINES, AREAS = f"{API}/lines/{{usage}}", f"{API}/rectangle-areas/{{usage}}"
 
 @TABLE.on(f"GET {LINES}", right=Right.SEE, needs=(MapAnnotations,))
 async def get_lines(context: Context, usage: LineUsage) -> list[wire.Line]:
-    """All of one kind, oldest first."""
+    """Return all lines of one kind, oldest first."""
     return [wire_line(line) for line in context.robot[MapAnnotations].current.lines_of(LINE_KINDS[usage])]
 
 
 @TABLE.on(f"POST {LINES}", right=Right.EDIT, needs=(MapAnnotations,))
 async def add_lines(context: Context, usage: LineUsage, body: Lines) -> bool:
-    """Add some; the ids in the body do not count."""
+    """Add lines; ids in the body are ignored."""
     lines = [line_of(LINE_KINDS[usage], line) for line in body]
     await context.robot[MapAnnotations].change(lambda now: now.with_new(*lines))
     return True
@@ -40,7 +40,7 @@ async def add_lines(context: Context, usage: LineUsage, body: Lines) -> bool:
 
 @TABLE.on(f"PUT {LINES}", right=Right.EDIT, needs=(MapAnnotations,))
 async def modify_lines(context: Context, usage: LineUsage, body: Lines) -> bool:
-    """Change those with these ids; 404, and nothing happens, if one of them does not exist."""
+    """Change lines by id; 404 without any change if one of them does not exist."""
     changed = {line.id: line_of(LINE_KINDS[usage], line) for line in body}
 
     def edit(now: Annotations) -> Annotations:
@@ -55,7 +55,7 @@ async def modify_lines(context: Context, usage: LineUsage, body: Lines) -> bool:
 
 @TABLE.on(f"DELETE {LINES}", right=Right.EDIT, needs=(MapAnnotations,))
 async def clear_lines(context: Context, usage: LineUsage) -> bool:
-    """Remove all of one kind."""
+    """Remove all lines of one kind."""
     kind = LINE_KINDS[usage]
     await context.robot[MapAnnotations].change(
         lambda now: replace(now, lines=tuple(line for line in now.lines if line.kind is not kind))
@@ -65,7 +65,7 @@ async def clear_lines(context: Context, usage: LineUsage) -> bool:
 
 @TABLE.on(f"DELETE {LINES}/{{id}}", right=Right.EDIT, needs=(MapAnnotations,))
 async def remove_line_by_id(context: Context, usage: LineUsage, id: int) -> bool:
-    """Remove one, or 404."""
+    """Remove a line; 404 if there is none."""
     kind = LINE_KINDS[usage]
 
     def edit(now: Annotations) -> Annotations:
@@ -80,13 +80,13 @@ async def remove_line_by_id(context: Context, usage: LineUsage, id: int) -> bool
 
 @TABLE.on(f"GET {AREAS}", right=Right.SEE, needs=(MapAnnotations,))
 async def get_rectangle_areas(context: Context, usage: AreaUsage) -> list[RectangleArea]:
-    """All of one kind, oldest first."""
+    """Return all areas of one kind, oldest first."""
     return [wire_area(area) for area in context.robot[MapAnnotations].current.areas_of(AREA_KINDS[usage])]
 
 
 @TABLE.on(f"POST {AREAS}", right=Right.EDIT, needs=(MapAnnotations,))
 async def add_rectangle_area(context: Context, usage: AreaUsage, body: AreaRequest) -> bool:
-    """Add one; what its metadata ask for must make sense."""
+    """Add an area; the settings in its metadata must be valid."""
     area = area_of(usage, body.area, wire.metadata_text(body.metadata))
     await context.robot[MapAnnotations].change(lambda now: now.with_new(area))
     return True
@@ -94,7 +94,7 @@ async def add_rectangle_area(context: Context, usage: AreaUsage, body: AreaReque
 
 @TABLE.on(f"DELETE {AREAS}", right=Right.EDIT, needs=(MapAnnotations,))
 async def clear_rectangle_areas(context: Context, usage: AreaUsage) -> bool:
-    """Remove all of one kind."""
+    """Remove all areas of one kind."""
     kind = AREA_KINDS[usage]
     await context.robot[MapAnnotations].change(
         lambda now: replace(now, areas=tuple(area for area in now.areas if area.kind is not kind))
@@ -104,7 +104,7 @@ async def clear_rectangle_areas(context: Context, usage: AreaUsage) -> bool:
 
 @TABLE.on(f"PUT {AREAS}/{{id}}", right=Right.EDIT, needs=(MapAnnotations,))
 async def edit_rectangle_area(context: Context, usage: AreaUsage, id: int, body: AreaChange) -> bool:
-    """Change place, metadata or both; 404 if there is none."""
+    """Change an area's place, metadata or both; 404 if there is none."""
 
     def edit(now: Annotations) -> Annotations:
         old = next((area for area in now.areas_of(AREA_KINDS[usage]) if area.id == id), None)
@@ -121,7 +121,7 @@ async def edit_rectangle_area(context: Context, usage: AreaUsage, id: int, body:
 
 @TABLE.on(f"DELETE {AREAS}/{{id}}", right=Right.EDIT, needs=(MapAnnotations,))
 async def remove_rectangle_area_by_id(context: Context, usage: AreaUsage, id: int) -> bool:
-    """Remove one, or 404."""
+    """Remove an area; 404 if there is none."""
     kind = AREA_KINDS[usage]
 
     def edit(now: Annotations) -> Annotations:

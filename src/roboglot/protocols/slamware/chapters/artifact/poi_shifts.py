@@ -1,4 +1,4 @@
-"""Shifts of points of interest after loop closures: the map was straightened, the points stayed where they were."""
+"""Shifts of points of interest after loop closures, which correct the map but not the points."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from roboglot.model.robot import Robot
 
 @dataclass(frozen=True, slots=True)
 class Shift:
-    """Shift of one place: the pose that it has, and the one that it should have."""
+    """Shift of one place: its current pose, and the corrected one."""
 
     has: Pose
     should: Pose
 
 
 class PoiShifts:
-    """Watches loops being closed; a place that a client moves meanwhile is left alone."""
+    """Follows loop closures; a place that a client has moved since is left alone."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -28,17 +28,17 @@ class PoiShifts:
         self._endings: list[Callable[[], None]] = []
 
     def start(self) -> None:
-        """Watch from now on."""
+        """Start following loop closures."""
         listen = self._robot.events.listen
         self._endings = [listen(LoopClosed, self._closed), listen(MapReplaced, lambda _: self._shifts.clear())]
 
     def close(self) -> None:
-        """Watch no more."""
+        """Stop following loop closures."""
         for end in self._endings:
             end()
 
     async def adjust(self) -> None:
-        """Put all places that were on the map when loops were closed to where they are on the straightened map."""
+        """Move places that were on the map at loop closures to their corrected poses."""
         shifts, self._shifts = self._shifts, {}
         places = [place for place in self._robot[Places].all() if place.id in shifts]
         stale = [place for place in places if place.pose == shifts[place.id].has]
@@ -55,6 +55,6 @@ class PoiShifts:
 
 
 def _moved(pose: Pose, moved: Sequence[tuple[Pose, Pose]]) -> Pose:
-    """Return the pose moved as the nearest of the places that are known before and after."""
+    """Return the pose, moved like the nearest place known before and after."""
     before, after = min(moved, key=lambda pair: pair[0].distance_to(pose))
     return after.compose(pose.relative_to(before))

@@ -1,4 +1,4 @@
-"""Chapter "delivery": what the operator of the robot sets."""
+"""Chapter "delivery": the operator's settings."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ async def get_password(context: Context) -> AdminPassword:
 
 @TABLE.on(f"PUT {API}/admin/password", right=Right.ADMIN, needs=(Settings,))
 async def set_password(context: Context, body: Password | None = None) -> OperationReply:
-    """Ask for this password, or for none. It guards the screen: the API itself is open."""
+    """Set or remove the password of the robot's screen; the API itself is open."""
     new = body or Password(enable=False)
     if new.enable and not new.password:
         return OperationReply(result=False, reason="a password is needed")
@@ -69,19 +69,19 @@ async def set_password(context: Context, body: Password | None = None) -> Operat
 
 @TABLE.on(f"GET {API}/admin/mode", right=Right.SEE, needs=(Delivery,))
 async def get_work_mode(context: Context) -> WorkModeEntry:
-    """Return which tasks may be created at the robot."""
+    """Return the work mode: the tasks that may be created at the robot."""
     return msgspec.convert({"work_mode": context.robot[Delivery].policy.work_mode.value.upper()}, WorkModeEntry)
 
 
 @TABLE.on(f"PUT {API}/admin/mode", right=Right.EDIT, needs=(Delivery,))
 async def set_work_mode(context: Context, body: WorkModeEntry) -> OperationReply:
-    """DISPATCH: none, RECYCLE: only collecting dishes, MANUAL: any."""
+    """Set the tasks that may be created at the robot: DISPATCH none, RECYCLE collecting dishes, MANUAL any."""
     return await _set(context, replace(context.robot[Delivery].policy, work_mode=WorkMode(body.work_mode.lower())))
 
 
 @TABLE.on(f"GET {API}/admin/language", right=Right.SEE, needs=(Settings,))
 async def get_language(context: Context) -> Language:
-    """Return the language that was set; at first Chinese."""
+    """Return the language; Chinese by default."""
     return Language(language_of(context.robot))
 
 
@@ -96,14 +96,14 @@ async def set_language(context: Context, body: Language) -> OperationReply:
 
 @TABLE.on(f"GET {API}/admin/working_time", right=Right.SEE, needs=(Delivery,))
 async def get_working_time(context: Context) -> WorkingTime:
-    """UTC; no hours: always."""
+    """Return the working hours, UTC; no hours: always."""
     policy = context.robot[Delivery].policy
     return WorkingTime([Hours(_clock(a), _clock(b)) for a, b in policy.hours], list(policy.rest_days))
 
 
 @TABLE.on(f"PUT {API}/admin/working_time", right=Right.EDIT, needs=(Delivery,))
 async def set_working_time(context: Context, body: WorkingTime) -> OperationReply:
-    """Outside these hours (UTC) the robot rests on its dock and tasks wait."""
+    """Set the working hours (UTC), outside of which the robot rests on its dock and tasks wait."""
     hours = tuple((_seconds(entry.start_time), _seconds(entry.end_time)) for entry in body.hours)
     rest_days = tuple(sorted(set(body.restdays)))
     return await _set(context, replace(context.robot[Delivery].policy, hours=hours, rest_days=rest_days))
@@ -126,7 +126,7 @@ async def get_move_options(context: Context) -> MoveOptions:
 
 @TABLE.on(f"PUT {API}/admin/move_options", right=Right.EDIT, needs=(Delivery,))
 async def set_move_options(context: Context, body: dict[str, object] | None = None) -> OperationReply:
-    """Change what is sent; an empty body goes back to the default. The next drive has it."""
+    """Change the given settings, or reset all by an empty body; applies from the next drive."""
     policy = context.robot[Delivery].policy
     words = {**policy.words, **body} if body else {}
     words = {name: value for name, value in words.items() if name in MoveOptions.__struct_fields__}
@@ -148,7 +148,7 @@ async def set_move_options(context: Context, body: dict[str, object] | None = No
 
 
 def _effective(how: MoveOptions) -> MoveOptions:
-    """With a list where clients send 0, null or [null] for no flags, and 0 for what is not set."""
+    """Return the settings normalised: a list for 0, null or [null] as flags, and 0 for unset values."""
     flags: list[str | None] = [flag for flag in how.flags if flag] if isinstance(how.flags, list) else []
     return MoveOptions(
         how.mode,
@@ -162,7 +162,7 @@ def _effective(how: MoveOptions) -> MoveOptions:
 
 @TABLE.on(f"GET {API}/admin/line_speed", right=Right.SEE, needs=(Base, Delivery))
 async def get_line_speed(context: Context) -> LineSpeed:
-    """m/s on the way to people and back; what was never set is as fast as the robot may drive."""
+    """Return the speeds on the way to people and back, m/s; by default the robot's top speed."""
     policy, most = context.robot[Delivery].policy, context.robot[Base].limits.twist.x
     there = most if policy.delivery_speed is None else policy.delivery_speed
     return LineSpeed(there, most if policy.return_speed is None else policy.return_speed)
@@ -170,7 +170,7 @@ async def get_line_speed(context: Context) -> LineSpeed:
 
 @TABLE.on(f"PUT {API}/admin/line_speed", right=Right.EDIT, needs=(Delivery,))
 async def set_line_speed(context: Context, body: LineSpeed) -> None:
-    """The next drive has it; never faster than the robot may drive."""
+    """Set the speeds from the next drive on, at most the robot's top speed."""
     policy = context.robot[Delivery].policy
     there = policy.delivery_speed if body.delivery_speed is None else body.delivery_speed
     back = policy.return_speed if body.return_speed is None else body.return_speed
@@ -179,7 +179,7 @@ async def set_line_speed(context: Context, body: LineSpeed) -> None:
 
 @TABLE.on(f"GET {API}/configurations", right=Right.SEE, needs=(Settings,))
 async def get_configurations(context: Context) -> Configuration:
-    """The machine; it does not search its place anew when parked."""
+    """Return the machine's configuration; it does not relocalize when parked."""
     plate = context.robot.description
     cargos = all_cargos(context.robot) if Cargo in context.robot else []
     return Configuration(device_id(plate.serial), software_version(context.robot), context.cloud.managed, False, cargos)
@@ -187,7 +187,7 @@ async def get_configurations(context: Context) -> Configuration:
 
 @TABLE.on(f"GET {API}/settings", right=Right.SEE, needs=(Delivery,))
 async def get_delivery_settings(context: Context) -> WrappedSettings:
-    """Battery levels (percent) and time-outs (s)."""
+    """Return battery levels (percent) and time-outs (s)."""
     policy = context.robot[Delivery].policy
     levels = BatteryLevels(policy.level_off, policy.level_home, policy.level_no_cloud, policy.level_no_takeout)
     timeouts = Timeouts(
@@ -202,13 +202,13 @@ async def get_delivery_settings(context: Context) -> WrappedSettings:
 
 @TABLE.on(f"PUT {API}/settings/timeout", right=Right.EDIT, needs=(Delivery,))
 async def set_timeout_settings(context: Context, body: TimeoutChange) -> None:
-    """Set how long the robot waits for a guest to take the food, s."""
+    """Set the time that the robot waits for a guest to take the food, s."""
     await _set(context, replace(context.robot[Delivery].policy, food_seconds=float(body.food_pickup_timeout)))
 
 
 @TABLE.on(f"GET {API}/voice_resources", right=Right.SEE, needs=(Settings,))
 async def get_voice_resources(context: Context) -> VoicePackages:
-    """The cloud's voice packages; ``result`` false without a cloud, or when it cannot be reached."""
+    """Return the cloud's voice packages; ``result`` false without a cloud, or out of reach."""
     if not context.cloud.reached:
         why = "the cloud is out of reach" if context.cloud.managed else "no cloud manages this robot"
         return VoicePackages(result=False, msg=why, data=[])

@@ -1,4 +1,4 @@
-"""The last thing that was asked of each cargo box, by whomever. Knows no HTTP."""
+"""Last operation of each cargo box, by any client. Knows no HTTP."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ class BoxLog:
         self._end: Callable[[], None] = lambda: None
 
     def start(self) -> None:
-        """Listen from now on, if there are boxes."""
+        """Start listening, if there are boxes."""
         if Cargo in self._robot:
             self._end = self._robot.events.listen(ActionChanged, self._changed)
 
     def close(self) -> None:
-        """Listen no more."""
+        """Stop listening."""
         self._end()
 
     def last(self, box: int) -> Action | None:
-        """The youngest opening or closing of that box."""
+        """Return the last opening or closing of a box."""
         return self._last.get(box)
 
     def _changed(self, event: ActionChanged) -> None:

@@ -31,7 +31,7 @@ BOXED = (OrderKind.TAKEOUT, OrderKind.DISTRIBUTE, OrderKind.COLLECT, OrderKind.S
 
 
 def all_cargos(robot: Robot) -> list[Cargo]:
-    """With their boxes as they are now."""
+    """Return all cargos with the current state of their boxes."""
     cargo, found = robot[CargoComponent], []
     for part in cargo.compartments:
         orientation, kind = orientation_and_type(part)
@@ -42,26 +42,26 @@ def all_cargos(robot: Robot) -> list[Cargo]:
 
 @TABLE.on(f"GET {CARGOS}", right=Right.SEE, needs=(CargoComponent,))
 async def get_cargos(context: Context) -> list[Cargo]:
-    """All groups of boxes with the state of each box."""
+    """Return all cargos with the state of each box."""
     return all_cargos(context.robot)
 
 
 @TABLE.on(f"GET {BOXES}", right=Right.SEE, needs=(CargoComponent,))
 async def get_cargo_boxes(context: Context, cargo_id: str) -> list[Box]:
-    """The boxes of one cargo; 404 if there is none."""
+    """Return the boxes of a cargo; 404 if there is none."""
     cargo = context.robot[CargoComponent]
     return [box_of(cargo.box(id)) for id in _compartment(context, cargo_id).boxes]
 
 
 @TABLE.on(f"GET {BOXES}/{{box_id}}", right=Right.SEE, needs=(CargoComponent,))
 async def get_cargo_box(context: Context, cargo_id: str, box_id: int) -> Box:
-    """One box; 404 if the cargo has none of that number."""
+    """Return a box; 404 if the cargo has none of that number."""
     return box_of(context.robot[CargoComponent].box(_box_id(context, cargo_id, box_id)))
 
 
 @TABLE.on(f"PUT {BOXES}/{{box_id}}/{{op}}", right=Right.DRIVE, needs=(CargoComponent,))
 async def operate_box(context: Context, cargo_id: str, box_id: int, op: Literal[":open", ":close"]) -> None:
-    """Begin to open or close; the door moves in its own time, ``operation_result`` has the outcome."""
+    """Start opening or closing a box; ``operation_result`` has the outcome."""
     cargo, id = context.robot[CargoComponent], _box_id(context, cargo_id, box_id)
     if op == ":open":
         cargo.open_box(id, source=SOURCE)

@@ -1,4 +1,4 @@
-"""Chapter "delivery": what the service does now, in one word and what belongs to it."""
+"""Chapter "delivery": the current stage of the service, with its details."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ LANDING = {None: "INITIALIZING", "approaching": "GOING_TO_LANDING_POINT"}  # by 
 
 @TABLE.on("GET /api/delivery/v1/stage", right=Right.SEE, needs=(Delivery, Places))
 async def get_stage(context: Context) -> TaskStage:
-    """A fault that keeps the robot from moving before the task before the way to rest."""
+    """Return the stage: a fault that stops the robot comes before the task, and that before the way to rest."""
     delivery, floor = context.robot[Delivery], context.maps.current.floor
     if errors := _errors(context):
         return TaskStage("DEVICE_ERROR", info=StageInfo(errors=errors))
@@ -49,7 +49,7 @@ async def get_stage(context: Context) -> TaskStage:
 
 
 def _bound_for(action: Action | None) -> str:
-    """The floor that the robot rides to; empty if it rides nowhere."""
+    """Return the floor that the robot rides to; empty without a ride."""
     return action.goal.rpartition("/")[2] if action and ride_word(action) and isinstance(action.goal, str) else ""
 
 

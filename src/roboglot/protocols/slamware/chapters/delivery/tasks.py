@@ -1,4 +1,4 @@
-"""Chapter "delivery": tasks, and what people at the robot say while it carries them out."""
+"""Chapter "delivery": tasks, and input of people at the robot during them."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ StatusFilter = Literal["ready", "running", "succeeded", "failed", "all"]
 async def get_tasks(
     context: Context, type: KindFilter | None = None, status: StatusFilter | None = None
 ) -> list[DeliveryTask]:
-    """Return the tasks ready and running, oldest first; with ``status`` all also those that ended."""
+    """Return ready and running tasks, oldest first; with ``status`` "all", ended ones, too."""
     return [
         task_of(context.robot, order)
         for order in context.robot[Delivery].orders
@@ -54,7 +54,7 @@ async def get_tasks(
 
 
 def is_asked(status: OrderStatus, asked: StatusFilter | None) -> bool:
-    """Return whether a query by status means this; none means what has not ended."""
+    """Return whether a query by status selects a task; without a status, those that have not ended."""
     match asked:
         case None:
             return not status.ended
@@ -77,7 +77,7 @@ async def create_task(context: Context, body: TaskRequest) -> TaskCreated:
 async def create_tasks(
     context: Context, body: Annotated[list[TaskRequest], msgspec.Meta(min_length=1, max_length=BATCH_MAX)]
 ) -> TasksCreated:
-    """Queue several, all or none."""
+    """Queue several tasks, all or none."""
     orders, errors = await _accept(context, [request_of(entry) for entry in body])
     return TasksCreated(bool(orders), [order.number for order in orders], errors)
 
@@ -93,25 +93,25 @@ async def _accept(context: Context, requests: list[OrderRequest]) -> tuple[Seque
 
 @TABLE.on(f"DELETE {TASKS}", right=Right.DRIVE, needs=(Delivery,))
 async def cancel_all_tasks(context: Context) -> None:
-    """All end as canceled; the robot brakes and goes to rest."""
+    """Cancel all tasks; the robot brakes and goes to rest."""
     await context.robot[Delivery].cancel()
 
 
 @TABLE.on(f"DELETE {TASKS}/{{task_id}}", right=Right.DRIVE, needs=(Delivery,))
 async def cancel_task_by_task_id(context: Context, task_id: str) -> None:
-    """One ends as canceled; 404 if there is none."""
+    """Cancel a task; 404 if there is none."""
     await context.robot[Delivery].cancel(task_id)
 
 
 @TABLE.on(f"DELETE {TASKS}/orders/{{order_id}}", right=Right.DRIVE, needs=(Delivery,))
 async def cancel_task_by_order_id(context: Context, order_id: str) -> None:
-    """The same by the number that creating it answered."""
+    """Cancel a task by the order number that its creation returned."""
     await context.robot[Delivery].cancel(order_id)
 
 
 @TABLE.on(f"PUT {TASKS}/:task_execution", right=Right.DRIVE, needs=(Delivery,))
 async def set_task_execution(context: Context, body: TaskExecution | None = None) -> TaskExecution:
-    """False: the robot stands still while people use its screen. True: it goes on, or to rest if there is no task.
+    """Hold the robot while people use its screen (false), or let it continue, or rest without a task (true).
 
     Without a body nothing changes; the answer is how it is.
     """
@@ -123,7 +123,7 @@ async def set_task_execution(context: Context, body: TaskExecution | None = None
 
 @TABLE.on(f"PUT {TASKS}/:task_finish", right=Right.DRIVE, needs=(Delivery,))
 async def end_task(context: Context) -> NoContent:
-    """All end as succeeded."""
+    """End all tasks as succeeded."""
     await context.robot[Delivery].finish()
     return NO_CONTENT
 
@@ -137,13 +137,13 @@ async def start_pickup(context: Context) -> NoContent:
 
 @TABLE.on(f"PUT {TASKS}/:end_pickup", right=Right.DRIVE, needs=(Delivery,))
 async def end_pickup(context: Context) -> NoContent:
-    """This box is done: its door shuts, and the next one opens. 403 unless goods are being taken out."""
+    """Finish a box: its door closes, and the next one opens. 403 unless goods are being taken out."""
     await context.robot[Delivery].end_pickup()
     return NO_CONTENT
 
 
 @TABLE.on(f"PUT {TASKS}/:end_operation", right=Right.DRIVE, needs=(Delivery,))
 async def end_operation(context: Context) -> NoContent:
-    """The task may leave this point; 403 unless the robot stands at one."""
+    """Let the task leave this point; 403 unless the robot stands at one."""
     await context.robot[Delivery].end_operation()
     return NO_CONTENT

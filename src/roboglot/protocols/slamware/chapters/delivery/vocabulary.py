@@ -1,4 +1,4 @@
-"""The delivery service's words for the model's: orders, stages, boxes, reasons."""
+"""Vocabulary of the delivery service: orders, stages, boxes, reasons."""
 
 from __future__ import annotations
 
@@ -109,18 +109,18 @@ STOCKS = {Stock.EMPTY: "EMPTY", Stock.PARTLY: "SEMIFULL", Stock.FULL: "FULL"}
 
 
 def request_of(body: TaskRequest) -> OrderRequest:
-    """Return what the client wants, in the model's words. Box "000" is number 0."""
+    """Return the client's request in the model's words. Box "000" is number 0."""
     boxes = boxes_of(body.cargos or ())
     return OrderRequest(KINDS[body.type], body.location.poi_name, tuple(body.location.task_points), boxes)
 
 
 def boxes_of(cargos: Iterable[CargoEntry]) -> tuple[BoxChoice, ...]:
-    """The boxes of all these."""
+    """Return the boxes of all cargos."""
     return tuple(BoxChoice(entry.cargo_id, int(box)) for entry in cargos for box in entry.boxes)
 
 
 def entries_of(boxes: Iterable[BoxChoice]) -> list[CargoEntry]:
-    """Boxes by cargo, as text of three digits."""
+    """Return boxes by cargo, as text of three digits."""
     grouped: dict[str, list[str | int]] = {}
     for choice in boxes:
         grouped.setdefault(choice.compartment, []).append(f"{choice.box:03}")
@@ -128,12 +128,12 @@ def entries_of(boxes: Iterable[BoxChoice]) -> list[CargoEntry]:
 
 
 def reason_of(failure: Failure | None) -> str:
-    """Empty if all went well; a plain sentence where clients know no word."""
+    """Return the reason of a failure: empty without one, a plain sentence where the API has no word."""
     return REASONS.get(failure, failure.value) if failure else ""
 
 
 def results_of(results: Sequence[PickUp]) -> list[PickupResult]:
-    """Return what became of boxes and stops."""
+    """Return the outcomes of boxes and stops."""
     found = []
     for result in results:
         entry = PickupResult("FAILED" if result.failure else "SUCCEEDED", reason=reason_of(result.failure))
@@ -146,7 +146,7 @@ def results_of(results: Sequence[PickUp]) -> list[PickupResult]:
 
 
 def name_of(robot: Robot, target: str) -> LocationInfo:
-    """A place by the name that people gave it; ``target`` may be its id."""
+    """Return a place's display name; ``target`` may be its id."""
     places = list(robot[Places].all())
     if Storeys in robot and (maps := robot[Storeys].maps) is not None:
         places += [known.place for known in maps.places()]
@@ -157,7 +157,7 @@ def name_of(robot: Robot, target: str) -> LocationInfo:
 
 
 def task_request_of(robot: Robot, order: Order) -> DeliveryTaskRequest:
-    """The request as the robot reports it."""
+    """Return the request in the form of reports."""
     return DeliveryTaskRequest(
         target=name_of(robot, order.request.target).poi_name,
         type=KIND_WORDS.get(order.request.kind, "RETURN"),
@@ -171,13 +171,13 @@ def task_request_of(robot: Robot, order: Order) -> DeliveryTaskRequest:
 
 
 def ride_word(action: Action | None) -> str:
-    """Return how far a ride in the lift is; empty where there is none."""
+    """Return the stage of a lift ride; empty without one."""
     stage = part_of(action).feedback if action else None
     return RIDE_STAGES[stage] if isinstance(stage, RideStage) else ""
 
 
 def task_of(robot: Robot, order: Order) -> DeliveryTask:
-    """The order as the API writes it; one that has not begun has no stage."""
+    """Return an order in the API's form; one that has not begun has no stage."""
     stage = "" if order.status is OrderStatus.READY else STAGES[order.stage]
     if order.status is OrderStatus.RUNNING:
         stage = ride_word(next(iter(robot.actions.running(ERRAND)), None)) or stage
@@ -187,7 +187,7 @@ def task_of(robot: Robot, order: Order) -> DeliveryTask:
 
 
 def box_of(state: BoxState) -> Box:
-    """A box as the API writes it."""
+    """Return a box in the API's form."""
     stock = STOCKS[state.stock]
     status = "ERROR" if state.errors else "EMPTY" if state.stock is Stock.EMPTY else "NOT_EMPTY"
     lock = "LOCKED" if state.locked else "UNLOCKED"
@@ -195,5 +195,5 @@ def box_of(state: BoxState) -> Box:
 
 
 def orientation_and_type(compartment: Compartment) -> tuple[str, str]:
-    """Return both in capitals."""
+    """Return orientation and type in capitals."""
     return compartment.orientation.upper(), compartment.kind.upper()

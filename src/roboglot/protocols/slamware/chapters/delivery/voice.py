@@ -23,24 +23,24 @@ PHRASES = {
 
 
 def language_of(robot: Robot) -> str:
-    """Return the language that was set; at first Chinese."""
+    """Return the language; Chinese by default."""
     return str(robot[Settings].get(LANGUAGE, LANGUAGE_AT_FIRST))
 
 
 class Voice:
-    """Speaks when the delivery service has news."""
+    """Announces news of the delivery service."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._end: Callable[[], None] = lambda: None
 
     def start(self) -> None:
-        """Listen from now on; a robot without a loudspeaker is silent."""
+        """Start listening for news; a robot without a loudspeaker is silent."""
         if Speaker in self._robot and Settings in self._robot:
             self._end = self._robot.events.listen(DeliveryReported, self._speak)
 
     def close(self) -> None:
-        """Be silent."""
+        """Stop announcements."""
         self._end()
 
     def _speak(self, event: DeliveryReported) -> None:

@@ -1,4 +1,4 @@
-"""Chapters "firmware" and "application": updates from the maker, installed apps."""
+"""Chapters "firmware" and "application": updates from the manufacturer, installed apps."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Outcome(msgspec.Struct):
 
 
 class UploadOutcome(msgspec.Struct):
-    """Result of an upload; ``msg`` says why it was refused, ``data`` has the version."""
+    """Result of an upload; ``msg``: reason of a refusal, ``data``: the version."""
 
     result: bool
     msg: str
@@ -72,7 +72,7 @@ class InstalledApp(msgspec.Struct):
 
 @TABLE.on(f"GET {API}/newversion", right=Right.SEE, needs=(Firmware,))
 async def get_new_version(context: Context) -> FirmwareInfo:
-    """Return the version offered by the maker, if it is newer than the running one."""
+    """Return the version offered by the manufacturer, if newer than the running one."""
     plate = context.robot.description
     if (package := context.robot[Firmware].available) is None:
         return FirmwareInfo()
@@ -87,7 +87,7 @@ async def get_enable_auto_update(context: Context) -> bool:
 
 @TABLE.on(f"PUT {API}/autoupdate/:enable", right=Right.ADMIN, needs=(Firmware,))
 async def set_enable_auto_update(context: Context, body: Switch) -> None:
-    """Let it, or not."""
+    """Switch automatic updates on the dock."""
     await context.robot[Firmware].set_automatic(body.enable)
 
 
@@ -134,13 +134,13 @@ async def get_firmware_progress(context: Context) -> UpdateProgress:
 
 @TABLE.on(f"GET {APPS}", right=Right.SEE, needs=(Apps,))
 async def get_apps(context: Context) -> list[InstalledApp]:
-    """The apps that people installed."""
+    """Return the installed apps."""
     return [InstalledApp(app.name, app.version) for app in context.robot[Apps].all()]
 
 
 @TABLE.on(f"POST {APPS}", right=Right.ADMIN, needs=(Apps,))
 async def install_app(context: Context, body: Upload) -> None:
-    """Install an Android package (APK) or a newer version of one; 400 for what is none, 500 without room."""
+    """Install or update an Android package (APK); 400 for a malformed one, 500 without disk space."""
     try:
         app = read_apk(body.file)
         await context.robot[Apps].install(app.name, app.version, body.file)
@@ -151,5 +151,5 @@ async def install_app(context: Context, body: Upload) -> None:
 
 @TABLE.on(f"DELETE {APPS}/{{app_name}}", right=Right.ADMIN, needs=(Apps,))
 async def delete_app(context: Context, app_name: str) -> None:
-    """Remove one, or 404."""
+    """Remove an app; 404 if there is none."""
     await context.robot[Apps].remove(app_name)

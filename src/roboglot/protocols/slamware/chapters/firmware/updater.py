@@ -1,4 +1,4 @@
-"""Carries an update of the robot's software through."""
+"""Execution of an update of the robot's software."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ class Updater:
         return self._task is not None and not self._task.done()
 
     def begin(self, package: FirmwarePackage) -> None:
-        """Begin with that; one without a URL is here already."""
+        """Start with a package; one without a URL needs no download."""
         self.failed = False
         work = self._update(self._robot[Firmware], package)
         self._task = asyncio.get_running_loop().create_task(work, name="update")
 
     def close(self) -> None:
-        """Give up."""
+        """Abort the update."""
         if self._task is not None:
             self._task.cancel()
 

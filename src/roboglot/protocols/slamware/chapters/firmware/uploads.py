@@ -1,4 +1,4 @@
-"""Large bodies on their way to the disk: a package is never whole in memory. Knows no HTTP words."""
+"""Upload of large bodies to disk: a package is never whole in memory. Knows no HTTP words."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ PACKAGE_MAX = 500 * 1000**2  # bytes of a firmware or app package
 
 
 class Upload:
-    """A body in a temporary file that has no name; it is gone once closed. A handler takes it as its ``body``."""
+    """A body in an unnamed temporary file, deleted once closed. A handler takes it as its ``body``."""
 
     def __init__(self) -> None:
         self.file: BinaryIO = cast(BinaryIO, tempfile.TemporaryFile(prefix="roboglot-"))  # noqa: SIM115 # closed by ``close``
@@ -18,7 +18,7 @@ class Upload:
         self._digest = hashlib.md5(usedforsecurity=False)
 
     def write(self, chunk: bytes) -> None:
-        """Add the next piece."""
+        """Append a chunk."""
         self.file.write(chunk)
         self._digest.update(chunk)
         self.size += len(chunk)
@@ -29,5 +29,5 @@ class Upload:
         return self._digest.hexdigest()
 
     def close(self) -> None:
-        """Forget it."""
+        """Delete the file."""
         self.file.close()

@@ -1,7 +1,7 @@
 """The action list of the REST door: the vendor's names for the robot's actions, and the last 20 that ended.
 
-Ids are the model's. Actions that other doors began show too, under the nearest vendor name, because to a client of the
-robot they are what the robot does.
+Ids are the model's. Actions of other doors are listed too, under the nearest vendor name, since a client has to see
+what the robot is doing.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ FOREIGN = {
 
 
 class ActionBook:
-    """Remembers under which name an action was asked for."""
+    """Book of actions, with the names under which clients requested them."""
 
     def __init__(self, robot: Robot, prefix: str) -> None:
         self._robot = robot
@@ -34,7 +34,7 @@ class ActionBook:
         self._named: dict[int, tuple[str, Action]] = {}
 
     def enter(self, name: str, action: Action) -> ActionInfo:
-        """Note that ``action`` was asked for as ``name``."""
+        """Record that ``action`` was requested as ``name``."""
         self._named[action.id] = (name, action)
         ended = [id for id, (_, known) in self._named.items() if known.status.ended]
         for id in ended[: max(0, len(ended) - HISTORY_MAX)]:
@@ -43,31 +43,31 @@ class ActionBook:
 
     @property
     def current(self) -> Action | None:
-        """The errand under way, or what moves the robot now or is about to: the youngest that holds the base."""
+        """Return the errand under way, or else the latest action that holds the base."""
         running = self._robot.actions.running(ERRAND) or self._robot.actions.running(BASE)
         return running[-1] if running else None
 
     def current_info(self) -> ActionInfo:
-        """The current one, or NotFound."""
+        """Return the current action. Raises NotFound."""
         if (action := self.current) is None:
             raise NotFound("Action Not Found")
         return self._info(action)
 
     def look_up(self, id: int) -> ActionInfo | ActionGravestone:
-        """One under way or one of the last 20, or NotFound."""
+        """Return an action under way or one of the last 20. Raises NotFound."""
         _, action = self._named.get(id, ("", None))
         if action is None:
             action = self._robot.actions.get(id)
         return ActionGravestone(action.id, state_of(action)) if action.status.ended else self._info(action)
 
     def abort(self) -> None:
-        """Stop whatever moves the robot, no matter who asked for it; it brakes from now on."""
+        """Cancel all motion of the robot, by any client; it starts braking."""
         actions = self._robot.actions
         for action in [*actions.running(ERRAND), *actions.running(BASE)]:
             action.cancel("aborted by a client")
 
     def name_of(self, action: Action) -> str:
-        """Return the name that it was asked for by, or the nearest vendor name."""
+        """Return the requested name of an action, or the nearest vendor name."""
         name, _ = self._named.get(action.id, (self.prefix + _vendor_word(action.name), action))
         return name
 

@@ -90,7 +90,7 @@ FACTORIES: dict[str, Factory] = {
 
 @TABLE.on(f"GET {API}/action-factories", right=Right.SEE)
 async def get_action_factories(context: Context) -> list[ActionFactory]:
-    """The kinds of action that this robot can do."""
+    """Return the kinds of action that this robot can do."""
     return [
         ActionFactory(context.actions.prefix + word)
         for word, factory in FACTORIES.items()
@@ -100,7 +100,7 @@ async def get_action_factories(context: Context) -> list[ActionFactory]:
 
 @TABLE.on(f"POST {API}/actions", right=Right.DRIVE)
 async def create_action(context: Context, body: ActionRequest) -> ActionInfo:
-    """Start an action in place of the one under way; 400 for what this robot cannot do or does not understand."""
+    """Start an action in place of the current one; 400 for unknown or unsupported ones."""
     return context.actions.enter(body.action_name, create(context, body))
 
 
@@ -112,13 +112,13 @@ async def get_current_action(context: Context) -> ActionInfo:
 
 @TABLE.on(f"DELETE {API}/actions/:current", right=Right.DRIVE)
 async def abort_current_action(context: Context) -> None:
-    """Stop, no matter who asked for the motion; fine when nothing moves."""
+    """Stop the robot, no matter which client moves it; no effect at rest."""
     context.actions.abort()
 
 
 @TABLE.on(f"GET {API}/actions/{{action_id}}", right=Right.SEE)
 async def get_action_result(context: Context, action_id: int) -> ActionInfo | ActionGravestone:
-    """One under way, or what is left of one of the last 20; 404 otherwise."""
+    """Return an action under way, or the result of one of the last 20; 404 otherwise."""
     return context.actions.look_up(action_id)
 
 
@@ -131,7 +131,7 @@ async def get_remaining_path(context: Context) -> PathPoints:
 
 @TABLE.on(f"GET {API}/milestones", right=Right.SEE)
 async def get_remaining_milestones(context: Context) -> PathPoints:
-    """The goals still to reach."""
+    """Return the goals that remain."""
     feedback = _navigation(context)
     return _path_points(feedback.milestones if feedback else ())
 
@@ -146,14 +146,14 @@ async def get_current_speed(context: Context) -> Speed:
 
 @TABLE.on(f"GET {API}/time", right=Right.SEE)
 async def get_remaining_time(context: Context) -> float:
-    """Seconds to the goal; 0 when the robot goes nowhere."""
+    """Return the seconds to the goal; 0 without one."""
     feedback = _navigation(context)
     return feedback.time_to_goal if feedback else 0.0
 
 
 @TABLE.on(f"POST {API}/:search_path", right=Right.SEE, needs=(Localization, Navigation))
 async def search_path(context: Context, body: PathQuery) -> PathPoints:
-    """The path that the robot would take to a target, without going; empty if there is none."""
+    """Plan the path to a target without driving; empty if there is none."""
     robot = context.robot
     plan = robot[Navigation].plan(robot[Localization].pose.point, Point(body.target.x, body.target.y))
     try:
@@ -164,7 +164,7 @@ async def search_path(context: Context, body: PathQuery) -> PathPoints:
 
 
 def create(context: Context, request: ActionRequest) -> Action:
-    """Start the action in place of whatever the robot does; HttpError 400 for whatever stands against it."""
+    """Start an action in place of the current one. Raises HttpError 400 for a refusal."""
     before = context.robot.actions.running(ERRAND)
     try:
         factory = FACTORIES.get(action_word(request.action_name) or "")

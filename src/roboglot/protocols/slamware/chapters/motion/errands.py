@@ -1,7 +1,7 @@
-"""Actions made of several of the robot's own, one after the other: a way and then the dock, a search and then a turn.
+"""Errands: sequences of the robot's own actions, such as a drive and then docking, or a search and then a turn.
 
-An errand is an action of the model like any other; it holds no wheel itself, its parts do. Another action that
-takes the wheels from a part ends the errand. Knows no wire format.
+An errand is an action of the model like any other; not it but its parts hold the base. Another action that takes
+the base from a part ends the errand. Knows no wire format.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ PART = "slamware part"  # of actions that an errand requests; invisible to clien
 
 
 class Errand:
-    """One under way."""
+    """An errand under way."""
 
     def __init__(self, robot: Robot, action: Action) -> None:
         self.robot = robot
         self._action = action
 
     async def do(self, part: Action, *, within: float | None = None) -> None:
-        """Wait for ``part``, which shows as the errand's progress, and raise its error.
+        """Wait for ``part``, report it as the errand's progress, and raise its error.
 
-        After ``within`` s it is cancelled, with Expired. If another client stops it, the errand is cancelled too.
+        After ``within`` s it is cancelled, with Expired. If another client cancels it, so is the errand.
         """
         self._action.report(part)
         stop = self.robot.events.listen(ActionChanged, lambda event: self._pass_on(event, part))
@@ -56,7 +56,7 @@ class Errand:
             raise part.error.again()
 
     def _pass_on(self, event: ActionChanged, part: Action) -> None:
-        """A paused errand's part is paused."""
+        """Pause and resume the part with the errand."""
         if event.action is self._action and part.paused is not self._action.paused:
             (part.pause if self._action.paused else part.resume)()
 
@@ -64,7 +64,7 @@ class Errand:
 def run_errand(
     robot: Robot, name: str, work: Callable[[Errand], Awaitable[None]], goal: object = None, *, source: str = SOURCE
 ) -> Action:
-    """Start ``work`` in place of whatever errand is under way; what it raises is how the action fails."""
+    """Start ``work`` in place of the current errand; an error of ``work`` aborts the action."""
 
     async def run(action: Action) -> None:
         await work(Errand(robot, action))
@@ -73,5 +73,5 @@ def run_errand(
 
 
 def part_of(action: Action) -> Action:
-    """Return what an errand is at now; any other action itself."""
+    """Return the current part of an errand, or any other action itself."""
     return action.feedback if isinstance(action.feedback, Action) else action

@@ -1,4 +1,4 @@
-"""The charging docks on the map, and which of them the robot goes home to: the bound one, else the first."""
+"""Charging docks on the map, and the robot's home among them: the bound one, else the first."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Docks = tuple[PointOfInterest, ...]
 
 
 def known_docks(robot: Robot) -> Docks:
-    """The docks on the map; the one that the robot found by itself if none was entered."""
+    """Return the docks on the map, or else the one that the robot found by itself."""
     docking, entered = robot[Docking], robot[MapAnnotations].current.docks
     if entered or docking.home is None:
         return entered
@@ -28,24 +28,24 @@ def known_docks(robot: Robot) -> Docks:
 
 
 def home_dock(robot: Robot) -> PointOfInterest | None:
-    """The bound one, else the first."""
+    """Return the bound dock, else the first."""
     docks, bound = known_docks(robot), robot[Settings].get(BOUND)
     return next((dock for dock in docks if dock.id == bound), docks[0] if docks else None)
 
 
 def before(dock: PointOfInterest) -> Pose:
-    """Return where a robot stands in front of ``dock``."""
+    """Return the pose of a robot in front of ``dock``."""
     return dock.pose.compose(Pose(BEFORE_DOCK))
 
 
 def settle_home(robot: Robot) -> None:
-    """Have the robot go home to where the map says that its dock is."""
+    """Set the robot's home to its dock on the map."""
     dock = home_dock(robot)
     robot[Docking].set_home(dock.pose if dock else None)
 
 
 async def change_docks(robot: Robot, edit: Callable[[Docks], Docks]) -> None:
-    """Replace the docks by ``edit`` of them. What ``edit`` raises goes to the caller."""
+    """Replace the docks by ``edit`` of them; an error of ``edit`` is raised."""
     changed: Docks = ()
 
     def work(docks: Docks) -> Docks:

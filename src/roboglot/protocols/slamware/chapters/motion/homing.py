@@ -1,4 +1,4 @@
-"""Chapter "motion", POST actions: going home, to the dock or to a parking place."""
+"""Chapter "motion", POST actions: return to the dock or to a parking place."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ PARKING = "PARKING"  # the type of parking places
 
 
 def go_home(context: Context, options: GoHomeOptions) -> Action:
-    """Drive to the landing point, and by default onto the dock, some times over if need be."""
+    """Drive to the landing point, and by default onto the dock, with retries."""
     wanted = options.gohome_options or GoHome()
     how = wanted.move_options or MoveOptions()
     navigation_options(context.robot, how, None)  # refuse impossible requests now rather than on the way
@@ -40,7 +40,7 @@ def go_home(context: Context, options: GoHomeOptions) -> Action:
 
 
 async def head_home(errand: Errand, wanted: GoHome) -> None:
-    """The way home, on this floor."""
+    """Drive to the dock of this floor."""
     how = wanted.move_options or MoveOptions()
     robot = errand.robot
     docking = robot[Docking]
@@ -69,7 +69,7 @@ async def _to_landing(errand: Errand, home: Pose | None, how: MoveOptions) -> No
 
 
 def return_to_parking(context: Context, options: ReturnToParkingOptions) -> Action:
-    """Drive to the named parking place, or to the nearest one that is free."""
+    """Drive to the named parking place, or to the nearest free one."""
     how = options.move_options or MoveOptions()
     navigation_options(context.robot, how, None)
     named = options.target.poi_name if options.target else ""

@@ -1,4 +1,4 @@
-"""Chapter "motion", POST actions beyond the manual: the jack, and ways with what stands on it."""
+"""Chapter "motion", POST actions beyond the manual: the jack, and transport of its load."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from roboglot.wire.slamware.chapters.motion import JackMoveOptions, JackTopMoveT
 
 
 def move_jack(context: Context, options: JackMoveOptions) -> Action:
-    """Lift or set down."""
+    """Raise or lower the jack."""
     jack = context.robot[Jack]
 
     async def work(errand: Errand) -> None:
@@ -27,7 +27,7 @@ def move_jack(context: Context, options: JackMoveOptions) -> Action:
 
 
 def carry(context: Context, options: JackTopMoveToOptions) -> Action:
-    """Lift what stands over the robot, if it is not lifted yet, and go through the targets with it."""
+    """Lift the shelf above the robot, unless lifted already, and carry it through the targets."""
     robot, wishes = context.robot, options.modify_params_move_options or JackTopWishes()
     targets = options.targets or ([options.target] if options.target else [])
     if not targets:

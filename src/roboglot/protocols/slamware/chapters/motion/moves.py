@@ -1,4 +1,4 @@
-"""Chapter "motion", POST actions: the kinds that go somewhere or turn."""
+"""Chapter "motion", POST actions: drives and turns."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ PRECISE, OCCUPIED_MAX = 0.05, 10.0  # m
 def navigate(
     robot: Robot, goals: Sequence[Point], how: MoveOptions, *, source: str = SOURCE, yaw: float | None = None
 ) -> Action:
-    """Go through ``goals``, as the client wants it; ``yaw``: the final heading, whatever the client says of it."""
+    """Drive through ``goals`` with the client's options; ``yaw``: final heading, which overrides them."""
     if yaw is None and how.has("with_yaw") and how.yaw is not None:
         yaw = wrap_angle(how.yaw)
     if how.mode and how.has("with_directed_virtual_track"):
@@ -50,7 +50,7 @@ def navigate(
 
 
 def _directed(robot: Robot, goals: Sequence[Point], *, strictly: bool) -> list[Point]:
-    """``goals`` with what leads to them along the tracks' direction; InvalidGoal if ``strictly`` and nothing does."""
+    """Return ``goals`` with ways along the tracks' direction. Raises InvalidGoal if ``strictly`` and there is none."""
     tracks = robot[MapAnnotations].current.lines_of(LineKind.TRACK)
     here, through = robot[Localization].pose.point, list[Point]()
     for goal in goals:
@@ -63,7 +63,7 @@ def _directed(robot: Robot, goals: Sequence[Point], *, strictly: bool) -> list[P
 
 
 def navigation_options(robot: Robot, how: MoveOptions, yaw: float | None) -> NavigationOptions:
-    """The model's; InvalidGoal for what cannot be done on this map."""
+    """Return the model's options. Raises InvalidGoal for options impossible on this map."""
     if how.mode not in (0, 1, 2):
         raise InvalidGoal(f"there is no move mode {how.mode}")
     tracks = TRACKS[how.mode]
@@ -85,7 +85,7 @@ def _near_enough(precision: float | None) -> float:
 
 
 def has_tracks(robot: Robot) -> bool:
-    """Return whether the map has any."""
+    """Return whether the map has tracks."""
     return MapAnnotations in robot and bool(robot[MapAnnotations].current.lines_of(LineKind.TRACK))
 
 
@@ -104,12 +104,12 @@ def series_move_to(context: Context, options: SeriesMoveToOptions) -> Action:
 
 
 def follow_path_points(context: Context, options: FollowPathPointsOptions) -> Action:
-    """Along a polyline, around what stands on it."""
+    """Drive along a polyline, around obstacles on it."""
     return navigate(context.robot, _points(options.path_points), options.move_options or MoveOptions())
 
 
 def sweep(context: Context, options: SweepOptions) -> Action:
-    """Return all coverage areas of the map or those with the given ids, in lanes."""
+    """Sweep coverage areas of the map, all or by id, in lanes."""
     wanted = options.sweep_options
     drawn = context.robot[MapAnnotations].current.areas_of(AreaKind.COVERAGE)
     ids = set(wanted.region_ids or ()) if wanted else set()
@@ -120,7 +120,7 @@ def sweep(context: Context, options: SweepOptions) -> Action:
 
 
 def move_by(context: Context, options: MoveByOptions) -> Action:
-    """Remote control."""
+    """Drive by remote control."""
     limit = context.robot[Base].limits.twist
     match options:
         case MoveByOptions(direction=None, theta=None):
@@ -145,6 +145,6 @@ def rotate(context: Context, options: AngleOptions) -> Action:
 
 
 def rotate_to(context: Context, options: AngleOptions) -> Action:
-    """Turn to a heading, the shorter way round."""
+    """Turn to a heading in the shorter direction."""
     turn = wrap_angle(options.angle - context.robot[Localization].pose.yaw)
     return context.robot[Driving].move_by(Pose(yaw=turn), source=SOURCE)

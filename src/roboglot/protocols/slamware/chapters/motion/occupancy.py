@@ -15,7 +15,7 @@ CERTAIN = 40  # evidence from which a cell counts as occupied
 
 
 def stands_in_something(robot: Robot) -> bool:
-    """Return whether a robot that is about to drive stands in something."""
+    """Return whether the place of a robot about to drive is occupied."""
     if Localization not in robot or Mapping not in robot:
         return False
     here, reach = robot[Localization].pose, robot.description.radius * SHARE

@@ -1,4 +1,4 @@
-"""Chapter "motion", POST actions: finding out where the robot is, by itself or while a person pushes it."""
+"""Chapter "motion", POST actions: relocalization, by itself or while a person pushes the robot."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ PAUSE_SECONDS = 0.5  # between two searches from the same place, and while it is
 
 
 def recover_localization(context: Context, options: RecoverLocalizationOptions) -> Action:
-    """Search the whole map or an area of it; standing still unless it may turn between two looks."""
+    """Search the whole map or an area; standing still, unless it may turn between scans."""
     how = options.relocalization_options or RelocalizationOptions()
     seconds = how.max_recover_time / 1000 or RECOVER_SECONDS
     turns = how.recover_movement_type is RecoverMovement.ROTATE_ONLY
@@ -54,7 +54,7 @@ def recover_localization(context: Context, options: RecoverLocalizationOptions) 
 
 
 def manual_relocalization(context: Context, _: NoOptions) -> Action:
-    """Look again and again while people push the robot, until a place fits or it stands on its dock."""
+    """Search repeatedly while people push the robot, until a place fits or it is on its dock."""
 
     async def work(errand: Errand) -> None:
         robot = errand.robot

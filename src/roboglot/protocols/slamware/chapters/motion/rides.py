@@ -1,4 +1,4 @@
-"""Chapter "motion", POST actions: to other floors by lift, and into and out of a car that others command."""
+"""Chapter "motion", POST actions: to other floors by lift, and into and out of a car called by others."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def multi_floor_move(context: Context, options: MultiFloorMoveOptions) -> Action
 
 
 def multi_floor_back_home(context: Context, options: GoHomeOptions) -> Action:
-    """Drive to the bound dock, or the next best, on whatever floor it is."""
+    """Drive to the bound dock, or the next best one, on any floor."""
     wanted = options.gohome_options or GoHome()
     navigation_options(context.robot, wanted.move_options or MoveOptions(), None)
 
@@ -78,7 +78,7 @@ def multi_floor_back_home(context: Context, options: GoHomeOptions) -> Action:
 
 
 def home_floor(context: Context) -> FloorMap | None:
-    """The floor of the dock to go home to; None if that is here, or nowhere."""
+    """Return the floor of the home dock; None if that is this one, or unknown."""
     bound = context.robot[Settings].get(BOUND)
     docks = [(floor, dock.id) for floor in context.maps.floors for dock in floor.annotations.docks]
     found = next((floor for floor, id in docks if id == bound), None)
@@ -88,7 +88,7 @@ def home_floor(context: Context) -> FloorMap | None:
 
 
 def _place(context: Context, name: str) -> tuple[FloorMap, Pose]:
-    """The loaded place of that name or id, preferably on this floor."""
+    """Return the loaded place of that name or id, preferably on this floor."""
     floors = sorted(context.maps.floors, key=lambda floor: floor.name != context.maps.current)
     for floor in floors:
         for place in floor.places:
@@ -98,7 +98,7 @@ def _place(context: Context, name: str) -> tuple[FloorMap, Pose]:
 
 
 def _floor(context: Context, building: str, floor: str) -> FloorMap | None:
-    """The loaded floor; None if the robot is there."""
+    """Return the loaded floor; None if the robot is on it."""
     here = context.maps.current
     if floor in ("", here.floor) and building in ("", here.building):
         return None
@@ -109,7 +109,7 @@ def _floor(context: Context, building: str, floor: str) -> FloorMap | None:
 
 
 async def change_floor(context: Context, errand: Errand, floor: FloorMap) -> None:
-    """Take the lift, if the robot is not there yet, and use the map of that floor from then on."""
+    """Take the lift to a floor, unless on it already, and switch to its map."""
     if floor.name == context.maps.current:
         return
     robot, maps = context.robot, context.maps
@@ -131,7 +131,7 @@ async def change_floor(context: Context, errand: Errand, floor: FloorMap) -> Non
 
 
 def _stop(context: Context, name: FloorName) -> int:
-    """The lift's number for a floor: by its name, else by its place in the order of the loaded floors."""
+    """Return the lift's number for a floor: by name, else by its order among the loaded floors."""
     stops = context.robot[LiftClient].floors
     if name.floor in stops:
         return stops.index(name.floor)
@@ -149,7 +149,7 @@ def _elevator(context: Context, id: str) -> Elevator:
 
 
 def enter_elevator(context: Context, options: EnterElevatorOptions) -> Action:
-    """Into a car that others have called, through the door that they opened; 400 for an unknown one."""
+    """Drive into a car called by others, through its open door; 400 for an unknown one."""
     elevator, how = _elevator(context, options.elevator_id), options.enter_elevator_options or EnterElevator()
     yaw = elevator.inward
     if how.elevator_stopping_yaw is StoppingYaw.FRONT:
@@ -179,13 +179,13 @@ def enter_elevator(context: Context, options: EnterElevatorOptions) -> Action:
 
 
 async def _cross(errand: Errand, elevator: Elevator, door: Door) -> None:
-    """Drive to where one waits at that door."""
+    """Drive to the waiting place at a door."""
     waiting = elevator.waiting(rear=door is Door.REAR)
     await errand.do(navigate(errand.robot, [waiting.point], MoveOptions(), source=PART, yaw=waiting.yaw))
 
 
 def leave_elevator(context: Context, options: LeaveElevatorOptions) -> Action:
-    """Out of the car to where one waits for it, and on to the target if wanted; 400 for an unknown elevator."""
+    """Leave the car to the waiting place, and drive on to the target, if given; 400 for an unknown elevator."""
     elevator, how = _elevator(context, options.elevator_id), options.leave_elevator_options or LeaveElevator()
     onward = how.move_options or MoveOptions()
     navigation_options(context.robot, onward, None)

@@ -31,7 +31,7 @@ class SpeedLimits:
         self._endings = [listen(kind, lambda _: self.reset()) for kind in (Rebooted, ModuleRestarted)]
 
     def close(self) -> None:
-        """Leave the robot as it was built."""
+        """Restore the limits of its build."""
         for end in self._endings:
             end()
         if Base in self._robot:
@@ -52,7 +52,7 @@ class SpeedLimits:
         return speed, turning
 
     def check(self, speed: float | None, turning: float | None) -> None:
-        """InvalidGoal for limits beyond what the drive can do."""
+        """Raise InvalidGoal for limits beyond those of the drive."""
         base = self._robot[Base]
         x, yaw = base.limits.twist.x if speed is None else speed, base.limits.twist.yaw if turning is None else turning
         if not (SPEED_MIN <= x <= self._built.x and SPEED_MIN <= yaw <= self._built.yaw):
@@ -61,7 +61,7 @@ class SpeedLimits:
             )
 
     def set(self, *, speed: float | None = None, turning: float | None = None) -> None:
-        """Drive no faster than ``speed`` m/s, turn no faster than ``turning`` rad/s. InvalidGoal beyond what it can."""
+        """Set the limits: ``speed`` m/s, ``turning`` rad/s. Raises InvalidGoal beyond those of the drive."""
         self.check(speed, turning)
         base = self._robot[Base]
         now = base.limits.twist

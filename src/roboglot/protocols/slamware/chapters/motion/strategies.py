@@ -17,7 +17,7 @@ SHARES = {"default": 1.0, "careful": 0.5}  # of the speed of every drive that a 
 
 
 def speed_share(robot: Robot) -> float:
-    """Return what the strategy in use leaves of the speed."""
+    """Return the share of the speed under the current strategy."""
     return SHARES.get(_current(robot), 1.0)
 
 
@@ -27,21 +27,21 @@ def _current(robot: Robot) -> str:
 
 @TABLE.on(f"GET {API}", right=Right.SEE, needs=(Navigation,))
 async def get_motion_strategies(context: Context) -> list[str]:
-    """All that there are."""
+    """Return all strategies."""
     _ = context.robot[Navigation]
     return list(SHARES)
 
 
 @TABLE.on(f"GET {API}/:current", right=Right.SEE, needs=(Navigation,))
 async def get_current_strategy(context: Context) -> Text:
-    """The one in use."""
+    """Return the current strategy."""
     _ = context.robot[Navigation]
     return Text(_current(context.robot))
 
 
 @TABLE.on(f"PUT {API}/:current", right=Right.EDIT, needs=(Navigation, Settings))
 async def set_current_strategy(context: Context, body: Strategy) -> bool:
-    """Use another one for whatever is started from now on, also after a restart; 400 if there is none of that name."""
+    """Set the strategy of further actions, kept over restarts; 400 for an unknown name."""
     if body.strategy not in SHARES:
         raise InvalidGoal(f"there is no strategy {body.strategy}")
     _ = context.robot[Navigation]

@@ -1,4 +1,4 @@
-"""Chapter "motion", POST actions: precisely up to a tag, a board, reflectors or a shelf, and away again."""
+"""Chapter "motion", POST actions: precise docking at a tag, board, reflectors or shelf, and backing off."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ MARKS = {
 
 
 def move_to_tag(context: Context, options: MoveToTagOptions) -> Action:
-    """Drive to the target, and from there to a place before the tag that is seen there, or under the shelf."""
+    """Drive to the target, and from there to a pose in front of the tag seen there, or under the shelf."""
     offset = options.target_relative_pose
     goal = MarkGoal(
         mark=MARKS[options.tag_type],
@@ -49,14 +49,14 @@ def move_to_tag(context: Context, options: MoveToTagOptions) -> Action:
 
 
 def scheduled_move_to_tag(context: Context, options: ScheduledMoveToTagOptions) -> Action:
-    """The same, from a place of this floor or a pose."""
+    """Dock as MoveToTag does, from a place of this floor or a pose."""
     target = pose3d(pose_of_target(context.robot, options.target))
     wishes = options.move_to_tag_options or TagWishes()
     return move_to_tag(context, MoveToTagOptions(target=target, **msgspec.structs.asdict(wishes)))
 
 
 def pose_of_target(robot: Robot, target: ScheduledTarget) -> Pose:
-    """The place of that name or id on this floor, or the pose. NotFound."""
+    """Return the pose, or that of a place of this floor by name or id. Raises NotFound."""
     if not target.poi_name:
         return Pose(target.x, target.y, wrap_angle(target.yaw))
     for place in robot[Places].all():
@@ -66,7 +66,7 @@ def pose_of_target(robot: Robot, target: ScheduledTarget) -> Pose:
 
 
 def back_off_from_tag(context: Context, options: BackOffFromTagOptions) -> Action:
-    """Straight away from where it docked; with care, it looks at the tag and keeps square to it."""
+    """Back straight off the mark; with care, keeping square to the visible tag."""
     mark = MARKS[options.tag_type]
     return _docking(context, mark).back_off(
         mark,

@@ -1,4 +1,4 @@
-"""The elevator events of a ride: what its stages and its failure mean in the vendor's words (chapter "platform")."""
+"""Elevator events of a ride: its stages and its failure in the vendor's words (chapter "platform")."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ FAILURES = {
 
 
 class RideEvents:
-    """Follows one ride after the other; each stage is reported once."""
+    """Follows rides one by one; each stage is reported once."""
 
     def __init__(self) -> None:
         self._reported: tuple[int, RideStage | None] = (0, None)
 
     def of(self, action: Action) -> tuple[ElevatorEvent, ...]:
-        """Return what a change of ``action`` means."""
+        """Return the event of a change of ``action``."""
         stage = action.feedback
         if not isinstance(stage, RideStage):
             return ()

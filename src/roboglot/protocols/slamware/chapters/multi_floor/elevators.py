@@ -1,4 +1,4 @@
-"""Chapter "multi-floor": the elevators on the map, and where the robot is relative to them.
+"""Chapter "multi-floor": elevators on the map, and the robot's place relative to them.
 
 An elevator area's centre line runs from the front door to the rear one; the manual does not say which end is which.
 """
@@ -46,7 +46,7 @@ DOORS = {"": DoorType.FRONT, "0": DoorType.FRONT, "1": DoorType.REAR, "2": DoorT
 
 
 class ElevatorInfo(msgspec.Struct):
-    """An elevator, and where to wait for it."""
+    """An elevator and its waiting places."""
 
     door_type: DoorType
     elevator_id: str
@@ -66,7 +66,7 @@ class Elevator:
 
     @property
     def inward(self) -> float:
-        """The way from the front door into the car, rad in the map."""
+        """Direction from the front door into the car, rad in the map."""
         return self.area.start.bearing_to(self.area.end)
 
     @property
@@ -76,12 +76,12 @@ class Elevator:
         return Pose((a.x + b.x) / 2, (a.y + b.y) / 2, self.inward)
 
     def waiting(self, *, rear: bool = False) -> Pose:
-        """Pose before a door, facing it."""
+        """Return the pose in front of a door, facing it."""
         door, yaw = (self.area.end, self.inward + math.pi) if rear else (self.area.start, self.inward)
         return Pose(door.x, door.y, wrap_angle(yaw)).compose(Pose(-self.sill - self.distance))
 
     def relation(self, here: Pose, radius: float) -> PoseRelation:
-        """Return where the robot's middle is, and whether its hull (``radius``, m) reaches over a door's sill."""
+        """Return the place of the robot's middle; over the sill if its hull (``radius``, m) reaches across."""
         if self.area.contains(here):
             return PoseRelation.IN
         reach = self.sill + radius
@@ -93,14 +93,14 @@ class Elevator:
 
     @property
     def info(self) -> ElevatorInfo:
-        """Return the elevator as the API writes it."""
+        """Return the elevator in the API's form."""
         front = [] if self.doors is DoorType.REAR else [pose3d(self.waiting())]
         rear = [] if self.doors is DoorType.FRONT else [pose3d(self.waiting(rear=True))]
         return ElevatorInfo(self.doors, self.id, front, rear)
 
 
 def elevators_of(drawn: Annotations) -> list[Elevator]:
-    """Return those that are drawn on a map; areas without extent are none."""
+    """Return the elevators drawn on a map; areas without extent do not count."""
     return [_elevator(area) for area in drawn.areas_of(AreaKind.ELEVATOR) if area.start != area.end]
 
 
@@ -123,7 +123,7 @@ def _metres(words: dict[str, str], key: str, default: float) -> float:
 
 
 def elevators_here(robot: Robot) -> list[Elevator]:
-    """Return those of the map in memory."""
+    """Return the elevators of the map in memory."""
     return elevators_of(robot[MapAnnotations].current)
 
 
@@ -135,7 +135,7 @@ def elevator_around(robot: Robot) -> str:
 
 
 def elevator_called(robot: Robot, id: str) -> Elevator:
-    """The one with this id, or 400 as in the manual."""
+    """Return the elevator with this id; 400 if there is none, as in the manual."""
     for elevator in elevators_here(robot):
         if elevator.id == id:
             return elevator
@@ -144,13 +144,13 @@ def elevator_called(robot: Robot, id: str) -> Elevator:
 
 @TABLE.on(f"GET {API}", right=Right.SEE, needs=(MapAnnotations,))
 async def get_elevators(context: Context) -> list[ElevatorInfo]:
-    """The elevators of this floor and where to wait for them."""
+    """Return the elevators of this floor and their waiting places."""
     return [elevator.info for elevator in elevators_here(context.robot)]
 
 
 @TABLE.on(f"GET {API}/{{elevator_id}}", right=Right.SEE, needs=(MapAnnotations,))
 async def get_elevators_by_id(context: Context, elevator_id: Identifier) -> ElevatorInfo:
-    """One, or 400."""
+    """Return an elevator; 400 if there is none."""
     return elevator_called(context.robot, elevator_id).info
 
 

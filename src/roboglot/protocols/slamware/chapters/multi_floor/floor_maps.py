@@ -12,23 +12,23 @@ from roboglot.protocols.slamware.context import Context
 
 
 class LoadedStoreys:
-    """One robot's. A floor's name is its building's and its own."""
+    """Storeys of one robot. A floor's name is that of its building and its own."""
 
     def __init__(self, context: Context) -> None:
         self._context = context
 
     @property
     def current(self) -> str:
-        """The floor whose map is in memory."""
+        """Floor whose map is in memory."""
         return _label(self._context.maps.current)
 
     def places(self) -> list[StoreyPlace]:
-        """Return places of the floors that are not in memory."""
+        """Return the places of floors that are not in memory."""
         others = (floor for floor in self._context.maps.floors if _label(floor.name) != self.current)
         return [StoreyPlace(_label(floor.name), place) for floor in others for place in floor.places]
 
     def home(self) -> str:
-        """The bound dock's floor; this one if there is a dock, else the first that has one."""
+        """Return the bound dock's floor; else this one if it has a dock, else the first that has one."""
         found = home_floor(self._context)
         return _label(found.name) if found else self.current
 

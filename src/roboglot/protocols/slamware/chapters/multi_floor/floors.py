@@ -56,13 +56,13 @@ async def get_status(context: Context) -> MultiFloorStatus:
 
 @TABLE.on(f"POST {MAP}/stcm", right=Right.EDIT, needs=(FileStore,))
 async def upload_map(context: Context, body: bytes) -> None:
-    """Keep this composite map on disk; it is used from the next reload on. 400 if it is none."""
+    """Store a composite map on disk, for the next reload; 400 for a malformed one."""
     await context.maps.upload(body)
 
 
 @TABLE.on(f"DELETE {MAP}/stcm", right=Right.EDIT, needs=(FileStore,))
 async def delete_map(context: Context) -> NoContent:
-    """Forget the map on disk; the one in memory stays."""
+    """Delete the map on disk; the one in memory stays."""
     await context.maps.delete()
     return NO_CONTENT
 
@@ -73,7 +73,7 @@ async def delete_map(context: Context) -> NoContent:
     needs=(Docking, FileStore, MapAnnotations, MapMemory, Mapping, Places, Settings),
 )
 async def save_stcm(context: Context) -> None:
-    """The map in memory to disk; 403 if the one on disk has several floors."""
+    """Save the map in memory to disk; 403 if the one on disk has several floors."""
     await context.maps.save()
 
 
@@ -83,7 +83,7 @@ async def save_stcm(context: Context) -> None:
     needs=(FileStore, Localization, MapAnnotations, MapMemory, Mapping, Settings),
 )
 async def reload_stcm(context: Context, body: Reload | None = None) -> None:
-    """The map on disk to memory; without a pose the robot is on its dock, or in front of it. 404 if none is saved."""
+    """Load the map from disk; without a pose the robot is on its dock, or in front of it. 404 if none is saved."""
     context.actions.abort()
     await context.maps.reload(pose_of(body.pose) if body and body.pose else None)
 
@@ -94,13 +94,13 @@ async def reload_stcm(context: Context, body: Reload | None = None) -> None:
     needs=(Docking, FileStore, MapAnnotations, MapMemory, Mapping, Places, Settings),
 )
 async def sync_stcm(context: Context) -> None:
-    """Save and reload: places added since then are known to multi-floor operations. The robot stays where it is."""
+    """Save and reload, so that multi-floor operations know new places; the robot keeps its pose."""
     await context.maps.sync()
 
 
 @TABLE.on(f"POST {MAP}/scene/unbind", right=Right.ADMIN, needs=(FileStore, Settings))
 async def unbind_scene(context: Context, body: Unbinding | None = None) -> None:
-    """The robot leaves its cloud, if it has one; the map on disk is deleted unless it is to be kept."""
+    """Unbind the robot from its cloud, if any; the map on disk is deleted unless it is to be kept."""
     await context.cloud.leave()
     if not (body and body.keep_local_map):
         await context.maps.delete()
@@ -108,27 +108,27 @@ async def unbind_scene(context: Context, body: Unbinding | None = None) -> None:
 
 @TABLE.on(f"GET {MAP}/floors", right=Right.SEE)
 async def get_floors(context: Context) -> list[FloorInfo]:
-    """The floors of the loaded map; none while nothing was loaded."""
+    """Return the floors of the loaded map; none before the first load."""
     names = (floor.name for floor in context.maps.floors)
     return [FloorInfo(name.building, name.floor, name.order, name.default) for name in names]
 
 
 @TABLE.on(f"GET {MAP}/floors/:current", right=Right.SEE, needs=(Localization, MapAnnotations))
 async def get_current_floor(context: Context) -> CurrentFloorInfo:
-    """The floor whose map is in memory, and the elevator that the robot is in."""
+    """Return the floor whose map is in memory, and the elevator that the robot is in."""
     name = context.maps.current
     return CurrentFloorInfo(name.building, name.floor, elevator_around(context.robot), name.map_id)
 
 
 @TABLE.on(f"PUT {MAP}/floors/:current", right=Right.DRIVE)
 async def set_current_floor(context: Context, body: FloorChoice) -> None:
-    """Use the map of the floor to which the robot was carried. 404 if it is not loaded."""
+    """Switch to the map of the floor that the robot was carried to; 404 if it is not loaded."""
     context.actions.abort()
     await context.maps.enter(body.building, body.floor, pose_of(body.pose) if body.pose else None)
 
 
 def _asked(context: Context, floor: str, building: str) -> list[FloorMap]:
-    """The loaded floors that a query means; InvalidGoal if it means none."""
+    """Return the loaded floors that a query selects. Raises InvalidGoal if there is none."""
     loaded = [
         f
         for f in context.maps.floors
@@ -151,7 +151,7 @@ def _dock(name: FloorName, dock: PointOfInterest) -> DockInfo:
 
 @TABLE.on(f"GET {MAP}/pois", right=Right.SEE)
 async def get_all_pois(context: Context, floor: FloorText = "", building: FloorText = "") -> list[PoiInfo]:
-    """The places of the loaded map, of one floor or of all; new ones are here after a sync."""
+    """Return the places of the loaded map, of one floor or of all; new ones appear after a sync."""
     return [_poi(f.name, place) for f in _asked(context, floor, building) for place in f.places]
 
 
@@ -159,13 +159,13 @@ async def get_all_pois(context: Context, floor: FloorText = "", building: FloorT
 async def get_multi_floor_home_docks(
     context: Context, floor: FloorText = "", building: FloorText = ""
 ) -> list[DockInfo]:
-    """The docks of the loaded map, of one floor or of all."""
+    """Return the docks of the loaded map, of one floor or of all."""
     return [_dock(f.name, dock) for f in _asked(context, floor, building) for dock in f.annotations.docks]
 
 
 @TABLE.on(f"POST {MAP}/pois/:search_nearby", right=Right.SEE, needs=(Localization, MapAnnotations))
 async def search_nearby_poi(context: Context) -> NearbyPoi:
-    """The nearest place on this floor as seen from the robot; ON_DOCK, IN_ELEVATOR, or UNKNOWN if there is none."""
+    """Return the nearest place on this floor; ON_DOCK, IN_ELEVATOR, or UNKNOWN if there is none."""
     if DockContact in context.robot and context.robot[DockContact].docked:
         return NearbyPoi("ON_DOCK", relative_pose=Point(0.0, 0.0))
     if elevator_around(context.robot):
@@ -181,7 +181,7 @@ async def search_nearby_poi(context: Context) -> NearbyPoi:
 
 @TABLE.on(f"POST {MAP}/homedocks/:search_nearby", right=Right.SEE, needs=(Localization,))
 async def search_nearby_home_dock(context: Context) -> DockInfo:
-    """The nearest dock on this floor, in a straight line; 404 if there is none."""
+    """Return the nearest dock on this floor, in a straight line; 404 if there is none."""
     here = context.robot[Localization].pose
     docks = [(floor, dock) for floor in _here(context) for dock in floor.annotations.docks]
     if not docks:
@@ -191,13 +191,13 @@ async def search_nearby_home_dock(context: Context) -> DockInfo:
 
 
 def _here(context: Context) -> list[FloorMap]:
-    """The loaded map of the floor on which the robot is, if any."""
+    """Return the loaded map of the robot's floor, if any."""
     return [floor for floor in context.maps.floors if floor.name == context.maps.current]
 
 
 @TABLE.on(f"GET {MAP}/homedocks/:current", right=Right.SEE, needs=(Settings,))
 async def get_current_home_dock(context: Context) -> BoundDock:
-    """The dock that the robot is bound to."""
+    """Return the dock that the robot is bound to."""
     bound = context.robot[Settings].get(BOUND)
     found = _find_dock(context, bound) if bound else None
     if found is None:
@@ -207,7 +207,7 @@ async def get_current_home_dock(context: Context) -> BoundDock:
 
 @TABLE.on(f"PUT {MAP}/homedocks/:current", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
 async def set_current_home_dock(context: Context, body: DockChoice) -> None:
-    """Go home to this dock from now on. If it is on another floor, the robot stands on it: its map is used."""
+    """Bind the robot to a dock. If that is on another floor, the robot is taken to be on it, with its map."""
     found = _find_dock(context, body.dock_id)
     if found is None:
         raise NotFound(f"the loaded map has no dock {body.dock_id}")
@@ -221,7 +221,7 @@ async def set_current_home_dock(context: Context, body: DockChoice) -> None:
 
 @TABLE.on(f"PUT {LOCALIZATION}/pose", right=Right.DRIVE, needs=(Localization,))
 async def set_pose_by_poi(context: Context, body: PoiChoice) -> bool:
-    """The robot is at this place of the floor, by its name or id; 404 if there is none."""
+    """Set the robot's pose to a place of the floor, by name or id; 404 if there is none."""
     for place in (place for floor in _here(context) for place in floor.places):
         if body.poi_name in (place.metadata.get(NAME), place.id):
             context.robot[Localization].set_pose(place.pose)
@@ -231,7 +231,7 @@ async def set_pose_by_poi(context: Context, body: PoiChoice) -> bool:
 
 @TABLE.on(f"PUT {LOCALIZATION}/homedock", right=Right.DRIVE, needs=(Docking, Localization, MapAnnotations, Settings))
 async def set_pose_by_homedock(context: Context, body: DockChoice | None = None) -> None:
-    """The robot is in front of this dock, or of its own; 404 if there is none."""
+    """Set the robot's pose to the front of a dock, by default its own; 404 if there is none."""
     if body is None:
         dock = home_dock(context.robot)
     else:

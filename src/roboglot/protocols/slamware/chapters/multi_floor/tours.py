@@ -1,4 +1,4 @@
-"""Chapter "multi-floor": in which order to visit places so that the way is shortest."""
+"""Chapter "multi-floor": the shortest order of places to visit."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ StopName = Annotated[str, msgspec.Meta(min_length=1, max_length=4096)]
 async def dispatch_by_pois(
     context: Context, body: Annotated[list[StopName], msgspec.Meta(max_length=STOPS_MAX)]
 ) -> list[str]:
-    """The names in the order of the shortest round trip from here, by the ways that the robot would drive.
+    """Return names in the order of the shortest round trip from here, by planned paths.
 
     Exact up to 12, beyond them nearly the shortest. 400 for more than 500 or what cannot be reached, 404 for places
     that this floor of the loaded map does not have.

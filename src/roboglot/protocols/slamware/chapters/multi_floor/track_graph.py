@@ -20,7 +20,7 @@ _Points = NDArray[np.float64]
 
 
 def way_along(tracks: Sequence[Line], start: Point, end: Point, *, directed: bool = False) -> list[Point]:
-    """From ``start`` to the nearest track, along tracks, and off the one nearest to ``end``; empty if none leads there.
+    """Return the way from ``start`` along tracks to ``end``, by the nearest track at both ends; empty if there is none.
 
     ``directed``: every track only from its start to its end. Raises InvalidGoal for too many tracks.
     """
@@ -41,7 +41,7 @@ def way_along(tracks: Sequence[Line], start: Point, end: Point, *, directed: boo
 
 
 def _shares(begins: _Points, spans: _Points, point: _Points) -> NDArray[np.float64]:
-    """Return how far along each piece (0..1) it comes nearest to ``point``."""
+    """Return the share (0..1) along each piece that is nearest to ``point``."""
     shares: NDArray[np.float64] = ((point - begins) * spans).sum(axis=1) / (spans**2).sum(axis=1)
     return shares.clip(0.0, 1.0)
 
@@ -68,7 +68,7 @@ def _crossings(begins: _Points, spans: _Points) -> list[_Points]:
 
 
 def _clustered(points: Sequence[_Points]) -> _Points:
-    """One of each group of points that lie together, the first of it."""
+    """Return the first of each cluster of points."""
     nodes = np.empty((0, 2))
     for point in points:
         if not len(nodes) or np.hypot(*(nodes - point).T).min() > JOIN:

@@ -65,7 +65,7 @@ class EventLog:
         self._endings: list[Callable[[], None]] = []
 
     def start(self) -> None:
-        """Listen from now on."""
+        """Start listening."""
         listen = self._robot.events.listen
         self._charging = Battery in self._robot and self._robot[Battery].state.charging
         self._endings = [
@@ -87,14 +87,14 @@ class EventLog:
         self._dock.start()
 
     def close(self) -> None:
-        """Listen no more."""
+        """Stop listening."""
         for end in self._endings:
             end()
         self._dock.close()
         self._unblock()
 
     def read(self) -> list[RobotEvent]:
-        """Return what happened since the last read, oldest first."""
+        """Return events since the last read, oldest first."""
         events = list(self._ring)
         if not self._keep:
             self._ring.clear()
@@ -102,7 +102,7 @@ class EventLog:
 
     @contextmanager
     def kept(self) -> Iterator[None]:
-        """Meanwhile reading leaves the events for the next reader: HEAD changes nothing."""
+        """Keep events while inside ``with``: HEAD changes nothing."""
         before, self._keep = self._keep, True
         try:
             yield
@@ -110,7 +110,7 @@ class EventLog:
             self._keep = before
 
     def note(self, kind: GeneralEvent | ElevatorEvent | DeliveryEvent, stamp: float | None = None) -> None:
-        """Something happened at ``stamp`` (robot time, s), or now."""
+        """Record an event at ``stamp`` (robot time, s), or now."""
         self._ring.append(RobotEvent(kind, milliseconds(self._robot.clock.time() if stamp is None else stamp)))
 
     def _dock_changed(self, event: DockContactChanged) -> None:
@@ -177,14 +177,14 @@ class EventLog:
 
 
 def _same_obstacle(before: PathBlocked, now: PathBlocked) -> bool:
-    """Return whether a client knows of it already: a scan or two without it do not make it another one."""
+    """Return whether an obstacle was reported already: a scan or two without it do not make it a new one."""
     if now.stamp - before.stamp >= OCCUPIED_AGAIN:
         return False
     return before.at is None or now.at is None or before.at.distance_to(now.at) < SAME_PLACE
 
 
 def _waits(action: Action) -> bool:
-    """Return whether it still stands before an obstacle."""
+    """Return whether the robot still waits in front of an obstacle."""
     if action.status.ended:
         return False
     return not isinstance(action.feedback, NavigationFeedback) or action.feedback.stage == "waiting"

@@ -13,7 +13,7 @@ API = "/api/platform/v1"
 
 @TABLE.on(f"GET {API}/timestamp", right=Right.SEE)
 async def get_timestamp(context: Context) -> str:
-    """Milliseconds since the start, as text."""
+    """Return milliseconds since the start, as text."""
     return milliseconds(context.robot.clock.time())
 
 

@@ -76,19 +76,19 @@ class FloorMap:
 
 
 def explore_map(grid: OccupancyGrid) -> ExploreMap:
-    """``grid`` with the vendor's sign: free above 0, occupied below."""
+    """Return ``grid`` with the vendor's sign: free above 0, occupied below."""
     cells = -np.maximum(grid.log_odds, -127)
     return ExploreMap(grid.origin.x, grid.origin.y, grid.resolution, cells.astype(np.int8))
 
 
 def grid_of(explored: ExploreMap) -> OccupancyGrid:
-    """The other way."""
+    """Return the grid of an explore map."""
     log_odds = (-np.maximum(explored.cells, -127)).astype(np.int8)
     return OccupancyGrid(log_odds, explored.resolution, Point(explored.x, explored.y))
 
 
 def composite_of(floor: FloorMap) -> CompositeMap:
-    """All layers of one floor; those that are empty are left out. Raises BadMap for what could not be read again."""
+    """Return the layers of a floor, without empty ones. Raises BadMap for content that could not be read back."""
     notes, label = floor.annotations, floor.name.pairs
     layers = [stcm_layers.grid_layer(explore_map(floor.grid), label)] if floor.grid is not None else []
     for usage, kind in LINE_LAYERS.items():
@@ -117,7 +117,7 @@ def _labelled(layer: Layer, label: Pairs) -> Layer:
 
 
 def floors_of(composite: CompositeMap) -> list[FloorMap]:
-    """The floors in a file, lowest first. Raises BadMap or InvalidGoal for layers that make no sense.
+    """Return the floors in a file, lowest first. Raises BadMap or InvalidGoal for malformed layers.
 
     Layers that name no floor belong to the default one.
     """
@@ -141,14 +141,14 @@ def floors_of(composite: CompositeMap) -> list[FloorMap]:
 
 
 def _check_size(composite: CompositeMap) -> None:
-    """BadMap for more than can be read in a few seconds."""
+    """Raise BadMap for more than can be read in a few seconds."""
     drawn = sum(len(layer.payload) for layer in composite.layers if layer.metadata.get("usage") in DRAWN_USAGES)
     if drawn > DRAWN_BYTES_MAX:
         raise BadMap(f"{drawn} bytes of places, lines and areas: at most {DRAWN_BYTES_MAX}")
 
 
 def _bounded(floors: Iterable[FloorMap]) -> list[FloorMap]:
-    """The floors, as long as not too much is drawn on all of them."""
+    """Return the floors. Raises BadMap if too much is drawn on them."""
     read, count = [], 0
     for floor in floors:
         notes = floor.annotations
@@ -165,7 +165,7 @@ def _floor_name(building: str, floor: str, order: str, default: str) -> FloorNam
 
 
 def _read(name: FloorName, layers: Sequence[Layer]) -> FloorMap:
-    """One floor of these layers."""
+    """Return the floor of these layers."""
     grid: OccupancyGrid | None = None
     lines: list[Line] = []
     areas: list[Area] = []
@@ -214,7 +214,7 @@ def _mark(id: str, pose: Pose, metadata: dict[str, str]) -> PointOfInterest:
 
 
 def _texts(metadata: dict[str, str]) -> dict[str, str]:
-    """Metadata of a file within the API's bounds, or BadMap."""
+    """Return a file's metadata. Raises BadMap beyond the API's limits."""
     if len(metadata) > artifact.METADATA_MAX or any(len(v) > artifact.METADATA_TEXT_MAX for v in metadata.values()):
         raise BadMap("more metadata than an entry can have")
     return {clean(key): clean(value) for key, value in metadata.items()}

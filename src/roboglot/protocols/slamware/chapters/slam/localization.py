@@ -71,14 +71,14 @@ async def get_map_localization(context: Context) -> bool:
 
 @TABLE.on(f"PUT {API}/localization/:enable", right=Right.EDIT, needs=(Localization,))
 async def set_map_localization(context: Context, body: Switch) -> bool:
-    """Let the lidar correct the pose, or follow the wheels alone."""
+    """Switch the correction of the pose by the lidar; off, it follows the wheels alone."""
     context.robot[Localization].enable(body.enable)
     return True
 
 
 @TABLE.on(f"POST {API}/localization/status/:reset", right=Right.DRIVE, needs=(Localization,))
 async def reset_localization_status(context: Context) -> bool:
-    """Begin anew from the present pose: doubts are forgotten, and the lidar looks for the place in a wide circle."""
+    """Restart localization at the current pose, searched in a wide circle by the lidar."""
     robot = context.robot
     robot[Localization].set_pose(robot[Localization].pose)
     if Health in robot:
@@ -90,33 +90,33 @@ async def reset_localization_status(context: Context) -> bool:
 
 @TABLE.on(f"GET {API}/mapping/:enable", right=Right.SEE, needs=(Mapping,))
 async def get_map_update(context: Context) -> bool:
-    """Return whether the map grows."""
+    """Return whether the lidar updates the map."""
     return context.robot[Mapping].enabled
 
 
 @TABLE.on(f"PUT {API}/mapping/:enable", right=Right.EDIT, needs=(Mapping,))
 async def set_map_update(context: Context, body: Switch) -> bool:
-    """Let the map grow, or leave it as it is."""
+    """Switch updates of the map by the lidar."""
     context.robot[Mapping].enable(body.enable)
     return True
 
 
 @TABLE.on(f"GET {API}/loopclosure/:enable", right=Right.SEE, needs=(Mapping,))
 async def get_loop_closure(context: Context) -> bool:
-    """Return whether loop closures straighten the map."""
+    """Return whether loop closures correct the map."""
     return context.robot[Mapping].closes_loops
 
 
 @TABLE.on(f"PUT {API}/loopclosure/:enable", right=Right.EDIT, needs=(Mapping,))
 async def set_loop_closure(context: Context, body: Switch) -> bool:
-    """Let it, or not."""
+    """Switch loop closures."""
     context.robot[Mapping].close_loops(body.enable)
     return True
 
 
 @TABLE.on(f"GET {API}/imu", right=Right.SEE, needs=(Imu,))
 async def get_imu(context: Context) -> ImuData:
-    """Attitude (rad), acceleration (m/s2) and turning rates (rad/s) in the robot's frame."""
+    """Return attitude (rad), acceleration (m/s2) and turning rates (rad/s) in the robot's frame."""
     require_heard(context.robot)
     imu = context.robot[Imu]
     try:
@@ -128,13 +128,13 @@ async def get_imu(context: Context) -> ImuData:
 
 @TABLE.on(f"GET {API}/knownarea", right=Right.SEE, needs=(Mapping,))
 async def get_known_area(context: Context) -> Rectangle:
-    """The extent of the map, m."""
+    """Return the extent of the map, m."""
     grid = context.robot[Mapping].grid
     return Rectangle(grid.origin.x, grid.origin.y, grid.width * grid.resolution, grid.height * grid.resolution)
 
 
 def imu_data(reading: ImuReading, raw: RawImu | None = None) -> ImuData:
-    """``reading`` with the quaternion worked out; the calibrated compass is marked as not available, as is ``raw``."""
+    """Return ``reading`` with its quaternion; the calibrated compass, and a missing ``raw``, are marked unavailable."""
     attitude, turning, acceleration = reading.orientation, reading.angular_velocity, reading.linear_acceleration
     (cr, sr), (cp, sp), (cy, sy) = (
         (math.cos(half), math.sin(half)) for half in (attitude.roll / 2, attitude.pitch / 2, attitude.yaw / 2)

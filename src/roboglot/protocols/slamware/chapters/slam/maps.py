@@ -41,7 +41,7 @@ async def get_explore_map(
     max_x: Bound | None = None,
     max_y: Bound | None = None,
 ) -> bytes:
-    """The map as binary (see the wire's explore_map), all of it or what a window in metres cuts out of it."""
+    """Return the map as binary (see the wire's explore_map), or the part within a window (m)."""
     grid = context.robot[Mapping].grid
     if any(bound is not None for bound in (min_x, min_y, max_x, max_y)):
         grid = grid.window(
@@ -55,13 +55,13 @@ async def get_explore_map(
 
 @TABLE.on(f"GET {API}/maps/stcm", right=Right.SEE, needs=(Docking, MapAnnotations, Mapping, Places, Settings))
 async def get_composite_map(context: Context) -> bytes:
-    """The map with all that is drawn on it as a composite map; 403 while one is being loaded."""
+    """Return the map with all its drawings as a composite map; 403 while one is being loaded."""
     return context.maps.export()
 
 
 @TABLE.on(f"PUT {API}/maps/stcm", right=Right.EDIT, needs=(Localization, MapAnnotations, MapMemory, Mapping, Settings))
 async def set_composite_map(context: Context, body: bytes) -> None:
-    """Use this map and what is drawn on it, in memory only; the robot's pose becomes the origin."""
+    """Replace the map and its drawings, in memory only; the robot's pose becomes the origin."""
     context.actions.abort()
     await context.maps.use(body, ORIGIN)
     context.events.note(GeneralEvent.SET_MAP_DONE)
@@ -69,7 +69,7 @@ async def set_composite_map(context: Context, body: bytes) -> None:
 
 @TABLE.on(f"DELETE {API}/maps", right=Right.EDIT, needs=(FileStore, Localization, MapMemory, Mapping, Settings))
 async def clear_map(context: Context) -> None:
-    """Forget the map and begin a new one here. The docks stay where they are; they get new coordinates.
+    """Clear the map and start a new one here. Docks keep their places in new coordinates.
 
     In memory only: a restart loads the map on disk.
     """
@@ -82,7 +82,7 @@ async def clear_map(context: Context) -> None:
 
 @TABLE.on(f"PUT {API}/maps/origin", right=Right.EDIT, needs=(MapAnnotations, MapMemory, Mapping, Places, Settings))
 async def move_origin_point(context: Context, body: NewOrigin) -> None:
-    """Make this place, to the nearest 5 cm, the map's origin; all that is drawn on the map moves with it."""
+    """Move the map's origin to this place, to the nearest 5 cm; drawings keep their places."""
     robot = context.robot
     wanted = Point(body.new_origin.x, body.new_origin.y)
     _check_reach(Point(p.x - wanted.x, p.y - wanted.y) for p in (robot[Mapping].grid.origin, *_drawn(robot)))
@@ -92,14 +92,14 @@ async def move_origin_point(context: Context, body: NewOrigin) -> None:
 
 
 def _check_reach(points: Iterable[Point]) -> None:
-    """InvalidGoal if some are so far from the origin that the map could not be saved and loaded again."""
+    """Raise InvalidGoal for points so far from the origin that the map could not be saved and loaded again."""
     for point in points:
         if max(abs(point.x), abs(point.y)) > REACH_MAX:
             raise InvalidGoal(f"something would be at ({point.x:g}, {point.y:g}), too far from the origin")
 
 
 def _drawn(robot: Robot) -> Iterator[Point]:
-    """All points that something on the map has."""
+    """Return all points of drawings on the map."""
     notes = robot[MapAnnotations].current
     for line in notes.lines:
         yield from (line.start, line.end, *(line.control or ()))

@@ -23,14 +23,14 @@ class Totals:
         self._keeping: asyncio.Task[object] | None = None
 
     def start(self) -> None:
-        """Load the earlier totals, and save them from now on."""
+        """Load the earlier totals and start saving them."""
         if Settings in self._robot:
             metres, seconds = self._robot[Settings].get(TOTALS, (0.0, 0.0))
             self._before = (float(metres), float(seconds))
             self._wait()
 
     async def close(self) -> None:
-        """Keep them a last time."""
+        """Save the totals a last time."""
         if self._timer is None:
             return
         self._timer.cancel()
@@ -38,7 +38,7 @@ class Totals:
 
     @property
     def metres(self) -> float:
-        """Driven so far."""
+        """Distance driven so far, m."""
         return self._before[0] + self._robot[Odometry].reading.distance
 
     @property

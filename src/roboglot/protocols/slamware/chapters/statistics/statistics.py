@@ -12,11 +12,11 @@ API = "/api/core/statistics/v1"
 
 @TABLE.on(f"GET {API}/odometry", right=Right.SEE, needs=(Odometry,))
 async def get_odometry(context: Context) -> float:
-    """Metres travelled."""
+    """Return the metres travelled."""
     return round(context.totals.metres, 3)
 
 
 @TABLE.on(f"GET {API}/runtime", right=Right.SEE)
 async def get_runtime(context: Context) -> float:
-    """Seconds of robot time."""
+    """Return the seconds of robot time."""
     return round(context.totals.seconds, 3)

@@ -1,4 +1,4 @@
-"""Sees that a robot on its dock does not charge though it should."""
+"""Detection of a robot that fails to charge on its dock."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ CHARGED = 0.9  # charge above which no current is expected
 
 
 class ChargingWatch:
-    """Calls ``failed`` once each time."""
+    """Calls ``failed`` once per failure."""
 
     def __init__(self, robot: Robot, failed: Callable[[], None]) -> None:
         self._robot, self._failed = robot, failed
@@ -22,13 +22,13 @@ class ChargingWatch:
         self._endings: list[Callable[[], None]] = []
 
     def start(self) -> None:
-        """Watch, if the robot has what it takes."""
+        """Start watching, if the robot has a dock contact and a battery."""
         if Battery in self._robot and DockContact in self._robot:
             listen = self._robot.events.listen
             self._endings = [listen(kind, lambda _: self._look()) for kind in (DockContactChanged, BatteryChanged)]
 
     def close(self) -> None:
-        """Watch no more."""
+        """Stop watching."""
         for end in self._endings:
             end()
         self._forget()

@@ -1,4 +1,4 @@
-"""Chapter "system": the configuration of the machine, which stays over restarts.
+"""Chapter "system": the configuration of the machine, kept over restarts.
 
 The vendor's tool exports it in a binary format that is not public; such a file is refused. What is understood is a
 JSON object of our own: ``max_moving_speed`` (m/s) and ``max_angular_speed`` (rad/s), as which the parameters of that
@@ -26,7 +26,7 @@ Speed = Annotated[float, msgspec.Meta(gt=0, le=10)]
 
 
 class CubeConfig(msgspec.Struct, forbid_unknown_fields=True):
-    """Configurable values; those left out are as the robot was built."""
+    """Configurable values; missing ones are those of the robot's build."""
 
     max_moving_speed: Speed | None = None
     max_angular_speed: Speed | None = None
@@ -41,7 +41,7 @@ class CubeConfig(msgspec.Struct, forbid_unknown_fields=True):
     right=Right.EDIT,
 )
 async def set_cube_config(context: Context, body: bytes) -> None:
-    """Configure the machine from now on; 400 for what is not understood, or not within what the robot can do."""
+    """Configure the machine; 400 for unknown settings or values beyond the robot's limits."""
     try:
         config = msgspec.json.decode(body, type=CubeConfig)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:

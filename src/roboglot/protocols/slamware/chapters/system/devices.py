@@ -92,7 +92,7 @@ async def set_depth_sensor_state(context: Context, body: Switch) -> None:
 
 @TABLE.on(f"GET {SENSORS}/masks", right=Right.SEE, needs=(SensorMasks,))
 async def get_disabled_sensors_mask_data(context: Context) -> list[DisabledSensor]:
-    """The sensors that are switched off."""
+    """Return the sensors that are switched off."""
     return [DisabledSensor(id, always) for id, always in sorted(context.robot[SensorMasks].masked.items())]
 
 
@@ -112,7 +112,7 @@ async def set_sensor_mask(context: Context, body: Annotated[list[SensorSwitch], 
 
 
 def restore_masks(robot: Robot) -> None:
-    """Restore the masks at a start: what is to be off always is, and nothing else."""
+    """Restore the masks at a start: exactly those that are to be off always."""
     if SensorMasks not in robot or Settings not in robot:
         return
     masks, always = robot[SensorMasks], set(robot[Settings].get(MASKED, []))

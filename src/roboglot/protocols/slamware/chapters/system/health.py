@@ -1,4 +1,4 @@
-"""Chapter "system": what is wrong with the robot, in the vendor's numbers."""
+"""Chapter "system": faults of the robot, in the vendor's numbers."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ OWN_CODE, UNKNOWN_CODE = 0x7000, 0x70FF
 
 
 def record_of(fault: Fault) -> BaseError:
-    """A fault as the API writes it."""
+    """Return a fault in the API's form."""
     if fault.name in NUMBERS:
         level, part, code, kind = NUMBERS[fault.name]
         return health_record(level, part, code, kind, fault.message)
@@ -73,7 +73,7 @@ async def get_robot_health(context: Context) -> BaseHealthInfo:
 
 
 def _records(robot: Robot) -> list[BaseError]:
-    """Return what is wrong and not dismissed. Limp legs are an emergency stop that the model has no fault for."""
+    """Return faults not dismissed. Limp legs are an emergency stop that the model has no fault for."""
     records = [record_of(fault) for fault in (robot[Health].faults if Health in robot else ())]
     if _stopped(robot) and not _has(robot, STOP):
         records.append(health_record(*NUMBERS[STOP], "emergency stop: the legs are limp"))
@@ -81,7 +81,7 @@ def _records(robot: Robot) -> list[BaseError]:
 
 
 def _has(robot: Robot, name: str) -> bool:
-    """Return whether this is wrong now, dismissed or not."""
+    """Return whether a fault is present, dismissed or not."""
     return Health in robot and robot[Health].has(name)
 
 
@@ -93,7 +93,7 @@ def _stopped(robot: Robot) -> bool:
 
 @TABLE.on(f"DELETE {API}/{{error_code}}", right=Right.DRIVE)
 async def clear_robot_health(context: Context, error_code: int) -> None:
-    """Dismiss a record; it comes back while its cause persists. 400 for a code that is not there.
+    """Dismiss a fault, which returns while its cause persists; 400 for an unknown code.
 
     The flags go on saying how the robot is.
     """

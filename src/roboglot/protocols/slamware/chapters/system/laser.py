@@ -1,4 +1,4 @@
-"""The newest laser scan in the robot's frame, encoded once however often it is asked for."""
+"""The latest laser scan in the robot's frame, encoded once for all requests."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _NONE_YET = msgspec.Raw(b"[]")
 
 
 class Laser:
-    """Remembers the last scan and where odometry had the robot then."""
+    """Last scan with the robot's odometry at its time."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -28,11 +28,11 @@ class Laser:
         self._end: Callable[[], None] = lambda: None
 
     def start(self) -> None:
-        """Listen to the lidar from now on."""
+        """Start listening to the lidar."""
         self._end = self._robot.events.listen(ScanTaken, self._taken)
 
     def close(self) -> None:
-        """Listen no more."""
+        """Stop listening."""
         self._end()
 
     @property
@@ -42,7 +42,7 @@ class Laser:
 
     @property
     def pose(self) -> Pose:
-        """Pose of the robot in the map at the time of the scan: its current pose, taken back along the odometry."""
+        """Pose of the robot in the map at the time of the scan: its current pose, corrected by odometry."""
         pose = self._robot[Localization].pose
         if self._last is None:
             return pose
@@ -50,7 +50,7 @@ class Laser:
 
     @property
     def points(self) -> msgspec.Raw:
-        """The scan's points as a JSON array of LaserPoints; empty before the first scan."""
+        """Return the scan as a JSON array of LaserPoints; empty before the first scan."""
         if (last := self._last) is None:
             return _NONE_YET
         if self._encoded is None or self._encoded[0] is not last:
@@ -62,7 +62,7 @@ class Laser:
 
 
 def laser_points(scan: LaserScan) -> list[LaserPoint]:
-    """``scan`` seen from base_link; points where nothing came back are kept, as (0, angle, not valid)."""
+    """Return ``scan`` from base_link; points without a return are kept, as (0, angle, not valid)."""
     ranges = scan.ranges.astype(np.float64)
     valid = np.isfinite(ranges) & (ranges >= scan.range_min) & (ranges <= scan.range_max)
     distances, angles = np.where(valid, ranges, 0.0), scan.angles + scan.mount.yaw

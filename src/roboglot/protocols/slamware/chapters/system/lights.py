@@ -1,4 +1,4 @@
-"""Chapter "system": the strips of light. A show is an action that holds its zone, so the next one replaces it."""
+"""Chapter "system": light strips. A show is an action that holds its zone, so the next one replaces it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ZONES = {
 
 @TABLE.on("POST /api/core/system/v1/light/control", right=Right.DRIVE, needs=(Light,))
 async def set_light_control(context: Context, body: LightControl) -> None:
-    """Show this on one half of a channel from now on; 501 if the robot has no such strip."""
+    """Set the light of one half of a channel; 501 if the robot has no such strip."""
     light, zone = context.robot[Light], ZONES[body.channel, body.control_part]
     if zone not in light.zones:
         raise HttpError(501, "Failed to set light control", f"this robot has no lights {zone}")
@@ -38,7 +38,7 @@ async def set_light_control(context: Context, body: LightControl) -> None:
 
 
 class Show:
-    """One zone's."""
+    """Light show of one zone."""
 
     def __init__(self, light: Light, zone: str, clock: Clock, wanted: LightControl) -> None:
         self._light, self._zone, self._clock, self._wanted = light, zone, clock, wanted
@@ -64,7 +64,7 @@ class Show:
         await self._clock.sleep(seconds)
 
     async def _breathe(self, low: Colour, high: Colour) -> None:
-        """Up by one every ``brightMs`` until all parts are there, and down again."""
+        """Raise the brightness by one every ``brightMs`` up to the top, then lower it again."""
         spans = (high.red - low.red, high.green - low.green, high.blue - low.blue)
         most = max(1, *spans)
         pace = max(self._wanted.bright_ms, 1) / 1000  # s per step; some may be skipped
@@ -76,7 +76,7 @@ class Show:
                 await self._hold(Colour(low.red + red, low.green + green, low.blue + blue), pace * stride)
 
     async def _run_round(self, colour: Colour) -> None:
-        """One lamp after the other."""
+        """Light one lamp after the other."""
         count, lamp = self._light.zones[self._zone], 0
         while True:
             self._light.shine(self._zone, DARK)

@@ -1,4 +1,4 @@
-"""Chapter "system": Wi-Fi, the order of the ways to the internet, the mobile operator's access point."""
+"""Chapter "system": Wi-Fi, the preferred uplink, the mobile operator's access point name."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ BEST, WORST = -50.0, -100.0  # dBm that count as 100 and as 0
 
 @TABLE.on(f"GET {API}/status", right=Right.SEE, needs=(Network,))
 async def get_network_status(context: Context) -> WrappedStatus:
-    """Return the current link of the Wi-Fi card; switched off it is a station without a network."""
+    """Return the link of the Wi-Fi card; switched off, it is a station without a network."""
     network = context.robot[Network]
     state = network.state
     share = (network.signal - WORST) / (BEST - WORST) if network.connected else 0.0
@@ -38,7 +38,7 @@ async def get_network_status(context: Context) -> WrappedStatus:
 
 @TABLE.on(f"PUT {API}/status", right=Right.ADMIN, needs=(Network,))
 async def set_network_status(context: Context, body: NetworkRequest) -> bool:
-    """Be a network, join one (which takes seconds, and where it fails changes nothing), or switch something."""
+    """Become an access point, join a network (takes seconds; no change on failure), or switch a setting."""
     network = context.robot[Network]
     options = body.options if isinstance(body.options, StationOptions) else StationOptions()
     match body.networkmode:
@@ -57,19 +57,19 @@ async def set_network_status(context: Context, body: NetworkRequest) -> bool:
 
 @TABLE.on(f"GET {API}/route", right=Right.SEE, needs=(Network,))
 async def get_network_route(context: Context) -> RouteStatus:
-    """Return the preferred way to the internet."""
+    """Return the preferred uplink."""
     return RouteStatus(PRIORITIES[context.robot[Network].priority])
 
 
 @TABLE.on(f"PUT {API}/route", right=Right.ADMIN, needs=(Network,))
 async def set_network_route(context: Context, body: RouteStatus) -> None:
-    """Choose it."""
+    """Set the preferred uplink."""
     await context.robot[Network].set_priority(Uplink.WIFI if body.priority == "wifi" else Uplink.MOBILE)
 
 
 @TABLE.on(f"GET {API}/apn", right=Right.SEE, needs=(Network,))
 async def get_cmlink_apn(context: Context) -> ApnStatus:
-    """With which access point name the modem asks the operator to let it in."""
+    """Return the modem's access point name."""
     if (mobile := context.robot[Network].mobile) is None:
         raise ComponentMissing(Network)
     return ApnStatus(mobile.apn)
@@ -77,5 +77,5 @@ async def get_cmlink_apn(context: Context) -> ApnStatus:
 
 @TABLE.on(f"PUT {API}/apn", right=Right.ADMIN, needs=(Network,))
 async def set_cmlink_apn(context: Context, body: ApnStatus) -> None:
-    """Another one: a wrong name is let in nowhere."""
+    """Set the modem's access point name; with a wrong one no operator accepts it."""
     await context.robot[Network].set_apn(body.apn)

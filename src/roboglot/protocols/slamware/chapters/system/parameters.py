@@ -1,4 +1,4 @@
-"""Chapter "system": parameters. They act at once and are gone after a restart."""
+"""Chapter "system": parameters, effective at once and lost at a restart."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SWITCH = {"on": True, "off": False}
 
 @TABLE.on(f"GET {PARAMETER}", right=Right.SEE, needs=(Base, Docking))
 async def get_system_parameter(context: Context, param: Annotated[str, msgspec.Meta(min_length=1)]) -> Text:
-    """Top speeds in m/s and rad/s, as text with six decimals; when the robot registers a dock that it touches."""
+    """Return a top speed (m/s, rad/s), as text with six decimals, or when touched docks are registered."""
     match param:
         case "base.max_moving_speed":
             return Text(f"{context.robot[Base].limits.twist.x:.6f}")
@@ -36,7 +36,7 @@ async def get_system_parameter(context: Context, param: Annotated[str, msgspec.M
 
 @TABLE.on(f"PUT {PARAMETER}", right=Right.DRIVE, needs=(Base, EmergencyStop))
 async def set_system_parameter(context: Context, body: Parameter) -> bool:
-    """Speed limits, emergency stop, brake release."""
+    """Set a speed limit, the emergency stop or the brake release."""
     match body.param:
         case "base.max_moving_speed":
             context.limits.set(speed=_number(body.value))

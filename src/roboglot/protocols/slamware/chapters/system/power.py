@@ -18,7 +18,7 @@ MODULES = {RestartMode.SOFT: Module.SOFTWARE, RestartMode.BASE: Module.BASE}
 
 @TABLE.on(f"POST {API}/:shutdown", right=Right.ADMIN, needs=(Power,))
 async def shutdown(context: Context, body: Shutdown) -> bool:
-    """Switch off, at once or later, and perhaps on again. While it is off there are no answers."""
+    """Switch off, at once or later, and optionally on again. There are no answers while off."""
     restart = body.restart_time_interval * 60.0 or None
     context.robot[Power].shut_down(source=SOURCE, after=body.shutdown_time_interval * 60.0, restart_after=restart)
     return True
@@ -38,7 +38,7 @@ async def wakeup(context: Context) -> None:
 
 @TABLE.on(f"POST {API}/:restartmodule", right=Right.ADMIN, needs=(Firmware,))
 async def restart_module(context: Context, body: Restart) -> bool:
-    """Restart all (without answers meanwhile), the software, or the base; 403 during an update."""
+    """Restart the robot (without answers meanwhile), its software, or its base; 403 during an update."""
     context.actions.abort()
     if body.mode is RestartMode.HARD:
         context.robot[Firmware].reboot(source=SOURCE)

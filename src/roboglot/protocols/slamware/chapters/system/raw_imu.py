@@ -1,4 +1,4 @@
-"""Chapter "system": what the IMU's converters say."""
+"""Chapter "system": raw readings of the IMU's converters."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ API = "/api/core/system/v1"
 
 @TABLE.on(f"GET {API}/rawadcimu", right=Right.SEE, needs=(Imu,))
 async def get_imu_raw_adc_data(context: Context) -> ImuCounts:
-    """Counts of accelerometer, gyro and compass."""
+    """Return the counts of accelerometer, gyro and compass."""
     raw = context.robot[Imu].raw
     return ImuCounts(*raw.acceleration, *raw.rate, *raw.field, _milliseconds(raw))
 
 
 @TABLE.on(f"GET {API}/rawimu", right=Right.SEE, needs=(Imu,))
 async def get_imu_raw_data(context: Context) -> ImuValues:
-    """The same in m/s2, rad/s and microtesla, not yet freed from the sensors' errors."""
+    """Return the uncorrected readings in m/s2, rad/s and microtesla."""
     raw = context.robot[Imu].raw
     a, r, f = in_units(raw)
     return ImuValues(a[0], a[1], a[2], r[0], r[1], r[2], f[0], f[1], f[2], _milliseconds(raw))
 
 
 def in_units(raw: RawImu) -> tuple[list[float], list[float], list[float]]:
-    """Acceleration (m/s2), turning rate (rad/s) and magnetic field (microtesla), each x, y, z."""
+    """Return acceleration (m/s2), turning rate (rad/s) and magnetic field (microtesla), each x, y, z."""
     acceleration = [count * raw.acceleration_unit for count in raw.acceleration]
     rate = [count * raw.rate_unit for count in raw.rate]
     return acceleration, rate, [count * raw.field_unit * 1e6 for count in raw.field]

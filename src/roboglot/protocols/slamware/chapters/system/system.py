@@ -60,7 +60,7 @@ async def get_capabilities(context: Context) -> list[Capability]:
 
 @TABLE.on(f"GET {API}/power/status", right=Right.SEE, needs=(Battery,))
 async def get_power_status(context: Context) -> PowerStatus:
-    """Battery, dock and how awake the robot is."""
+    """Return the state of battery, dock and power mode."""
     require_heard(context.robot)
     state = context.robot[Battery].state
     docked = DockContact in context.robot and context.robot[DockContact].docked
@@ -78,7 +78,7 @@ async def get_power_status(context: Context) -> PowerStatus:
 
 @TABLE.on(f"GET {API}/battery/pack", right=Right.SEE, needs=(Battery,))
 async def get_battery_pack(context: Context) -> BatteryPack:
-    """Current (mA, positive: charging) and temperature (0.1 degrees Celsius)."""
+    """Return current (mA, positive: charging) and temperature (0.1 degrees Celsius)."""
     require_heard(context.robot)
     state = context.robot[Battery].state
     return BatteryPack(round(state.current * 1000, 1), 1, [round(state.temperature * 10)])
@@ -86,7 +86,7 @@ async def get_battery_pack(context: Context) -> BatteryPack:
 
 @TABLE.on(f"GET {API}/robot/info", right=Right.SEE)
 async def get_robot_info(context: Context) -> DeviceInfo:
-    """The name plate. Numbers that only the vendor hands out are made from the names, the same at every start."""
+    """Return the name plate; numbers that only the vendor assigns are derived from names, and stable."""
     plate = context.robot.description
     return DeviceInfo(
         manufacturer_id=SLAMTEC if plate.maker == "Slamtec" else 0,
@@ -100,18 +100,18 @@ async def get_robot_info(context: Context) -> DeviceInfo:
 
 
 def software_version(robot: Robot) -> str:
-    """Return what runs now: updates change it."""
+    """Return the running version, which updates change."""
     return robot[Firmware].version if Firmware in robot else robot.description.software_version
 
 
 def device_id(serial: str) -> str:
-    """32 upper-case hex digits: the serial number itself if it is that, otherwise made from it."""
+    """Return 32 upper-case hex digits: the serial number if it has that form, otherwise derived from it."""
     bare = serial.replace("-", "")
     return (bare if re.fullmatch("[0-9a-fA-F]{32}", bare) else uuid.uuid5(uuid.NAMESPACE_OID, serial).hex).upper()
 
 
 @TABLE.on(f"GET {API}/laserscan", right=Right.SEE, needs=(Lidar, Localization, Odometry))
 async def get_laser_scan(context: Context) -> LaserScan:
-    """The last turn of the lidar (rad from straight ahead, m) and the robot's pose then."""
+    """Return the lidar's last turn (rad from straight ahead, m) and the robot's pose at its time."""
     _ = context.robot[Lidar]
     return LaserScan(pose3d(context.laser.pose), context.laser.points)
