@@ -46,7 +46,7 @@ class Gate:
     def before(self, factory: Factory, name: str, right: Right | None = None, most: int = OPEN_MAX) -> Factory:
         """Wrap ``factory``: only clients with ``right`` get its protocols; others are disconnected.
 
-        None: the protocol itself asks who comes. ``most`` are open at once, half of them of one address.
+        ``right`` None: the protocol identifies clients. At most ``most`` are open, half of them from one address.
         """
         if self._tls is not None:
             factory = partial(TlsPort, factory, self._tls, self._admission.may_shake_hands)

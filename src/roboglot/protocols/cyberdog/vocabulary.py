@@ -56,7 +56,7 @@ def points_of(points: Iterable[Point]) -> list[dict[str, float]]:
 
 
 def grid_of(grid: OccupancyGrid) -> dict[str, object]:
-    """The map structure: -1 unknown, 0 free, 100 occupied, rows from the smallest y; clients test for just these."""
+    """Return the map structure: -1 unknown, 0 free, 100 occupied (as clients test), rows from the smallest y."""
     cells = np.where(grid.log_odds > 0, 100, np.where(grid.log_odds < 0, 0, -1))
     origin = pose_of(Pose(grid.origin.x, grid.origin.y))
     size = {"resolution": grid.resolution, "width": grid.width, "height": grid.height}
@@ -90,7 +90,7 @@ def twist_of(motion: int, vel_des: Sequence[float]) -> Twist:
 
 
 def body_of(pos_des: Sequence[float], rpy_des: Sequence[float]) -> BodyPose:
-    """``pos_des`` [x, y, z] in m (z 0: the height as it is), ``rpy_des`` in rad; another length counts as zeros."""
+    """Return the body pose: ``pos_des`` [x, y, z], m (z 0: same height), ``rpy_des``, rad; other lengths: zeros."""
     x, y, z = pos_des if len(pos_des) == 3 else (0.0, 0.0, 0.0)
     roll, pitch, yaw = rpy_des if len(rpy_des) == 3 else (0.0, 0.0, 0.0)
     return BodyPose(z or None, Orientation(roll, pitch, yaw), Point(x, y))

@@ -76,7 +76,7 @@ class DrivingClient:
         return False
 
     def rest(self, echoed: bool) -> bool:
-        """Note that the client drives nothing; return whether to ask it anyway, to learn early if its host answers."""
+        """Record that the client drives nothing; return whether to probe it anyway, to see early if it answers."""
         self._misses = 0
         self._echoes = self._echoes or echoed
         self._greetings -= self._greetings > 0

@@ -1,6 +1,6 @@
 """State of this door for one robot: its order, actions and errors; takes messages, and has orders driven.
 
-Reports facts only: a node is passed when the navigation says that the robot was there, an action is finished when it
+Reports facts only: a node is passed when navigation reports that the robot was there, an action is finished when it
 has ended.
 """
 
@@ -36,7 +36,7 @@ START_REACH = 0.5  # m from an order's first node that count as being there
 
 
 class Context:
-    """The context of every handler: one robot and its fleet control."""
+    """Context of every handler: one robot and its fleet control."""
 
     def __init__(
         self, robot: Robot, version: Version, map_id: str, send_factsheet: Callable[[], Awaitable[None]]
@@ -60,14 +60,14 @@ class Context:
 
     @property
     def map_id(self) -> str:
-        """The mapId of the map in use."""
+        """Id (mapId) of the map in use."""
         return self.maps.in_use
 
     def _metres(self) -> float:
         return self.robot[Odometry].reading.distance if Odometry in self.robot else 0.0
 
     def touch(self) -> None:
-        """Have the state sent."""
+        """Schedule a state message."""
         self.changed.set()
 
     def check(self, operation: str, right: Right | None) -> None:

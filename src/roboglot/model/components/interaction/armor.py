@@ -30,7 +30,7 @@ class HitKind(StrEnum):
 
 
 class Armor(Component):
-    """Publishes ``ArmorHit``; beads and collisions must be harder the lower the sensitivity is, a hand need not."""
+    """Publishes ``ArmorHit``. The lower the sensitivity, the harder a bead or collision must be; hands always count."""
 
     plates: tuple[PlatePlace, ...]
 

@@ -35,7 +35,7 @@ class TrainingWords(Component):
     def teach(self, value: str, *, kind: str = "vp_task", seconds: float = 30.0, source: str = "") -> Action:
         """Listen until the same utterance was heard REPEATS times; from then on it triggers ``value``.
 
-        Feedback: how often it was heard. Raises InvalidGoal; aborts with Expired when nothing was said often enough in
+        Feedback: times it was heard. Raises InvalidGoal; aborts with Expired when nothing was said often enough in
         time, Refused when the robot knows WORDS_MAX words.
         """
 

@@ -148,5 +148,5 @@ class MapAnnotations(Component):
     async def change(self, edit: Callable[[Annotations], Annotations]) -> None:
         """Replace the current annotations by ``edit`` of them, serialized; return once they are on disk.
 
-        What ``edit`` raises goes to the caller, and nothing changes. InvalidGoal beyond ``LINES_MAX`` and its kin.
+        An error of ``edit`` is raised and nothing changes. Raises InvalidGoal beyond ``LINES_MAX`` and similar limits.
         """

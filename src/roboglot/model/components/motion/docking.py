@@ -27,7 +27,7 @@ class Docking(Component):
     def dock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
         """Drive to the dock and onto its contacts; aborts with DockNotFound and navigation's errors.
 
-        A dock whose place is unknown is looked for nearby. Feedback: "searching" then, "approaching", "docking",
+        A dock at an unknown place is searched nearby. Feedback: "searching" in that case, "approaching", "docking",
         "docked".
         """
 

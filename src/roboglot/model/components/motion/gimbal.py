@@ -58,7 +58,7 @@ class Gimbal(Component):
     @property
     @abstractmethod
     def attitude(self) -> GimbalAngles:
-        """Relative to the world: pitch to the horizon, yaw to the heading at power-on (by the gyro, so it drifts)."""
+        """Angles in the world: pitch to the horizon, yaw to the heading at power-on (by the gyro, so it drifts)."""
 
     @property
     @abstractmethod

@@ -62,6 +62,6 @@ class Navigation(Component):
     async def visiting_order(self, places: Sequence[Point], *, round_trip: bool = False) -> Sequence[int]:
         """Return the indices of ``places`` (map) in the order of a short tour from here, and back if ``round_trip``.
 
-        The shortest by the planned ways up to 12 places; beyond, a good one. Without ``round_trip``, places that cannot
-        be reached come last; with it, they are Unreachable. InvalidGoal beyond 500.
+        The shortest tour by planned paths up to 12 places; beyond, a good one. Unreachable places come last without
+        ``round_trip``; with it, they raise Unreachable. Raises InvalidGoal beyond 500.
         """

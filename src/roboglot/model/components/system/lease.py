@@ -53,7 +53,7 @@ class Holder:
 
 
 class Lease(Component):
-    """One robot's. Publishes ``ControlChanged``; Health has a warning while control is taken or others move it."""
+    """Lease of a robot. Publishes ``ControlChanged``; Health warns while control is taken or others move it."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot, self._clock = robot, robot.clock
@@ -96,7 +96,7 @@ class Lease(Component):
         return not taken or who == taken or who.startswith((f"{taken} ", f"{taken}:"))
 
     def fence(self, why_not: Callable[[], str]) -> None:
-        """Ask this before anything moves the robot: why it may not be moved by this program; empty: it may."""
+        """Set a check before every motion: it returns why this program may not move the robot; empty: it may."""
         self._fence = why_not
 
     def halt(self, reason: str) -> None:

@@ -31,7 +31,7 @@ THERE = math.radians(0.5)
 
 @TABLE.on("gimbal speed", right=Right.DRIVE, needs=(Gimbal,))
 async def set_speed(context: Context, *, p: GimbalSpeed = 0.0, y: GimbalSpeed = 0.0) -> None:
-    """Turn at p and y degrees/s until the next command (3.2.4.1); in chassis_lead y does nothing, and robots say so."""
+    """Turn at p and y degrees/s until the next command (3.2.4.1); in chassis_lead y has no effect, as robots say."""
     idle_yaw = context.mode is FollowMode.CHASSIS_LEAD
     gimbal = context.robot[Gimbal]
     gimbal.set_speed(-math.radians(p), 0.0 if idle_yaw else -math.radians(y), source=context.source)

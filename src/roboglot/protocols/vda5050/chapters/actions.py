@@ -51,14 +51,14 @@ async def request_factsheet(context: Context) -> str:
 
 @TABLE.on("clearInstantActions", right=Right.DRIVE)
 async def clear_instant_actions(context: Context) -> str:
-    """Leave instant actions that ended out of the state from now on."""
+    """Remove ended instant actions from the state."""
     context.clear_instant_actions()
     return ""
 
 
 @TABLE.on("trigger", right=Right.DRIVE)
 async def trigger(context: Context) -> str:
-    """Let an action go on that waits for a trigger."""
+    """Resume an action that waits for a trigger."""
     context.release_trigger()
     return ""
 
@@ -81,7 +81,7 @@ async def initialize_position(
     mapId: Id,  # noqa: N803
     lastNodeId: Id = "",  # noqa: N803
 ) -> str:
-    """Set where the robot is in its map."""
+    """Set the robot's pose in its map."""
     if mapId == context.map_id:
         context.robot[Localization].set_pose(Pose(x, y, theta))
     elif MapLibrary not in context.robot or mapId not in await context.robot[MapLibrary].names():
@@ -110,13 +110,13 @@ async def stop_charging(context: Context) -> str:
 
 @TABLE.on("retry", right=Right.DRIVE)
 async def retry(context: Context, *, actionId: Id) -> str:  # noqa: N803
-    """Try an action again that failed and is RETRIABLE."""
+    """Retry a failed action that is RETRIABLE."""
     context.answer_retry(actionId, again=True)
     return ""
 
 
 @TABLE.on("skipRetry", right=Right.DRIVE)
 async def skip_retry(context: Context, *, actionId: Id) -> str:  # noqa: N803
-    """Let an action fail that is RETRIABLE."""
+    """Fail an action that is RETRIABLE."""
     context.answer_retry(actionId, again=False)
     return ""

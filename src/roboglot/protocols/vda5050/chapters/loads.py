@@ -1,4 +1,4 @@
-"""Chapter 6.2.3: taking loads and setting them down, with the jack."""
+"""Chapter 6.2.3: picking and dropping loads with the jack."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ async def pick(
     depth: NotNegative | None = None,
     side: Text = "",
 ) -> str:
-    """Lift what stands over the robot; at stationType "shelf" the robot finds the shelf's legs and drives under it."""
+    """Lift the load above the robot; at stationType "shelf" the robot finds the shelf's legs and drives under it."""
     robot, jack = context.robot, context.robot[Jack]
     _check(lhd, stationType, height, depth, side)
     if jack.loaded:
@@ -74,7 +74,7 @@ async def drop(
 
 
 def _check(lhd: str, station: str, height: float | None, depth: float | None, side: str) -> None:
-    """Raise Refused for what a jack cannot do."""
+    """Raise Refused for a load that a jack cannot handle."""
     if lhd not in ("", JACK_POSITION):
         raise Refused(f"there is no load handling device {lhd!r}; it is called {JACK_POSITION!r}")
     if station not in ("", SHELF):

@@ -1,4 +1,4 @@
-"""Chapter 6.2.3: the maps that the robot keeps."""
+"""Chapter 6.2.3: stored maps of the robot."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from roboglot.wire.vda5050.orders import Id, Text
 
 @TABLE.on("enableMap", right=Right.EDIT, needs=(MapLibrary, Mapping, Localization))
 async def enable_map(context: Context, *, mapId: Id, mapVersion: Text = "") -> str:  # noqa: N803 - the standard's words
-    """Use a kept map from now on, once the robot has found itself in it; else the map in use stays."""
+    """Switch to a stored map once the robot is localized in it; otherwise the current map stays."""
     if mapId == context.map_id:
         return "it is in use"
     if context.book.nodes:
@@ -25,7 +25,7 @@ async def enable_map(context: Context, *, mapId: Id, mapVersion: Text = "") -> s
 
 @TABLE.on("deleteMap", right=Right.EDIT, needs=(MapLibrary,))
 async def delete_map(context: Context, *, mapId: Id, mapVersion: Text = "") -> str:  # noqa: N803
-    """Forget a kept map that is not in use."""
+    """Delete a stored map that is not in use."""
     if mapId == context.map_id:
         raise Refused(f"{mapId!r} is in use")
     await context.maps.kept(mapId, mapVersion)

@@ -16,5 +16,5 @@ async def take_order(context: Context, *, payload: bytes) -> None:
 
 @TABLE.on("instantActions", right=Right.SEE)
 async def take_instant_actions(context: Context, *, payload: bytes) -> None:
-    """Do actions at once; each asks for its own right."""
+    """Execute instant actions, each with its own right."""
     context.take_instant_actions(payload)

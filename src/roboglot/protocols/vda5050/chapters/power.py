@@ -16,7 +16,7 @@ SLEEP_MAX = 31 * 24 * 3600.0  # s
 
 @TABLE.on("startHibernation", right=Right.ADMIN)
 async def start_hibernation(context: Context, *, wakeUpTime: str = "") -> str:  # noqa: N803 - the standard's word
-    """Forget the order, save power, and send no state until stopHibernation or the wake-up time (ISO 8601, UTC)."""
+    """Drop the order, save power, and send no state until stopHibernation or the wake-up time (ISO 8601, UTC)."""
     seconds = _seconds_until(wakeUpTime, context.robot.clock.epoch()) if wakeUpTime else None
     if not context.book.idle:
         await context.clear_order()
@@ -30,7 +30,7 @@ async def start_hibernation(context: Context, *, wakeUpTime: str = "") -> str:  
 
 @TABLE.on("stopHibernation", right=Right.ADMIN)
 async def stop_hibernation(context: Context) -> str:
-    """Be ready for orders again."""
+    """Leave hibernation and accept orders again."""
     if context.alarm is not None:
         context.alarm.cancel()
     await _wake(context)
@@ -39,7 +39,7 @@ async def stop_hibernation(context: Context) -> str:
 
 @TABLE.on("shutdown", right=Right.ADMIN, needs=(Power,))
 async def shut_down(context: Context) -> str:
-    """Switch the robot off; it takes leave of the broker before, and comes back when it is switched on."""
+    """Switch the robot off after disconnecting from the broker; it reconnects when switched on."""
     if not context.book.idle:
         raise Refused(f"order {context.book.order_id} is not finished")
     await ended(context.robot[Power].shut_down(source=SOURCE))
@@ -61,7 +61,7 @@ async def _wake(context: Context) -> None:
 
 
 def _seconds_until(text: str, now: float) -> float:
-    """Return how long it is until then. Raises InvalidGoal."""
+    """Return the seconds until a time. Raises InvalidGoal."""
     try:
         then = datetime.fromisoformat(text)
     except ValueError:

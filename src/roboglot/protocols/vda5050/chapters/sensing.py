@@ -27,7 +27,7 @@ REPORTS_MAX = 10
 
 
 class Thing(StrEnum):
-    """Objects that the robot's camera makes out."""
+    """Objects that the robot's camera recognises."""
 
     PERSON = "person"
     FACE = "face"

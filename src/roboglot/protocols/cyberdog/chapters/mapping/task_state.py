@@ -37,7 +37,7 @@ NOT_LOCALIZED = frozenset({TaskState.IDLE, TaskState.LOCALIZATION_FAILED, TaskSt
 
 @dataclass(frozen=True, slots=True)
 class TaskRequest:
-    """Request for a task: its kind, ``outdoor`` for an outdoor map, ``thing`` to follow a thing and not a person."""
+    """Request for a task: its kind, ``outdoor`` for an outdoor map, ``thing`` to follow an object, not a person."""
 
     kind: TaskType
     outdoor: bool = False
@@ -56,7 +56,7 @@ class TaskRequest:
 
     @property
     def begins_in(self) -> Set[TaskState]:
-        """Tasks exclude each other; navigation needs a robot that was localized before, in that kind of map.
+        """States in which it may begin: tasks are exclusive; navigation needs localization in that kind of map.
 
         Charging may begin without localization: the current map may know the dock.
         """

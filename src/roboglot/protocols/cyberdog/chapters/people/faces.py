@@ -24,7 +24,7 @@ Seconds = Annotated[int, msgspec.Meta(ge=0, le=2**31 - 1)]
 async def enter_face(
     call: Call, *, command: Int32, username: str = "", oriname: str = "", ishost: bool = False
 ) -> dict[str, object]:
-    """0 enter, 1 cancel that, 2 confirm (the robot did already), 3 rename, 4 delete a face, 5 list members with one."""
+    """Enrol (0), cancel (1), confirm (2: no effect), rename (3) or delete (4) a face, or list members with one (5)."""
     robot, faces = call.context.robot, call.context.faces
     robot[Vision], robot[Members]
     try:
@@ -75,7 +75,7 @@ async def _begin_entry(call: Call, name: str, host: bool) -> FaceResult:
 async def recognise_faces(
     call: Call, *, command: Int32, username: str = "", id: Int32 = 0, timeout: Seconds = 60
 ) -> dict[str, int]:
-    """0 all known faces, 1 ``username`` only, 2 stop; for ``timeout`` s (1 to 300). Push 7004 reports each person."""
+    """Recognise all faces (0) or ``username`` (1) for ``timeout`` s (1 to 300), or stop (2). Reports: push 7004."""
     faces = call.context.faces
     call.context.robot[Vision]
     if command == 2:

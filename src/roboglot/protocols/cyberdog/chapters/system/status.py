@@ -142,7 +142,7 @@ def _versions(context: Context) -> dict[str, object]:
 
 
 def _motor_temperatures(context: Context) -> dict[str, object]:
-    """Celsius, four legs a joint. Robots send text with two decimals, and words of theirs where there are none."""
+    """Return temperatures, Celsius, four legs per joint. Real robots send text with two decimals, or a word."""
     warm = dict(context.robot[Motors].temperatures) if Motors in context.robot else {}
     legs = {joint: [warm.get(f"{leg} {name}") for leg in LEGS] for joint, name in JOINTS.items()}
     if context.profile is Profile.SPEC:

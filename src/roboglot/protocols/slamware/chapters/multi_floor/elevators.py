@@ -128,7 +128,7 @@ def elevators_here(robot: Robot) -> list[Elevator]:
 
 
 def elevator_around(robot: Robot) -> str:
-    """The id of the one that the robot is in; empty outside. Raises ComponentMissing without Localization."""
+    """Return the id of the robot's elevator; empty outside. Raises ComponentMissing without Localization."""
     here, radius = robot[Localization].pose, robot.description.radius
     found = (e.id for e in elevators_here(robot) if e.relation(here, radius) is PoseRelation.IN)
     return next(found, "")
