@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.statements import parsed, statements
+
 ROOT = Path(__file__).parent.parent
 FILES_MAX = 25  # modules in a folder of src, pages, benchmarks
 LINES_MAX = 400  # of a module
@@ -50,12 +52,18 @@ PAGES = sorted(p for p in [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")] i
 @cache
 def tree_of(path: Path) -> ast.Module:
     """A file, parsed once for all tests."""
-    return ast.parse(path.read_text())
+    return parsed(path)
+
+
+@cache
+def statements_of(path: Path) -> list[ast.AST]:
+    """A file's statements, found once for all tests."""
+    return statements(tree_of(path))
 
 
 def functions(path: Path) -> Iterator[tuple[str, int]]:
     """Name and number of lines of each function, without decorators and docstring."""
-    for node in ast.walk(tree_of(path)):
+    for node in statements_of(path):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             begin = node.body[1].lineno if ast.get_docstring(node) and len(node.body) > 1 else node.lineno
             yield node.name, (node.end_lineno or begin) - begin + 1
@@ -103,7 +111,7 @@ def test_no_function_is_long() -> None:
 
 def methods(path: Path) -> Iterator[tuple[str, int]]:
     """Name of each class and how many methods it has itself; a property with its setter is one."""
-    for node in ast.walk(tree_of(path)):
+    for node in statements_of(path):
         if isinstance(node, ast.ClassDef):
             yield node.name, len({m.name for m in node.body if isinstance(m, ast.FunctionDef | ast.AsyncFunctionDef)})
 
@@ -132,7 +140,7 @@ def test_plain_words(texts: list[Path]) -> None:
 
 def docstrings(path: Path) -> Iterator[tuple[int, str]]:
     """Line and text of each docstring of a file."""
-    for node in ast.walk(tree_of(path)):
+    for node in statements_of(path):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             text = ast.get_docstring(node)
             yield from [(node.body[0].lineno, text)] if text else []
@@ -222,7 +230,7 @@ def test_walk_in_docs_is_way_through_the_code(walk: list[tuple[str, str]]) -> No
 def imports(path: Path, modules: Mapping[str, Path]) -> set[str]:
     """The modules of ours that a file imports, those for its types included."""
     found = set()
-    for node in ast.walk(tree_of(path)):
+    for node in statements_of(path):
         if isinstance(node, ast.ImportFrom) and node.module:
             for alias in node.names:
                 module = f"{node.module}.{alias.name}"

@@ -1,6 +1,6 @@
 """A small app as anyone might write it: drives a robot by its REST API and its text protocol, knows no roboglot.
 
-python courier.py http://192.168.11.1:1448 1.0 0.5
+python courier.py http://192.168.11.1:1448 1.0 0.5 [seconds of patience]
 """
 
 import json
@@ -107,6 +107,6 @@ class Arm:
 
 
 if __name__ == "__main__":
-    courier = Courier(sys.argv[1])
+    courier = Courier(sys.argv[1], *map(float, sys.argv[4:5]))
     courier.go(float(sys.argv[2]), float(sys.argv[3]))
     print("arrived at", *(f"{value:.1f}" for value in courier.place()))

@@ -9,6 +9,7 @@ from functools import cache
 from pathlib import Path
 
 import roboglot
+from tests.statements import parsed, statements
 
 ROOT = Path(roboglot.__file__).parent
 PLACES = (
@@ -25,7 +26,7 @@ HOLE = "{}"
 @cache
 def sentences(root: Path = ROOT) -> dict[str, str]:
     """Return each sentence, with ``{}`` for what is filled in, and the first place where it is said."""
-    trees = {path.relative_to(root): ast.parse(path.read_text("utf-8")) for path in sorted(root.rglob("*.py"))}
+    trees = {path.relative_to(root): parsed(path) for path in sorted(root.rglob("*.py"))}
     errors = _errors(trees)
     found: dict[str, str] = {}
     for path, tree in trees.items():
@@ -40,13 +41,21 @@ def _errors(trees: Mapping[Path, ast.Module]) -> set[str]:
     """The names of the classes below ``KINDS``."""
     bases: dict[str, set[str]] = {}
     for tree in trees.values():
-        for node in ast.walk(tree):
+        for node in statements(tree):
             if isinstance(node, ast.ClassDef):
-                bases.setdefault(node.name, set()).update(ast.unparse(base).rpartition(".")[2] for base in node.bases)
+                bases.setdefault(node.name, set()).update(map(_name, node.bases))
     known = set(KINDS)
     while new := {name for name, above in bases.items() if above & known} - known:
         known |= new
     return known
+
+
+def _name(node: ast.expr) -> str:
+    """The last word of what is called or derived from."""
+    match node:
+        case ast.Name(id=name) | ast.Attribute(attr=name):
+            return name
+    return ast.unparse(node).rpartition(".")[2]
 
 
 def _said(tree: ast.Module, errors: set[str], outside: bool) -> Iterator[tuple[str, int]]:
@@ -56,7 +65,7 @@ def _said(tree: ast.Module, errors: set[str], outside: bool) -> Iterator[tuple[s
         line = getattr(node, "lineno", 0)
         match node:
             case ast.Call():
-                name = ast.unparse(node.func).rpartition(".")[2]
+                name = _name(node.func)
                 place = LATER.get(name, 0 if name in first else len(node.args))
                 values = node.args[place : place + 1]
                 values += [keyword.value for keyword in node.keywords if keyword.arg in NAMED]

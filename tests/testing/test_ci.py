@@ -22,19 +22,19 @@ ADDRESS = "127.0.0.222"
 
 def robot(folder: Path, *arguments: str, **more: str) -> str:
     environment = os.environ | {"ROBOGLOT_CI": str(folder / "ci"), "ROBOGLOT_VENV": sys.prefix} | more
-    done = subprocess.run(
-        [ROBOT, *arguments], env=environment, cwd=folder, capture_output=True, text=True, timeout=300, check=False
-    )
+    done = subprocess.run([ROBOT, *arguments], env=environment, cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
 
+@pytest.mark.timeout(900)  # a hang; the robot and its app are patient, however busy the machine is
 def test_job_starts_and_drives_a_robot_keeping_events(tmp_path: Path) -> None:
     address = robot(tmp_path, "up", ARGUMENTS=f"--address {ADDRESS} --no-console --world empty --speed 4").strip()
     try:
         assert address == ADDRESS
-        app = [sys.executable, str(ROOT / "examples/ci/courier.py"), f"http://{address}:1448", "0.4", "0.0"]
-        assert subprocess.run(app, capture_output=True, text=True, timeout=300, check=True).stdout.startswith("arrived")
+        app = [sys.executable, str(ROOT / "examples/ci/courier.py"), f"http://{address}:1448", "0.4", "0.0", "800"]
+        drove = subprocess.run(app, capture_output=True, text=True, check=False)
+        assert drove.stdout.startswith("arrived"), drove.stderr
     finally:
         robot(tmp_path, "down")
     [recording] = (tmp_path / "ci/artifacts").glob("*.mcap")
