@@ -8,12 +8,15 @@ import dataclasses
 import itertools
 import json
 import os
+import struct
 from collections.abc import AsyncIterator, Coroutine
 from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import Any
 from urllib.request import Request, urlopen
 
 from websockets.asyncio.client import ClientConnection, connect
+from websockets.typing import Subprotocol
 
 from roboglot.clients.cyberdog.link import DogLink
 from roboglot.clients.errors import ClientError
@@ -32,6 +35,7 @@ from tests.narrowing import of_kind
 
 WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
 ADDRESS = f"127.0.194.{101 + WORKER}"
+TWIST = b"\0\1\0\0" + struct.pack("<6d", 0.2, 0.0, 0.0, 0.0, 0.0, 0.1)  # CDR, little endian
 FRAME: dict[str, object] = dict.fromkeys(("style", "describe", "body"), "") | {
     "type": "task",
     "target_id": [],
@@ -124,6 +128,38 @@ class Session:
 
         await self._until_asked(listen())
 
+    async def foxglove_drives(self) -> None:
+        """Look at all topics but pictures, drive for half a second, and hang up."""
+        door, gone = "foxglove", self.gone.count("foxglove")
+        socket = await connect(f"ws://{ADDRESS}:8765", subprotocols=[Subprotocol("foxglove.sdk.v1")], max_size=None)
+        channels: list[dict[str, Any]] = []
+        while not channels:
+            message = await socket.recv()
+            channels = json.loads(message).get("channels", []) if isinstance(message, str) else []
+        wanted = [{"id": c["id"], "channelId": c["id"]} for c in channels if "cam" not in c["topic"]]
+        publish = {"id": 7, "topic": "/a/cmd_vel", "encoding": "json", "schemaName": "geometry_msgs/Twist"}
+        twist = {"linear": {"x": 0.2, "y": 0, "z": 0}, "angular": {"x": 0, "y": 0, "z": 0.2}}
+        for said in (
+            json.dumps({"op": "subscribe", "subscriptions": wanted}),
+            json.dumps({"op": "advertise", "channels": [publish]}),
+            *[struct.pack("<BI", 1, 7) + json.dumps(twist).encode()] * 2,
+        ):
+            number = self.heard.get((door, Direction.REPLY), 0) + 1
+            await socket.send(said)
+            await self.until_heard(door, Direction.REPLY, number)
+            await self.clock.advance(0.123)
+        await socket.close()
+        async with asyncio.timeout(120):  # a busy machine
+            while self.gone.count(door) == gone:  # noqa: ASYNC110 - the robot calls back in the loop
+                await asyncio.sleep(0.0005)
+
+    async def ros2_drives(self) -> None:
+        """Hand one message of ROS 2 to its door, as Zenoh does."""
+        number = self.heard.get(("ros2", Direction.REPLY), 0) + 1
+        door: Any = self.runtime.doors["a"].door("ros2")
+        door.receive("cmd_vel", TWIST)
+        await self.until_heard("ros2", Direction.REPLY, number)
+
     async def _until_asked(self, listening: Coroutine[object, object, None]) -> None:
         number = self.heard.get(("cyberdog", Direction.REQUEST), 0) + 1
         task = asyncio.ensure_future(listening)
@@ -167,7 +203,7 @@ async def begun(folder: Path, **more: object) -> AsyncIterator[Session]:
 
 async def hold(folder: Path, rounds: int) -> Session:
     """Hold a session of ``rounds`` times 20 s of robot time."""
-    async with begun(folder) as session:
+    async with begun(folder, foxglove={"enabled": True}, ros2={"enabled": True}) as session:
         clock, rest = session.clock, session.rest
         reader, writer = await asyncio.open_connection(ADDRESS, 40923)
 
@@ -216,6 +252,8 @@ async def hold(folder: Path, rounds: int) -> Session:
                 await clock.advance(2.5)
                 await session.dog_asks(6009, type=0)
                 await clock.advance(1.011)
+                await session.foxglove_drives()
+                await session.ros2_drives()
                 await session.console_does("world/remove_box", number=_last_box(session))
                 await session.dog.close()  # the app leaves without notice
                 await clock.advance(6.557)

@@ -101,6 +101,7 @@ async def test_what_cannot_be_is_said(drive: tuple[Path, float], tmp_path: Path)
         ended = CliRunner().invoke(loaded("export"), [str(source), "--rosbag2", str(bag)])
         assert ended.exit_code == 2
         assert "roboglot export:" in ended.output
+    assert not (tmp_path / "x").exists()
 
 
 def test_a_damaged_message_is_an_error() -> None:

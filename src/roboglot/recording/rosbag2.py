@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections import Counter
 from pathlib import Path
 from typing import Any, Literal
@@ -20,23 +21,32 @@ NEVER = QosTime(2147483647, 4294967295)
 def export(recording: Path, bag: Path, storage: str = "mcap", robot: str = "") -> Counter[str]:
     """Write the messages of a recording, or of one robot, into the new folder ``bag``; returns how many by topic.
 
-    Raises BadRecording, OSError.
+    Raises BadRecording, OSError; then no new folder stays.
     """
-    words, written = Ros2Words(robot), Counter[str]()
+    new = not bag.exists()
     try:
-        with Writer(bag, version=VERSION, storage_plugin=STORAGES[storage]) as writer:
-            connections: dict[tuple[str, str], Any] = {}
-            for record in read_messages(recording):
-                for message in words.translate(record):
-                    key = message.topic, message.type
-                    connection = connections.get(key) or _connection(writer, message)
-                    connections[key] = connection
-                    writer.write(connection, message.at, message.data)
-                    written[message.topic] += 1
-    except WriterError as error:
+        return _write(recording, bag, storage, robot)
+    except WriterError as error:  # the folder is there already, say
         raise BadRecording(str(error)) from None
-    except ValueError as error:
+    except (OSError, ValueError) as error:
+        if new:
+            shutil.rmtree(bag, ignore_errors=True)
+        if isinstance(error, OSError | BadRecording):
+            raise
         raise BadRecording(f"{recording}: {error}") from None
+
+
+def _write(recording: Path, bag: Path, storage: str, robot: str) -> Counter[str]:
+    words, written = Ros2Words(robot), Counter[str]()
+    with Writer(bag, version=VERSION, storage_plugin=STORAGES[storage]) as writer:
+        connections: dict[tuple[str, str], Any] = {}
+        for record in read_messages(recording):
+            for message in words.translate(record):
+                key = message.topic, message.type
+                connection = connections.get(key) or _connection(writer, message)
+                connections[key] = connection
+                writer.write(connection, message.at, message.data)
+                written[message.topic] += 1
     return written
 
 
