@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import asyncio
 import gc
 import re
@@ -13,9 +14,11 @@ import pytest_asyncio
 import typer
 
 from roboglot.cli.lesson import command
+from roboglot.console.studio.checks import Check, Work, failure
 from roboglot.console.studio.lessons import FOLDER, Grade, Lesson, grade, load, read
+from roboglot.console.studio.mistakes import explain
 from roboglot.programs.functions.table import call
-from roboglot.programs.rehearsing import Scene
+from roboglot.programs.rehearsing import Played, Scene, Spot
 from roboglot.rehearsal import Rehearsals
 
 LESSONS = load([FOLDER])
@@ -109,10 +112,49 @@ async def test_an_endless_program_is_ended(rehearsals: Rehearsals) -> None:
     ]
 
 
-@pytest.mark.parametrize("wrong", ["x = 1", TEN_LINES + "metre = 3", TEN_LINES.replace('"say"', '"fly"'), "title = ["])
-async def test_what_is_no_mission_is_refused_in_words(wrong: str) -> None:
-    with pytest.raises(ValueError, match=r"\w+"):
+def printing(pattern: str) -> str:
+    return TEN_LINES.replace('"say"', '"print"').replace('"bark"', f'"{pattern}"')
+
+
+@pytest.mark.parametrize(
+    ("wrong", "why"),
+    [
+        ("x = 1", "x is unknown"),
+        (TEN_LINES + "metre = 3", r"check\[0\].metre is unknown"),
+        (TEN_LINES.replace('"say"', '"fly"'), r"check\[0\].kind cannot be 'fly'"),
+        (TEN_LINES.replace("[[check]]", "[check]"), "check must be a list, not an object"),
+        ("title = [", "Invalid value"),
+        (printing("("), "a printed text is a regular expression: missing"),
+        ('blocks = ["cyberdog.motion.go_strait"]' + TEN_LINES, "did you mean 'cyberdog.motion.go_straight'"),
+        ('allowed = ["forever", "cyberdog.motion.go"]' + TEN_LINES, "no function 'cyberdog.motion.go'"),
+    ],
+)
+async def test_what_is_no_mission_is_refused_in_words(wrong: str, why: str, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=why):
         read(wrong)
+    (tmp_path / "bad.toml").write_text(wrong, "utf-8")
+    (tmp_path / "good.toml").write_text(TEN_LINES, "utf-8")
+    assert list(load([tmp_path])) == ["good"]  # the others are there all the same
+
+
+async def test_reasons_say_no_number_that_would_do() -> None:
+    """What is missed by a hair is not rounded to what is wanted."""
+    path = [Spot(0.0, 0.0, 0.0, 0.0), Spot(1.0, 0.4999, 0.0, 0.0)]
+    work = Work(Played(path=path, seconds=5.01), ast.parse("x = 1"), [], (0.0, 0.0))
+    checks = [Check(kind="move", metres=0.5), Check(kind="within", seconds=5), Check(kind="light", text="red")]
+    assert [why and why.en for why in (failure(check, work) for check in checks)] == [
+        "The dog walked 0.49 m; at least 0.5 are needed.",
+        "It took 5.1 s; 5 are allowed.",
+        "No light was red.",
+    ]
+
+
+async def test_errors_name_what_is_missing_and_what_was_meant() -> None:
+    """Not what was meant as what is missing."""
+    found = explain("AttributeError: 'cyberdog.audio' has no 'ply'; did you mean 'play'? (line 2: a.ply())")
+    assert (found["en"], found["line"]) == ("There is no ply here. Did you mean play?", 2)
+    found = explain("AttributeError: 'cyberdog.audio.play' cannot be changed (line 1: x)")
+    assert found["zh"] == "程序里不能使用或更改 cyberdog.audio.play。"
 
 
 async def test_the_command_plays_a_mission_back(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

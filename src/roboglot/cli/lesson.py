@@ -24,22 +24,35 @@ def command(
     chinese: Annotated[bool, typer.Option("--chinese", help="Give the reasons in Chinese.")] = False,
 ) -> None:
     """Play missions in their own worlds, as fast as the machine can; the exit status is 1 if one is not as it says."""
-    from roboglot.console.studio.lessons import read
-
     try:
-        found = [(path.stem, read(_text(path))) for path in files]
+        found = [(path.stem, _lesson(path)) for path in files]
         own = None if program is None else _text(program)
-    except (OSError, ValueError) as error:
+    except ValueError as error:
         print(f"roboglot lesson: {visible(str(error))}", file=sys.stderr)
         raise typer.Exit(2) from None
     if not asyncio.run(_play_all(found, own, chinese)):
         raise typer.Exit(1)
 
 
+def _lesson(path: Path) -> Lesson:
+    from roboglot.console.studio.lessons import read
+
+    text = _text(path)
+    try:
+        return read(text)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
 def _text(path: Path) -> str:
-    if path.stat().st_size > FILE_MAX:
-        raise ValueError(f"{path} has more than {FILE_MAX} bytes")
-    return path.read_text("utf-8")
+    try:
+        if path.stat().st_size > FILE_MAX:
+            raise ValueError(f"{path} has more than {FILE_MAX} bytes")
+        return path.read_text("utf-8")
+    except OSError as error:
+        raise ValueError(f"cannot read {path}: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise ValueError(f"{path} is no UTF-8 text") from None
 
 
 async def _play_all(lessons: list[tuple[str, Lesson]], own: str | None, chinese: bool) -> bool:
@@ -62,8 +75,12 @@ async def _play_all(lessons: list[tuple[str, Lesson]], own: str | None, chinese:
 
 
 async def _graded(rehearsals: Rehearsals, lesson: Lesson, program: str) -> Grade:
-    from roboglot.console.studio.lessons import Grade, Row, grade
+    from roboglot.console.studio.lessons import Grade, Row, grade, no_program
+    from roboglot.programs.functions.prelude import ability_set
+    from roboglot.programs.language import check
 
+    if problems := check(program, ability_set().names()):
+        return no_program(problems)
     try:
         return grade(lesson, program, await rehearsals.play(program, lesson.scene, speed=0))
     except (SyntaxError, ValueError) as error:

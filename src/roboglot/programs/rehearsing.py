@@ -46,9 +46,9 @@ class Spot:
 
 @dataclass(slots=True)
 class Played:
-    """Record of a program. ``error`` is empty if it came to its end; ``late``: it was ended for taking too long.
-    ``error`` is empty if it came to its end; ``late``: it was ended for taking too long.
+    """Record of a program.
 
+    ``error`` is empty if it came to its end; ``late``: it was ended for taking too long.
     ``outlines``: of walls and furniture on its floor. ``colours``: zone and red, green, blue of every look of the
     lights. ``said``: texts and names of sounds.
     """

@@ -88,7 +88,10 @@ class Check(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         if self.kind == "uses" and self.text not in CONSTRUCTS:
             raise ValueError(f"a program uses one of {', '.join(CONSTRUCTS)}")
         if self.kind == "print":
-            re.compile(self.text)
+            try:
+                re.compile(self.text)
+            except re.error as error:
+                raise ValueError(f"a printed text is a regular expression: {error}") from None
 
 
 def failure(check: Check, work: Work) -> Why | None:
@@ -121,6 +124,8 @@ def _visit(check: Check, work: Work) -> Why | None:
     if reached == len(wanted):
         return None
     total = len(wanted)
+    if total == 1:
+        return Why("The dog did not pass the place that it was to visit.", "机器狗没有经过要去的地方。")
     return Why(
         f"The dog came to {reached} of {total} places, in their order.",
         f"机器狗按顺序到达了 {total} 处中的 {reached} 处。",
@@ -142,10 +147,16 @@ def _say(check: Check, work: Work) -> Why | None:
     if not said:
         return Why("The dog said nothing.", "机器狗什么也没说。")
     what = check.text or "…"
+    if not found:
+        return Why(f"“{what}” was not said.", f"没有说“{what}”。")
     return Why(
-        f"“{what}” was said {found} times instead of {check.times}.",
-        f"“{what}”说了 {found} 次，应当说 {check.times} 次。",
+        f"“{what}” was said {_often(found)}; at least {check.times} are needed.",
+        f"“{what}”说了 {found} 次，至少要说 {check.times} 次。",
     )
+
+
+def _often(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"
 
 
 def _print(check: Check, work: Work) -> Why | None:
@@ -162,7 +173,7 @@ def _light(check: Check, work: Work) -> Why | None:
     shown = {tuple(int(part > 60) for part in look[1:]) for look in work.played.colours if any(look[1:])}
     if wanted in shown or (wanted is None and shown):
         return None
-    if not shown:
+    if wanted is None:
         return Why("No light was switched on.", "没有点亮任何灯。")
     return Why(f"No light was {check.text}.", f"没有点亮{COLOURS_ZH[check.text]}的灯。")
 
@@ -196,18 +207,19 @@ def _move(check: Check, work: Work) -> Why | None:
     way = sum(math.dist((a.x, a.y), (b.x, b.y)) for a, b in itertools.pairwise(path))
     if way >= check.metres:
         return None
+    walked = math.floor(way * 100.0) / 100.0  # never rounded up to what is wanted
     return Why(
-        f"The dog walked {way:.2f} m; it should be {check.metres:g}.",
-        f"机器狗走了 {way:.2f} 米，应当走 {check.metres:g} 米。",
+        f"The dog walked {walked:.2f} m; at least {check.metres:g} are needed.",
+        f"机器狗走了 {walked:.2f} 米，至少要走 {check.metres:g} 米。",
     )
 
 
 def _within(check: Check, work: Work) -> Why | None:
     if work.played.seconds <= check.seconds and not work.played.late:
         return None
-    took = work.played.seconds
+    took = math.ceil(work.played.seconds * 10.0) / 10.0  # never rounded down to what is allowed
     return Why(
-        f"It took {took:.0f} s; {check.seconds:g} are allowed.", f"用了 {took:.0f} 秒，只允许 {check.seconds:g} 秒。"
+        f"It took {took:.1f} s; {check.seconds:g} are allowed.", f"用了 {took:.1f} 秒，只允许 {check.seconds:g} 秒。"
     )
 
 
@@ -228,9 +240,11 @@ def _calls(check: Check, work: Work) -> Why | None:
     if found >= check.times:
         return None
     names = label_of(check.text)
+    if not found:
+        return Why(f"“{names['en']}” was not done.", f"没有执行“{names['zh']}”。")
     return Why(
-        f"“{names['en']}” was done {found} times instead of {check.times}.",
-        f"“{names['zh']}”执行了 {found} 次，应当执行 {check.times} 次。",
+        f"“{names['en']}” was done {_often(found)}; at least {check.times} are needed.",
+        f"“{names['zh']}”执行了 {found} 次，至少要执行 {check.times} 次。",
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import difflib
 import logging
 import math
 from collections.abc import Mapping, Sequence
@@ -12,7 +13,9 @@ from typing import Annotated
 import msgspec
 
 from roboglot.console.studio.checks import Check, Why, Work, failure
+from roboglot.misfits import misfit
 from roboglot.model.geometry import Point, Pose
+from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.language import Problem
 from roboglot.programs.rehearsing import Act, Played, Scene
 
@@ -68,6 +71,13 @@ class Lesson(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     blocks: list[str] = []
     hints: Annotated[list[Words], msgspec.Meta(max_length=5)] = []
     wrong: list[Wrong] = []
+
+    def __post_init__(self) -> None:
+        functions = {operation.key for operation in ABILITIES}
+        named = [*self.blocks, *(block for block in self.allowed if block.startswith("cyberdog."))]
+        if unknown := next((block for block in named if block not in functions), ""):
+            near = difflib.get_close_matches(unknown, functions, n=1)
+            raise ValueError(f"there is no function {unknown!r}" + (f"; did you mean {near[0]!r}?" if near else ""))
 
     @property
     def scene(self) -> Scene:
@@ -138,7 +148,10 @@ def _box(x: float, y: float, width: float, depth: float) -> list[Point]:
 
 def read(text: str) -> Lesson:
     """One file's. Raises ValueError that says what is wrong with it."""
-    return msgspec.toml.decode(text, type=Lesson)
+    try:
+        return msgspec.toml.decode(text, type=Lesson)
+    except msgspec.ValidationError as error:
+        raise ValueError(misfit(error, "the mission")) from None
 
 
 def load(folders: Sequence[Path]) -> dict[str, Lesson]:

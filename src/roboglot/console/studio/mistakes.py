@@ -9,7 +9,8 @@ from roboglot.programs.functions.records import RECORDS
 
 _PLACE = re.compile(r" \((?:module (?P<module>\w+), )?line (?P<line>\d+): ", re.DOTALL)
 _FIELD = re.compile(r"'(\w+)' object has no attribute '(\w+)'")
-_NAME = re.compile(r"'(\w+)'")
+_NAME = re.compile(r"'([\w.]+)'")
+_GUESS = re.compile(r"; did you mean '(\w+)'\?")
 
 # Explanation and advice, by the error's type and by words in its message.
 _SENTENCES: tuple[tuple[str, str, str, str], ...] = (
@@ -27,7 +28,8 @@ _SENTENCES: tuple[tuple[str, str, str, str], ...] = (
     ("TypeError", "", "A value is of the wrong kind here.", "这里的值类型不对。"),
     ("ValueError", "invalid literal for int", "This text is not a whole number.", "这段文字不是整数。"),
     ("ValueError", "", "This value is not possible here.", "这里不能用这个值。"),
-    ("AttributeError", "", "There is no {1} here.", "这里没有 {1}。"),
+    ("AttributeError", "has no", "There is no {1} here.", "这里没有 {1}。"),
+    ("AttributeError", "", "{0} cannot be used or changed in programs.", "程序里不能使用或更改 {0}。"),
     ("RecursionError", "", "The function calls itself without an end.", "函数不停地调用自己。"),
     ("MemoryError", "", "The program uses too much memory.", "程序用了太多内存。"),
     ("CpuLimit", "", "The program computes for too long.", "程序计算的时间太长。"),
@@ -68,6 +70,8 @@ def _sentence(kind: str, message: str) -> tuple[str, str]:
 
 def _meant(message: str) -> str:
     """The field that was perhaps meant where a record has none of that name."""
+    if guess := _GUESS.search(message):
+        return guess[1]
     found = _FIELD.search(message)
     if found is None:
         return ""

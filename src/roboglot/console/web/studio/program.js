@@ -208,7 +208,7 @@ function contents(text) {
 }
 
 /** Blocks become text for good. */
-export function continueAsText() { const text = plain(editor.code.value); fresh("text", { name: program.value.name }); body.value = text; changed(); }
+export function continueAsText() { const text = plain(editor.code.value); fresh("text", { name: program.value.name, lesson: program.value.lesson }); body.value = text; changed(); }
 
 /** Python without the marks of blocks. @param {string} code */
 export const plain = (code) => code.replace(/^[ \t]*cyberdog\.task\.block\('[0-9A-Za-z]+'\)\n/gm, "");
