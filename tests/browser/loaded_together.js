@@ -33,9 +33,16 @@ async () => {
   const odd = [{ disabledReasons: ["MANUALLY_DISABLED"] }, { collapsed: true }, { icons: { comment: { text: "a", pinned: false, height: 80, width: 160 } } }, { inline: false }]
     .map((how) => ({ type: "controls_repeat_ext", ...how, inputs: { TIMES: { block: { type: "math_number", fields: { NUM: 2 } } }, DO: { block: inside } }, next: { block: inside } }));
   const blocks = [...top, ...odd].map(({ kind, ...state }, i) => ({ ...state, x: 20, y: 20 + 150 * i }));
-  const state = { blocks: { languageVersion: 0, blocks } }, load = B.serialization.workspaces.load;
-  const ours = await drawn((workspace) => together(workspace, () => load(state, workspace)));
-  const plain = await drawn((workspace) => load(state, workspace));
-  const unlike = [...new Set([...ours.rows.keys(), ...plain.rows.keys()])].filter((row) => ours.rows.get(row) !== plain.rows.get(row));
-  return { elements: ours.rows.size, unlike: unlike.slice(0, 5), connected: ours.found.map((all, i) => all === plain.found[i]) };
+  const load = B.serialization.workspaces.load;
+  async function compared(blocks) {
+    const state = { blocks: { languageVersion: 0, blocks } };
+    const ours = await drawn((workspace) => together(workspace, () => load(state, workspace)));
+    const plain = await drawn((workspace) => load(state, workspace));
+    const unlike = [...new Set([...ours.rows.keys(), ...plain.rows.keys()])].filter((row) => ours.rows.get(row) !== plain.rows.get(row));
+    return { elements: ours.rows.size, unlike: unlike.slice(0, 5), connected: ours.found.map((all, i) => all === plain.found[i]) };
+  }
+  // Alone, so that no other block has had the texts measured before.
+  const alone = await compared([{ type: "controls_whileUntil", x: 20, y: 20, inputs: { BOOL: { shadow: { type: "logic_boolean", fields: { BOOL: "TRUE" } } } } }]);
+  const all = await compared(blocks);
+  return { ...all, unlike: [...alone.unlike, ...all.unlike] };
 }

@@ -40,12 +40,23 @@ export function inject(place, options) {
 let canvas = /** @type {Element | null} */ (null);
 const size = Field.prototype.updateSize_;
 // The quick measure fills the memory that the slow one, which has the browser work out all styles, looks into first.
+/** @param {any} field */
+function measure(field) {
+  const c = field.getConstants();
+  if (deferring && c && field.textElement_) dom.getFastTextWidth(field.textElement_, c.FIELD_TEXT_FONTSIZE, c.FIELD_TEXT_FONTWEIGHT, c.FIELD_TEXT_FONTFAMILY);
+}
 Field.prototype.updateSize_ = function (/** @type {number | undefined} */ margin) {
-  const c = this.getConstants();
-  if (deferring && c && this.textElement_) dom.getFastTextWidth(this.textElement_, c.FIELD_TEXT_FONTSIZE, c.FIELD_TEXT_FONTWEIGHT, c.FIELD_TEXT_FONTFAMILY);
+  measure(this);
   size.call(this, margin);
   canvas ??= document.querySelector(".blocklyComputeCanvas");
   if (canvas?.isConnected) canvas.remove(); // it measures outside of the page, too, and there asks for no styles
+};
+
+// Drop-downs measure by themselves, which outside of the page has no style to go by: true and false lay on their arrows.
+const choice = /** @type {any} */ (Blockly.FieldDropdown.prototype), { render_: choose } = choice;
+choice.render_ = function () {
+  if (deferring && this.textContent_) { this.textContent_.nodeValue = this.getDisplayText_(); measure(this); }
+  choose.call(this);
 };
 
 for (const { prototype: made } of /** @type {any[]} */ ([Field, Blockly.BlockSvg])) {
