@@ -31,6 +31,22 @@ WRONG = {
     }
 }
 
+QUICK = {
+    "blocks": {
+        "languageVersion": 0,
+        "blocks": [
+            {"type": "forever", "id": "quick", "x": 30, "y": 30, "inputs": {"DO": {"block": {
+                "type": "math_change", "id": "add", "fields": {"VAR": {"name": "n"}},
+                "inputs": {"DELTA": {"shadow": {"type": "math_number", "fields": {"NUM": 1}}}},
+                "next": {"block": {
+                    "type": "math_change", "id": "more", "fields": {"VAR": {"name": "n"}},
+                    "inputs": {"DELTA": {"shadow": {"type": "math_number", "fields": {"NUM": 2}}}},
+                }}}}}}
+        ],
+    }
+}  # fmt: skip
+QUICK_WORDS = "change n by"
+
 
 async def test_a_class_from_its_code_to_its_results(studio: Open) -> None:
     teacher, anna = await studio(), await studio()
@@ -58,6 +74,13 @@ async def test_a_class_from_its_code_to_its_results(studio: Open) -> None:
     await until(teacher, "studio.editor.workspace.getAllBlocks(false).length === 3")
     await until(teacher, "studio.program.value.name.includes('Anna')")
     await teacher.click("#panel .button.danger")  # stop all
+    await phase(anna, "idle")
+
+    await loaded(anna, QUICK)  # its blocks change faster than pupils report
+    await anna.keyboard.press("F5")
+    for words in ("Running", QUICK_WORDS):
+        await until(teacher, f"{row}.includes({words!r})")
+    await teacher.click("#panel .button.danger")
     await phase(anna, "idle")
 
     await loaded(anna, WRONG)

@@ -10,11 +10,14 @@ import zipfile
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 from websockets.asyncio.client import connect
 
 from roboglot.config import AccessConfig, ConsoleConfig, RobotConfig, load_config
 from roboglot.console.resend import resend
+from roboglot.console.thumbnails import ROBOT, UNKNOWN, thumbnail
 from roboglot.console.verbs.robots import VERBS
 from roboglot.console.verbs.world import WORLD_VERBS
 from roboglot.model.clock import LockstepClock, RealClock
@@ -36,6 +39,14 @@ from roboglot.protocols.door import Endpoint
 from roboglot.runtime import Runtime
 from roboglot.simulation.world.world_files import load_world
 from tests.console.conftest import ADDRESS, Shown
+
+
+async def test_a_map_that_has_just_begun_is_no_square_of_the_marker() -> None:
+    """A robot that knows a few cells only."""
+    for cells, marked in ((2, False), (40, True)):
+        grid = OccupancyGrid(np.zeros((cells, cells), np.int8), 0.05, Point(0.0, 0.0))
+        pixels = np.asarray(Image.open(io.BytesIO(thumbnail(grid, Pose(0.05, 0.05)))))
+        assert [bool((pixels == colour).all(axis=2).any()) for colour in (ROBOT, UNKNOWN)] == [marked, True]
 
 
 async def test_one_robot_is_driven_mapped_and_refused(shown: Shown) -> None:

@@ -12,6 +12,7 @@ from roboglot.model.maps import OccupancyGrid
 
 UNKNOWN, FREE, OCCUPIED, ROBOT = (0, 0, 0, 0), (226, 232, 240, 255), (30, 41, 59, 255), (37, 99, 235, 255)
 MARK = 3  # pixels from the robot marker's centre to its edge
+MARKED_MIN = 4 * MARK  # pixels along the shorter side of a map; on a smaller one the marker would be all there is
 
 
 def thumbnail(grid: OccupancyGrid, robot: Pose) -> bytes:
@@ -32,7 +33,8 @@ def thumbnail(grid: OccupancyGrid, robot: Pose) -> bytes:
     picture[blocks.max(axis=(1, 3)) > 0] = OCCUPIED
     row, column = grid.cell_of(robot)
     row, column = row // step, column // step
-    picture[max(0, row - MARK) : max(0, row + MARK + 1), max(0, column - MARK) : max(0, column + MARK + 1)] = ROBOT
+    if min(rows, columns) >= MARKED_MIN:
+        picture[max(0, row - MARK) : max(0, row + MARK + 1), max(0, column - MARK) : max(0, column + MARK + 1)] = ROBOT
     file = io.BytesIO()
     Image.fromarray(picture[::-1]).save(file, "PNG")
     return file.getvalue()

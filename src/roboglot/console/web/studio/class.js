@@ -6,7 +6,7 @@ import { choose, hello } from "../link.js";
 import { ask, listen, online, open, send } from "./link.js";
 import { results } from "./missions.js";
 import { program, python, show, whole } from "./program.js";
-import { failure, failureWords, lit, module, phase } from "./runner.js";
+import { failure, failureWords, line, lit, module, phase } from "./runner.js";
 
 const EVERY = 700, SLOWLY = 3000, AGAIN = 2000; // ms between two reports of a pupil, at least and at most; until another try
 const code = kept("studio.class", ""), role = kept("studio.role", "");
@@ -18,7 +18,7 @@ const stars = () => Object.values(results()).reduce((sum, n) => sum + n, 0);
 const doing = () => ({ phase: phase.value, lit: litWords(), program: program.value.name.slice(0, 100), error: String(failureWords.value ?? "").slice(0, 280), mission: program.value.lesson ?? "", stars: stars() });
 function litWords() {
   const block = window.studio?.editor.workspace?.getBlockById(lit.value);
-  return (module.value || (block ? block.toString(60) : "")).slice(0, 200);
+  return (module.value || (block ? block.toString(60) : program.value.kind === "text" && line.value ? t("studio.line", { n: line.value }) : "")).slice(0, 200);
 }
 
 let due = /** @type {any} */ (null); // to join or to teach, as soon as there is a link
@@ -71,8 +71,9 @@ effect(() => {
 });
 
 let timer = 0;
-function report() { clearTimeout(timer); timer = window.setTimeout(() => { if (group.value) wish({ do: "doing", doing: doing(), style: JSON.stringify(whole()) }); }, EVERY); }
-effect(() => { void phase.value; void lit.value; void failure.value; void program.value; if (group.value) report(); });
+/** Soon, whatever comes until then: blocks that change quickly must not put it off again and again. */
+function report() { timer ||= window.setTimeout(() => { timer = 0; if (group.value) wish({ do: "doing", doing: doing(), style: JSON.stringify(whole()) }); }, EVERY); }
+effect(() => { void phase.value; void lit.value; void line.value; void failure.value; void program.value; if (group.value) report(); });
 
 setInterval(() => { if (group.value && phase.value === "running" && !document.hidden) report(); }, SLOWLY); // the robot moves on
 
@@ -102,7 +103,7 @@ function Teacher() {
   return html`<h2>${name || t("studio.tab.group")} <code class="code">${grid.value.code}</code></h2><p class="muted">${t("studio.class.tell")}</p>
     <div class="buttons"><${Button} kind="danger" icon="stop" label=${t("stop.all")} onClick=${() => wish({ do: "stop_all" })} /><${Button} label=${t("studio.class.export")} onClick=${exported} /><${Button} label=${t("studio.class.leave")} onClick=${leave} /><${Button} label=${t("studio.class.end")} onClick=${() => { if (confirm(t("studio.class.end.sure"))) wish({ do: "close" }); }} /></div>
     ${pupils.length ? html`<ul class="rows pupils">${pupils.map((p) => html`<li key=${p.name} class=${p.error ? "bad" : ""}>${maps.value[p.name] ? html`<img class="map" alt=${t("studio.class.map", { name: p.name })} src=${`data:image/png;base64,${maps.value[p.name]}`} />` : html`<span class="map"></span>`}<span class="grow"><b>${p.name}${p.here ? "" : ` (${t("studio.class.away")})`}</b>
-        <small>${p.world ? `${p.world} · ` : ""}${p.robot} · ${t(`studio.phase.${p.phase}`)}${p.lit ? ` · ${p.lit}` : ""}</small><small>${[p.program, p.error].filter(Boolean).join(" · ")}</small>
+        <small>${[p.world, p.robot, p.robot && t(`studio.phase.${p.phase === "idle" && p.error ? "failed" : p.phase}`), p.lit].filter(Boolean).join(" · ")}</small><small>${[p.program, p.error].filter(Boolean).join(" · ")}</small>
         <small class="done">${p.stars} ★${p.handed ? ` · ${t("studio.class.handed")}` : ""}</small></span><${Button} compact icon="eye" label=${t("studio.class.look.at", { name: p.name })} onClick=${() => look(p.name)} /></li>`)}</ul>` : html`<p class="muted">${t("studio.class.empty")}</p>`}`;
 }
 
@@ -112,6 +113,7 @@ export function Group() {
     return html`<h2>${group.value.class || t("studio.tab.group")}</h2><p>${t("studio.class.in", { name: group.value.name, code: group.value.code })}</p>
       <div class="buttons"><${Button} kind="main" label=${t("studio.class.hand")} onClick=${() => { if (python().trim()) wish({ do: "hand_in", doing: doing(), style: JSON.stringify(whole()) }); else say(t("studio.empty")); }} /><${Button} label=${t("studio.class.leave")} onClick=${leave} /></div>`;
   }
+  if (code.value && role.value && online.value !== "open") return html`<p class="muted">${t("studio.class.back", { code: code.value })}</p>`;
   const joins = (e) => { e.preventDefault(); const f = new FormData(e.target); joinAs(String(f.get("code")), String(f.get("name")), { style: mine() }); };
   const opens = (e) => { e.preventDefault(); const f = new FormData(e.target); teach(String(f.get("again")), String(f.get("name"))); };
   return html`<form class="card" onSubmit=${joins}><h3>${t("studio.class.join")}</h3><label class="field"><span>${t("studio.class.code")}</span><input name="code" required maxlength="12" autocapitalize="characters" autocomplete="off" /></label>
