@@ -41,8 +41,8 @@ from roboglot.simulation.world.world_files import load_world
 from tests.console.conftest import ADDRESS, Shown
 
 
-async def test_a_map_that_has_just_begun_is_no_square_of_the_marker() -> None:
-    """A robot that knows a few cells only."""
+async def test_a_new_map_is_more_than_the_marker() -> None:
+    """Draw no marker where it would cover all."""
     for cells, marked in ((2, False), (40, True)):
         grid = OccupancyGrid(np.zeros((cells, cells), np.int8), 0.05, Point(0.0, 0.0))
         pixels = np.asarray(Image.open(io.BytesIO(thumbnail(grid, Pose(0.05, 0.05)))))

@@ -138,7 +138,7 @@ async def test_what_is_no_mission_is_refused_in_words(wrong: str, why: str, tmp_
 
 
 async def test_reasons_say_no_number_that_would_do() -> None:
-    """What is missed by a hair is not rounded to what is wanted."""
+    """Round nothing that was missed by a hair to what is wanted."""
     path = [Spot(0.0, 0.0, 0.0, 0.0), Spot(1.0, 0.4999, 0.0, 0.0)]
     work = Work(Played(path=path, seconds=5.01), ast.parse("x = 1"), [], (0.0, 0.0))
     checks = [Check(kind="move", metres=0.5), Check(kind="within", seconds=5), Check(kind="light", text="red")]
@@ -149,8 +149,8 @@ async def test_reasons_say_no_number_that_would_do() -> None:
     ]
 
 
-async def test_errors_name_what_is_missing_and_what_was_meant() -> None:
-    """Not what was meant as what is missing."""
+async def test_errors_name_the_missing_and_the_meant() -> None:
+    """Name them apart."""
     found = explain("AttributeError: 'cyberdog.audio' has no 'ply'; did you mean 'play'? (line 2: a.ply())")
     assert (found["en"], found["line"]) == ("There is no ply here. Did you mean play?", 2)
     found = explain("AttributeError: 'cyberdog.audio.play' cannot be changed (line 1: x)")
