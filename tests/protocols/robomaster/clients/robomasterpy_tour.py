@@ -11,7 +11,7 @@ from robomasterpy.client import Commander, get_broadcast_ip
 
 
 def wait_until(reached) -> None:
-    deadline = time.monotonic() + 20
+    deadline = time.monotonic() + 60
     while not reached():
         if time.monotonic() > deadline:
             raise TimeoutError
@@ -19,10 +19,10 @@ def wait_until(reached) -> None:
 
 
 def main(ip: str) -> None:  # noqa: PLR0915 - one tour
-    wait_until(lambda: get_broadcast_ip(20) == ip)  # other robots on this machine broadcast, too
+    wait_until(lambda: get_broadcast_ip(60) == ip)  # other robots on this machine broadcast, too
     seen: dict[str, object] = {"broadcast": ip}
-    robot = Commander(ip, timeout=20)
-    second = Commander(ip, timeout=20)  # the framework opens one per worker
+    robot = Commander(ip, timeout=60)
+    second = Commander(ip, timeout=60)  # the framework opens one per worker
     seen["ip"] = robot.get_ip()
     seen["version"] = robot.version()
     seen["mode at first"] = robot.get_robot_mode()
