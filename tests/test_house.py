@@ -158,6 +158,18 @@ def test_docstrings_begin_with_verb_or_noun(files: list[Path]) -> None:
     assert found == []
 
 
+@pytest.mark.parametrize("files", [SOURCES, TESTS, TOOLS], ids=["src", "tests", "tools"])
+def test_docstrings_say_nothing_twice(files: list[Path]) -> None:
+    """Sentences were doubled where docstrings had been wrapped by a tool."""
+    found = []
+    for path in files:
+        for line, text in docstrings(path):
+            sentences = [" ".join(part.split()) for part in re.split(r"(?<=[.!?)])\s+", text)]
+            if any(sentences.count(each) > 1 for each in sentences if len(each) > 12):
+                found.append(f"{path.relative_to(ROOT)}:{line}")
+    assert found == []
+
+
 def test_commit_subjects_have_an_area_and_fit() -> None:
     """`area: imperative`, 60 characters at most; asked of the commits that are not pushed yet and can be mended."""
     git = shutil.which("git")

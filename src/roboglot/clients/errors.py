@@ -8,7 +8,7 @@ class ClientError(Exception):
 
 
 class LinkLost(ClientError):
-    """No connection, or it broke before the answer arrived; the robot may or may not have obeyed."""
+    """No connection, or it broke before the answer; the robot may or may not have obeyed."""
 
 
 class TimedOut(LinkLost):
@@ -16,11 +16,11 @@ class TimedOut(LinkLost):
 
 
 class BadAnswer(ClientError):
-    """The robot answered something that its protocol does not have."""
+    """The robot sent an answer that its protocol does not know."""
 
 
 class RefusedByRobot(ClientError):
-    """The robot said no: ``code`` and ``words`` are its own, ``operation`` is what it was asked."""
+    """The robot refused: ``code`` and ``words`` are its own, ``operation``: the request."""
 
     def __init__(self, operation: str, code: int | str, words: str) -> None:
         super().__init__(f"{operation}: {code} {words}".rstrip())

@@ -32,8 +32,7 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class Workshop:
-    """State shared by the drivers of one program. Without ``touches`` robots are only observed. Without ``touches``
-    robots are only observed.
+    """State shared by the drivers of one program. Without ``touches`` robots are only observed.
 
     ``own``: addresses of the program's own doors, which discovery ignores.
     """

@@ -1,4 +1,4 @@
-"""Search of the pose in a whole map where a scan fits best: branch and bound. Exact on its steps. Exact on its steps.
+"""Search of the pose in a whole map where a scan fits best: branch and bound. Exact on its steps.
 
 A bound for a square of places is the sum, over the scan's points, of the best field value within the square's size
 (``pyramid``). Squares that cannot beat the best place found are dropped unseen.

@@ -1,4 +1,4 @@
-"""Rasterizer: culls, clips and projects quads and fills a depth buffer with their numbers. No colours here. No colours
+"""Rasterizer: culls, clips and projects quads and fills a depth buffer with their numbers. No colours
 here.
 
 Camera frame: x right, y down, z forward. A plane seen through a pixel is linear in 1/z, and texture coordinates times

@@ -1,5 +1,4 @@
 """Interfaces of the programs' stores, and the records kept there. `roboglot.storage` implements them.
-`roboglot.storage` implements them.
 
 When a write returns, it survives a crash. Every method raises StoreError (`roboglot.programs.errors`) where the store
 fails; methods that end in ``_now`` block and are for start-up.

@@ -1,4 +1,4 @@
-"""The whole client: one robot, its commands by chapter, what it says by itself, and a link that comes back."""
+"""The client of one robot: commands by chapter, pushes and events, and a link that reconnects."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Ports:
-    """The robot's, and the port on our side for pushes; real robots have no others."""
+    """Ports of the robot, and the local one for pushes; real robots have no others."""
 
     control: int = 40923
     video: int = 40921
@@ -66,7 +66,7 @@ class RoboMasterClient:
     """``async with RoboMasterClient("192.168.2.1") as client: await client.chassis.move(x=0.5, wait=True)``.
 
     Commands raise RoboMasterRefused (the robot's own words), LinkLost, TimedOut and BadAnswer. While the link is lost
-    nothing is kept for later: a command raises at once. ``clock`` measures every time-out and pause. ``local`` is the
+    commands raise at once: none is queued. ``clock`` measures every time-out and pause. ``local`` is the
     address to connect from. ``pushes`` is shared with the other clients of the program, if there are any.
     """
 
@@ -110,7 +110,7 @@ class RoboMasterClient:
     async def connect(self) -> None:
         """Connect and enter SDK mode. Raises LinkLost, TimedOut, RoboMasterRefused; then it may be tried again.
 
-        While it is connected nothing happens; while the robot is sought, it is tried at once.
+        No effect while connected; during a search the robot is tried at once.
         """
         if self.state is LinkState.CONNECTED:
             return
@@ -124,7 +124,7 @@ class RoboMasterClient:
         await self._events.open(self.host)
 
     async def close(self) -> None:
-        """Hang up: the robot stops what this client commanded, and leaves SDK mode when it was the last one."""
+        """Disconnect: the robot stops this client's motions, and leaves SDK mode after the last client."""
         self._change(LinkState.CLOSED)
         self._search.cancel()
         self._events.close()
@@ -137,7 +137,7 @@ class RoboMasterClient:
         self._listeners.close()
 
     def note_in(self, line: Line) -> None:
-        """Record commands, answers and pushes there from now on; call before ``connect``."""
+        """Record commands, answers and pushes in ``line``; call before ``connect``."""
         self._noting = self._listeners.noting = Noting(line)
 
     @property
@@ -169,13 +169,13 @@ class RoboMasterClient:
     # -- commands ------------------------------------------------------------------------------------------------------
 
     async def ask(self, command: str, timeout: float = ANSWER_SECONDS) -> str:
-        """Send any command's text (without ``;``) and return the answer as it comes, refusals too."""
+        """Send the text of any command (without ``;``) and return the raw answer, even a refusal."""
         if self._link is None or not self._link.open:
             raise LinkLost(f"{self.host} is not connected: {command!r} was not sent")
         return await self._link.ask(command, timeout)
 
     async def command(self) -> None:
-        """Enter SDK mode (3.2.1.1); being in it already is no error."""
+        """Enter SDK mode (3.2.1.1); no effect if entered."""
         await self._expect("command", Reply.OK, Reply.ALREADY_IN_SDK_MODE)
 
     async def quit(self) -> None:
@@ -195,7 +195,7 @@ class RoboMasterClient:
     # -- pushes and events ---------------------------------------------------------------------------------------------
 
     def listen(self, heard: Callable[[Telemetry], object], *kinds: type[Telemetry]) -> Callable[[], None]:
-        """Call ``heard`` with every push and event of ``kinds`` (none: all); returns what ends it. Raises LinkLost.
+        """Call ``heard`` with pushes and events of ``kinds`` (none: all); return a function to stop. Raises LinkLost.
 
         The robot sends only what has been switched on (``chassis.push``, ``armor.event`` …).
         """
@@ -205,15 +205,15 @@ class RoboMasterClient:
         return self._listeners.add(heard, kinds)
 
     def watch(self, *kinds: type[Telemetry]) -> Viewer[Telemetry]:
-        """The same as an async iterator; close it, or use ``with``. It ends with the client."""
+        """Return pushes and events as an async iterator; close it, or use ``with``. It ends with the client."""
         return self._listeners.view(lambda heard: self.listen(heard, *kinds))
 
     def video(self) -> AsyncIterator[AccessUnit]:
-        """Pictures as H.264 access units from a keyframe on; they flow while ``stream.on()``. Ends with LinkLost."""
+        """Yield H.264 access units, from a keyframe on, while ``stream.on()``. Ends with LinkLost."""
         return access_units(self.clock, self.host, self._ports.video)
 
     def sounds(self) -> AsyncIterator[bytes]:
-        """Opus packets of 20 ms; they flow while ``audio.on()``. Ends with LinkLost."""
+        """Yield Opus packets of 20 ms while ``audio.on()``. Ends with LinkLost."""
         return opus_packets(self.clock, self.host, self._ports.audio)
 
     # -- the link ------------------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""The control connection: one command, one answer, in order; it says so when the link is gone. Knows no commands."""
+"""The control connection: one command, one answer, in order; reports a lost link. Knows no commands."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class ControlLink(asyncio.Protocol):
                 self._noting.lost(number, why)
 
     def close(self) -> None:
-        """Hang up; what waits for an answer gets LinkLost."""
+        """Disconnect; commands that await an answer raise LinkLost."""
         if self._transport:
             self._transport.abort() if self._transport.get_write_buffer_size() else self._transport.close()
 
@@ -122,7 +122,7 @@ class ControlLink(asyncio.Protocol):
 
 
 def keep_asking(connection: socket.socket) -> None:
-    """Have the kernel notice within some four seconds that the other end has vanished."""
+    """Let the kernel detect a vanished peer within about four seconds."""
     idle, interval, count = KEEPALIVE
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
@@ -141,7 +141,7 @@ async def connect(
     lost: Callable[[str], None],
     noting: Noting | None = None,
 ) -> ControlLink:
-    """An open link. Raises LinkLost or TimedOut."""
+    """Open a link. Raises LinkLost or TimedOut."""
     opening = asyncio.get_running_loop().create_connection(
         lambda: ControlLink(clock, lost, noting),
         host,

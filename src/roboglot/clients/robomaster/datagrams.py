@@ -33,7 +33,7 @@ class PushPort:
         self._socket: socket.socket | None = None
 
     def attach(self, robot: str, heard: Heard) -> Callable[[], None]:
-        """Pass datagrams from the address ``robot`` to ``heard``; returns what ends it. Raises LinkLost."""
+        """Pass datagrams from the address ``robot`` to ``heard``; return a function to stop. Raises LinkLost."""
         if self._socket is None:
             self._socket = _bound(self._host, self._port, "share one PushPort between the clients of a program")
             asyncio.get_running_loop().add_reader(self._socket, self._read)
@@ -68,10 +68,10 @@ async def discover(
     port: int = BROADCAST_PORT,
     passing_over: Collection[str] = (),
 ) -> list[str]:
-    """Addresses of the robots on the network that no client holds, as they broadcast every 2 s (manual 3.2.19).
+    """Return addresses of free robots on the network, which broadcast every 2 s (manual 3.2.19).
 
-    Listens for ``seconds``, or with ``first`` until one is heard. Who broadcasts from an address in ``passing_over``
-    does not count. Raises LinkLost if the port can't be had.
+    Listens for ``seconds``, or with ``first`` until one is found. Addresses in ``passing_over`` are ignored. Raises
+    LinkLost if the port is taken.
     """
     loop, clock = asyncio.get_running_loop(), clock or RealClock()
     found: dict[str, None] = {}

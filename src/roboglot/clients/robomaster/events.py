@@ -1,4 +1,4 @@
-"""The event port: a connection that only listens, and that comes back by itself until it is closed."""
+"""The event port: a read-only connection, which reconnects by itself until it is closed."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class EventLink:
             await self._clock.wait_for(self._connected.wait(), RETRY_SECONDS / 2)
 
     def close(self) -> None:
-        """No more events."""
+        """Disconnect for good."""
         if self._task:
             self._task.cancel()
             self._task = None

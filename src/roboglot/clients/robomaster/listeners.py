@@ -22,13 +22,13 @@ class Listeners:
         self._feeds: set[Feed[Telemetry]] = set()
 
     def add(self, heard: Listener, kinds: tuple[type[Telemetry], ...]) -> Callable[[], None]:
-        """Call ``heard`` with everything of ``kinds`` (none: all); returns what ends it."""
+        """Call ``heard`` with values of ``kinds`` (none: all); return a function to stop."""
         entry = (heard, kinds)
         self._listeners.append(entry)
         return lambda: self._listeners.remove(entry) if entry in self._listeners else None
 
     def view(self, listen: Callable[[Listener], Callable[[], None]]) -> Viewer[Telemetry]:
-        """Return a viewer of what ``listen`` hears; it begins to listen when it is first needed."""
+        """Return a viewer of values from ``listen``, which starts on first use."""
         stop: list[Callable[[], None]] = []
 
         def end() -> None:
@@ -41,7 +41,7 @@ class Listeners:
         return viewer
 
     def hear(self, data: bytes) -> None:
-        """Hand on what a datagram or an event's line says."""
+        """Parse a datagram or an event's line, and pass it on."""
         if self.noting is not None:
             self.noting.heard(data)
         for item in hear(data):

@@ -1,4 +1,4 @@
-"""Notes what goes over the connections to one robot, with the keys of the contract. Knows no sockets."""
+"""Record of the traffic with one robot, by keys of the contract. Knows no sockets."""
 
 from __future__ import annotations
 
@@ -13,31 +13,31 @@ BEYOND = frozenset({"version", "version ?"})  # commands that robots know althou
 
 
 class Noting:
-    """One control connection's commands, and what the robot says by itself."""
+    """Record of one control connection's commands, and of pushes and events."""
 
     def __init__(self, line: Line) -> None:
         self.line = line
         self._asked: dict[int, tuple[str, float]] = {}
 
     def sent(self, number: int, command: str) -> None:
-        """A command went out."""
+        """Record a command."""
         if self.line.watched:
             key = _key(command)
             self._asked[number] = key, self.line.request(key, command)
 
     def answered(self, number: int, wording: str, answer: str) -> None:
-        """An answer came: as it came, and what it says."""
+        """Record an answer, raw and parsed."""
         if (asked := self._asked.pop(number, None)) is not None:
             refused = answer if answer in REFUSALS else ""
             self.line.reply(asked[0], wording, refused or "ok", refused, asked[1])
 
     def lost(self, number: int, why: str) -> None:
-        """No answer will be waited for any more."""
+        """Record that no answer is expected any more."""
         if (asked := self._asked.pop(number, None)) is not None:
             self.line.reply(asked[0], b"", LOST, why, asked[1])
 
     def heard(self, data: bytes) -> None:
-        """The robot pushed telemetry, or reported an event."""
+        """Record telemetry or an event."""
         if self.line.watched:
             words = " ".join(data.decode("utf-8", "replace").split(None, 2)[:2])
             key = "> game_msg push" if words == "game msg" else f"> {words}"

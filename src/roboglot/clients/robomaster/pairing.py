@@ -1,4 +1,4 @@
-"""Pairing of answers with commands: by ``seq`` where the robot repeats it, else by order. Knows no sockets. Knows no
+"""Pairing of answers with commands: by ``seq`` where the robot repeats it, else by order. Knows no
 sockets.
 
 A robot answers each command once and in order, but builds differ in what ends an answer, and the oldest end it with

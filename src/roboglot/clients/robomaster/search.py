@@ -1,4 +1,4 @@
-"""The search for a robot whose link was lost: tried again and again, ever more slowly, until it is there."""
+"""The search for a robot whose link was lost: retries at growing intervals until it is found."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ class Search:
 
     @property
     def going_on(self) -> bool:
-        """True while it is sought."""
+        """True while searching."""
         return self._task is not None and not self._task.done()
 
     def begin(self) -> None:
-        """Seek it in the background."""
+        """Search in the background."""
         self._task = asyncio.get_running_loop().create_task(self._seek(), name=f"seek {self._host}")
 
     def cancel(self) -> None:
-        """Seek it no more."""
+        """Stop searching."""
         if self._task:
             self._task.cancel()
 

@@ -1,4 +1,4 @@
-"""Places of a program and its stops: a place is a line of a unit (0 is the program, 1... its modules). its modules).
+"""Places of a program and its stops: a place is a line of a unit (0 is the program, 1... its modules).
 
 Both ends of the shared memory number all places of a run in one row, from the same texts. Pure arithmetic.
 """

@@ -6,12 +6,12 @@ from roboglot.clients.robomaster.calls import Chapter, on_off
 
 
 class Ai(Chapter):
-    """``client.ai``: what is made out in the picture comes as TargetsSeen and LinesSeen."""
+    """``client.ai``: recognition in the picture, received as TargetsSeen and LinesSeen."""
 
     async def attribute(
         self, *, line_color: str | None = None, marker_color: str | None = None, marker_dist: float | None = None
     ) -> None:
-        """Choose the lines and markers that count: colours red, green, blue; distance in m (3.2.15.1)."""
+        """Filter lines and markers: colours red, green, blue; distance in m (3.2.15.1)."""
         await self._do("AI attribute", line_color=line_color, marker_color=marker_color, marker_dist=marker_dist)
 
     async def push(

@@ -27,13 +27,13 @@ class RoboticArm(Chapter):
         await self._do("robotic_arm moveto", x=x, y=y, wait=wait or None)
 
     async def recenter(self, *, wait: bool = False) -> None:
-        """3.2.13.3."""
+        """Return to the position at power-on (3.2.13.3)."""
         await self._do("robotic_arm recenter", wait=wait or None)
 
     async def stop(self) -> None:
-        """3.2.13.4."""
+        """Stop and hold the position (3.2.13.4)."""
         await self._do("robotic_arm stop")
 
     async def get_position(self) -> ArmPosition:
-        """3.2.13.5."""
+        """Return the position of the end point (3.2.13.5)."""
         return ArmPosition(*await self._numbers("robotic_arm position", 2))

@@ -9,11 +9,11 @@ class Armor(Chapter):
     """``client.armor``."""
 
     async def sensitivity(self, value: int) -> None:
-        """1 to 10 (3.2.6.1)."""
+        """Set the sensitivity, 1 to 10 (3.2.6.1)."""
         await self._do("armor sensitivity", value)
 
     async def get_sensitivity(self) -> int:
-        """3.2.6.2."""
+        """Return the sensitivity (3.2.6.2)."""
         return round(await self._number("armor sensitivity"))
 
     async def event(self, hit: bool) -> None:

@@ -13,9 +13,9 @@ class Blaster(Chapter):
         await self._do("blaster bead", num)
 
     async def fire(self) -> None:
-        """3.2.5.2."""
+        """Fire one shot (3.2.5.2)."""
         await self._do("blaster fire")
 
     async def get_bead(self) -> int:
-        """3.2.5.3."""
+        """Return the beads per shot (3.2.5.3)."""
         return round(await self._number("blaster bead"))

@@ -9,7 +9,7 @@ class Camera(Chapter):
     """``client.camera``."""
 
     async def exposure(self, ev_level: str) -> None:
-        """default, small, medium, large (3.2.16.1)."""
+        """Set the exposure: default, small, medium, large (3.2.16.1)."""
         await self._do("camera exposure", ev_level)
 
 
@@ -17,11 +17,11 @@ class Stream(Chapter):
     """``client.stream``; ``client.video()`` has the pictures."""
 
     async def on(self) -> None:
-        """3.2.17.1."""
+        """Start the video stream (3.2.17.1)."""
         await self._do("stream on")
 
     async def off(self) -> None:
-        """3.2.17.2."""
+        """Stop the video stream (3.2.17.2)."""
         await self._do("stream off")
 
 
@@ -29,9 +29,9 @@ class Audio(Chapter):
     """``client.audio``; ``client.sounds()`` has the packets."""
 
     async def on(self) -> None:
-        """3.2.18.1."""
+        """Start the audio stream (3.2.18.1)."""
         await self._do("audio on")
 
     async def off(self) -> None:
-        """3.2.18.2."""
+        """Stop the audio stream (3.2.18.2)."""
         await self._do("audio off")

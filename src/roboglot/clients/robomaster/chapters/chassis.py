@@ -39,7 +39,7 @@ class Chassis(Chapter):
         await self._do("chassis speed", x=x, y=y, z=z)
 
     async def wheel(self, w1: float = 0, w2: float = 0, w3: float = 0, w4: float = 0) -> None:
-        """Turn the wheels at so many rpm (3.2.3.2)."""
+        """Turn the wheels at these rpm (3.2.3.2)."""
         await self._do("chassis wheel", w1=w1, w2=w2, w3=w3, w4=w4)
 
     async def move(
@@ -56,23 +56,23 @@ class Chassis(Chapter):
         await self._do("chassis move", x=x, y=y, z=z, vxy=vxy, vz=vz, wait=wait or None)
 
     async def stop(self) -> None:
-        """Stand still; in no manual."""
+        """Stop; in no manual."""
         await self._do("chassis stop")
 
     async def get_speed(self) -> ChassisSpeed:
-        """3.2.3.4."""
+        """Return the measured speeds (3.2.3.4)."""
         return ChassisSpeed(*await self._numbers("chassis speed", 7))
 
     async def get_position(self) -> ChassisPose:
-        """3.2.3.5."""
+        """Return the position (3.2.3.5)."""
         return ChassisPose(*await self._numbers("chassis position", 3))
 
     async def get_attitude(self) -> ChassisAttitude:
-        """3.2.3.6."""
+        """Return the attitude (3.2.3.6)."""
         return ChassisAttitude(*await self._numbers("chassis attitude", 3))
 
     async def get_status(self) -> ChassisStatus:
-        """3.2.3.7."""
+        """Return the motion flags (3.2.3.7)."""
         words = await self._words("chassis status", 11)
         try:
             return status_of(words)

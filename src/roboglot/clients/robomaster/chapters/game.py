@@ -9,9 +9,9 @@ class GameMessages(Chapter):
     """``client.game_msg``: the pilot's keyboard and mouse come as GameInput."""
 
     async def on(self) -> None:
-        """3.2.20.1."""
+        """Start pushes of GameInput (3.2.20.1)."""
         await self._do("game_msg on")
 
     async def off(self) -> None:
-        """3.2.20.2."""
+        """Stop pushes of GameInput (3.2.20.2)."""
         await self._do("game_msg off")

@@ -42,7 +42,7 @@ class Gimbal(Chapter):
         await self._do("gimbal suspend")
 
     async def resume(self) -> None:
-        """Wake it (3.2.4.5)."""
+        """Power the motors again (3.2.4.5)."""
         await self._do("gimbal resume")
 
     async def recenter(self, *, wait: bool = True) -> None:
@@ -50,11 +50,11 @@ class Gimbal(Chapter):
         await self._do("gimbal recenter", wait=wait)
 
     async def stop(self) -> None:
-        """Hold where it is; in no manual."""
+        """Stop and hold the angles; in no manual."""
         await self._do("gimbal stop")
 
     async def get_attitude(self) -> GimbalAttitude:
-        """3.2.4.7."""
+        """Return the attitude (3.2.4.7)."""
         return GimbalAttitude(*await self._numbers("gimbal attitude", 2))
 
     async def push(self, attitude: bool, afreq: int | None = None) -> None:

@@ -17,9 +17,9 @@ class RoboticGripper(Chapter):
         await self._do("robotic_gripper close", level)
 
     async def stop(self) -> None:
-        """Undocumented."""
+        """Stop the jaws; in no manual."""
         await self._do("robotic_gripper stop")
 
     async def get_status(self) -> int:
-        """The manual's 0 closed, 1 between, 2 open; robots' 2, 0, 1 (3.2.14.3)."""
+        """Return the state: 0 closed, 1 between, 2 open in the manual; 2, 0, 1 from real robots (3.2.14.3)."""
         return round(await self._number("robotic_gripper status"))

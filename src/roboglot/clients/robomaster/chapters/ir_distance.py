@@ -9,9 +9,9 @@ class IrDistanceSensor(Chapter):
     """``client.ir_distance_sensor``."""
 
     async def measure(self, on: bool) -> None:
-        """All of them (3.2.11.1)."""
+        """Switch all sensors (3.2.11.1)."""
         await self._do("ir_distance_sensor measure", on_off(on))
 
     async def get_distance(self, id: int) -> float:
-        """mm; robots: cm (3.2.11.2)."""
+        """Return the distance, mm; real robots: cm (3.2.11.2)."""
         return await self._number(f"ir_distance_sensor distance {id:d}")

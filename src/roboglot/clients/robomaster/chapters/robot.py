@@ -9,13 +9,13 @@ class RobotChapter(Chapter):
     """``client.robot``: mode and battery."""
 
     async def mode(self, mode: str) -> None:
-        """chassis_lead, gimbal_lead or free (3.2.2.1)."""
+        """Set the mode: chassis_lead, gimbal_lead or free (3.2.2.1)."""
         await self._do("robot mode", mode)
 
     async def get_mode(self) -> str:
-        """3.2.2.2."""
+        """Return the mode (3.2.2.2)."""
         return (await self._words("robot mode", 1))[0]
 
     async def get_battery(self) -> int:
-        """Percent (3.2.2.3)."""
+        """Return the charge, percent (3.2.2.3)."""
         return round(await self._number("robot battery"))

@@ -9,15 +9,15 @@ class SensorAdapter(Chapter):
     """``client.sensor_adapter``. Adapters 1 to 6 have inputs 1 and 2."""
 
     async def get_adc(self, id: int, port: int) -> float:
-        """V; robots: 0 to 1023 (3.2.10.1)."""
+        """Return the voltage, V; real robots: 0 to 1023 (3.2.10.1)."""
         return await self._number("sensor_adapter adc", id=id, port=port)
 
     async def get_io_level(self, id: int, port: int) -> int:
-        """0 or 1 (3.2.10.2)."""
+        """Return the logic level, 0 or 1 (3.2.10.2)."""
         return round(await self._number("sensor_adapter io_level", id=id, port=port))
 
     async def get_pulse_period(self, id: int, port: int) -> int:
-        """ms (3.2.10.3)."""
+        """Return the time between the last two changes of level, ms (3.2.10.3)."""
         return round(await self._number("sensor_adapter pulse_period", id=id, port=port))
 
     async def event(self, io_level: bool) -> None:

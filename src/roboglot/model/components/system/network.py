@@ -71,8 +71,7 @@ class MobileState:
 
 
 class Network(Component):
-    """State and settings of Wi-Fi card and modem. Settings survive restarts. Publishes ``NetworkChanged``. Settings
-    survive restarts. Publishes ``NetworkChanged``.
+    """State and settings of Wi-Fi card and modem. Settings survive restarts. Publishes ``NetworkChanged``.
 
     Setting methods return once the setting is on disk; the link follows within seconds of robot time.
     """
