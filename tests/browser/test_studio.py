@@ -367,6 +367,7 @@ async def test_a_change_of_language_and_look_loses_nothing(studio: Open) -> None
         assert [v["id"] for v in found["violations"] if v["impact"] in ("serious", "critical")] == []
     await page.click("header >> text=中文")
     await until(page, "document.documentElement.lang === 'zh-CN'")
+    await until(page, "document.title === '编程工作室'")
     await until(page, held)
     await shows(page, "[studio.editor.code.value, studio.editor.breaks.value.join()]", [code, "say"])
     await page.keyboard.press("F8")

@@ -168,7 +168,7 @@ effect(() => {
 });
 loadMissions().catch(() => undefined);
 addEventListener("pagehide", () => { if (editor.changes.peek()) changed(); });
-document.title = t("studio");
+effect(() => { document.title = t("studio"); });
 /** Keep the page's files, on https and this machine. */
 function keepForAway() {
   if (runner.phase.value !== "idle" && performance.now() < AWAY_AT_LAST) setTimeout(keepForAway, AWAY_AFTER);
