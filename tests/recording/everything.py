@@ -139,11 +139,12 @@ class Session:
         wanted = [{"id": c["id"], "channelId": c["id"]} for c in channels if "cam" not in c["topic"]]
         publish = {"id": 7, "topic": "/a/cmd_vel", "encoding": "json", "schemaName": "geometry_msgs/Twist"}
         twist = {"linear": {"x": 0.2, "y": 0, "z": 0}, "angular": {"x": 0, "y": 0, "z": 0.2}}
-        for said in (
+        messages: list[str | bytes] = [
             json.dumps({"op": "subscribe", "subscriptions": wanted}),
             json.dumps({"op": "advertise", "channels": [publish]}),
             *[struct.pack("<BI", 1, 7) + json.dumps(twist).encode()] * 2,
-        ):
+        ]
+        for said in messages:
             number = self.heard.get((door, Direction.REPLY), 0) + 1
             await socket.send(said)
             await self.until_heard(door, Direction.REPLY, number)
