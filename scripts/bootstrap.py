@@ -96,6 +96,8 @@ def venv_is_sound() -> bool:
 def make_venv() -> None:
     """An empty .venv that has pip, or at least the means to run it."""
     say(f"making .venv with Python {sys.version.split()[0]}")
+    if VENV.is_symlink():
+        VENV.unlink()  # what it leads to is another's, and would be emptied
     with_pip = find_spec("ensurepip") is not None
     venv.EnvBuilder(symlinks=True, clear=True, with_pip=with_pip).create(VENV)
     if not with_pip:

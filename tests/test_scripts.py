@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
+import venv
 from pathlib import Path
 from types import SimpleNamespace
 from typing import BinaryIO
@@ -146,6 +147,19 @@ def test_the_likely_reason_is_named() -> None:
 def test_packages_of_other_systems_are_not_counted() -> None:
     lock = "a==1 \\\n    --hash=sha256:00\ncolorama==1 ; sys_platform == 'win32' \\\nnumpy==2 ; x\nnumpy==3 ; y\n"
     assert bootstrap.package_names(lock) == {"a", "numpy"}
+
+
+def test_making_venv_leaves_a_linked_one_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "another").mkdir()
+    (tmp_path / "another/kept").touch()
+    (tmp_path / ".venv").symlink_to(tmp_path / "another")
+    make = venv.EnvBuilder
+    monkeypatch.setattr(bootstrap, "VENV", tmp_path / ".venv")
+    monkeypatch.setattr(venv, "EnvBuilder", lambda **wanted: make(**wanted | {"with_pip": False}))
+    monkeypatch.setattr(bootstrap, "find_spec", lambda _: True)
+    bootstrap.make_venv()
+    assert [file.name for file in (tmp_path / "another").iterdir()] == ["kept"]
+    assert (tmp_path / ".venv/bin/python").exists()
 
 
 # --- the lock files
