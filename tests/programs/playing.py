@@ -8,6 +8,7 @@ import gc
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from roboglot.programs.engine.engine import Engine
@@ -108,6 +109,20 @@ def open_descriptors() -> set[tuple[str, str]]:
     for descriptor in os.listdir("/proc/self/fd"):
         with contextlib.suppress(FileNotFoundError):  # this listing's own
             found.add((descriptor, os.readlink(f"/proc/self/fd/{descriptor}")))
+    return found
+
+
+def children_of(pid: int) -> set[int]:
+    """Processes whose parent this is."""
+    found = set()
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                stat = (entry / "stat").read_text().rpartition(")")[2].split()
+            except (FileNotFoundError, ProcessLookupError):
+                continue
+            if int(stat[1]) == pid:
+                found.add(int(entry.name))
     return found
 
 

@@ -20,6 +20,7 @@ from roboglot.testing.campaign.report import interval, report
 from roboglot.testing.campaign.table import OtherCampaign, Row, Table
 from roboglot.testing.campaign.trials import Outcome, Result, Trial, trials_of
 from roboglot.testing.scenarios.files import find
+from tests.programs.playing import children_of
 
 SLEEP = f"314.{os.getpid()}"
 FINE = "given: {world: empty, body: robomaster_ep, lockstep: true}\nthen: [{travelled: {at_most: 1}}]\n"
@@ -58,9 +59,9 @@ def begin(folder: Path, *options: str) -> subprocess.Popen[str]:
 
 def fork_server_of(process: subprocess.Popen[str]) -> bool:
     """Return whether the process from which it forks trials has begun to load."""
-    for path in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split():
+    for child in children_of(process.pid):
         with contextlib.suppress(OSError):
-            if b"multiprocessing.forkserver" in Path(f"/proc/{path}/cmdline").read_bytes():
+            if b"multiprocessing.forkserver" in Path(f"/proc/{child}/cmdline").read_bytes():
                 return True
     return False
 

@@ -8,7 +8,6 @@ import signal
 import sys
 import textwrap
 from functools import partial
-from pathlib import Path
 
 import pytest
 import uvloop
@@ -22,23 +21,9 @@ from roboglot.programs.engine.events import (
     Finished,
     Output,
 )
-from tests.programs.playing import PRELUDE, open_descriptors, play, process_state, until
+from tests.programs.playing import PRELUDE, children_of, open_descriptors, play, process_state, until
 
 BUSY = "print('ready')\nwhile True: pass"
-
-
-def children_of(pid: int) -> set[int]:
-    """Processes whose parent this is."""
-    found = set()
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit():
-            try:
-                stat = (entry / "stat").read_text().rpartition(")")[2].split()
-            except (FileNotFoundError, ProcessLookupError):
-                continue
-            if int(stat[1]) == pid:
-                found.add(int(entry.name))
-    return found
 
 
 async def test_nothing_is_left_after_close() -> None:

@@ -11,7 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from multiprocessing import forkserver
+from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -81,11 +81,12 @@ def play_here(trials: Iterator[Trial], workers: int, seconds_max: float, leave: 
 
 def _start_fork_server() -> None:
     """Start the process from which trials are forked: Ctrl-C is for the campaign alone, also while that one loads."""
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # a new program inherits what is ignored, not a handler
+    resource_tracker.ensure_running()  # it would unblock SIGINT
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # a new program inherits it; none is lost here
     try:
         forkserver.ensure_running()
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextlib.contextmanager
@@ -134,6 +135,7 @@ def _play(trial: Trial, leave: Path | None, mouth: Connection) -> None:
     """Play in the forked process: a group of its own, so that Ctrl-C reaches the campaign alone; it ends with that."""
     os.setpgid(0, 0)
     signal.signal(signal.SIGINT, signal.default_int_handler)  # for the commands of its scenario
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     threading.Thread(target=_end_with_campaign, daemon=True).start()
     mouth.send_bytes(msgspec.json.encode(play_trial(trial, leave)))
