@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 
-from tests.browser.served import Served, shows, until
+from tests.browser.served import Served, becomes, shows, until
 from tests.browser.test_studio import Open, Page, loaded, phase, prints, studio
+from tests.narrowing import known
 
 __all__ = ["studio"]
 pytestmark = pytest.mark.asyncio(loop_scope="session")
@@ -91,8 +92,13 @@ async def test_a_module_is_opened_changed_and_deleted(studio: Open, opened: Serv
     await until(page, "studio.editor.code.value.includes('x * x')")
     await page.locator(".blocklyDraggable > .blocklyPath").first.click(button="right", position={"x": 12, "y": 12})
     await page.click("text=Keep as a module")
-    await page.wait_for_selector(".notice >> text=is a module now")
-    assert await page.evaluate("studio.program.value.module") == "double"
+    service = next(iter(opened.runtime._programs.values())).service
+
+    async def squares() -> bool:
+        return "x * x" in known(await service.library.get("double")).body
+
+    await becomes(squares, True)
+    await until(page, "studio.program.value.module === 'double'")
     await page.click("text=Programs")
     await row.locator("text=Open").click()
     await until(page, "studio.editor.code.value.includes('x * x')")
@@ -100,7 +106,6 @@ async def test_a_module_is_opened_changed_and_deleted(studio: Open, opened: Serv
     page.on("dialog", lambda dialog: dialog.accept())
     await row.locator("text=Delete").click()
     await page.wait_for_selector("text=is called by My program")  # the first of those above
-    service = next(iter(opened.runtime._programs.values())).service
     for task in await service.tasks():
         await service.delete(task.id)
     await row.locator("text=Delete").click()
