@@ -1,1 +1,1 @@
-"""The world itself: its description, its time and physics, and what can be seen in it. Knows no protocol."""
+"""The world itself: description, time, physics and lines of sight. Knows no protocol."""

@@ -1,4 +1,4 @@
-"""Gel beads in the air: ballistic flight in small steps, each tested exactly against plates and everything solid.
+"""Gel beads in the air: ballistic flight in small steps, each tested exactly against armor plates and all solids.
 
 Knows no blaster.
 """
@@ -31,15 +31,15 @@ class Target(Protocol):
     hull: Hull
 
     def meet(self, origin: Floats, way: Floats) -> tuple[float, str] | None:
-        """Return at which share of the way (world, m) a plate is hit first from outside, and which."""
+        """Return the share of the way (world, m; 0 to 1) to the first plate hit from outside, and the plate's name."""
 
     def struck(self, plate: str, velocity: Floats) -> None:
-        """A bead of this velocity (world, m/s) burst there."""
+        """Report that a bead of this velocity (world, m/s) burst on a plate."""
 
 
 @dataclass(frozen=True, slots=True)
 class Landing:
-    """Place where a bead burst (world, m), and what it hit: a solid's name, or robot and plate."""
+    """Place where a bead burst (world, m); ``what``: name of the solid, or of robot and plate."""
 
     x: float
     y: float
@@ -75,18 +75,18 @@ class Beads:
         return [(float(x), float(y), float(z)) for x, y, z in (bead.position for bead in self._flying)]
 
     def launch(self, position: Floats, velocity: Floats, shooter: Hull) -> None:
-        """One more, from there (world, m and m/s); it flies through its shooter."""
+        """Add a bead with this position and velocity (world, m and m/s); it passes through its shooter."""
         self._flying.append(_Bead(position, velocity, shooter))
 
     def fly(self, seconds: float) -> None:
-        """Go on for ``seconds``."""
+        """Move all beads on by ``seconds``."""
         for _ in range(len(self._flying)):
             bead = self._flying.popleft()
             if not self._lands(bead, seconds):
                 self._flying.append(bead)
 
     def _lands(self, bead: _Bead, seconds: float) -> bool:
-        """Move one bead; whether its flight is over."""
+        """Move one bead; return whether its flight is over."""
         way = bead.velocity * seconds
         way[2] -= GRAVITY * seconds**2 / 2
         first = self._rays.meet(bead.position, way, bead.shooter)

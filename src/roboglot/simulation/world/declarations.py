@@ -1,4 +1,4 @@
-"""Reads a declarative TOML file into a typed structure and says plainly what is wrong with a bad one.
+"""Reads a declarative TOML file into a typed structure; errors name file, line and mistake.
 
 Knows no worlds and no robots: the structure is the caller's.
 """
@@ -22,11 +22,11 @@ DECODED_MAX = 8  # files cached
 
 
 class BadFile(ValueError):
-    """A world or body file that cannot be used; the message names the file, the place and what was meant."""
+    """A world or body file that cannot be used; the message names file, place and mistake."""
 
 
 def read_toml(path: Path, structure: type[T]) -> T:
-    """``path`` as a ``structure``. Raises BadFile."""
+    """Return the content of ``path`` as a ``structure``. Raises BadFile."""
     try:
         if path.stat().st_size > FILE_BYTES_MAX:
             raise BadFile(f"{path}: larger than {FILE_BYTES_MAX} bytes")
@@ -45,12 +45,12 @@ def read_toml(path: Path, structure: type[T]) -> T:
 
 @lru_cache(maxsize=DECODED_MAX)
 def _decoded(text: str, structure: object) -> object:
-    """The same text gives the same (frozen) structure: a hundred robots of a kind read their body once."""
+    """Return the (frozen) structure of a text, cached: a hundred robots of a kind decode their body once."""
     return msgspec.toml.decode(text, type=structure, strict=False)
 
 
 def _explained(error: msgspec.ValidationError, structure: type) -> str:
-    """Return what does not fit, with a guess at what an unknown key was meant to be."""
+    """Return the mistake in plain words, with the nearest known key for an unknown one."""
     message = misfit(error, "the file")
     unknown = re.search(r"unknown field `([^`]+)`", str(error))
     if unknown is None:
@@ -60,7 +60,7 @@ def _explained(error: msgspec.ValidationError, structure: type) -> str:
 
 
 def _keys_of(structure: type) -> set[str]:
-    """Every key that may stand anywhere in such a file."""
+    """Return all keys that may occur anywhere in such a file."""
     keys: set[str] = set()
     waiting = [msgspec.inspect.type_info(structure)]
     while waiting:
@@ -80,7 +80,7 @@ def _keys_of(structure: type) -> set[str]:
 
 
 def _line_of(text: str, message: str) -> str:
-    """``:line`` where the message's path ``$.floors[1].walls[3]`` begins; empty if it is unknown."""
+    """Return ``:line`` of the start of the message's path ``$.floors[1].walls[3]``; empty if unknown."""
     path = re.search(r"at `\$([^`]*)`", message)
     steps = re.findall(r"\.(\w+)(?:\[(\d+)\])?", path[1] if path else "")
     position = 0

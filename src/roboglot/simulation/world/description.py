@@ -1,6 +1,6 @@
 """World descriptions as TOML: floors with walls, furniture, docks, people, access points, and a lift.
 
-Metres; angles in degrees, because people write these files; the robot code sees radians only. Knows no physics:
+Metres; degrees, as people write these files: elsewhere all angles are in radians. Knows no physics:
 ``blueprint`` turns it into solids, ``scene`` into a MuJoCo model.
 """
 
@@ -41,7 +41,7 @@ class Opening(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Wall(Struct, frozen=True, forbid_unknown_fields=True):
-    """A straight wall as high as the storey; ``material``: what lidars make of it."""
+    """A straight wall as high as the storey; ``material`` decides how lidars see it."""
 
     start: Spot = field(name="from")
     end: Spot = field(name="to")
@@ -51,7 +51,7 @@ class Wall(Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def length(self) -> float:
-        """Metres from end to end."""
+        """Length, m."""
         return math.dist(self.start, self.end)
 
 
@@ -75,7 +75,7 @@ class Cylinder(Struct, frozen=True, forbid_unknown_fields=True, tag="cylinder", 
 
 
 class Dock(Struct, frozen=True, forbid_unknown_fields=True):
-    """A charging dock: ``at`` is the middle of its front, ``facing`` the direction (degrees) it looks into the room.
+    """A charging dock: ``at`` is the middle of its front, ``facing`` the direction of its front, degrees.
 
     ``tag``: the number on an AprilTag on its front, if it has one.
     """
@@ -86,7 +86,7 @@ class Dock(Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def pose(self) -> Pose:
-        """Front middle; +x leads away from the dock."""
+        """Middle of the front, +x away from the dock (world; m, rad)."""
         return Pose(self.at[0], self.at[1], math.radians(self.facing))
 
 
@@ -98,9 +98,9 @@ class Hole(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Shelf(Struct, frozen=True, forbid_unknown_fields=True):
-    """A shelf on four legs that a jack can lift: ``size`` of its board, which begins ``clearance`` above the floor.
+    """A shelf on four legs that a jack can lift: ``size`` of its board, ``clearance`` below the board, m.
 
-    ``tag``: the number on an AprilTag between its hind legs that looks to the front, where robots come in.
+    ``tag``: the number on an AprilTag between its hind legs, facing the front, where robots drive in.
     """
 
     at: Spot
@@ -114,7 +114,7 @@ class Shelf(Struct, frozen=True, forbid_unknown_fields=True):
 class Person(Struct, frozen=True, forbid_unknown_fields=True):
     """A person who walks along ``path`` and back for ever, or stands still (one point); waits ``pause`` s at each.
 
-    A ``script`` takes the place of the strolling and begins anew when it is over; ``path`` is then where they start.
+    A ``script`` replaces the walk along ``path``, from its first point, and repeats. ``speed``: m/s.
     ``voice``: its pitch, Hz.
     """
 
@@ -136,9 +136,9 @@ Addresses = Annotated[str, Meta(pattern=rf"^{PART}\.{PART}\.{PART}$")]
 
 
 class AccessPoint(Struct, frozen=True, forbid_unknown_fields=True):
-    """A Wi-Fi access point; ``power`` is what one receives a metre away, dBm. Those of one ``ssid`` are one network.
+    """A Wi-Fi access point; ``power`` is received at 1 m, dBm. Access points of one ``ssid`` form one network.
 
-    ``password``: "" for an open one; ``addresses``: the first three parts of those that it gives out.
+    ``password``: "" for an open network; ``addresses``: first three parts of the IP addresses it assigns.
     """
 
     at: Spot
@@ -150,7 +150,7 @@ class AccessPoint(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Mobile(Struct, frozen=True, forbid_unknown_fields=True):
-    """Reception of the mobile network, dBm, and the access point names that the operator knows."""
+    """Reception of the mobile network, dBm, and the operator's access point names (APN)."""
 
     signal: Annotated[float, Meta(ge=-140, le=-40)] = -85.0
     apns: tuple[Annotated[str, Meta(max_length=100)], ...] = ("cmnet", "cmhk")
@@ -158,7 +158,7 @@ class Mobile(Struct, frozen=True, forbid_unknown_fields=True):
 
 class Gadget(Struct, frozen=True, forbid_unknown_fields=True):
     """Something with a Bluetooth radio: a bracelet (with a UWB tag), a dock, anything. ``wearer``: number of the person
-    on its floor who carries it; ``power``: dBm heard a metre away; ``newest``: a firmware that there is for it.
+    on its floor who carries it; ``power``: dBm received at 1 m; ``newest``: firmware version available for it.
     """
 
     name: Annotated[str, Meta(max_length=50)]
@@ -174,7 +174,7 @@ class Gadget(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Georeference(Struct, frozen=True, forbid_unknown_fields=True):
-    """Position of the world's origin on the globe: degrees north and east, m; ``north``: its bearing (90: along +y)."""
+    """Position of the world's origin: degrees north and east, m; ``north``: direction of north, degrees from +x."""
 
     latitude: Annotated[float, Meta(ge=-89, le=89)]
     longitude: Annotated[float, Meta(ge=-180, le=180)]
@@ -183,7 +183,7 @@ class Georeference(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Marker(Struct, frozen=True, forbid_unknown_fields=True):
-    """A visual marker: a square card. ``at``: its middle, ``height`` m above the floor; it looks to ``facing``."""
+    """A visual marker: a square card. ``at``: its middle, ``height`` m above the floor; it faces ``facing`` degrees."""
 
     at: Spot
     symbol: Annotated[
@@ -196,7 +196,7 @@ class Marker(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Tag(Struct, frozen=True, forbid_unknown_fields=True):
-    """A printed code, square: an AprilTag (``text`` is its number) or a QR code. ``at``, ``height``: its middle."""
+    """A square printed code: an AprilTag (``text`` is its number) or a QR code. ``at``, ``height``: its middle."""
 
     at: Spot
     text: Annotated[str, Meta(min_length=1, max_length=100)]
@@ -207,7 +207,7 @@ class Tag(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Reflector(Struct, frozen=True, forbid_unknown_fields=True):
-    """A standing strip of reflecting foil; ``base`` and ``top`` are the heights of its ends."""
+    """A vertical strip of reflecting foil from height ``base`` to ``top``, m."""
 
     at: Spot
     facing: float = 0.0
@@ -225,9 +225,9 @@ class Line(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Terrain(Struct, frozen=True, forbid_unknown_fields=True):
-    """Ramps, bumps and steps: ``profile`` lists (way, height) along its x, with straight slopes between.
+    """Ramps, bumps and steps: ``profile`` lists (distance, height) along its x, with straight slopes between.
 
-    ``at`` is the middle of the edge at way 0. ``grip`` is relative to the floor's: 0.1 is ice, also where it is flat.
+    ``at``: middle of the edge at distance 0. ``grip`` is relative to the floor's: 0.1 is ice, on flat parts too.
     """
 
     at: Spot
@@ -238,9 +238,9 @@ class Terrain(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Stairs(Struct, frozen=True, forbid_unknown_fields=True):
-    """A straight flight of stairs, solid below: it rises to ``facing``. ``at``: the middle of the first riser's foot.
+    """A straight flight of stairs, solid below, rising towards ``facing``. ``at``: middle of the first riser's foot.
 
-    ``rise`` and ``run`` of each step; the last one is prolonged by a ``landing``, behind which it ends sheer.
+    ``rise`` and ``run`` of each step, m; a ``landing`` prolongs the last step and ends in a sheer drop.
     """
 
     at: Spot
@@ -258,7 +258,7 @@ class Stairs(Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def treads(self) -> tuple[Terrain, ...]:
-        """Each step as a level block: between two blocks stands a riser, which no profile can have."""
+        """Each step as a level block, as a terrain's profile cannot be vertical like a riser."""
         yaw = math.radians(self.facing)
         blocks = []
         for number in range(self.steps):
@@ -281,7 +281,7 @@ class Thing(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Start(Struct, frozen=True, forbid_unknown_fields=True):
-    """Start of the first robot if not on a dock."""
+    """Start of the first robot, instead of a dock."""
 
     at: Spot
     facing: float = 0.0
@@ -289,10 +289,10 @@ class Start(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Lift(Struct, frozen=True, forbid_unknown_fields=True):
-    """A lift shaft through all floors; ``at`` its middle, ``size`` the car's floor, the door looks to ``facing``.
+    """A lift shaft through all floors; ``at`` its middle, ``size`` the car's floor, ``facing`` the door's direction.
 
-    ``speed`` and ``acceleration`` of the car (m/s, m/s2), ``door_time`` for opening or closing, ``dwell`` for which the
-    door stays open at least (s), ``capacity`` in kg.
+    ``speed`` and ``acceleration`` of the car (m/s, m/s2), ``door_time`` to open or close (s), ``dwell``: the least time
+    that the door stays open (s), ``capacity`` in kg.
     """
 
     at: Spot
@@ -308,7 +308,7 @@ class Lift(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class PlannedFault(Struct, frozen=True, forbid_unknown_fields=True):
-    """Something that goes wrong ``at`` seconds of robot time, for ``duration`` s, on ``robot`` (or on all that can)."""
+    """A fault ``at`` seconds of robot time, for ``duration`` s, of ``robot`` (None: of all that can have it)."""
 
     kind: str
     at: NotNegative = 0.0
@@ -318,7 +318,7 @@ class PlannedFault(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Floor(Struct, frozen=True, forbid_unknown_fields=True):
-    """One storey; ``origin`` is its lower left corner. ``like`` takes walls and furniture of an earlier floor too."""
+    """One storey; ``origin``: its lower left corner. ``like``: an earlier floor to copy walls and furniture from."""
 
     size: tuple[Positive, Positive]
     name: str = ""
@@ -345,7 +345,7 @@ class Floor(Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def relief(self) -> tuple[Terrain, ...]:
-        """All that is uneven: its terrain and the steps of its stairs."""
+        """All uneven ground: terrain, and the steps of stairs."""
         return self.terrain + tuple(tread for flight in self.stairs for tread in flight.treads)
 
 
@@ -361,5 +361,5 @@ class WorldDescription(Struct, frozen=True, forbid_unknown_fields=True):
     mobile: Mobile = Mobile()
 
     def elevation(self, floor: int) -> float:
-        """Height of the floor's surface, m."""
+        """Return the height of a floor's surface, m."""
         return sum(storey.height for storey in self.floors[:floor])

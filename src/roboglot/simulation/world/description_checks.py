@@ -28,7 +28,7 @@ EDGE = 0.5  # m by which objects may protrude from a floor
 
 
 def completed(world: WorldDescription, where: str) -> WorldDescription:
-    """``world`` with every floor's ``like`` carried out. Raises BadFile that begins with ``where``."""
+    """Return ``world`` with every ``like`` of its floors resolved. Raises BadFile, prefixed with ``where``."""
     floors: list[Floor] = []
     for number, floor in enumerate(world.floors):
         if floor.like:
@@ -48,7 +48,7 @@ def completed(world: WorldDescription, where: str) -> WorldDescription:
 
 
 def _problems(world: WorldDescription) -> Iterator[str]:
-    """Yield problems in plain words; the first is enough."""
+    """Yield problems in plain words; callers take the first."""
     yield from _count_problems(world)
     yield from _name_problems(world)
     for number, floor in enumerate(world.floors):
@@ -165,7 +165,7 @@ def _radio_problems(floor: Floor, where: str) -> Iterator[str]:
 
 
 def tag_problem(kind: TagKind, text: str) -> str:
-    """Return why such a code cannot say ``text``; empty if it can."""
+    """Return why a code of this kind cannot hold ``text``; empty if it can."""
     if kind is TagKind.APRIL and not (text.isdecimal() and text.isascii() and int(text) <= APRIL_MAX):
         return f"an AprilTag has a number from 0 to {APRIL_MAX}"
     if kind is TagKind.QR and not 0 < len(text.encode()) <= QR_BYTES_MAX:

@@ -1,4 +1,4 @@
-"""Environment that the parts of all robots share: the building, the air, and what is seen, heard and reached."""
+"""Environment shared by the parts of all robots: building, things, radio, sound and sight."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Environment:
-    """One world's. ``north``: the direction of north in the world frame, rad."""
+    """Shared objects of one world. ``north``: direction of north in the world frame, rad."""
 
     description: WorldDescription
     building: Building
@@ -43,5 +43,5 @@ class Environment:
 
     @property
     def docks(self) -> Sequence[Sequence[Pose]]:
-        """Charging docks by floor, world frame."""
+        """Poses of the charging docks, by floor (world; m, rad)."""
         return self.building.docks

@@ -1,7 +1,7 @@
-"""Reflections of a lidar: it looks through glass, and around a corner in mirrors.
+"""Reflections of lidar rays: most pass glass, mirrors deflect them.
 
-Glass answers rays that meet it nearly square, and lets all others pass; a mirror sends each on, and what it meets there
-seems to stand behind the mirror. Plane geometry on rows of numbers, as in ``sight``; no state.
+Glass reflects rays that meet it nearly at a right angle, and lets all others pass; a mirror deflects each ray, so that
+its target seems to stand behind the mirror. Plane geometry on rows of numbers, as in ``sight``; no state.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def _cross(a: Vectors, b: Vectors) -> NDArray[np.float64]:
 
 
 def met(edges: Rows, origins: Vectors, ways: Vectors) -> tuple[NDArray[np.float64], Vectors]:
-    """Return how far (m) each ray goes to an edge met from outside (inf: never), and the edge's outward normal."""
+    """Return each ray's distance (m) to the first edge met from outside (inf: none), and its outward normal."""
     if not len(edges):
         return np.full(len(ways), np.inf), np.zeros_like(ways)
     start, along = edges[:, :2], edges[:, 2:] - edges[:, :2]
@@ -42,7 +42,7 @@ def met(edges: Rows, origins: Vectors, ways: Vectors) -> tuple[NDArray[np.float6
 
 
 def met_circles(circles: Rows, origins: Vectors, ways: Vectors) -> NDArray[np.float64]:
-    """The same for circles."""
+    """Return each ray's distance (m) to the first circle met from outside; inf: none."""
     if not len(circles):
         return np.full(len(ways), np.inf)
     off = circles[None, :, :2] - origins[:, None]
@@ -58,9 +58,9 @@ def met_circles(circles: Rows, origins: Vectors, ways: Vectors) -> NDArray[np.fl
 def seen(
     behind: NDArray[np.float64], glass: Rows, mirrors: Rows, edges: Rows, circles: Rows, eye: Vectors, ways: Vectors
 ) -> NDArray[np.float64]:
-    """Distances (m) of a turn from ``eye`` (1, 2) along ``ways`` (unit vectors, world).
+    """Return the distances (m) of a turn from ``eye`` (1, 2) along ``ways`` (unit vectors, world).
 
-    ``behind``: those of a world without glass and mirrors, which ``edges`` and ``circles`` are.
+    ``behind``: distances without glass and mirrors; ``edges`` and ``circles``: the solids of that world.
     """
     found, eyes = behind.copy(), np.repeat(eye, len(ways), axis=0)
     away, normals = met(glass, eyes, ways)

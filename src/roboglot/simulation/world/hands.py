@@ -1,4 +1,4 @@
-"""Hands in a world: the model's ``Stage`` over the physics, for tests, consoles and agents."""
+"""Hands in a world: the model's ``Stage`` on the physics, for tests, consoles and agents."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ TAG_SIZE_MIN, TAG_SIZE_MAX = 0.02, 2.0  # m, as in world files
 
 
 class Hands(Stage):
-    """One world's."""
+    """Hands of one world."""
 
     def __init__(
         self, population: Population, environment: Environment, clock: Clock, faults: Callable[[], Faults]

@@ -1,6 +1,6 @@
-"""Prediction of contacts between robots; while none is possible, the physics looks for none.
+"""Prediction of contacts of robots; while none is possible, the physics does not search for contacts.
 
-The search for contacts is half of a step of the physics, wherever everything is.
+The search takes half of the time of a physics step, even if everything is far apart.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ NO_CONTACTS = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
 
 
 class Meetings:
-    """Counts everything as round, and all floors as one."""
+    """Switches the search for contacts. Treats everything as round, and all floors as one."""
 
     def __init__(
         self, model: mujoco.MjModel, data: mujoco.MjData, hulls: Sequence[Hull], props: Props, *, possible: bool
     ) -> None:
-        """``possible``: whether there may be moments without contacts at all in this world."""
+        """``possible``: whether this world can be without contacts at all."""
         self._model, self._data, self._hulls, self._props, self._possible = model, data, hulls, props, possible
         bodies = np.flatnonzero(model.body_mocapid >= 0)
         bodies = bodies[np.argsort(model.body_mocapid[bodies])]
@@ -47,12 +47,12 @@ class Meetings:
         self._wait = AGAIN
 
     def forget(self) -> None:
-        """Something was put elsewhere at once."""
+        """Search again: something was moved at once."""
         self._switch(off=False)
         self._left, self._others = 0.0, None
 
     def look(self, seconds: float) -> None:
-        """Decide whether the physics looks for contacts in a step of so many ``seconds``."""
+        """Decide whether the physics searches for contacts in a step of ``seconds``."""
         if not self._possible:
             return
         revision = sum(self._props.revisions.values())
@@ -77,7 +77,7 @@ class Meetings:
         return hull.support.sprung and not (hull.disturbed or (hull.rests and hull.pulls))
 
     def _is_calm(self) -> bool:
-        """Return whether all robots stand on springs and nothing is pressed; notes which of them rest."""
+        """Return whether all robots stand on springs without contact forces; note which of them rest."""
         for hull in self._hulls:
             vx, vy, _, _ = hull.motion
             hull.rests = not hull.pulls and abs(vx) < STILL and abs(vy) < STILL
@@ -92,7 +92,7 @@ class Meetings:
         return there, radii.tolist(), np.where(people, PERSON_MAX, 0.0).tolist()
 
     def _free(self) -> float:
-        """Seconds in which nothing can come to touch a robot, HORIZON at most; less than WORTH may be any."""
+        """Return the seconds during which nothing can touch a robot, HORIZON at most; inexact below WORTH."""
         hulls = self._hulls
         free = self._free_of_each_other() if len(hulls) > 1 else HORIZON
         for hull, radius, pull in zip(hulls, self._radii.tolist(), self._pulls.tolist(), strict=True):
@@ -104,7 +104,7 @@ class Meetings:
         return free
 
     def _free_of_others(self, hull: Hull, radius: float, pull: float) -> float:
-        """The same of one robot, and of what is moved by hand."""
+        """Return the same for one robot against people and props."""
         if self._others is None:
             self._others = self._there()
         there, radii, people = self._others
@@ -116,7 +116,7 @@ class Meetings:
         return free
 
     def _free_of_each_other(self) -> float:
-        """The same of all robots among each other."""
+        """Return the same for all pairs of robots."""
         first, second = self._pairs
         places = np.array([(hull.x, hull.y) for hull in self._hulls])
         rest = np.array([hull.rests for hull in self._hulls])
@@ -132,7 +132,7 @@ class Meetings:
 
 
 def _soonest(gap: float, speed: float, pull: float) -> float:
-    """Return when a gap (m) may close, at a speed (m/s) growing so fast (m/s2); HORIZON: never."""
+    """Return the least time (s) to close a gap (m) at speed (m/s) and acceleration ``pull`` (m/s2); HORIZON: never."""
     if not (speed > 0.0 or pull > 0.0):
         return HORIZON
     gap = min(max(gap, 0.0), FAR)

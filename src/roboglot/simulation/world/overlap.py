@@ -1,4 +1,4 @@
-"""True if standing solids share room. Pure geometry, in one floor's plane."""
+"""Test of two standing solids for overlap. Pure geometry, in one floor's plane."""
 
 from __future__ import annotations
 

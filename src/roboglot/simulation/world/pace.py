@@ -1,4 +1,4 @@
-"""True if the machine keeps up with the world, and what the log says when it does not. Knows no robot."""
+"""Watches whether the machine keeps up with the world, and logs it if not. Knows no robot."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ CALM = 6  # windows without a loss after which it is over
 
 
 class Pace:
-    """Adds up the robot time that is skipped. ``speed`` is what is wanted: robot seconds per real second."""
+    """Sum of the skipped robot time. ``speed``: the wanted pace, robot seconds per real second."""
 
     def __init__(self, speed: Callable[[], float]) -> None:
         self._speed = speed
@@ -22,12 +22,12 @@ class Pace:
         self._calm = 0
 
     def skip(self, seconds: float) -> None:
-        """So much robot time was not simulated."""
+        """Note ``seconds`` of robot time that were not simulated."""
         self._lost += seconds
         self._total += seconds
 
     def look(self, now: float) -> None:
-        """Judge, if a window of the clock is over; cheap otherwise."""
+        """Judge the pace at the end of a window of the clock; cheap otherwise."""
         if self._began is None:
             self._began = now
         if now - self._began < WINDOW:

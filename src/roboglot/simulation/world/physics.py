@@ -32,7 +32,7 @@ _compiled = lru_cache(maxsize=8)(build)
 
 
 def _model_of(world: WorldDescription, bodies: Mapping[str, Body]) -> mujoco.MjModel:
-    """Return a model of its own, compiled once for all worlds that are the same: those that are reset or reopened."""
+    """Return a copy of the compiled model, which is cached: worlds are reset and reopened."""
     what = replace(world, faults=()), tuple(bodies.items())
     try:
         hash(what)
@@ -42,7 +42,7 @@ def _model_of(world: WorldDescription, bodies: Mapping[str, Body]) -> mujoco.MjM
 
 
 class Physics:
-    """Raises BadFile if the world cannot be built."""
+    """Physics of one world. Raises BadFile if the world cannot be built."""
 
     def __init__(self, world: WorldDescription, bodies: Mapping[str, Body]) -> None:
         self._model = _model_of(world, bodies)
@@ -84,9 +84,9 @@ class Physics:
         self._sleep = Sleep(model, self._data)
 
     def step(self, seconds: float, meanwhile: Callable[[float], None] | None = None) -> None:
-        """Let ``seconds`` pass with the controls as they are, and note what touches whom.
+        """Let ``seconds`` pass with the present controls, and note what touches each hull.
 
-        ``meanwhile`` is called after every small step with its length, for what must not jump.
+        ``meanwhile`` is called after every small step with its length (s), for objects too fast for a whole tick.
         """
         for hull in self.hulls.values():
             if hull.hand is not None:
@@ -105,7 +105,7 @@ class Physics:
         self._see()
 
     def _see(self) -> None:
-        """Take from a step where all are, and what they touch."""
+        """Read positions, velocities and touches after a step."""
         velocities = self._data.qvel.tolist()
         if self._sleep.settle(velocities):
             velocities = self._data.qvel.tolist()
@@ -129,7 +129,7 @@ class Physics:
             hull.stand(sum(wheel in touching for wheel in hull.wheels) / len(hull.wheels))
 
     def move_person(self, body: str, pose: Pose, floor: int) -> None:
-        """Have a person stand at ``pose``."""
+        """Place a person at ``pose`` (world)."""
         person = self._people[body]
         spots, at = self._spots, 3 * person.mocap
         spots[at], spots[at + 1], spots[at + 2] = pose.x, pose.y, self._elevations[floor] + person.half
@@ -152,14 +152,14 @@ class Physics:
         self._model.body_conaffinity[person.id] = 0
 
     def spare_person(self, there: Container[str]) -> str:
-        """Return a spare person's name that is not ``there``. Raises ValueError when all are."""
+        """Return the name of a spare person that is not ``there``. Raises ValueError if all are."""
         free = next((body for body in visitors() if body not in there), None)
         if free is None:
             raise ValueError(f"no more than {VISITORS_MAX} people can be added to a world")
         return free
 
     def add_obstacle(self, pose: Pose, size: tuple[float, float, float], floor: int) -> int:
-        """Put one of the spare boxes there. Raises ValueError when none is left or the size makes no sense."""
+        """Place one of the spare boxes; return its number. Raises ValueError if none is left or for a bad size."""
         number = next((n for n in range(OBSTACLES_MAX) if n not in self.obstacles), None)
         if number is None:
             raise ValueError(f"no more than {OBSTACLES_MAX} obstacles at a time")
@@ -170,33 +170,33 @@ class Physics:
         return number
 
     def move_obstacle(self, number: int, pose: Pose, floor: int) -> None:
-        """Put a box elsewhere. Raises NotFound."""
+        """Move a box. Raises NotFound."""
         if number not in self.obstacles:
             raise NotFound(f"there is no obstacle {number}")
         self.obstacles[number] = floor, Solid(SolidKind.FURNITURE, pose, self.obstacles[number][1].size)
         self.props.put(f"obstacle {number}", *self.obstacles[number])
 
     def remove_obstacle(self, number: int) -> None:
-        """Put it away."""
+        """Remove a box. Raises NotFound."""
         if self.obstacles.pop(number, None) is None:
             raise NotFound(f"there is no obstacle {number}")
         self.props.remove(f"obstacle {number}")
 
     @property
     def car_lift(self) -> float:
-        """Height of the lift's car above the floor where it was parked, m."""
+        """Height of the lift's car above the floor of ``parked_at``, m."""
         assert self._car is not None
         return float(self._data.qpos[self._car[0]])
 
     def drive_car(self, lift: float) -> None:
-        """Have the car's servo go there."""
+        """Set the goal of the car's servo, as a height like ``car_lift``, m."""
         assert self._car is not None
         self._data.ctrl[self._car[1]] = lift
 
     def _note_touches(self, feet: int) -> None:
-        """Update where something other than a dock presses on each hull, and until it is clear of that again.
+        """Update the places where anything but a dock presses on each hull, until it is clear of the hull again.
 
-        ``feet``: how many may stand on floors.
+        ``feet``: the number of feet that may stand on floors.
         """
         before = self._touched
         for hull in before:

@@ -1,8 +1,8 @@
 """Start places of robots: as configured, at the world's start, on docks (facing away), or beside the first one.
 
-Beside it means side by side in the same room with room ahead, so that each can drive off. More robots than TOGETHER
-are spread over the floor's rooms, the emptiest first, away from doors and people. Where rooms are full, robots have to
-do without room.
+"Beside" means side by side in the same room with space ahead, so that each can drive off. More robots than TOGETHER
+are spread over the floor's rooms, the emptiest first, away from doors and people. Where rooms are full, robots get
+no space around them.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ NEAR, NEAR_STEP = 3.0, 0.1  # m around an occupied place that are searched for a
 
 
 def docks_of(world: WorldDescription) -> list[list[Pose]]:
-    """Per floor, the docks' fronts, +x away from the dock."""
+    """Return the docks' fronts by floor (world), +x away from the dock."""
     return [[dock.pose for dock in floor.docks] for floor in world.floors]
 
 
 @dataclass(frozen=True, slots=True)
 class _Search:
-    """Places for robots of one size around one pose: good ones, and any at all."""
+    """Places for robots of one size around one pose: good ones, and the rest."""
 
     good: Iterator[tuple[Pose, int]]
     rest: Iterator[tuple[Pose, int]]
@@ -45,7 +45,7 @@ class _Search:
 
 @dataclass(slots=True)
 class Places:
-    """Gives places away, one after the other."""
+    """Assigns start places, one after the other."""
 
     world: WorldDescription
     reserved: Sequence[tuple[Pose, int, float]] = ()  # for robots with a configured place; others stay away
@@ -57,7 +57,7 @@ class Places:
     _spots: dict[tuple[int, float, int, float], Iterator[Pose]] = field(default_factory=dict)
 
     def next(self, wanted: Pose | None, floor: int, radius: float) -> tuple[Pose, int]:
-        """Pose and floor for one more robot. Raises ValueError if it cannot stand where it should, or anywhere."""
+        """Return pose and floor for one more robot. Raises ValueError if ``wanted``, or every place, is taken."""
         if not 0 <= floor < len(self.world.floors):
             raise ValueError(f"there is no floor {floor}; the world has {len(self.world.floors)}")
         if wanted is not None and not self.free(wanted, floor, radius):
@@ -92,9 +92,9 @@ class Places:
             yield place
 
     def _spread(self, floor: int, radius: float, here: Sequence[Pose]) -> Iterator[tuple[Pose, int]]:
-        """Yield places in the rooms, those with the fewest robots for their size first; none where there is one room.
+        """Yield places in the rooms, those with the fewest robots for their size first; nothing for a single room.
 
-        A room's places are looked at once: what was none is none for the next robot, robots only get more.
+        Each place is checked once: robots only become more, so a place that was refused stays refused.
         """
         if floor not in self._rooms:
             self._rooms[floor] = rooms_of(self.world.floors[floor], self.world.lift)
@@ -112,7 +112,7 @@ class Places:
                 yield pose, floor
 
     def _roomy(self, rooms: Rooms, key: tuple[int, float, int, float], yaw: float) -> Iterator[Pose]:
-        """Yield places in a room that are clear of all, and of doors, with room ahead; most face the same way."""
+        """Yield places in a room clear of robots, people, solids and doors, with space ahead; most face one way."""
         floor, radius, number, room = key
         people = self.world.floors[floor].people
         for turn, (x, y) in product(TURNS, tuple(rooms.spots(number, 2 * radius + BESIDE))):
@@ -126,7 +126,7 @@ class Places:
                 yield pose
 
     def _near(self, wanted: Pose, floor: int, radius: float) -> Pose | None:
-        """Return a free place within ``NEAR`` of one that is taken, the nearest of a grid."""
+        """Return the nearest free place on a grid within ``NEAR`` of a taken one; None: there is none."""
         steps = range(-round(NEAR / NEAR_STEP), round(NEAR / NEAR_STEP) + 1)
         cells = sorted((math.hypot(i, j), i, j) for i in steps for j in steps)
         x, y = round(wanted.x, 1), round(wanted.y, 1)
@@ -137,9 +137,9 @@ class Places:
         return any(number == floor and pose.distance_to(other) < radius + r for other, number, r in self.reserved)
 
     def _search(self, floor: int, radius: float, around: Pose) -> _Search:
-        """Return iterators over the places around the first robot, nearest first, that go on where they were left.
+        """Return iterators over the places around the first robot, nearest first; the next robot continues them.
 
-        What was no place for such a robot is none for the next one: robots only get more.
+        A place refused to a robot of this size stays refused, as robots only become more.
         """
         step = 2 * radius + BESIDE
         rings = math.ceil(SEARCH / step)
@@ -157,7 +157,7 @@ class Places:
         )
 
     def _good(self, place: Pose, around: Pose, floor: int, radius: float) -> bool:
-        """True if a robot there and all others can drive off, and nothing solid is between it and the first one."""
+        """True if a robot there and all others can drive off, without a solid between it and the first robot."""
         if not (self.free(place, floor, radius) and self.free(place.compose(Pose(AHEAD)), floor, radius)):
             return False
         if self._in_front(place, floor, radius):
@@ -168,19 +168,19 @@ class Places:
         return all(_distance(at, solid) > 0.0 for at in between for solid in self._solids[floor])
 
     def _in_front(self, place: Pose, floor: int, radius: float) -> bool:
-        """True if a robot there would stand in the way of one that drives off."""
+        """True if a robot there would block another that drives off."""
         fronts = ((other.compose(Pose(AHEAD)), r) for other, number, r in self._taken if number == floor)
         return any(place.distance_to(front) < radius + r for front, r in fronts)
 
     def inside(self, pose: Pose, floor: int) -> bool:
-        """True if there is such a floor, and the place lies on it; whatever stands there."""
+        """True if the floor exists and the place lies on it, be it occupied or not."""
         if not 0 <= floor < len(self.world.floors) or not math.isfinite(pose.yaw):
             return False
         (x, y), (width, depth) = self.world.floors[floor].origin, self.world.floors[floor].size
         return x <= pose.x <= x + width and y <= pose.y <= y + depth
 
     def free(self, pose: Pose, floor: int, radius: float) -> bool:
-        """True if a robot can stand there without touching anything."""
+        """True if a robot of this radius (m) can stand there without touching anything."""
         storey = self.world.floors[floor]
         for value, low, size in zip((pose.x, pose.y), storey.origin, storey.size, strict=True):
             if not low + radius <= value <= low + size - radius:

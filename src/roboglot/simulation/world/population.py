@@ -1,4 +1,4 @@
-"""The robots and people of one world by name. Truth, hands and the world's time all look them up here."""
+"""The robots and people of one world by name, for its truth, hands and steps."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ P = TypeVar("P")
 
 @dataclass(frozen=True, slots=True)
 class Population:
-    """``robots`` and ``simulated`` grow as robots are equipped; their hulls stand in the physics from the start."""
+    """``robots`` and ``simulated`` grow as robots are equipped; their hulls are in the physics from the start."""
 
     physics: Physics
     walkers: list[Walker]  # shared by everything that observes people
@@ -57,21 +57,21 @@ class Population:
         return self.simulated[name].find(kind)
 
     def part(self, name: str, kind: type[P], interface: type[Component]) -> P:
-        """Return the same. Raises ComponentMissing where the body has none."""
+        """Return the same part. Raises ComponentMissing if the body has none."""
         part = self.find(name, kind)
         if part is None:
             raise ComponentMissing(interface)
         return part
 
     def walker(self, name: str) -> Walker:
-        """Return a person by name, or by place in the file: "person 0 2" is the third on the lowest floor."""
+        """Return a person by name or by place in the file ("person 0 2": the third on floor 0). Raises NotFound."""
         for walker in self.walkers:
             if walker.key == name:
                 return walker
         raise NotFound(f"no person here is named {name!r}")
 
     def add_walker(self, pose: Pose, floor: int, name: str) -> Walker:
-        """Add a person who is not in the world file. Raises ValueError for a taken name, or too many."""
+        """Add a person who is not in the world file. Raises ValueError for a taken name or too many people."""
         body = self.physics.spare_person({walker.body for walker in self.walkers})
         if any(walker.key == (name or body) for walker in self.walkers):
             raise ValueError(f"there is a person {name or body} already")

@@ -1,4 +1,4 @@
-"""Named streams of chance: one seed, one independent generator for each purpose, so that none disturbs another."""
+"""Named random streams: one seed, an independent generator for each purpose."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 
 class Chances:
-    """All streams of one world."""
+    """All random streams of one world."""
 
     def __init__(self, seed: int) -> None:
         self.seed = seed
@@ -17,15 +17,15 @@ class Chances:
         self._drawers: list[Callable[[], None]] = []
 
     def of(self, *names: str) -> np.random.Generator:
-        """Return the generator that belongs to these names: the same one every time."""
+        """Return the generator of these names, the same at every call."""
         return self._streams.setdefault(names, _stream(self.seed, names))
 
     def on_reseed(self, forget: Callable[[], None]) -> None:
-        """Call ``forget`` at every reseeding: for parts that draw numbers before they need them."""
+        """Call ``forget`` at every reseeding: for parts that draw numbers in advance."""
         self._drawers.append(forget)
 
     def reseed(self, seed: int) -> None:
-        """Have every stream go on as if the world had begun with ``seed`` now."""
+        """Restart every stream as in a new world with ``seed``."""
         self.seed = seed
         for forget in self._drawers:
             forget()

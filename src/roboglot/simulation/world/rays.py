@@ -1,4 +1,4 @@
-"""Rays in three dimensions: what solid thing they meet first. Truth, world frame."""
+"""Rays in three dimensions to the first solid. Truth, world frame."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ COMPILED = (2, 3, 5, 6)  # MuJoCo's numbers of the shapes that the kernel suppor
 
 
 class Rays:
-    """Casts them against everything but the robot that looks."""
+    """Casts rays against everything but the observing robot."""
 
     def __init__(self, model: MjModel, data: MjData) -> None:
         import mujoco  # loading takes a quarter of a second
@@ -33,7 +33,7 @@ class Rays:
         self._outdated = False  # whether people and props may have moved since the physics placed all shapes
 
     def outdate(self) -> None:
-        """Take note that the physics sleeps while people walk on."""
+        """Mark the shapes' places as outdated: the physics sleeps while people walk on."""
         self._outdated = True
 
     def _place_shapes(self) -> None:
@@ -42,9 +42,9 @@ class Rays:
             self._mujoco.mj_kinematics(self._model, self._data)
 
     def load_kernel(self) -> None:
-        """Cast by the compiled kernel from now on, where the world has no other shapes than it knows.
+        """Use the compiled kernel from now on, if it supports all shapes of the world.
 
-        Its distances agree with those of MuJoCo to rounding, but not to the last bit.
+        Its distances equal MuJoCo's up to rounding.
         """
         if np.isin(self._model.geom_type, COMPILED).all():
             with loading():
@@ -55,9 +55,9 @@ class Rays:
     def cast(
         self, origins: NDArray[np.float64], directions: NDArray[np.float64], reach: float, viewer: Hull
     ) -> NDArray[np.float64]:
-        """Distances (m) along ``directions`` (n x 3, of length 1); inf where nothing is nearer than ``reach``.
+        """Return distances (m) along ``directions`` (n x 3, of length 1); inf where nothing is nearer than ``reach``.
 
-        From each of the ``origins`` (m x 3) go as many of them, in their order.
+        The directions are split evenly among the ``origins`` (m x 3), in order.
         """
         self._place_shapes()
         if self._kernel is None:
@@ -75,7 +75,7 @@ class Rays:
     def _cast_slowly(
         self, origin: NDArray[np.float64], directions: NDArray[np.float64], reach: float, viewer: Hull
     ) -> NDArray[np.float64]:
-        """The same by MuJoCo, which knows every shape."""
+        """Return the same from MuJoCo, which supports every shape."""
         count = len(directions)
         found, distances = np.empty(count, np.int32), np.empty(count)
         ways = np.ascontiguousarray(directions).ravel()
@@ -87,7 +87,7 @@ class Rays:
         return distances
 
     def meet(self, origin: NDArray[np.float64], way: NDArray[np.float64], viewer: Hull) -> tuple[float, str] | None:
-        """Return the first hit on the straight ``way`` from ``origin`` (3 each, m): its share of it, and its name."""
+        """Return the first hit on the straight ``way`` from ``origin`` (3 each, m): share of the way, and name."""
         self._place_shapes()
         found = np.zeros(1, np.int32)
         with self._looking_through(viewer):

@@ -1,4 +1,4 @@
-"""A world as it stands now, as a world file: the building as it was described, and all that can move where it is."""
+"""A world in its present state as a world file: the building as described, all movable things at their places."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ DIGITS = 4  # of metres and degrees
 
 
 def snapshot(population: Population, environment: Environment) -> WorldDescription:
-    """Describe the world with boxes, people and things where they are, and its first robot's place as the start."""
+    """Describe the world with boxes, people and things at their present places, and the first robot's as the start."""
     world = environment.description
     floors = [_floor_now(number, floor, population, environment) for number, floor in enumerate(world.floors)]
     start = world.start
@@ -72,7 +72,7 @@ def _floor_now(number: int, floor: Floor, population: Population, environment: E
 
 
 def _person_now(person: Person, walker: Walker) -> Person:
-    """A person who follows a script begins it anew; one who was sent elsewhere stands there."""
+    """Return a person with the script from its beginning, or standing at the present place without one."""
     if walker.follows_script:
         return replace(person, emotion=walker.emotion)
     spot: Spot = (_rounded(walker.pose.x), _rounded(walker.pose.y))
@@ -94,9 +94,9 @@ def _degrees(radians: float) -> float:
 
 
 def world_toml(world: WorldDescription) -> str:
-    """Return the world's file, in the form of the shipped ones: a table for each floor, an entry a line in its lists.
+    """Return the text of a world file in the style of the shipped ones: a table per floor, a line per list entry.
 
-    Reading it gives the same description again; fields that have their default are left out.
+    Reading it gives the same description again; fields with default values are left out.
     """
     return "\n".join(_lines(world)) + "\n"
 
@@ -139,7 +139,7 @@ def _key(text: str) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Return structs as dictionaries of what differs from the defaults, by the names of the file."""
+    """Return structs as dictionaries of the values that differ from their defaults, by the file's names."""
     if isinstance(value, Struct):
         config = value.__struct_config__
         found: dict[str, object] = {config.tag_field: config.tag} if config.tag_field else {}

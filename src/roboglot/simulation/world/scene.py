@@ -1,7 +1,7 @@
 """The world as a MuJoCo model: floors, solids, lift car, people, spare obstacles, robots. The only maker of geoms.
 
-Contacts by bits: a robot's chassis and things meet what MOVES, and near walls what STANDS; its torso, as wide as the
-chassis, only what HANGS above the chassis or moves; the casters that carry robots touch floors only.
+Contacts by bits: chassis and things collide with solids that MOVE, and near walls with those that STAND; a torso, as
+wide as the chassis, only with those that HANG above the chassis or move; the casters under robots touch floors only.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ TYRES = 0.4  # N m s/rad per kg: damping of the body by tyres and suspension
 
 
 def build(world: WorldDescription, robots: Sequence[tuple[str, Body]]) -> mujoco.MjModel:
-    """The compiled model. Raises BadFile if there is too much in it."""
+    """Return the compiled model. Raises BadFile for too many solids."""
     spec = _empty_spec()
     root = spec.worldbody
     solids = 0
@@ -87,7 +87,7 @@ def _empty_spec() -> mujoco.MjSpec:
 
 
 def _add_floor(spec: mujoco.MjSpec, world: WorldDescription, number: int, floor: Floor, solids: int) -> int:
-    """Add a storey with all that is on it; return the number of solids, ``solids`` before."""
+    """Add a storey with everything on it; return the new total of solids, after ``solids`` before."""
     root, elevation = spec.worldbody, world.elevation(number)
     _add_slabs(root, floor, world.lift, elevation)
     hanging = root.add_body(name=f"hanging {number}")
@@ -107,7 +107,7 @@ def _add_floor(spec: mujoco.MjSpec, world: WorldDescription, number: int, floor:
 
 
 def visitors() -> list[str]:
-    """Return the physics' names of the spare people, who can be put into a world while time passes."""
+    """Return the physics' names of the spare people, who can be added to a running world."""
     return [f"visitor {number}" for number in range(1, VISITORS_MAX + 1)]
 
 
@@ -128,7 +128,7 @@ class _Placed(TypedDict, total=False):
 def _add_standing(
     body: mujoco.MjsBody, kind: mujoco.mjtGeom, size: list[float], bits: int, **placed: Unpack[_Placed]
 ) -> None:
-    """A geom that robots bump into and rays hit."""
+    """Add a geom that robots bump into and rays hit."""
     body.add_geom(type=kind, size=size, contype=0, conaffinity=bits, friction=[0.3, 0.005, 0.0001], **placed)
 
 
@@ -161,7 +161,7 @@ def _add_solid(root: mujoco.MjsBody, solid: Solid, elevation: float, name: str, 
 
 
 def _add_car(spec: mujoco.MjSpec, lift: Lift, elevation: float) -> None:
-    """The lift car's floor on a slide joint; gravity compensated, so that it stands exactly where it is put."""
+    """Add the lift car's floor on a slide joint; without gravity, so that it stands exactly at its goal."""
     yaw = math.radians(lift.facing)
     car = spec.worldbody.add_body(
         name="car",
@@ -182,7 +182,7 @@ def _add_car(spec: mujoco.MjSpec, lift: Lift, elevation: float) -> None:
 
 
 def _add_terrain(spec: mujoco.MjSpec, terrain: Terrain, elevation: float, name: str) -> None:
-    """Convex pieces that carry wheels as floors do."""
+    """Add convex pieces that carry wheels as floors do."""
     for index, corners in enumerate(pieces_of(terrain)):
         shape = [(x, y, z + elevation) for x, y, z in corners]
         spec.add_mesh(name=f"{name} {index}", uservert=[value for corner in shape for value in corner])
@@ -196,7 +196,7 @@ def _add_terrain(spec: mujoco.MjSpec, terrain: Terrain, elevation: float, name: 
 
 
 def _add_thing(root: mujoco.MjsBody, thing: Thing, elevation: float) -> None:
-    """A can on a frictionless foot: it never falls over; damping stands for its friction on the floor."""
+    """Add a can on a frictionless foot: it never falls over; damping stands for its friction on the floor."""
     never = mujoco.mjtSleepPolicy.mjSLEEP_NEVER  # it may be moved at any time
     body = root.add_body(name=f"thing {thing.name}", sleep=never)
     for axis, direction, damping in (("x", [1, 0, 0], 1.0), ("y", [0, 1, 0], 1.0), ("z", [0, 0, 1], 0.0)):
@@ -214,7 +214,7 @@ def _add_thing(root: mujoco.MjsBody, thing: Thing, elevation: float) -> None:
 
 
 def _add_foot(body: mujoco.MjsBody, name: str, radius: float, at: tuple[float, float]) -> None:
-    """A frictionless ball under a body. Its priority: contacts take its friction (none), not the larger of the two."""
+    """Add a frictionless ball under a body. By its priority, contacts take its friction, not the larger of the two."""
     body.add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_SPHERE,
@@ -229,7 +229,7 @@ def _add_foot(body: mujoco.MjsBody, name: str, radius: float, at: tuple[float, f
 
 
 def _add_robot(spec: mujoco.MjSpec, name: str, body: Body, tilting: bool) -> None:
-    """A chassis that drives, and a torso on a slide above it."""
+    """Add a robot: a driven chassis, and a torso on a slide above it."""
     chassis = spec.worldbody.add_body(name=name)
     _add_chassis(chassis, name, body, tilting)
     _add_torso(spec, chassis, name, body)
@@ -237,9 +237,9 @@ def _add_robot(spec: mujoco.MjSpec, name: str, body: Body, tilting: bool) -> Non
 
 
 def _add_chassis(chassis: mujoco.MjsBody, name: str, body: Body, tilting: bool) -> None:
-    """On slides x, y, z and a hinge, carried by one frictionless caster.
+    """Add the chassis on slides x, y, z and a yaw hinge, carried by one frictionless caster.
 
-    Where the ground is uneven (``tilting``), hinges for pitch and roll too, carried by a foot where each wheel is.
+    On uneven ground (``tilting``) it also has hinges for pitch and roll, and a foot in place of each wheel.
     """
     hull = body.hull
     for axis, direction in (("x", [1, 0, 0]), ("y", [0, 1, 0]), ("z", [0, 0, 1])):
@@ -295,7 +295,7 @@ def _bumper_travel(body: Body) -> float:
 
 
 class Cylinder(NamedTuple):
-    """An upright one; ``base`` is the height of its underside (m)."""
+    """An upright cylinder; ``base``: height of its underside. All in m."""
 
     radius: float
     height: float
@@ -303,7 +303,7 @@ class Cylinder(NamedTuple):
 
 
 def _add_hull(body: mujoco.MjsBody, name: str, shape: Cylinder, mass: float, bits: int, travel: float = 0.0) -> None:
-    """A cylinder that bumps into things; contacts count, without force, from ``travel`` m on before it touches."""
+    """Add a cylinder that bumps into things; within ``travel`` m, contacts are reported without a force."""
     body.add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_CYLINDER,
@@ -332,7 +332,7 @@ def _add_waist(body: mujoco.MjsBody, name: str, radius: float, gap: float, top: 
 
 
 def _add_drive(spec: mujoco.MjSpec, name: str, body: Body) -> None:
-    """Velocity servos along x, y and around z, as strong as the wheels' grip on the floor."""
+    """Add velocity servos along x, y and around z, as strong as the wheels' grip on the floor."""
     hull = body.hull
     grip = body.base.traction * hull.mass * GRAVITY
     inertia = hull.mass * hull.radius**2 / 2

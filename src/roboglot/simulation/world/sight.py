@@ -1,7 +1,7 @@
 """Sight in a horizontal plane of the world: still solids, people, obstacles, things, the other robots.
 
-Truth, world frame; knows no sensor. Edges and circles are rows of numbers here: x, y, x, y of two ends, and x, y,
-radius, 0.
+Truth, world frame; knows no sensor. Edges and circles are rows of numbers here: x, y, x, y of both ends; and x, y,
+radius, 0 (m).
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ Four = tuple[float, float, float, float]
 
 
 class Sight:
-    """Casts rays for the sensors. What moves is looked at anew each time."""
+    """Casts rays for the sensors, always against the present places of moving objects."""
 
     def __init__(
         self,
@@ -64,9 +64,9 @@ class Sight:
         self._edges: dict[tuple[int, float], tuple[int, Rows]] = {}  # by floor and height, with the props' revision
 
     def load_kernel(self) -> None:
-        """Cast by the compiled kernel from now on; takes a second, some more when nothing is compiled yet.
+        """Use the compiled kernel from now on; loading takes a second, or several to compile it first.
 
-        Its distances agree with those of numpy to rounding, but not to the last bit.
+        Its distances equal numpy's up to rounding.
         """
         with loading():
             from roboglot.kernels import sweep as compiled
@@ -78,9 +78,9 @@ class Sight:
         self._moving.clear()
 
     def turn(self, hull: Hull, height: float, rays: int, reach: float, bearing: float = 0.0) -> Distances:
-        """Distances of a full turn around the middle of ``hull``, ``height`` m above its floor; see ``sweep``.
+        """Return distances (m) of a full turn around ``hull``'s middle, ``height`` m above its floor; see ``sweep``.
 
-        ``bearing``: where the ray in the middle points to, rad in base_link.
+        ``bearing``: direction of the middle ray, rad in base_link.
         """
         floor = hull.floor
         key = floor, round(height, 3)
@@ -95,7 +95,7 @@ class Sight:
         return self._cast(edges, circles, _ways(rays), hull.x, hull.y, hull.turned + bearing, reach)
 
     def dark(self, hull: Hull, height: float, rays: int, reach: float, share: float) -> Distances:
-        """The same as ``turn`` if nothing but the black ones of the still furniture stood there: ``share`` of it."""
+        """Return the distances as ``turn`` to the black pieces of still furniture only: ``share`` of all pieces."""
         key = hull.floor, round(height, 3), share
         kept = self._dark.get(key)
         if kept is None:
@@ -105,7 +105,7 @@ class Sight:
         return self._cast(*kept, _ways(rays), hull.x, hull.y, hull.turned, reach)
 
     def glossy(self, hull: Hull, height: float, rays: int, reach: float, exact: Distances) -> Distances:
-        """Return a lidar's turn with glass and mirrors, from the ``exact`` one without."""
+        """Return the distances of a lidar's turn with glass and mirrors; ``exact``: those without reflections."""
         if not self._glossy[hull.floor]:
             return exact
         circles, ways = self._circles_at(hull.floor, height), _ways(rays)
@@ -122,7 +122,7 @@ class Sight:
         return found
 
     def _edges_with_props(self, key: tuple[int, float], height: float) -> tuple[int, Rows]:
-        """The edges of still solids and of movable boxes, and their revision; kept until one of the boxes moves."""
+        """Return the revision of the props and the edges of still solids and props; cached until a prop moves."""
         floor = key[0]
         if len(self._edges) > KEPT_MAX:
             self._edges.clear()
@@ -132,7 +132,7 @@ class Sight:
         return kept
 
     def _circles_at(self, floor: int, height: float) -> Rows:
-        """Round things that stand still, and all that moves."""
+        """Return the circles of round solids and of everything that moves."""
         moving = [*self._people_at(floor, height), *self._robots_at(floor, height), *self._things_at(floor, height)]
         _, circles = self._floors[floor].at(height)
         if not moving:
@@ -150,7 +150,7 @@ class Sight:
         return found
 
     def _robots_at(self, floor: int, height: float) -> list[Four]:
-        """All hulls: a robot that looks is within its own circle, and nothing is seen from within."""
+        """Return the circles of all hulls; the observing robot is inside its own, which is invisible from inside."""
         return [
             (hull.x, hull.y, hull.body.hull.radius, 0.0)
             for hull in self._hulls
@@ -168,13 +168,13 @@ class Sight:
 
 
 def _sweep(edges: Rows, circles: Rows, ways: Rows, x: float, y: float, yaw: float, reach: float) -> Distances:
-    """With numpy, which knows plane vectors as complex numbers."""
+    """Sweep with numpy, whose plane vectors are complex numbers."""
     return sweep(edges.view(np.complex128), circles.view(np.complex128), x, y, yaw, len(ways), reach)
 
 
 @lru_cache(maxsize=8)
 def _ways(rays: int) -> Rows:
-    """Unit vectors of a turn, x and y."""
+    """Return the unit vectors of a turn (n x 2: x, y)."""
     return directions(rays).view(np.float64).reshape(rays, 2)
 
 
@@ -190,7 +190,7 @@ def _rows(numbers: list[Four]) -> Rows:
 
 
 class _Still:
-    """The still solids of a floor, sliced; slices are kept, since heights change little."""
+    """The still solids of a floor, sliced by height; slices are cached, as heights change little."""
 
     def __init__(self, solids: list[Solid]) -> None:
         self.solids = solids
@@ -199,7 +199,7 @@ class _Still:
         self._slices: dict[int, tuple[Rows, Rows]] = {}
 
     def at(self, height: float) -> tuple[Rows, Rows]:
-        """Edges and circles at ``height`` above the floor."""
+        """Return edges and circles at ``height`` m above the floor."""
         band = bisect_right(self._steps, height)
         if band not in self._slices:
             self._slices[band] = _edges_at(self.solids, height), _circles_at(self.solids, height)
@@ -213,7 +213,7 @@ def _slopes_at(terrain: Terrain, height: float) -> Iterator[Solid]:
 
 
 def _edges_at(solids: Sequence[Solid], height: float) -> Rows:
-    """The edges of the boxes at ``height``, counter-clockwise around each."""
+    """Return the edges of the boxes at ``height``, counter-clockwise around each."""
     edges: list[Four] = []
     for solid in solids:
         if solid.round or not solid.base <= height < solid.base + solid.size[2]:
@@ -228,7 +228,7 @@ def _edges_at(solids: Sequence[Solid], height: float) -> Rows:
 
 
 def _circles_at(solids: Sequence[Solid], height: float) -> Rows:
-    """The cylinders at ``height``."""
+    """Return the circles of the cylinders at ``height``."""
     circles = [
         (solid.pose.x, solid.pose.y, solid.size[0] / 2, 0.0)
         for solid in solids

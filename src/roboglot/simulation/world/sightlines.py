@@ -1,6 +1,6 @@
-"""Lines of sight in three dimensions: what stands between a place and another. Truth, world frame, per floor.
+"""Lines of sight between places in three dimensions. Truth, world frame, per floor.
 
-People count as the block that holds their body as they hold it, robots as cylinders. Ramps and floors hide nothing.
+A person counts as the block around the present posture, a robot as a cylinder. Ramps and floors hide nothing.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Row = tuple[float, ...]
 class Obstacles:
     """Obstacles on a floor at one moment.
 
-    Rows: middle x, y, z from the floor, half extents x, y, z, yaw, and 1 for a cylinder. ``movers``: their row numbers.
+    Rows: middle x, y, z from the floor, half extents x, y, z, yaw, 1 for a cylinder. ``movers``: rows of moving ones.
     """
 
     rows: Floats
@@ -38,7 +38,7 @@ class Obstacles:
     elevation: float
 
     def clear(self, eye: Floats, places: Floats, but: Iterable[Hull | Walker]) -> NDArray[np.bool_]:
-        """Return for each place (n, 3; world) whether nothing but ``but`` stands before it."""
+        """Return for each place (n, 3; world) whether nothing except ``but`` hides it from ``eye``."""
         rows = np.delete(self.rows, [self.movers[one] for one in but if one in self.movers], axis=0)
         ways = places - eye
         lengths = np.linalg.norm(ways, axis=1)
@@ -49,14 +49,14 @@ class Obstacles:
 
 
 class SightLines:
-    """``walkers``, ``hulls`` and ``props`` are looked at anew each time."""
+    """Lines of sight of one world, always past the present ``walkers``, ``hulls`` and ``props``."""
 
     def __init__(self, world: WorldDescription, hulls: Sequence[Hull], walkers: Sequence[Walker], props: Props) -> None:
         self._world, self._hulls, self._walkers, self._props = world, hulls, walkers, props
         self._still: dict[int, list[Row]] = {}
 
     def now(self, floor: int) -> Obstacles:
-        """All that stands there."""
+        """Return all obstacles on a floor, at their present places."""
         if floor not in self._still:
             solids = solids_of(self._world.floors[floor], self._world.lift, lift_here=True)
             # Docks are props.
@@ -74,7 +74,7 @@ class SightLines:
         return Obstacles(np.array(rows).reshape(-1, 8), movers, self._world.elevation(floor))
 
     def leads(self, walker: Walker, spot: Point) -> bool:
-        """True if the person can walk straight to that place: over nothing, and no one stands there."""
+        """True if the person can walk straight to that place: the way and the place are free."""
         obstacles, (x, y) = self.now(walker.floor), (walker.pose.x, walker.pose.y)
         away = max(1e-6, math.hypot(spot.x - x, spot.y - y))
         beyond = 1.0 + walker.person.radius / away
@@ -112,7 +112,7 @@ def _person_row(walker: Walker) -> Row:
 
 
 def _meet_boxes(blocks: Floats, eye: Floats, ways: Floats) -> NDArray[np.bool_]:
-    """Return for each way whether it leads through a box (slab test in the boxes' own frames)."""
+    """Return for each way whether it passes through a box (slab test in the boxes' own frames)."""
     if not len(blocks):
         return np.zeros(len(ways), dtype=bool)
     c, s = np.cos(blocks[:, 6]), np.sin(blocks[:, 6])
@@ -128,7 +128,7 @@ def _meet_boxes(blocks: Floats, eye: Floats, ways: Floats) -> NDArray[np.bool_]:
 
 
 def _meet_cylinders(blocks: Floats, eye: Floats, ways: Floats) -> NDArray[np.bool_]:
-    """Return for each way whether it leads through a standing cylinder."""
+    """Return for each way whether it passes through a standing cylinder."""
     if not len(blocks):
         return np.zeros(len(ways), dtype=bool)
     off = eye - blocks[:, :3]

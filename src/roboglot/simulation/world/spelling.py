@@ -1,4 +1,4 @@
-"""Suggests the word that was meant by a mistyped one."""
+"""Suggests the nearest known word for a mistyped one."""
 
 from __future__ import annotations
 
@@ -7,6 +7,6 @@ from collections.abc import Iterable
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """``"; did you mean 'x'?"``, or nothing when nothing is near."""
+    """Return ``"; did you mean 'x'?"``; empty if no known word is near."""
     near = difflib.get_close_matches(word, sorted(known), n=1)
     return f"; did you mean {near[0]!r}?" if near else ""

@@ -1,4 +1,4 @@
-"""Ground truth of a world: for tests, recordings and overlays. Changes nothing; no robot may ask it."""
+"""Ground truth of a world: for tests, recordings and overlays. Read only; no robot may use it."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ class Truth:
         self._population, self._environment = population, environment
 
     def pose_of(self, name: str) -> Pose:
-        """Return where a robot's base_link is. Raises NotFound."""
+        """Return the pose of a robot's base_link. Raises NotFound."""
         return self._population.hull(name).pose
 
     def height_of(self, name: str) -> float:
-        """Return how high a robot's base_link is above its floor's level, m: on a ramp, or held up by a hand."""
+        """Return a robot's base_link's height above its floor's level, m: on a ramp, or lifted. Raises NotFound."""
         return self._population.hull(name).rise
 
     def floor_of(self, name: str) -> int:
-        """Return which floor a robot is on; 0 is the lowest."""
+        """Return the floor of a robot; 0 is the lowest. Raises NotFound."""
         return self._population.hull(name).floor
 
     def has_room(self, name: str, pose: Pose) -> bool:
-        """Return whether a robot could stand there, on its floor, without touching a still thing or another robot."""
+        """Return whether a robot could stand there, on its floor, without touching a still solid or another robot."""
         hull = self._population.hull(name)
         others = (h for h in self._population.hulls.values() if h is not hull and h.floor == hull.floor)
         radius = hull.body.hull.radius
@@ -42,11 +42,11 @@ class Truth:
 
     @property
     def people(self) -> Sequence[tuple[int, Pose]]:
-        """Everyone's floor and pose."""
+        """Floor and pose of each person."""
         return [(walker.floor, walker.pose) for walker in self._population.walkers]
 
     def held_by(self, name: str) -> Thing | None:
-        """Return what a robot's gripper really holds."""
+        """Return the thing that a robot's gripper really holds; None: nothing. Raises NotFound."""
         gripper = self._population.find(name, SimulatedGripper)
         return gripper.holds if gripper else None
 

@@ -75,8 +75,8 @@ def _version() -> str:
 class World:
     """A described world with robots in it, and its time. Raises ValueError in plain words if it cannot be built.
 
-    ``truth`` is what really is the case; ``hands`` change it, and what they do is noted ``outside``; ``own_hands`` are
-    those of the world itself; ``faults`` break things.
+    ``truth`` reads the world's real state; ``hands`` change it, and their actions are noted in ``outside``;
+    ``own_hands`` are those of the world itself; ``faults`` break things.
     """
 
     def __init__(
@@ -120,7 +120,7 @@ class World:
         self._pace = Pace(lambda: clock.speed if isinstance(clock, RealClock) else 1.0)
 
     def _make_environment(self, seed: int) -> Environment:
-        """Make what the robots' parts share."""
+        """Make the objects that the robots' parts share."""
         description, physics, walkers = self.description, self._physics, self._walkers
         hulls, props, things = list(physics.hulls.values()), physics.props, physics.things
         radio, beads = Radio(description), Beads(physics.rays)
@@ -148,7 +148,7 @@ class World:
         return self._population.hull(name).body.describe(serial=serial, software_version=_version())
 
     def equip(self, robot: Robot) -> None:
-        """Give ``robot`` the simulated components of the body that was placed under its id."""
+        """Give ``robot`` the simulated components of the body with its id."""
         fitting = Fitting(robot, self._population.hull(robot.id), self._environment, TICK)
         turn = 0 if self._clock.repeats else len(self._population.simulated)
         self._population.simulated[robot.id] = SimulatedRobot(fitting, turn)
@@ -156,7 +156,7 @@ class World:
 
     @property
     def robots(self) -> Mapping[str, Robot]:
-        """All that were equipped, by name."""
+        """All equipped robots, by name."""
         return self._population.robots
 
     def robot(self, name: str) -> Robot:
@@ -175,21 +175,21 @@ class World:
 
     @property
     def simulated(self) -> float:
-        """Robot time that was really simulated since the start, s: less than passed on a machine that is too slow."""
+        """Robot time simulated since the start, s: less than the clock's on a machine that is too slow."""
         return self._ticks * TICK
 
     def chance(self, purpose: str) -> np.random.Generator:
-        """Return random numbers for one purpose, from the world's seed."""
+        """Return the random generator of one purpose, from the world's seed."""
         return self._environment.chances.of(purpose)
 
     async def prepare(self, *, wait: bool) -> None:
-        """Load the compiled kernels; return at once, or with ``wait`` when they are used (a lockstep world waits)."""
+        """Load the compiled kernels; return at once, or with ``wait`` once they are in use (a lockstep world waits)."""
         self._loading = asyncio.create_task(self._load_kernels(), name="kernels of the world")
         if wait:
             await self._loading
 
     async def _load_kernels(self) -> None:
-        """Have the sensors use the compiled kernels; missing ones are compiled first, in a process of their own."""
+        """Switch the sensors to the compiled kernels; missing ones are compiled first, in a process of their own."""
         with contextlib.suppress(KernelsUnavailable):  # autonomy reports it; sensors continue without it
             await compile_beside(("sweep", "rays"))
             await load(self._environment.sight.load_kernel)
@@ -220,9 +220,9 @@ class World:
         self._clock.in_turn(self._advance, first=True)
 
     def _advance(self) -> None:
-        """Do a tick that is due; others get their turn before the next one, even if it is due as well.
+        """Do a tick that is due; other tasks get their turn before the next one, even if it is due as well.
 
-        A machine that is too slow skips robot time instead of running after it.
+        A machine that is too slow skips robot time instead of catching up.
         """
         if self._timer is None:
             return  # closed
@@ -235,7 +235,7 @@ class World:
         self._clock.in_steps(self._steps(due > 0))
 
     def _steps(self, due: bool) -> Iterator[None]:
-        """Do the steps of a tick, if it is ``due``, and wait for the next one."""
+        """Do the steps of a tick, if it is ``due``, and schedule the next one."""
         if due:
             for _ in self._tick():
                 yield
@@ -277,7 +277,7 @@ class World:
                     self._sound(walker, step)
 
     def _sound(self, walker: Walker, step: Say | Clap) -> None:
-        """Let a person be heard, unless there are too many sounds already."""
+        """Emit a person's sound, unless there are too many sounds already."""
         speech: Speech | None = None
         match step:
             case Say(text=text):

@@ -1,6 +1,6 @@
-"""Finds worlds: shipped, one's own, or a ROS map (``yaml`` beside an image, as map_server saves it) as one floor.
+"""Finds worlds: shipped, the user's own, or a ROS map (``yaml`` beside an image, as map_server saves it) as one floor.
 
-Occupied cells become walls, exactly; unknown cells are empty space. A dock is put where there is most room.
+Occupied cells become walls, exactly; unknown cells are empty space. A dock is put in a roomy place.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class RosMap(Struct, frozen=True):
 
 
 def load_world(name_or_path: str | Path) -> WorldDescription:
-    """A shipped world by name, one's own TOML file, or any ROS map (yaml). Raises BadFile (a ValueError)."""
+    """Load a shipped world by name, a TOML file, or a ROS map (yaml). Raises BadFile (a ValueError)."""
     name = str(name_or_path)
     known = sorted(file.stem for file in WORLDS.glob("*.toml"))
     path = WORLDS / f"{name}.toml" if name in known else Path(name)
@@ -70,14 +70,14 @@ def load_world(name_or_path: str | Path) -> WorldDescription:
 
 
 def world_sources(name_or_path: str) -> list[Path]:
-    """Return the files that make a world: one's own TOML file, or a ROS map and its image."""
+    """Return the files of a world: its TOML file, or a ROS map and its image."""
     shipped = WORLDS / f"{name_or_path}.toml"
     path = shipped if shipped.is_file() else Path(name_or_path)
     return [path] if path.suffix == ".toml" else [path, path.parent / _read(path).image]
 
 
 def import_ros_map(path: Path) -> WorldDescription:
-    """The world that a ROS map shows. Raises BadFile."""
+    """Return a ROS map as a world of one floor. Raises BadFile."""
     ros_map = _read(path)
     occupied, free = _cells(ros_map, _pixels(path.parent / ros_map.image))
     if not free.any():
@@ -98,7 +98,7 @@ def import_ros_map(path: Path) -> WorldDescription:
 
 
 def read_ros_grid(path: Path) -> OccupancyGrid:
-    """The same map as the grid that a robot uses, as sure as can be of every known cell. Raises BadFile."""
+    """Return a ROS map as a robot's grid, with full certainty in every known cell. Raises BadFile."""
     ros_map = _read(path)
     occupied, free = _cells(ros_map, _pixels(path.parent / ros_map.image))
     log_odds = np.where(occupied, 127, np.where(free, -127, 0)).astype(np.int8)
@@ -126,7 +126,7 @@ def _read(path: Path) -> RosMap:
 
 
 def _pixels(path: Path) -> NDArray[np.float64]:
-    """The image's brightness 0..255, row 0 at the map's lowest y."""
+    """Return the image's brightness 0..255, row 0 at the map's lowest y. Raises BadFile."""
     try:
         with Image.open(path) as image:
             if image.width * image.height > CELLS_MAX:
@@ -140,7 +140,7 @@ def _pixels(path: Path) -> NDArray[np.float64]:
 
 
 def _cells(ros_map: RosMap, pixels: NDArray[np.float64]) -> tuple[Cells, Cells]:
-    """Return which cells are occupied and which are free, by map_server's rules."""
+    """Return the masks of occupied and of free cells, by map_server's rules."""
     if ros_map.mode == "raw":
         evidence = np.where(pixels <= 100, pixels / 100, 0.5 * (ros_map.free_thresh + ros_map.occupied_thresh))
     else:
@@ -149,7 +149,7 @@ def _cells(ros_map: RosMap, pixels: NDArray[np.float64]) -> tuple[Cells, Cells]:
 
 
 def _solids(ros_map: RosMap, occupied: Cells, path: Path) -> tuple[tuple[Wall, ...], tuple[Box, ...]]:
-    """The occupied cells as boxes; the long ones as walls, which weaken radio waves."""
+    """Return the occupied cells as walls, which weaken radio waves, and short ones as boxes. Raises BadFile."""
     rectangles = cover(occupied)
     if len(rectangles) > SOLIDS_MAX:
         raise BadFile(f"{path}: takes {len(rectangles)} boxes, more than {SOLIDS_MAX}; clean the map of speckles")
@@ -170,7 +170,7 @@ def _solids(ros_map: RosMap, occupied: Cells, path: Path) -> tuple[tuple[Wall, .
 def _place_for_dock(ros_map: RosMap, free: Cells, path: Path) -> tuple[Spot, float]:
     """Return the place of the dock's front and its direction (degrees).
 
-    It faces the open floor, in as much room as can be had, as near to the middle of the map as can be.
+    It faces the open floor, with as much room as possible, then as near to the map's middle as possible.
     """
     cell = ros_map.resolution
     for room in ROOM:
@@ -186,7 +186,7 @@ def _place_for_dock(ros_map: RosMap, free: Cells, path: Path) -> tuple[Spot, flo
 
 
 def _most_central(free: Cells, side: int) -> tuple[int, int] | None:
-    """The middle of that free square of ``side`` cells that lies nearest to the middle of all free cells."""
+    """Return the middle of the free square of ``side`` cells nearest to the middle of all free cells; None: none."""
     if side > min(free.shape):
         return None
     rows, columns = np.nonzero(free)
