@@ -236,10 +236,31 @@ def test_only_the_unwritable_value_is_left_out(tmp_path: Path) -> None:
     thread = WriterThread(files)
     thread.put(tick(1))
     thread.put(Entry("/a/map", "grid", 0, 0, "no map"))
+    thread.put(tick(-1, -1.0))  # a time that the format does not have
     thread.put(tick(2))
     thread.close()
     assert numbers(tmp_path / "x.mcap") == [1, 2]
-    assert thread.dropped == 1
+    assert thread.dropped == 2
+
+
+def test_a_line_logged_in_the_midst_of_a_put_is_taken_along(monkeypatch: pytest.MonkeyPatch) -> None:
+    sink = SlowSink()
+    sink.go_on.set()
+    thread, full, logged = WriterThread(sink), WriterThread._full, list[bool]()
+
+    def collect(self: WriterThread, weight: int) -> bool:  # as the garbage collector may, in any call
+        if not logged:
+            logged.append(True)
+            logged.append(thread.put(tick(1)))
+        return full(self, weight)
+
+    monkeypatch.setattr(WriterThread, "_full", collect)
+    putting = threading.Thread(target=thread.put, args=(tick(2),), daemon=True)
+    putting.start()
+    putting.join(60)
+    assert logged == [True, True]
+    thread.close()
+    assert sink.written == [tick(1), tick(2)]
 
 
 def test_ring_writes_the_last_minutes_and_no_more(tmp_path: Path) -> None:

@@ -64,9 +64,9 @@ class OpenChunk:
 
     def add(self, channel: int, at: int, data: bytes, wall: int, sequence: int) -> None:
         """Take a message along."""
-        self._index.setdefault(channel, []).extend((at, self.size))
         size = len(data)
         self._records += (_message(Opcode.MESSAGE, size + 22, channel, sequence, at, wall), data)
+        self._index.setdefault(channel, []).extend((at, self.size))
         self.size += size + 31
 
     def hand_over(self) -> None:

@@ -39,7 +39,7 @@ class WriterThread:
         self._sink, self._patient = sink, patient
         self._queue: deque[Entry] = deque()
         self._weight = 0
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()  # the garbage collector may log, and so put, in the midst of a put
         self._room = threading.Condition(self._lock)
         self._wake = threading.Event()
         self._settled = threading.Event()
