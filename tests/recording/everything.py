@@ -202,9 +202,9 @@ async def begun(folder: Path, **more: object) -> AsyncIterator[Session]:
         await session.runtime.close()
 
 
-async def hold(folder: Path, rounds: int) -> Session:
-    """Hold a session of ``rounds`` times 20 s of robot time."""
-    async with begun(folder, foxglove={"enabled": True}, ros2={"enabled": True}) as session:
+async def hold(folder: Path, rounds: int, *, field: bool) -> Session:
+    """Hold a session of ``rounds`` times 20 s of robot time; ``field``: with clients of Foxglove and ROS 2, too."""
+    async with begun(folder, foxglove={"enabled": field}, ros2={"enabled": field}) as session:
         clock, rest = session.clock, session.rest
         reader, writer = await asyncio.open_connection(ADDRESS, 40923)
 
@@ -253,8 +253,9 @@ async def hold(folder: Path, rounds: int) -> Session:
                 await clock.advance(2.5)
                 await session.dog_asks(6009, type=0)
                 await clock.advance(1.011)
-                await session.foxglove_drives()
-                await session.ros2_drives()
+                if field:
+                    await session.foxglove_drives()
+                    await session.ros2_drives()
                 await session.console_does("world/remove_box", number=_last_box(session))
                 await session.dog.close()  # the app leaves without notice
                 await clock.advance(6.557)
