@@ -1,4 +1,4 @@
-"""A lithium battery: drains by what the robot does, sags, warms, charges on the dock."""
+"""A lithium battery: drains with the robot's load, sags, warms, charges on the dock."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ TAPER = 0.9  # charge from which the charger reduces its current
 class BatterySection(Struct, frozen=True, forbid_unknown_fields=True):
     """Capacity in Wh; powers in W; ``resistance`` (ohm) makes the voltage sag and the cells warm.
 
-    ``dock`` says how a dock charges it: through "contacts" or "wireless", by a coil. ``life``: cycles after which it
-    holds four fifths of its capacity.
+    ``dock``: charged through "contacts" or "wireless", by a coil. ``life``: cycles after which four fifths of the
+    capacity are left.
     """
 
     capacity: Positive
@@ -55,7 +55,7 @@ class BatterySection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedBattery(Battery):
-    """Charge counted in energy; empty, it lets the base drive no more."""
+    """Battery whose charge counts energy; an empty one locks the base."""
 
     def __init__(
         self,
@@ -99,12 +99,12 @@ class SimulatedBattery(Battery):
 
     @property
     def charge(self) -> float:
-        """0..1, as in the state."""
+        """Charge, 0..1, as in the state."""
         return self._charge
 
     @property
     def temperature(self) -> float:
-        """Celsius, as in the state."""
+        """Temperature in Celsius, as in the state."""
         return self._temperature
 
     @property
@@ -113,12 +113,12 @@ class SimulatedBattery(Battery):
 
     @property
     def _health(self) -> float:
-        """Ageing goes evenly with the cycles."""
+        """Share of the nominal capacity, falling linearly with the cycles."""
         return max(0.3, 1.0 - (1.0 - AGED) * self._cycles / self._section.life)
 
     @property
     def _starved(self) -> bool:
-        """True if it hangs on a dock that gives nothing."""
+        """True if the dock supplies no current and no wire is plugged in."""
         return self.unfed and not self._wire
 
     @property
@@ -130,7 +130,7 @@ class SimulatedBattery(Battery):
         return Supply(self._section.dock) if docked else Supply.NONE
 
     def plug(self, wire: bool) -> None:
-        """Plug a charger in, or pull it out; a robot on a wire does not drive."""
+        """Plug in a charger, or unplug it; a robot on a wire does not drive."""
         self._wire = wire
         if wire:
             self._base.locks.lock("wire", "the robot is charging by wire")
@@ -138,22 +138,22 @@ class SimulatedBattery(Battery):
             self._base.locks.unlock("wire")
 
     def reset(self) -> None:
-        """Be charged as at the start, with no wire plugged in; age and cycles stay."""
+        """Set the charge of the start and unplug the wire; age and cycles stay."""
         self.plug(False)
         self.set_charge(self._section.charge)
 
     def set_charge(self, charge: float) -> None:
-        """Have this charge (0..1) at once: for tests and faults."""
+        """Set the charge (0..1) at once: for tests and faults. Raises ValueError."""
         if not 0.0 <= charge <= 1.0:
             raise ValueError("a charge lies between 0 and 1")
         self._charge = charge
 
     def warm(self, temperature: float) -> None:
-        """Have this temperature (Celsius) at once: for tests."""
+        """Set the temperature (Celsius) at once: for tests."""
         self._temperature = temperature
 
     def sense(self, stamp: float, seconds: float) -> None:
-        """Move ``seconds`` worth of energy."""
+        """Add or draw the energy of ``seconds``, then publish changes."""
         if self._published is None:
             self._published = self._words()  # not charging yet: a robot that wakes up on its dock begins to charge now
         load = self._load()
@@ -179,28 +179,28 @@ class SimulatedBattery(Battery):
             self._events.publish(BatteryChanged(stamp=stamp, percentage=self._charge, charging=self._charging))
 
     def _words(self) -> tuple[int, bool]:
-        """Values whose change is worth an event: percent and charging."""
+        """Return the values whose changes are published: percent and charging."""
         return math.floor(self._charge * 100.0 + 1e-9), self._charging
 
     def _load(self) -> float:
-        """W."""
+        """Return the power that the robot draws, W."""
         rolling = self._section.rolling_resistance * self._hull.body.hull.mass * GRAVITY * self._base.velocity.speed
         moving = (self._hull.traction_power + rolling) / self._section.efficiency
         return self._section.idle_power * self.saving + moving + self._hull.effort
 
     def _charger(self) -> float:
-        """W into the cells: full power, then less towards the end."""
+        """Return the power into the cells, W: full power, then less towards the end."""
         rest = min(1.0, max(0.05, (1.0 - self._charge) / (1.0 - TAPER)))
         return self._section.charge_power * rest
 
     def _open_circuit(self) -> float:
-        """V without load."""
+        """Return the voltage without load, V."""
         part = min(bisect_right(CHARGES, self._charge), len(CHARGES) - 1) - 1
         slope = (VOLTS[part + 1] - VOLTS[part]) / (CHARGES[part + 1] - CHARGES[part])
         return (VOLTS[part] + slope * (self._charge - CHARGES[part])) * self._section.cells
 
     def _feel(self, power: float, seconds: float) -> None:
-        """Current, voltage under it, warmth."""
+        """Update current, voltage and temperature for ``power`` (W; negative: drawn)."""
         inside = self._open_circuit()
         self._current = power / self._voltage
         self._voltage = max(1.0, inside + self._current * self._section.resistance)

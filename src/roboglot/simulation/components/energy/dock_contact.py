@@ -1,4 +1,4 @@
-"""The charging contacts at the rear: whether they touch a dock, by geometry."""
+"""The charging contacts at the rear, which touch a dock by geometry."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class DockContactSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedDockContact(DockContact):
-    """Touches when the rear of the hull meets the middle of a dock's front, near and straight enough."""
+    """Contact while the hull's rear is at the middle of a dock's front, within the tolerances."""
 
     def __init__(
         self, section: DockContactSection, hull: Hull, docks: Sequence[Sequence[Pose]], events: EventStream
@@ -41,7 +41,7 @@ class SimulatedDockContact(DockContact):
         return self._docked
 
     def sense(self, stamp: float, _seconds: float) -> None:
-        """Feel for a dock; while none is near, not in every tick."""
+        """Check for a dock; seldom while none is near."""
         if stamp < self._far:
             return
         hull = self._hull
@@ -56,11 +56,11 @@ class SimulatedDockContact(DockContact):
             self._events.publish(DockContactChanged(stamp=stamp, docked=touches))
 
     def displaced(self) -> None:
-        """The robot was lifted and put elsewhere."""
+        """Check again: the robot was lifted and put elsewhere."""
         self._far = 0.0
 
     def _touches(self) -> tuple[bool, float]:
-        """Return whether the robot touches a dock, and how far out of reach the next one is at least, m."""
+        """Return whether the robot touches a dock, and the least distance to any dock's reach, m."""
         hull, away = self._hull, SELDOM * FASTEST
         x, y, radius, near = hull.x, hull.y, hull.body.hull.radius, self._section.distance
         for dock in self._docks[hull.floor]:

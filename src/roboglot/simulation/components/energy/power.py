@@ -1,4 +1,4 @@
-"""Power modes: saving power lying down, sleeping with the sensors off, switching off and on again."""
+"""Power modes: low power while lying, asleep with the sensors off, off and on again."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _SHARES = {PowerMode.OFF: 0.0, PowerMode.ASLEEP: 0.5, PowerMode.LOW_POWER: 1.0} 
 
 
 class PowerSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """``idle_time``: s of lying until low power; ``wake_time`` in s; ``saving``: share of the idle power then."""
+    """``idle_time``: s of lying until low power; ``wake_time``: s; ``saving``: low power as a share of idle power."""
 
     automatic: bool = False
     idle_time: Positive = 30.0
@@ -36,7 +36,7 @@ class PowerSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedPower(Power):
-    """A robot that is not awake has a locked base and motors off."""
+    """Power modes of a simulated robot: unless awake, its base is locked and its motors are off."""
 
     def __init__(
         self,
@@ -151,7 +151,7 @@ class SimulatedPower(Power):
         self._robot.events.publish(PowerModeChanged(stamp=self._clock.time(), mode=mode))
 
     def sense(self, stamp: float, _seconds: float) -> None:
-        """A robot that has been lying for a while with nothing to do saves power, if that is switched on."""
+        """Go to low power after lying idle for ``idle_time``, if automatic."""
         if self._mode is not PowerMode.AWAKE or self._legs is None or self._legs.posture is not Posture.LYING:
             self._lying_since = None
         elif self._lying_since is None:
@@ -162,7 +162,7 @@ class SimulatedPower(Power):
             self._lying_since = stamp
 
     def close(self) -> None:
-        """The world ends."""
+        """Stop: the world is being closed."""
         if self._switching:
             self._switching.cancel()
 

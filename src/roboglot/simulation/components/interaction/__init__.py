@@ -1,1 +1,1 @@
-"""Simulated parts that people meet: speaker, skin, armor, blaster, remote control."""
+"""Simulated parts for interaction: speaker, skin, armor, blaster, remote control."""

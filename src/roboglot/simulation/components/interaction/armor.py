@@ -1,6 +1,6 @@
-"""Armor plates as rectangles around the hull and at the gimbal: what beads, collisions and hands do to them.
+"""Armor plates as rectangles around the hull and at the gimbal, hit by beads, collisions and hands.
 
-A bead must come fast enough, a collision must push hard enough for the sensitivity; a touch by a person always counts.
+The sensitivity sets the least speed of a bead and force of a collision; a touch by a person always counts.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ AT_GIMBAL = {PlatePlace.GIMBAL_LEFT: 1.0, PlatePlace.GIMBAL_RIGHT: -1.0}
 class ArmorSection(Struct, frozen=True, forbid_unknown_fields=True):
     """Four plates (width, height) around the hull, their middles ``above_floor``; two at the gimbal, if there is one.
 
-    ``gimbal_side``: how far those are from the gimbal's middle.
+    ``gimbal_side``: distance of the latter from the gimbal's middle. All in m.
     """
 
     size: tuple[Positive, Positive]
@@ -55,7 +55,7 @@ class ArmorSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedArmor(Armor):
-    """Also a target of beads."""
+    """Armor that is also a target of beads."""
 
     def __init__(self, section: ArmorSection, hull: Hull, gimbal: SimulatedGimbal | None, events: EventStream) -> None:
         self.plates = (*AROUND, *AT_GIMBAL) if gimbal else (*AROUND,)
@@ -77,7 +77,7 @@ class SimulatedArmor(Armor):
         self._sensitivity = sensitivity
 
     def touch(self, place: PlatePlace) -> None:
-        """A hand taps the plate. Raises NotFound."""
+        """Tap a plate by hand. Raises NotFound."""
         if place not in self.plates:
             raise NotFound(f"there is no plate {place}")
         self._note(place, HitKind.HAND)
@@ -85,7 +85,7 @@ class SimulatedArmor(Armor):
     # -- beads ---------------------------------------------------------------------------------------------------------
 
     def meet(self, origin: Floats, way: Floats) -> tuple[float, str] | None:
-        """Return at which share of a bead's way (world) it hits a plate from outside, and which."""
+        """Return the share of a bead's way (world, 0 to 1) to the first plate hit from outside, and its name."""
         to_body = rotation(self.hull.tilt, self.hull.turned)
         start, along = (origin - self.hull.position) @ to_body, way @ to_body
         best: tuple[float, str] | None = None
@@ -103,7 +103,7 @@ class SimulatedArmor(Armor):
         return best
 
     def struck(self, plate: str, velocity: Floats) -> None:
-        """A bead of this velocity (world, m/s) burst there."""
+        """Note a hit if the bead (velocity in world, m/s) was fast enough."""
         place = PlatePlace(plate)
         _, axes, _ = self._plate(place)
         towards = -float((velocity @ rotation(self.hull.tilt, self.hull.turned)) @ axes[:, 0])
@@ -112,7 +112,7 @@ class SimulatedArmor(Armor):
             self._note(place, HitKind.BEAD)
 
     def _plate(self, place: PlatePlace) -> tuple[Floats, Floats, tuple[float, float]]:
-        """Return its middle, its axes (columns: outwards, sideways, up) in base_link, and its size."""
+        """Return a plate's middle (m), axes (columns: outwards, sideways, up) in base_link, and size (m)."""
         section = self._section
         if place in AROUND:
             axes = rotation((0.0, 0.0), AROUND[place])
@@ -128,7 +128,7 @@ class SimulatedArmor(Armor):
     # -- pushes --------------------------------------------------------------------------------------------------------
 
     def sense(self, stamp: float, seconds: float) -> None:
-        """Feel what touches, and publish all hits since the last time."""
+        """Check the hull's touches, and publish all hits since the last time."""
         if self.hull.touches:
             self._feel(stamp, seconds)
         if self._hits:

@@ -1,4 +1,4 @@
-"""Launches beads along the gimbal's sight line. What becomes of them is the world's business."""
+"""Launches beads along the gimbal's sight line. Their flight is the world's."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from roboglot.simulation.world.beads import Beads
 
 
 class BlasterSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """``muzzle``: ahead of the gimbal's axes; ``spread``: one standard deviation, rad."""
+    """``muzzle``: m ahead of the gimbal's axes; ``spread``: one standard deviation, rad; ``speed`` in m/s."""
 
     muzzle: Positive
     speed: Positive
@@ -31,7 +31,7 @@ class BlasterSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedBlaster(Blaster):
-    """Sits on the gimbal; beads scatter a little and take the robot's own velocity along."""
+    """Blaster on the gimbal; beads scatter a little and add the robot's own velocity."""
 
     def __init__(
         self,
@@ -83,11 +83,11 @@ class SimulatedBlaster(Blaster):
 
     @property
     def idle(self) -> bool:
-        """True if it would go on doing nothing."""
+        """True if there is no bead to fire and no pause to wait for."""
         return not self._due and not self._wait
 
     def control(self, seconds: float) -> None:
-        """Let a bead go when it is time."""
+        """Fire a bead when it is due."""
         if self.idle:
             self.busy.end()
             return

@@ -1,4 +1,4 @@
-"""Coloured lights in zones; what each lamp shows follows from effect and clock alone."""
+"""Coloured lights in zones; each lamp's colour follows from effect and clock alone."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ PACES = {
 
 
 class SimulatedRemoteControl(RemoteControl):
-    """Looks at the device when the companion does, ten times a second."""
+    """Reads the connected device ten times a second."""
 
     def __init__(self, robot: Robot, bluetooth: SimulatedBluetooth) -> None:
         self._robot, self._bluetooth = robot, bluetooth
@@ -47,7 +47,7 @@ class SimulatedRemoteControl(RemoteControl):
         self._gear = gear
 
     def sense(self, stamp: float, _seconds: float) -> None:
-        """Take over what the device's stick and button say."""
+        """Drive by the device's stick, and change the gear by its button."""
         gadget = self._bluetooth.gadget
         if gadget is None or gadget.gadget.kind != "bracelet":
             self._stop()

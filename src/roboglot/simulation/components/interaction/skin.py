@@ -1,4 +1,4 @@
-"""Electronic skin of a simulated body: three patches of the trunk, and one on each leg of those that walk."""
+"""Electronic skin of a simulated body: three patches on the trunk, one on each leg with a foot."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from roboglot.simulation.bodies.part import Fitting, Part
 
 
 class SkinSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """Turns dark and light in patches: three on the trunk, one on each leg with a foot."""
+    """A skin whose patches turn dark and light."""
 
 
 class SimulatedSkin(ShownSkin):
-    """Sees from the feet of its robot which leg stands."""
+    """Skin that reads the standing legs from its robot's feet."""
 
     def __init__(self, robot: Robot, seed: int) -> None:
         super().__init__(robot.clock, f"{seed} {robot.id}")

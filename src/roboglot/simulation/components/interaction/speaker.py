@@ -1,4 +1,4 @@
-"""The loudspeaker: what it says and plays goes into the air, and is published as events once it is over."""
+"""The loudspeaker: emits speech and sounds into the air, and publishes an event at the end of each."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ log = logging.getLogger(__name__)
 
 
 class SpeakerSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """``loudness``: how loud full volume is a metre away, of a microphone's full scale."""
+    """``loudness``: amplitude at full volume 1 m away, as a share of a microphone's full scale."""
 
     loudness: Annotated[float, Meta(gt=0, le=10)]
 
 
 class SimulatedSpeaker(Speaker):
-    """Without a voice on this machine a text takes its time, but makes no sound."""
+    """Speaker; without a voice on this machine, a text takes its time but is silent."""
 
     def __init__(self, section: SpeakerSection, hull: Hull, air: Air, robot: Robot) -> None:
         self._loudness, self._hull, self._air, self._robot = section.loudness, hull, air, robot
@@ -71,7 +71,7 @@ class SimulatedSpeaker(Speaker):
         return self._robot.actions.start("play", run, resources=[SPEAKER], goal=sound.name, source=source)
 
     async def _sound(self, sound: Sound | None, seconds: float, speech: Speech | None) -> None:
-        """Play the sound, if there is any, and wait for its end; silence it when cancelled."""
+        """Play the sound, if any, and wait ``seconds`` for its end; silence it when cancelled. Raises Refused."""
         clock, hull = self._robot.clock, self._hull
         if sound is None:
             await clock.sleep(seconds)

@@ -1,4 +1,4 @@
-"""Cargo boxes whose doors move in time, stall on hands, and lock. People load them through ``put``."""
+"""Cargo boxes with doors that take time, stall on hands, and lock. People load them through ``put``."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ NAMESPACE = uuid.UUID("5d3c53f2-8a51-4b29-9e54-62b0a4f0b9b1")  # of the compartm
 
 
 class CompartmentSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """A group of ``boxes`` side by side."""
+    """A compartment: ``boxes`` side by side."""
 
     orientation: Literal["front", "back", "top"] = "front"
     kind: Literal["takeout", "retail"] = "takeout"
@@ -37,7 +37,7 @@ class CompartmentSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class CargoSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """Compartments from below; ``door_time`` (s) for a door's whole way."""
+    """Compartments from the bottom up; ``door_time``: s for a door's full travel."""
 
     compartments: Annotated[tuple[CompartmentSection, ...], Meta(min_length=1, max_length=20)]
     door_time: Positive
@@ -45,7 +45,7 @@ class CargoSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 @dataclass(slots=True)
 class _Box:
-    """``opening`` 0..1; ``moving`` -1, 0, 1."""
+    """State of a box: ``opening`` 0..1; ``moving`` -1 (closing), 0, 1 (opening)."""
 
     id: int
     opening: float = 0.0
@@ -68,7 +68,7 @@ class _Box:
 
 
 class SimulatedCargo(Cargo):
-    """Doors open and shut at one pace; a door is locked exactly when it is shut."""
+    """Cargo whose doors open and close at one speed; a door is locked exactly while closed."""
 
     def __init__(self, section: CargoSection, robot: Robot) -> None:
         self._section, self._robot = section, robot
@@ -94,7 +94,7 @@ class SimulatedCargo(Cargo):
     # -- people's actions ----------------------------------------------------------------------------------------------
 
     def put(self, id: int, fill: float) -> None:
-        """Have the box be so full (0..1). Refused while its door is not open. ValueError for other numbers."""
+        """Set the fill level of a box (0..1). Raises Refused unless its door is open, ValueError out of range."""
         box = self._get(id)
         if not 0.0 <= fill <= 1.0:
             raise ValueError("the fill level of a box is 0 to 1")
@@ -104,11 +104,11 @@ class SimulatedCargo(Cargo):
         self._publish(box)
 
     def hold_hand_into(self, id: int, there: bool) -> None:
-        """Put a hand or a parcel into the door, or take it out."""
+        """Put a hand or a parcel into the door, or take it out. Raises NotFound."""
         self._get(id).hand = there
 
     def jam(self, id: int, jammed: bool) -> None:
-        """The door's motor fails, or works again."""
+        """Make the door's motor fail, or work again. Raises NotFound."""
         self._get(id).jammed = jammed
 
     # ------------------------------------------------------------------------------------------------------------------
@@ -121,7 +121,7 @@ class SimulatedCargo(Cargo):
         return self._robot.actions.start(name, run, resources={f"box {box.id}"}, goal=box.id, source=source)
 
     async def _move(self, box: _Box, direction: int, action: Action) -> None:
-        """Move the door until it is there; however it ends, the door stands still."""
+        """Move the door to its end; at any end of the action, stop the door. Raises Blocked."""
         box.error = ""
         end = 1.0 if direction > 0 else 0.0
         try:

@@ -1,4 +1,4 @@
-"""The jack: lifts the shelf that the robot stands under, and carries it along."""
+"""The jack: lifts the shelf above the robot, and carries it along."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ LOOK = 0.02  # s between steps
 
 
 class JackSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """A platform on the hull; ``time`` (s) for the whole ``stroke`` (m)."""
+    """A platform on the hull; ``time``: s for the full ``stroke`` (m)."""
 
     stroke: Positive
     time: Positive
 
 
 class SimulatedJack(Jack):
-    """Jack whose top is the hull's while down."""
+    """Jack whose top is level with the hull's while down."""
 
     def __init__(self, section: JackSection, hull: Hull, shelves: Sequence[ShelfStand], robot: Robot) -> None:
         self.stroke = section.stroke
@@ -75,7 +75,7 @@ class SimulatedJack(Jack):
         self._publish()
 
     def sense(self, _stamp: float, _seconds: float) -> None:
-        """Move the shelf with the robot after every tick, and no farther than what stands in its way."""
+        """Move the shelf with the robot after every tick; halt the robot if the shelf meets an obstacle."""
         if self._shelf is None:
             return
         hull, lifted = self._hull, self._lifted(self._shelf)
@@ -89,7 +89,7 @@ class SimulatedJack(Jack):
         self._shelf.move(hull.pose.compose(self._offset), hull.floor, lifted)
 
     def displaced(self) -> None:
-        """Note that the robot was put elsewhere with its load: what the load is in now does not stop it."""
+        """Accept the new place of robot and load: obstacles that the load overlaps there do not stop the robot."""
         if self._shelf is not None:
             pose, floor = self._hull.pose.compose(self._offset), self._hull.floor
             self._free = self._hull.pose, self._shelf.meets(pose, floor, self._lifted(self._shelf))
@@ -129,7 +129,7 @@ class SimulatedJack(Jack):
         return self._hull.body.hull.height + self._position - shelf.shelf.clearance
 
     def _meet_shelf(self) -> None:
-        """Take it up when the platform touches the board; set it down when its legs touch the floor."""
+        """Take up a shelf when the platform touches its board; set it down when its legs touch the floor."""
         if self._shelf is None:
             for shelf in self._shelves:
                 if (

@@ -1,4 +1,4 @@
-"""The robot's radio to the lift: works where the Wi-Fi reaches, hears what the lift broadcasts."""
+"""The robot's radio to the lift: works within the Wi-Fi's range, receives the lift's broadcasts."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from roboglot.simulation.components.system.network import SimulatedNetwork
 
 
 class LiftClientSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """A radio that hears the lift from ``signal_min`` dBm of Wi-Fi on."""
+    """A radio that needs a Wi-Fi signal of ``signal_min`` dBm."""
 
     signal_min: Annotated[float, Meta(ge=-120, le=0)] = -85.0
 
 
 class SimulatedLiftClient(LiftClient):
-    """Keeps what it heard last while out of reach."""
+    """Client that keeps the last received state while out of reach."""
 
     def __init__(self, section: LiftClientSection, lift: LiftCar, robot: Robot) -> None:
         self._section, self._lift, self._robot = section, lift, robot

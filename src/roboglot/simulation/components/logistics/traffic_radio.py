@@ -1,4 +1,4 @@
-"""The radio among robots: heard at once, through walls, as far as its range goes."""
+"""The radio between robots: received at once, through walls, within its range."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from roboglot.simulation.radio.radio import Claimant
 
 
 class TrafficRadioSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """Announces to other robots what this one claims, as far as ``range`` m."""
+    """A radio that sends claims and announcements to other robots within ``range`` m."""
 
     range: Annotated[float, Meta(gt=0, le=10_000)] = 500.0
 
 
 class SimulatedTrafficRadio(TrafficRadio):
-    """``air``: all radios of the world."""
+    """Radio of one robot. ``air``: all radios of the world."""
 
     def __init__(self, section: TrafficRadioSection, hull: Hull, air: list[Claimant]) -> None:
         self._section, self._hull, self._air = section, hull, air

@@ -1,1 +1,1 @@
-"""Simulated components that move something: base, legs, gimbal, arm, and what stops them."""
+"""Simulated components for motion: base, legs, gimbal, arm, and their stops."""

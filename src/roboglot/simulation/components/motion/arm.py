@@ -1,4 +1,4 @@
-"""An arm in a vertical plane: its end point moves straight from place to place in time; the linkage is not modelled."""
+"""An arm in a vertical plane: its end point moves in straight lines over time; the linkage is not modelled."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class ArmSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedArm(Arm):
-    """One axis along the straight way from where a motion began; the reach is convex, so the way stays inside."""
+    """Arm with one axis along the straight way to the goal, which stays inside the convex reach."""
 
     def __init__(self, section: ArmSection, hull: Hull, robot: Robot) -> None:
         self.reach = ArmReach(ArmPosition(*section.lowest), ArmPosition(*section.highest), section.radius)
@@ -54,7 +54,7 @@ class SimulatedArm(Arm):
 
     @property
     def mount(self) -> tuple[float, float, float]:
-        """The end point, base_link."""
+        """Position of the end point in base_link, m."""
         at = self.position
         return self._section.forward + at.x, 0.0, self._hull.belly + self._section.above_belly + at.z
 
@@ -77,7 +77,7 @@ class SimulatedArm(Arm):
         self._halt()
 
     def control(self, seconds: float) -> None:
-        """Go on along the way."""
+        """Move along the way."""
         if self.moving.on:
             self._way.approach(self._length, self._section.speed, seconds)
 

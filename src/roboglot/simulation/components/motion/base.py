@@ -1,5 +1,5 @@
-"""Mecanum or differential drive: kinematics both ways, limited accelerations, brakes. Knows no obstacles; the physics
-does.
+"""Mecanum or differential drive: forward and inverse kinematics, limited accelerations, brakes.
+Obstacles are the physics'.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ NO_WHEELS = WheelSpeeds()
 
 
 class SimulatedBase(Base):
-    """The wheels turn as commanded; whether the body follows is between them, the floor and what stands in the way.
+    """Base whose wheels turn as commanded; whether the body follows depends on floor and obstacles.
 
-    A differential drive has its wheels at the left and at the right: those in front and behind turn alike.
+    On a differential drive, front and rear wheels of a side turn alike.
     """
 
     def __init__(self, section: BaseSection, hull: Hull) -> None:
@@ -87,24 +87,24 @@ class SimulatedBase(Base):
         return self.wheels.twist_of(self.wheels.driven(self._speeds)) if self.wheels.dead else self._twist
 
     def walk(self, walkable: Callable[[Twist], Twist] | None) -> None:
-        """Cut velocities by ``walkable`` from now on: the gait's limits; None: the base's own are enough."""
+        """Limit velocities by ``walkable``, a gait's limits, from now on; None: by the base's own only."""
         self._walkable = walkable or _any
 
     @property
     def refusal(self) -> Refused | None:
-        """The first lock except that of the legs, which stand up when a drive starts."""
+        """Error of the first lock; not of the legs' lock, as they stand up when a drive starts."""
         return self.locks.first(but=LEGS)
 
     @property
     def collides(self) -> bool:
-        """True if the wheels, or what was asked of them, press the hull on what it touches; legs that leap aside."""
+        """True if the velocity, commanded or present, presses the hull on an obstacle; never while legs carry it."""
         if not self.hindrances.touching or self._carried:
             return False
         return self.hindrances.presses(self.wanted)
 
     @property
     def wanted(self) -> Twist:
-        """The velocity that it is to have, or while it is to stand the one that it still has."""
+        """Commanded velocity; the present one if the command is to stand."""
         target = self._twist_of(self._target)
         return target if target.speed > STANDS else self._twist
 
@@ -116,23 +116,23 @@ class SimulatedBase(Base):
         return self.hindrances.blocks(self._twist_of(command).x)
 
     def roll_freely(self, free: bool) -> None:
-        """Let the wheels run without brake and motor, or hold them again."""
+        """Let the wheels roll without brake and motor, or hold them again."""
         self._free = free
         self.cut()
         self._hull.roll_freely(free)
 
     def cut(self) -> None:
-        """Block the wheels at once, without the gentle ramp."""
+        """Block the wheels at once, without a ramp."""
         self._target = self._twist = STILL
         self._speeds = NO_WHEELS
 
     def carry(self, twist: Twist) -> None:
-        """The legs move base_link at ``twist`` at once, whatever locks the base for others."""
+        """Move base_link at ``twist`` by the legs, at once and in spite of locks."""
         self._target = self._twist = twist
         self._speeds, self._carried = self.wheels.speeds_of(twist), twist != STILL
 
     def control(self, seconds: float) -> None:
-        """Come nearer to the target as fast as the accelerations allow."""
+        """Approach the target velocity within the acceleration limits."""
         if self.hindrances.bars:
             self._respect_bars()
         wanted = self._target
@@ -153,12 +153,12 @@ class SimulatedBase(Base):
         self._hull.drive(self.velocity if self.wheels.dead else self._twist, seconds)
 
     def _take_time(self) -> None:
-        """Brake hard no more, unless it is to stand still."""
+        """End hard braking, unless the command is to stand."""
         if self._target not in (STILL, NO_WHEELS):
             self._haste = 1.0
 
     def _respect_bars(self) -> None:
-        """Block at once what is barred; a turn on the spot stays possible."""
+        """Stop at once in a barred direction; a turn on the spot stays possible."""
         target = self._twist_of(self._target)
         if self.hindrances.blocks(target.x):
             self._target = Twist(0.0, 0.0, target.yaw)
@@ -174,7 +174,7 @@ class SimulatedBase(Base):
         return command if isinstance(command, Twist) else self.wheels.twist_of(command)
 
     def _rolled(self) -> Twist:
-        """Return an external push as the wheels feel it."""
+        """Return the hull's velocity in base_link, as freely rolling wheels measure it."""
         (vx, vy, _, turn), yaw = self._hull.motion, self._hull.turned
         c, s = math.cos(yaw), math.sin(yaw)
         return Twist(c * vx + s * vy, (c * vy - s * vx) if self.wheels.mecanum else 0.0, turn)

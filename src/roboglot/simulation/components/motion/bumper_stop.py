@@ -1,4 +1,4 @@
-"""The firmware's reaction to the bumper, below every motion and every door."""
+"""The firmware's reaction to the bumper, below all motions and doors."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from roboglot.simulation.components.sensing.bumper import SimulatedBumper
 
 
 class BumperStop:
-    """In the tick in which the hull is pressed on something, block the wheels and abort the motion with Collided.
+    """Blocks the wheels in the tick of a collision, and aborts the motion with Collided.
 
-    Until the hull is free the base refuses motion towards what it touches (Collided); away from it, along it and
-    turning on the spot stay possible. It knows what the bumper knows: a masked zone stops nothing, a stuck one does.
+    Until the hull is free, the base refuses motion towards the obstacle (Collided); motion away from it, along it and
+    turns on the spot stay possible. It reads the bumper only: a masked zone stops nothing, a stuck one does.
     """
 
     def __init__(self, robot: Robot, base: SimulatedBase, bumper: SimulatedBumper) -> None:

@@ -1,4 +1,4 @@
-"""Locks on a base: while anyone has one, it refuses to drive."""
+"""Locks on a base, which refuses to drive while there is any."""
 
 from __future__ import annotations
 
@@ -8,35 +8,35 @@ from roboglot.model.errors import Refused
 
 
 class DriveLocks:
-    """The first lock gives the reason of every refusal. ``brake`` is called with each new one."""
+    """Locks by holder; refusals give the reason of the first. ``brake`` is called at each new lock."""
 
     def __init__(self, brake: Callable[[], None]) -> None:
         self._brake = brake
         self._locks: dict[str, Refused] = {}
 
     def lock(self, who: str, reason: str | Refused) -> None:
-        """Brake, and refuse to drive until ``who`` unlocks it again; ``reason`` is why, or the error to refuse with."""
+        """Brake, and refuse to drive until ``who`` unlocks; ``reason``: a text, or the error to raise."""
         self._locks[who] = reason if isinstance(reason, Refused) else Refused(reason)
         self._brake()
 
     def unlock(self, who: str) -> None:
-        """Withdraw the objection of ``who``; do nothing if there was none."""
+        """Remove the lock of ``who``, if there is one."""
         self._locks.pop(who, None)
 
     def held_by(self, who: str) -> bool:
-        """True if ``who`` objects to driving."""
+        """True if ``who`` has a lock."""
         return who in self._locks
 
     @property
     def held(self) -> bool:
-        """True if anyone does."""
+        """True if there is any lock."""
         return bool(self._locks)
 
     def first(self, *, but: str) -> Refused | None:
-        """Return the error of the first lock that is not that of ``but``."""
+        """Return the error of the first lock of a holder other than ``but``; None: there is none."""
         return next((reason for who, reason in self._locks.items() if who != but), None)
 
     def check(self) -> None:
-        """Raise Refused if anyone objects."""
+        """Raise the first lock's Refused, if there is a lock."""
         if self._locks:
             raise next(iter(self._locks.values()))

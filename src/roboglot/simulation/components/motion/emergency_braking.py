@@ -1,4 +1,4 @@
-"""Automatic emergency braking from what the lidar sees ahead and behind. Blind without scans, and says so."""
+"""Automatic emergency braking by the lidar, ahead and behind. Without scans it does not brake."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ BLOCKED_DECELERATION = 5.0  # m/s2 of blocked wheels on the floor, with a margin
 
 
 class EmergencyBrakingSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """Cuts in when the way to stop, and ``margin`` m, is longer than what the lidar sees free; ``on`` at the start."""
+    """Brakes if the stopping distance plus ``margin`` m exceeds the free distance; ``on``: enabled at the start."""
 
     margin: Positive
     on: bool = True
 
 
 class SimulatedEmergencyBraking(EmergencyBraking):
-    """Looks at every new scan while the robot drives faster than it may creep."""
+    """Braking that checks every new scan while the robot drives faster than creeping."""
 
     def __init__(
         self, section: EmergencyBrakingSection, radius: float, base: SimulatedBase, lidar: Lidar, events: EventStream
@@ -57,7 +57,7 @@ class SimulatedEmergencyBraking(EmergencyBraking):
         return self._braking
 
     def sense(self, stamp: float, _seconds: float) -> None:
-        """Look ahead, if driving or held back."""
+        """Check the free distances, if driving or braking."""
         speed = self._base.velocity.x
         if not self.duty.on or (abs(speed) < SLOW and not self._braking):
             return
@@ -80,7 +80,7 @@ class SimulatedEmergencyBraking(EmergencyBraking):
 
 
 def _free(scan: LaserScan, radius: float) -> tuple[float, float]:
-    """Metres between the hull and the nearest thing in the strip that it drives through, ahead and behind."""
+    """Return the distances between hull and nearest hit in its driving strip, ahead and behind, m."""
     seen: NDArray[np.bool_] = np.isfinite(scan.ranges)
     ranges, angles = scan.ranges[seen], scan.angles[seen] + scan.mount.yaw
     x, y = ranges * np.cos(angles) + scan.mount.x, ranges * np.sin(angles) + scan.mount.y

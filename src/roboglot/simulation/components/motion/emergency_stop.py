@@ -1,4 +1,4 @@
-"""The emergency stop: the button on the hull, its twin in the software, and the brake's release."""
+"""The emergency stop: the button on the hull, the software's stop, and the brake's release."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ WHO, BRAKE = "emergency stop", "brake"
 
 
 class EmergencyStopSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """A button, and its twin in the software."""
+    """An emergency stop button on the hull."""
 
 
 class SimulatedEmergencyStop(EmergencyStop):
-    """Locks the base and cuts the motors."""
+    """Emergency stop that locks the base and cuts the motors."""
 
     def __init__(self, base: SimulatedBase, robot: Robot) -> None:
         self._base, self._robot = base, robot
@@ -74,7 +74,7 @@ class SimulatedEmergencyStop(EmergencyStop):
         self._robot.events.publish(EmergencyStopChanged(stamp=self._robot.clock.time(), engaged=engaged))
 
     def _hold(self, who: str, reason: str) -> None:
-        """Stop every motion."""
+        """Lock the base, block the wheels and cancel every motion."""
         self._base.locks.lock(who, EmergencyStopped(reason))
         self._base.cut()
         for action in self._robot.actions.running(BASE):

@@ -14,14 +14,14 @@ FALLEN = "fallen"
 
 
 class FallGuard:
-    """Watches the hull's height; a hand that holds the robot, or the lift's car below it, is no fall."""
+    """Guard that watches the hull's height; a robot held by hand or on the lift's car has not fallen."""
 
     def __init__(self, hull: Hull, base: SimulatedBase, footing: Footing) -> None:
         self._hull, self._base, self._footing = hull, base, footing
         self.duty = hull.edges.call(Duty())
 
     def sense(self, _stamp: float, _seconds: float) -> None:
-        """Look after every tick in which the floor may end near."""
+        """Check the height after every tick near an edge of the floor."""
         hull = self._hull
         if not hull.edges.near:
             self.duty.end()
@@ -30,7 +30,7 @@ class FallGuard:
             self._base.cut()
 
     def displaced(self) -> None:
-        """Unlock the wheels: the robot was put on them again."""
+        """Unlock the wheels: the robot was put elsewhere."""
         self._base.locks.unlock(FALLEN)
 
 

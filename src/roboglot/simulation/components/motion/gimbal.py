@@ -1,6 +1,6 @@
 """A gimbal of two motors, stabilised against the body's turning and tilting; in GIMBAL_LEAD it steers the base.
 
-Kinematics in time: the motors are strong enough that the load never matters.
+Kinematics only: the motors are strong enough for any load.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ Floats = NDArray[np.float64]
 
 
 class SimulatedGimbal(Gimbal):
-    """Gimbal whose commands aim the axes, or have them turn."""
+    """Gimbal whose commands aim the axes or keep them turning."""
 
     def __init__(self, section: GimbalSection, hull: Hull, base: SimulatedBase, robot: Robot) -> None:
         side = section.sideways
@@ -130,14 +130,14 @@ class SimulatedGimbal(Gimbal):
         return self._move_to(0.0, 0.0, GimbalFrame.BODY, speed, speed, source)
 
     def sight_line(self) -> tuple[Floats, Floats]:
-        """Crossing of the axes, and the gimbal's direction of view, world."""
+        """Return the crossing of the axes (m) and the direction of view (unit vector), in the world frame."""
         hull = self._hull
         pivot, ahead = hull.to_world(np.array((self.pivot, self.orientation[:, 0])))
         return pivot + hull.position, ahead
 
     @property
     def pivot(self) -> tuple[float, float, float]:
-        """Crossing of the axes, base_link, m."""
+        """Crossing of the axes in base_link, m."""
         return self._section.forward, 0.0, self._hull.belly + self._section.above_belly
 
     @property

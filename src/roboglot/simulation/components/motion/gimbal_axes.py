@@ -1,4 +1,4 @@
-"""The two axes of a gimbal in time: held against the body's motion, turned to where they are aimed."""
+"""The two axes of a gimbal over time: held against the body's motion, turned to their aims."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ THERE = 0.002  # rad: tolerance of a goal
 
 
 class GimbalSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """Crossing of the axes (m), range up, down and sideways (rad), speed and acceleration of both axes."""
+    """Crossing of the axes (m), range up, down and sideways (rad), speed (rad/s) and acceleration (rad/s2)."""
 
     forward: Offset
     above_belly: Offset
@@ -39,7 +39,7 @@ class GimbalSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True, slots=True)
 class Aim:
-    """One axis: go to ``goal`` (rad) at up to ``speed`` (rad/s), or without a goal keep turning at ``speed``."""
+    """Aim of an axis: go to ``goal`` (rad) at up to ``speed`` (rad/s); without a goal, keep turning at ``speed``."""
 
     goal: float | None
     speed: float
@@ -50,9 +50,9 @@ UNAIMED = (None, None)
 
 
 class GimbalAxes:
-    """Keeps the axes' angles relative to the body; what is not aimed stays where it points in the world.
+    """Angles of the axes relative to the body; an axis without an aim keeps its direction in the world.
 
-    ``lean``: the body's pitch where the gimbal looks, rad.
+    ``lean``: the body's pitch in the gimbal's direction, rad.
     """
 
     def __init__(self, section: GimbalSection, hull: Hull, base: SimulatedBase, robot: Robot) -> None:
@@ -69,12 +69,12 @@ class GimbalAxes:
         self.lean = 0.0
 
     def set_mode(self, mode: FollowMode) -> None:
-        """Follow the body, have it follow, or neither."""
+        """Set which of gimbal and chassis follows the other."""
         self.mode, self._resting = mode, False
         self._base.steer = None
 
     def suspend(self) -> None:
-        """Cut the motors: the axes stay where they are against the body."""
+        """Cut the motors: the axes keep their angles to the body."""
         self.suspended = True
         self.halt()
         self.pitch.rate = self.yaw.rate = 0.0
@@ -85,15 +85,15 @@ class GimbalAxes:
         self.suspended = self._resting = False
 
     def aim(self, pitch: Aim | None, yaw: Aim | None) -> None:
-        """Have the axes turn there, or leave one alone (None)."""
+        """Set the axes' aims; None: keep the direction in the world."""
         self._aims, self._resting = (pitch, yaw), False
 
     def halt(self) -> None:
-        """Have both stay where they point."""
+        """Stop both axes, which keep their directions in the world."""
         self.aim(None, None)
 
     def arrived(self) -> bool:
-        """True if every axis is where it is to be; raises Unreachable once one is at its end short of that."""
+        """Return whether all axes are at their goals. Raises Unreachable if one is at its end short of its goal."""
         short = 0.0
         for axis, goal in ((self.pitch, self._goal(0)), (self.yaw, self._goal(1))):
             if goal is None or not (axis.rate or abs(axis.position - goal) > THERE):
@@ -107,14 +107,14 @@ class GimbalAxes:
 
     @property
     def heading(self) -> float:
-        """The body's since power-on as the gyro has it, rad, not wrapped."""
+        """Heading of the body since power-on by the gyro, rad, not wrapped."""
         if Imu not in self._robot:
             return self._since_start
         measured = self._robot[Imu].reading.orientation.yaw
         return self._since_start + wrap_angle(measured - self._since_start)
 
     def _goal(self, index: int) -> float | None:
-        """Return the goal of an axis as a joint's angle, rad; in CHASSIS_LEAD only the chassis aims the yaw."""
+        """Return an axis' goal as a joint angle, rad; None: no goal, or the yaw in CHASSIS_LEAD."""
         aim = self._aims[index]
         if aim is None or aim.goal is None or (index and self.mode is FollowMode.CHASSIS_LEAD):
             return None
@@ -123,7 +123,7 @@ class GimbalAxes:
         return aim.goal - (self.heading if index else self.lean)
 
     def control(self, seconds: float) -> None:
-        """Hold against the body's last motion, follow or be followed, turn to the aim; before the base's control."""
+        """Compensate the body's motion, follow or steer the chassis, turn to the aims; before the base's control."""
         hull = self._hull
         turn, self._turned = hull.turned - self._turned, hull.turned
         if self._resting and not turn and hull.tilt is LEVEL:
@@ -149,23 +149,23 @@ class GimbalAxes:
 
     @property
     def _plain(self) -> bool:
-        """True if all it does is to follow the chassis."""
+        """True if the gimbal only follows the chassis."""
         unaimed = self._aims == UNAIMED and not self.pitch.rate
         return unaimed and self.mode is FollowMode.CHASSIS_LEAD and not self.suspended
 
     def _follow_body(self, turn: float, seconds: float) -> float:
-        """Hold the yaw against a turn of the body while coming back to its front; return it."""
+        """Compensate a turn of the body (rad) and return to its front; return the yaw, rad."""
         axis = self.yaw
         axis.trail(-turn, FOLLOWING, self._top_speed, seconds)
         self._resting = not axis.position and not axis.rate
         return axis.position
 
     def displaced(self) -> None:
-        """The robot was lifted and put elsewhere: the axes went with it."""
+        """Note that the robot was put elsewhere, together with its axes."""
         self._turned = self._hull.turned
 
     def _advance(self, index: int, axis: Axis, held: float, seconds: float) -> None:
-        """Move one axis; ``held`` is how it turns to point where it did before the body moved."""
+        """Move one axis; ``held``: the turn (rad) that keeps its direction in spite of the body's motion."""
         aim, led = self._aims[index], index == 1 and self.mode is FollowMode.CHASSIS_LEAD
         if held and (aim is None or led or aim.goal is None or aim.frame is GimbalFrame.WORLD):
             axis.shift(held)
@@ -177,11 +177,11 @@ class GimbalAxes:
             axis.run(aim.speed if aim is not None else 0.0, seconds)
 
     def _follow(self, axis: Axis, seconds: float) -> None:
-        """Come back to the body's front, the faster the further off."""
+        """Return to the body's front, at a rate that grows with the offset."""
         axis.trail(0.0, FOLLOWING, self._top_speed, seconds)
 
     def _steer(self) -> None:
-        """Have the base turn after the gimbal, unless something else than hands drives it."""
+        """Turn the base after the gimbal, unless an action other than manual driving uses the base."""
         drivers = self._robot.actions.running(BASE)
         if self._base.locks.held or not all(isinstance(driver.goal, Twist | WheelSpeeds) for driver in drivers):
             self._base.steer = None
@@ -196,6 +196,6 @@ def reaches(axis: Axis, goal: float) -> bool:
 
 
 def _lean(tilt: tuple[float, float], yaw: float) -> float:
-    """The body's pitch in the direction ``yaw``."""
+    """Return the body's pitch in the direction ``yaw``, rad."""
     roll, pitch = tilt
     return pitch * math.cos(yaw) - roll * math.sin(yaw)

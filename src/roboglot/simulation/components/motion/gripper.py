@@ -1,4 +1,4 @@
-"""Two jaws that close until they meet or press on a thing of the world, and then carry it."""
+"""Two jaws that close until they meet or hold a thing of the world, and carry it."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ FRICTION = 0.8  # of both jaws on an object
 
 
 class GripperSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """Opening between the jaws, their length; speed (m/s) and force (N) that every level adds."""
+    """Opening between the jaws and their length, m; speed (m/s) and force (N) per level."""
 
     opening: Positive
     fingers: Positive
@@ -38,7 +38,7 @@ class GripperSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedGripper(Gripper):
-    """Sits at the arm's end point and grips along the body's y."""
+    """Gripper at the arm's end point, gripping along the body's y."""
 
     def __init__(self, section: GripperSection, hull: Hull, arm: SimulatedArm, things: Things, robot: Robot) -> None:
         self._section, self._hull, self._arm, self._things, self._robot = section, hull, arm, things, robot
@@ -71,7 +71,7 @@ class SimulatedGripper(Gripper):
         self._goal = None
 
     def control(self, seconds: float) -> None:
-        """Move the jaws, and what they hold."""
+        """Move the jaws and the held thing."""
         if self._goal is not None:
             self._move(self._goal, seconds)
         if self.holds is not None:
@@ -99,7 +99,7 @@ class SimulatedGripper(Gripper):
         self._jaws.rate = 0.0
 
     def _move(self, goal: float, seconds: float) -> None:
-        """Closing, a thing between the jaws stops them; opening, it is let go."""
+        """Move the jaws: a thing between them stops closing jaws, and is dropped by opening ones."""
         self._jaws.approach(goal, self._section.speed * self._level, seconds)
         between = None
         if goal == 0.0:
@@ -116,7 +116,7 @@ class SimulatedGripper(Gripper):
             self._goal = None
 
     def _between(self) -> Thing | None:
-        """Return the thing between the jaws that is not too wide for them."""
+        """Return the thing between the jaws, if it is not too wide for them."""
         for thing in self._things:
             x, y, z = self._seen(thing).tolist()
             fits = abs(y) + thing.diameter / 2 <= self._section.opening / 2 + PLAY
@@ -125,13 +125,13 @@ class SimulatedGripper(Gripper):
         return None
 
     def _seen(self, thing: Thing) -> NDArray[np.float64]:
-        """The thing's foot from the end point, along the axes of base_link."""
+        """Return the position of a thing's foot from the end point, along base_link's axes, m."""
         axes = self._hull.to_world(np.eye(3))  # rows: the axes of base_link, world
         seen: NDArray[np.float64] = axes @ (thing.position - self._hull.position) - self._arm.mount
         return seen
 
     def _take(self, thing: Thing) -> None:
-        """Hold it, if it is not too heavy for this level."""
+        """Hold a thing, if it is not too heavy for the level."""
         if FRICTION * self._section.force * self._level >= thing.mass * GRAVITY:
             self._grip = self._seen(thing)
             self._grip[1] = 0.0  # the jaws centre the object

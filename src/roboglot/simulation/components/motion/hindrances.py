@@ -1,4 +1,4 @@
-"""Hindrances of a base: directions that others have barred, and what its hull touches."""
+"""Hindrances of a base: directions barred by other components, and contacts of its hull."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ GLANCING = 0.1  # cosine between the hull's motion and a contact up to which the
 
 
 class Hindrances:
-    """``bars``: who keeps it from driving ahead or behind, and why.
+    """``bars``: by holder, whether driving ahead and behind is barred, and the reason.
 
     ``touching``: directions (unit vectors, base_link) in which the hull touches something.
     """
@@ -20,20 +20,20 @@ class Hindrances:
         self.touching: tuple[tuple[float, float], ...] = ()
 
     def bar(self, who: str, *, ahead: bool = False, behind: bool = False, reason: str = "") -> None:
-        """Do not drive forwards or backwards, whatever is asked, until ``who`` bars it no more."""
+        """Bar driving forwards or backwards until ``who`` calls this with neither."""
         if ahead or behind:
             self.bars[who] = ahead, behind, reason
         else:
             self.bars.pop(who, None)
 
     def blocks(self, way: float) -> Blocked | None:
-        """Return why it does not drive ``way`` m/s forwards, if it is barred."""
+        """Return the error for driving ``way`` m/s forwards; None: it is not barred."""
         for who, (ahead, behind, reason) in self.bars.items():
             if (ahead and way > 0.0) or (behind and way < 0.0):
                 return Blocked(f"{who} stopped the robot: {reason}")
         return None
 
     def presses(self, twist: Twist) -> bool:
-        """True if this motion leads into what the hull touches; turning on the spot and passing along do not."""
+        """True if this motion leads into a touched obstacle; turning on the spot and sliding past do not."""
         limit = max(STANDS, GLANCING * twist.speed)
         return any(twist.x * x + twist.y * y > limit for x, y in self.touching)

@@ -1,6 +1,6 @@
-"""Legs: the ways between postures take time, limp legs let the body sink, motions move the body and jump.
+"""Legs: changes of posture take time, limp legs let the body sink, motions move the body and jump.
 
-The body's attitude is held kinematically, jumps are ballistic flights in the physics. Walking itself is the base's.
+The body's attitude is kinematic, jumps are ballistic flights in the physics. Walking itself is the base's.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ OWN_GAIT_AFTER = 1.0  # s of standstill after which the robot returns to its own
 
 
 class SimulatedLegs(Legs):
-    """Holds the torso; walks at the pace of the base, leaps in the physics."""
+    """Legs that hold the torso, walk at the base's velocity, and leap in the physics."""
 
     def __init__(self, section: LegsSection, hull: Hull, base: SimulatedBase, robot: Robot, tick: float) -> None:
         self._section, self._hull, self._base, self._robot = section, hull, base, robot
@@ -130,7 +130,7 @@ class SimulatedLegs(Legs):
         return self._robot.actions.start(name, run, resources=[LEGS] if there else [LEGS, BASE], goal=goal, source=by)
 
     async def _move(self, action: Action, wanted: Posture, height: float, duration: float) -> None:
-        """Brake, then bring the torso there; cancelled, it stays where it is, between the postures."""
+        """Brake, then move the torso to ``height`` (m) in ``duration`` (s); if cancelled, it stays between postures."""
         if self.off:
             raise Refused(self.off)
         await self._brake()
@@ -143,12 +143,12 @@ class SimulatedLegs(Legs):
         self._become(wanted)
 
     async def _follow(self, action: Action, track: Track) -> None:
-        """Wait until the body is there; for ever if something else moves it now."""
+        """Move the torso along ``track``; never returns if another motion takes over."""
         self.duty.begin()
         await self._torso.follow(track, action, self._clock, LOOK)
 
     async def _brake(self) -> None:
-        """Return when the wheels stand still; if cancelled meanwhile, the robot stands as before."""
+        """Lock the base and wait until its wheels stand still; if cancelled while standing, unlock it again."""
         self._base.locks.lock(LEGS, "the robot changes its posture")
         try:
             while self._base.velocity != STILL:
@@ -237,7 +237,7 @@ class SimulatedLegs(Legs):
     async def _play(
         self, action: Action, motion: Motion | None, make: Callable[[], Iterator[MotionTick]], spec: MotionSpec | None
     ) -> None:
-        """Brake, perform to the end, and see where one is. Given up, the body lands and straightens itself."""
+        """Brake, perform, and check the final place. If cancelled, land and straighten. Raises Collided."""
         await self._brake()
         self._torso.body = held_body(self._hull)
         self._become(Posture.CHANGING)
@@ -265,7 +265,7 @@ class SimulatedLegs(Legs):
     # -- every tick ----------------------------------------------------------------------------------------------------
 
     def control(self, seconds: float) -> None:
-        """Move the torso's set point, the feet, and base_link while performing; before the physics."""
+        """Move torso and feet, and base_link while performing; before the physics."""
         torso = self._torso
         if performance := self._player.performance:
             self._player.play(performance)
@@ -283,7 +283,7 @@ class SimulatedLegs(Legs):
             self.duty.end()
 
     def _walk_on(self, seconds: float) -> None:
-        """Swing the body with the gait; after a stand the default gait returns."""
+        """Sway the body with the gait; after a standstill, return to the default gait."""
         velocity, gait, body = self._base.velocity, self._steps.gait, self._torso.body
         on_a_leash = gait is Gait.TROT_PASSIVE
         if on_a_leash and self._hull.leash and not (self._base.locks.held or self._robot.actions.running(BASE)):

@@ -1,4 +1,4 @@
-"""Plays motions and choreographies: their frames, one a tick, to the base, the torso and the feet."""
+"""Plays motions and choreographies: one frame per tick, to the base, the torso and the feet."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from roboglot.simulation.components.motion.base import SimulatedBase
 
 
 class MotionPlayer:
-    """``performance`` is what is played now."""
+    """Player; ``performance``: the present one, None: none."""
 
     def __init__(self, hull: Hull, base: SimulatedBase, torso: Torso, steps: Steps, stance: Stance) -> None:
         self._hull, self._base, self._torso, self._steps, self._stance = hull, base, torso, steps, stance
         self.performance: Performance | None = None
 
     async def until_over(self, performance: Performance, clock: Clock, period: float) -> None:
-        """Wait until it is over, or another one is played; look every ``period`` s."""
+        """Wait until a performance is over or replaced, checking every ``period`` s."""
         while not performance.over and self.performance is performance:
             await clock.sleep(period)
 
     def give_up(self, performance: Performance) -> None:
-        """Have it land if need be, and straighten itself."""
+        """Replace the remaining frames: land if in the air, then straighten."""
         torso = self._torso
         performance.frames = given_up(performance, self._hull, torso.body, torso.straight, self._stance)
 
     def play(self, performance: Performance) -> None:
-        """Move base_link, the torso and the feet by the next frame; a motion that meets something ends."""
+        """Move base_link, torso and feet by the next frame; give up a motion that meets an obstacle."""
         frame = performance.frame
         if frame and not performance.hit and in_the_way(self._hull, frame.twist):
             performance.hit = True

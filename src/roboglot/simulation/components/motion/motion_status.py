@@ -1,4 +1,4 @@
-"""Motion status: tilt and blows from the IMU, slip by wheels against motion, lifting by contacts."""
+"""Motion status: tilt and blows from the IMU, slip from wheels and motion, lifting from contacts."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ SLIP_TICKS = 5  # in a row before it counts: contacts jitter
 
 
 class MotionStatusSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """``blow``: acceleration that counts as an impact, m/s2; ``hold``: how long an impact is reported, s."""
+    """``blow``: acceleration that counts as an impact, m/s2; ``hold``: s for which an impact is reported."""
 
     blow: Positive
     hold: Positive
 
 
 class SimulatedMotionStatus(MotionStatus):
-    """Computes most flags on request; impacts and slip are watched all the time."""
+    """Status that computes most flags on request, but watches impacts and slip all the time."""
 
     def __init__(self, section: MotionStatusSection, hull: Hull, base: SimulatedBase, imu: SimulatedImu) -> None:
         self._section, self._hull, self._base, self._imu = section, hull, base, imu
@@ -82,7 +82,7 @@ class SimulatedMotionStatus(MotionStatus):
             self._slipping = 0
 
     def _slips(self, wheels: Twist, vx: float, vy: float, turn: float) -> bool:
-        """True if the body does not move (m/s, rad/s, world) as the wheels turn."""
+        """True if the body's motion (m/s, rad/s, world) differs from that of the wheels."""
         if not -SLIP_RATE <= turn - wheels.yaw <= SLIP_RATE:
             return True
         hull = self._hull

@@ -22,7 +22,7 @@ MOTORS_MAX = 64
 
 
 class MotorsSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """``warming``: kelvin that each motor warms up by, in the long run, per watt of its share of the load."""
+    """``warming``: steady temperature rise per watt of a motor's share of the load, K/W."""
 
     names: Annotated[tuple[str, ...], Meta(min_length=1, max_length=MOTORS_MAX)]
     warming: Positive
@@ -30,7 +30,7 @@ class MotorsSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedMotors(Motors):
-    """First-order warming; no motor's share is quite like another's."""
+    """Motors with first-order warming and slightly different shares of the load."""
 
     def __init__(self, section: MotorsSection, hull: Hull, random: np.random.Generator) -> None:
         self._section, self._hull = section, hull
@@ -49,12 +49,12 @@ class SimulatedMotors(Motors):
         return self._hottest
 
     def warm(self, celsius: float) -> None:
-        """Have all motors this warm at once: for tests and faults."""
+        """Set the temperature of all motors (Celsius) at once: for tests and faults."""
         self._temperatures[:] = celsius
         self._hottest = round(float(celsius), 2)
 
     def sense(self, _stamp: float, seconds: float) -> None:
-        """Gather a second's load, then warm up or cool down."""
+        """Sum up a second's load, then warm up or cool down."""
         self._energy += (self._hull.traction_power + self._hull.effort) * seconds
         self._seconds += seconds
         if self._seconds < 1.0:

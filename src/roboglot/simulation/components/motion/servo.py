@@ -17,7 +17,7 @@ from roboglot.simulation.bodies.schedule import Duty
 
 
 class ServosSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """Number of servos, their range to both sides (rad), speed and acceleration."""
+    """Number of servos, range to both sides (rad), speed (rad/s) and acceleration (rad/s2)."""
 
     count: Count
     limit: Positive
@@ -26,7 +26,7 @@ class ServosSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedServos(Servos):
-    """Turning has no ends; only the commanded angle has."""
+    """Servos that can turn endlessly; only commanded angles are limited."""
 
     def __init__(self, section: ServosSection, robot: Robot) -> None:
         self.count, self.limit, self.speed = section.count, section.limit, section.speed
@@ -93,7 +93,7 @@ class SimulatedServos(Servos):
             self._halt(index)
 
     def control(self, seconds: float) -> None:
-        """Turn those that are to turn."""
+        """Turn all servos that have a goal or a speed."""
         for index, (goal, speed) in self._goals.items():
             self._axes[index].approach(goal, speed, seconds)
         for index, rate in self._speeds.items():
@@ -113,7 +113,7 @@ class SimulatedServos(Servos):
 
 
 def _within_a_turn(angle: float) -> float:
-    """``angle`` in [-pi, pi]: both ends of the reach are places of their own."""
+    """Return ``angle`` in [-pi, pi]: both ends are distinct positions."""
     return math.remainder(angle, math.tau)
 
 

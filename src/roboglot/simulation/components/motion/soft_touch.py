@@ -1,6 +1,6 @@
-"""The bumper's feelers: what stands close ahead of the way makes the robot slow, so that a touch is no blow.
+"""The bumper's feelers: slow the robot ahead of obstacles, so that a touch is no blow.
 
-A fan in two level planes: what stands in both at the same distance stands, what the lower one meets first slopes.
+Rays in two level planes: equal distances in both mean an upright obstacle, a shorter lower one means a slope.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ SLOW = 0.3  # m/s; below this it does not begin
 
 
 class SoftTouch:
-    """``speed`` (m/s): the fastest that it lets the hull touch something, as far as the wheels can brake."""
+    """Limit of the base's pace. ``speed``: highest speed of a touch, as far as the wheels can brake, m/s."""
 
     def __init__(self, speed: float, hull: Hull, base: SimulatedBase, bumper: SimulatedBumper, sight: Sight) -> None:
         self._speed, self._hull, self._base, self._bumper, self._sight = speed, hull, base, bumper, sight
 
     def sense(self, _stamp: float, _seconds: float) -> None:
-        """Feel ahead, and bound the base's pace."""
+        """Measure ahead, and limit the base's pace."""
         twist, base = self._base.wanted, self._base
         slow = twist.speed <= (max(SLOW, self._speed) if math.isinf(base.pace) else self._speed)
         if slow or zone_of(twist.x, twist.y) in self._bumper.masked:
@@ -47,7 +47,7 @@ class SoftTouch:
         base.pace = math.sqrt(self._speed**2 + 2.0 * DECELERATION * max(0.0, free))
 
     def _free(self, twist: Twist, reach: float) -> float:
-        """Metres between the hull and what stands where ``twist`` (base_link) leads; inf if it is far."""
+        """Return the distance from the hull to an upright obstacle towards ``twist`` (base_link), m; inf: none near."""
         hull, radius, way = self._hull, self._hull.body.hull.radius, math.atan2(twist.y, twist.x)
         low, high = HEIGHTS
         near = self._sight.turn(hull, hull.rise + low, RAYS, reach, way)[AHEAD]

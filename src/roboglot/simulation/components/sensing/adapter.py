@@ -1,4 +1,4 @@
-"""Sensor adapters whose inputs the world sets: tests and users say what voltage lies there."""
+"""Sensor adapters whose input voltages are set by tests and users."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from roboglot.simulation.bodies.quantities import Count, Positive
 
 
 class SensorAdaptersSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """Number of adapters and of ports each; full scale and threshold of a high input, V."""
+    """Number of adapters, and of ports per adapter; full scale, and threshold of the high level, V."""
 
     count: Count
     ports: Count
@@ -25,7 +25,7 @@ class SensorAdaptersSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 @dataclass(slots=True)
 class _Input:
-    """Voltage, and when the level changed last; ``period``: between the last two changes, s."""
+    """Voltage (V), time of the last level change (s); ``period``: between the last two changes, s."""
 
     voltage: float = 0.0
     changed_at: float | None = None
@@ -33,7 +33,7 @@ class _Input:
 
 
 class SimulatedSensorAdapters(SensorAdapters):
-    """Open inputs lie at 0 V."""
+    """Adapters whose open inputs are at 0 V."""
 
     def __init__(self, section: SensorAdaptersSection, clock: Clock, events: EventStream) -> None:
         self.count, self.ports, self.voltage_max = section.count, section.ports, section.voltage_max
@@ -50,7 +50,7 @@ class SimulatedSensorAdapters(SensorAdapters):
         return self._input(adapter, port).period
 
     def apply(self, adapter: int, port: int, voltage: float) -> None:
-        """Have this voltage at the input from now on. Raises NotFound, InvalidGoal outside 0 to full scale."""
+        """Set the voltage of an input, V. Raises NotFound; InvalidGoal outside 0 to full scale."""
         there = self._input(adapter, port)
         if not 0.0 <= voltage <= self.voltage_max:
             raise InvalidGoal(f"an input takes 0 to {self.voltage_max:g} V, not {voltage}")

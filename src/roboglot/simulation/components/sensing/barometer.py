@@ -1,4 +1,4 @@
-"""A barometer in the standard atmosphere: the height of the robot in the world, with an offset and noise."""
+"""A barometer in the standard atmosphere: pressure by the robot's height, with an offset and noise."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LAPSE, EXPONENT = 2.25577e-5, 5.25588  # 1/m, and the exponent of the remaining 
 
 
 class BarometerSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """``rate``: measurements a second; standard deviations of ``noise`` and of the sensor's constant ``offset``, Pa."""
+    """``rate``: Hz; ``noise`` and the sensor's constant ``offset``: standard deviations, Pa."""
 
     rate: Annotated[float, Meta(gt=0, le=50)]
     noise: NotNegative
@@ -27,12 +27,12 @@ class BarometerSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedBarometer(Barometer):
-    """Measures when asked, at most ``rate`` times a second; draws its chance in order of time."""
+    """Barometer that measures when read, at most ``rate`` times a second."""
 
     def __init__(
         self, section: BarometerSection, hull: Hull, altitude: float, clock: Clock, random: np.random.Generator
     ) -> None:
-        """``altitude``: of the world's origin above the sea, m."""
+        """``altitude``: height of the world's origin above the sea, m."""
         self._section, self._hull, self._altitude, self._clock, self._random = section, hull, altitude, clock, random
         self._offset = float(random.normal(0.0, section.offset))
         self._reading = BarometerReading(-math.inf, SEA_LEVEL)

@@ -1,4 +1,4 @@
-"""Four touch zones around the hull, from the contacts that the physics finds."""
+"""Four touch zones around the hull, from the contacts in the physics."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from roboglot.simulation.bodies.schedule import Duty
 
 
 class BumperSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """Four zones around the hull; ``touch_speed`` (m/s): the fastest that it lets the hull come upon what it feels."""
+    """Four zones around the hull; ``touch_speed``: speed limit towards obstacles that its feelers detect, m/s."""
 
     touch_speed: Positive = 0.1
 
@@ -24,7 +24,7 @@ MIDDLES = {"front": (1.0, 0.0), "left": (0.0, 1.0), "rear": (-1.0, 0.0), "right"
 
 
 class SimulatedBumper(Bumper):
-    """Zones of 90 degrees. A dock's contact springs and small things, which roll away, do not press it."""
+    """Bumper with zones of 90 degrees. Docks and light things do not press it."""
 
     zones = tuple(MIDDLES)
 
@@ -45,7 +45,7 @@ class SimulatedBumper(Bumper):
 
     @property
     def stuck(self) -> frozenset[str]:
-        """Zones whose switches hang."""
+        """Zones whose switches are stuck."""
         return self._stuck
 
     @stuck.setter
@@ -54,7 +54,7 @@ class SimulatedBumper(Bumper):
         self.duty.begin()
 
     def sense(self, stamp: float, _seconds: float) -> None:
-        """Look at what touches."""
+        """Update the pressed zones by the hull's contacts."""
         self.touched = bool(self._hull.touches or self._pressed or self._stuck)
         if not self.touched:
             self.duty.end()
@@ -78,7 +78,7 @@ class SimulatedBumper(Bumper):
 
 
 def zone_of(x: float, y: float) -> str:
-    """The zone of a point in base_link."""
+    """Return the zone of a point in base_link."""
     if abs(x) >= abs(y):
         return "front" if x > 0 else "rear"
     return "left" if y > 0 else "right"

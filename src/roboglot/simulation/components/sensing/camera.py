@@ -1,4 +1,4 @@
-"""The camera: takes an instant of the world and has it drawn, at its rate and only while it has viewers."""
+"""The camera: draws the world's present state at its rate, only while it has viewers."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ ENOUGH, RECOVERED = 0.8, 0.95  # share of the pictures: below the first a warnin
 
 
 class CameraSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """Pictures; ``fov``: horizontal, rad; ``forward`` and ``above_belly``: where it sits; ``pitch``: rad, nose down."""
+    """``fov``: horizontal, rad; ``forward``, ``above_belly``: position, m; ``pitch``: rad, nose down; ``rate``: Hz."""
 
     width: Annotated[int, Meta(ge=64, le=1920, multiple_of=16)]
     height: Annotated[int, Meta(ge=64, le=1080, multiple_of=2)]
@@ -50,7 +50,7 @@ class CameraSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True, slots=True)
 class _Shot:
-    """All that a picture is made from."""
+    """Everything needed to draw a picture."""
 
     stage: Scenery
     renderer: Renderer
@@ -60,14 +60,14 @@ class _Shot:
     gain: float
 
     def develop(self) -> Frame:
-        """Draw it; takes some milliseconds and may run in any thread, one at a time per renderer."""
+        """Draw the picture; takes some milliseconds, in any thread, one at a time per renderer."""
         planes = self.renderer.render(self.stage.scene(self.instant), self.eye, self.gain)
         planes.setflags(write=False)
         return Frame(self.stamp, planes)
 
 
 class Shortfall:
-    """Log of a camera that takes fewer pictures than it should."""
+    """Log of a camera whose pictures fall short of its rate."""
 
     def __init__(self, robot: str, rate: float) -> None:
         self._robot, self._rate = robot, rate
@@ -76,7 +76,7 @@ class Shortfall:
         self._short = False
 
     def note(self, now: float) -> None:
-        """Count a picture; judge when a window of robot time is over."""
+        """Count a picture; judge the rate at the end of a window of robot time."""
         if self._began is None:
             self._began = now
             return
@@ -97,7 +97,7 @@ class Shortfall:
 
 
 class SimulatedCamera(Camera):
-    """Sits at the front of the torso and goes up and down with it. No noise, no lens errors, no motion blur."""
+    """Camera at the front of the torso, moving with it. No noise, no lens errors, no motion blur."""
 
     def __init__(self, section: CameraSection, hull: Hull, studio: Studio, clock: Clock) -> None:
         self.width, self.height, self.rate, self.fov = section.width, section.height, section.rate, section.fov
@@ -132,7 +132,7 @@ class SimulatedCamera(Camera):
         self._exposure = stops
 
     def prepare(self) -> None:
-        """Load the renderer and draw once, beside the loop; in lockstep nothing happens."""
+        """Load the renderer and draw once, in the background; do nothing in lockstep."""
         if isinstance(self._clock, RealClock) and self._renderer is None and self._preparing is None:
             self._preparing = asyncio.get_running_loop().create_task(self._prepare(), name="camera gets ready")
 
@@ -163,7 +163,7 @@ class SimulatedCamera(Camera):
         self._feed.close()
 
     def _shoot(self, stage: Scenery, renderer: Renderer) -> _Shot:
-        """Freeze what there is to see now."""
+        """Freeze the visible state of the world."""
         hull, mount = self._hull, self.mount
         pitch, yaw = hull.gaze
         axes = rotation((0.0, self._section.pitch + pitch), yaw).T[[1, 2, 0]] * ((-1.0,), (-1.0,), (1.0,))

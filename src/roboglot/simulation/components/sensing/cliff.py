@@ -1,4 +1,4 @@
-"""Cliff sensors at the hull's rim. Over a drop they block the wheels in its direction, for every kind of motion."""
+"""Cliff sensors at the hull's rim. Over a drop they bar driving in its direction, for every kind of motion."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class CliffSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedCliff(Cliff):
-    """Looks for floor under each of its places; cheap while no edge is near."""
+    """Cliff sensors that check for floor under each zone; cheap while no edge is near."""
 
     zones = tuple(PLACES)
 
@@ -51,7 +51,7 @@ class SimulatedCliff(Cliff):
 
     @property
     def fooled(self) -> frozenset[str]:
-        """Zones that see a drop where none is."""
+        """Zones that report a drop without one."""
         return self._fooled
 
     @fooled.setter
@@ -60,7 +60,7 @@ class SimulatedCliff(Cliff):
         self.duty.begin()
 
     def sense(self, stamp: float, _seconds: float) -> None:
-        """Look down."""
+        """Update the zones above a drop, and bar driving towards it."""
         hull = self._hull
         near = self._footing.ends_near(hull.x, hull.y, hull.floor, hull.elevation, self._reach)
         if not near and not self._detected and not self._fooled:

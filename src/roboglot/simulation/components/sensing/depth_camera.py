@@ -1,4 +1,4 @@
-"""A depth camera that looks ahead and down, by rays in the physics: sees all that is solid, at every height."""
+"""A depth camera that looks ahead and down, by rays in the physics: sees all solids at every height."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 
 class DepthCameraSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """Looks ahead from ``above_ground`` m, ``forward`` of the middle, ``pitch`` rad down; field of view in rad."""
+    """Position ``above_ground`` and ``forward`` of the middle, m; ``pitch`` down and field of view, rad."""
 
     rows: Annotated[int, Meta(ge=2, le=240)]
     columns: Annotated[int, Meta(ge=2, le=320)]
@@ -39,7 +39,7 @@ class DepthCameraSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedDepthCamera(DepthCamera):
-    """Takes an image when asked, not more often than its rate; the noise grows with the square of the depth."""
+    """Depth camera that takes an image when read, at most at its rate; noise grows with the depth squared."""
 
     def __init__(
         self, section: DepthCameraSection, hull: Hull, rays: Rays, clock: Clock, random: np.random.Generator
@@ -87,7 +87,7 @@ class SimulatedDepthCamera(DepthCamera):
 
 
 def _bundle(section: DepthCameraSection) -> Floats:
-    """A ray through every pixel, of length 1: x along the optical axis, y left, z up; rows from above."""
+    """Return a unit vector for every pixel (n x 3): x along the optical axis, y left, z up; rows from the top."""
     across = np.tan(np.linspace(section.width / 2, -section.width / 2, section.columns))
     down = np.tan(np.linspace(section.height / 2, -section.height / 2, section.rows))
     y, z = np.meshgrid(across, down)

@@ -1,4 +1,4 @@
-"""Satellite navigation: a fix under the open sky after a while, none indoors; errors wander slowly."""
+"""Satellite navigation: a fix under the open sky after a search, none indoors; errors wander slowly."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class GpsSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedGps(Gps):
-    """Measures when asked, at most ``rate`` times a second; draws its chance in order of time."""
+    """Receiver that measures when read, at most ``rate`` times a second."""
 
     def __init__(
         self, section: GpsSection, hull: Hull, world: WorldDescription, clock: Clock, random: np.random.Generator
@@ -53,7 +53,7 @@ class SimulatedGps(Gps):
         return self._reading
 
     def sense(self, stamp: float, _seconds: float) -> None:
-        """Look up: since when is the sky open?"""
+        """Note since when the sky is open."""
         if self._reference is None or self.jammed or not self._floors[self._hull.floor].outdoors:
             self._sky_since = None
         elif self._sky_since is None:
@@ -81,7 +81,7 @@ class SimulatedGps(Gps):
 
 
 def globe(reference: Georeference, x: float, y: float) -> tuple[float, float]:
-    """Latitude and longitude (degrees) of a place in the world; a tangent plane, good for some kilometres."""
+    """Return latitude and longitude (degrees) of a place (world, m) by a tangent plane, valid for some km."""
     north_is = math.radians(reference.north)
     north = x * math.cos(north_is) + y * math.sin(north_is)
     east = x * math.sin(north_is) - y * math.cos(north_is)

@@ -1,6 +1,6 @@
-"""Hearing: claps counted in the microphone's sound, and words that arrive loudly enough.
+"""Hearing: claps counted in the microphone's sound, and words loud enough to be understood.
 
-A recogniser of speech is not simulated: the words travel beside the sound, and get lost when the sound does.
+Speech recognition is not simulated: words are passed along with the sound, and lost with it.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ FULL_SCALE = 32767.0
 
 
 class HearingSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """Understands what the microphone hears."""
+    """Recognition of the microphone's sound."""
 
 
 class SimulatedHearing(Hearing):
-    """``noise``: the microphone's own and the room's, root mean square, of full scale."""
+    """Hearing; ``noise``: of microphone and room, root mean square, as a share of full scale."""
 
     def __init__(self, robot: Robot, hull: Hull, air: Air, noise: float) -> None:
         self._robot, self._hull, self._air, self._noise = robot, hull, air, noise * FULL_SCALE
@@ -58,7 +58,7 @@ class SimulatedHearing(Hearing):
         return self._speech.subscribe()
 
     def close(self) -> None:
-        """Hear no more."""
+        """Stop hearing."""
         self._claps.close()
         self._speech.close()
 
@@ -104,14 +104,14 @@ class SimulatedHearing(Hearing):
         )
 
     def _voices(self) -> dict[bytes, str]:
-        """Names of the members whose voices were entered."""
+        """Return the names of members by their enrolled voices."""
         if Members not in self._robot:
             return {}
         return {member.voice: member.name for member in self._robot[Members].all() if member.voice is not None}
 
 
 async def _logged(listening: Coroutine[None, None, None]) -> None:
-    """Log what went wrong in a task that no one awaits."""
+    """Await ``listening``, and log its exception: no other task awaits it."""
     try:
         await listening
     except Exception:

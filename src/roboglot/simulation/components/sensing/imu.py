@@ -1,7 +1,7 @@
 """Gyro and accelerometer with scale error, bias and noise; yaw is the gyro's integral and drifts.
 
-The accelerometer gives the mean over a tick, as one behind a filter does: contacts make the momentary value useless.
-Roll and pitch are true: the filter that levels them leaves less error than anybody can see.
+The accelerometer gives the mean over a tick, like a filtered one: contacts make momentary values useless.
+Roll and pitch are exact: a real filter's error in them would be negligible.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class ImuSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedImu(Imu):
-    """Sits in the torso, above base_link."""
+    """IMU in the torso, above base_link."""
 
     averages = True
 
@@ -98,11 +98,11 @@ class SimulatedImu(Imu):
         return self._raw
 
     def forget(self) -> None:
-        """The robot was lifted and put elsewhere: nothing was felt in between."""
+        """Forget the last motion: the robot was put elsewhere, without a measurement in between."""
         self._turned, self._motion = self._hull.turned, self._hull.motion
 
     def forget_noise(self) -> None:
-        """Draw anew: chance begins from another seed."""
+        """Discard the drawn noise: the seed has changed."""
         self._noises, self._at = b"", 0
 
     def sense(self, stamp: float, seconds: float) -> None:
@@ -135,7 +135,7 @@ class SimulatedImu(Imu):
     def _tilted(
         self, stamp: float, felt: tuple[float, float, float], noise: Sequence[float], seconds: float
     ) -> ImuReading:
-        """Measure with a body that leans, by the ground or by its legs; ``felt``: acceleration plus gravity, world."""
+        """Measure with a tilted body, by ground or legs; ``felt``: acceleration plus gravity, world, m/s2."""
         hull, held, before = self._hull, self._hull.attitude, self._held
         self._held = held
         roll, pitch = hull.tilt[0] + held.roll, hull.tilt[1] + held.pitch
@@ -154,7 +154,7 @@ class SimulatedImu(Imu):
 
 
 def earth_field(north: float) -> tuple[float, float, float]:
-    """T in the world's frame where north lies in that direction (rad); no declination."""
+    """Return the earth's field in the world frame, T, for the direction of north (rad); no declination."""
     return HORIZONTAL * math.cos(north), HORIZONTAL * math.sin(north), -DOWN
 
 

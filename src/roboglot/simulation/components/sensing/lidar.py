@@ -1,6 +1,6 @@
 """A planar lidar: exact distances in its plane, with range limits and noise.
 
-All rays are cast at one instant; a real scanner smears a turn over its period. On slopes the plane stays level.
+All rays are cast at one instant; a real scanner spreads a turn over its period. On slopes the plane stays level.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ class LidarSection(Struct, frozen=True, forbid_unknown_fields=True):
     """A full turn of ``rays``; ``above_belly`` is the height of its plane above the belly.
 
     ``dropouts``: share of rays that measure nothing (NaN); every ``sector_every`` s on average a packet of a twelfth of
-    a turn is lost (0: never); ``jitter``: standard deviation (s) of the stamp, which odometry is looked up by.
-    ``gloss``: whether glass lets rays pass and mirrors reflect them; else both answer like any wall.
-    ``dark``: share of the furniture that is black and answers only from less than ``dark_reach`` m (NaN beyond).
+    a turn is lost (0: never); ``jitter``: standard deviation (s) of the stamp, by which odometry is looked up.
+    ``gloss``: whether glass lets rays pass and mirrors reflect them; otherwise both act like any wall.
+    ``dark``: share of black furniture, which is measured only within ``dark_reach`` m (NaN beyond).
     """
 
     rays: Annotated[int, Meta(ge=4, le=RAYS_MAX)]
@@ -53,7 +53,7 @@ class LidarSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedLidar(Lidar):
-    """Lidar in the middle of the torso, looking through its hull."""
+    """Lidar in the middle of the torso, which sees through its own hull."""
 
     def __init__(
         self,
@@ -78,7 +78,7 @@ class SimulatedLidar(Lidar):
         return self._scan
 
     def sense(self, stamp: float, _seconds: float) -> None:
-        """Take a scan: a turn has ended."""
+        """Take a scan at the end of a turn."""
         if self.silent:
             self._scan = None
             return
@@ -114,7 +114,7 @@ class SimulatedLidar(Lidar):
         self._events.publish(ScanTaken(stamp=stamp, scan=self._scan, odometry=pose))
 
     def _drop(self, ranges: NDArray[np.float32]) -> None:
-        """Lose single rays (black, glossy, too flat), now and then a packet."""
+        """Drop single rays at random (dark, glossy, grazing), and now and then a packet."""
         section, random = self._section, self._random
         if section.dropouts:
             ranges[random.random(len(ranges)) < section.dropouts] = np.nan

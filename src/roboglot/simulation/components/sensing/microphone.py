@@ -1,4 +1,4 @@
-"""The microphone: what the air brings, and the room's murmur, in blocks while it has listeners."""
+"""The microphone: sound from the air and the room's noise, in blocks while it has listeners."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ BEHIND_MAX = 0.5  # s by which a slow machine may lag before sound is skipped
 
 
 class MicrophoneSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """``noise``: the room's murmur, root mean square, of full scale."""
+    """``noise``: of the room, root mean square, as a share of full scale."""
 
     noise: Annotated[float, Meta(ge=0, le=0.5)]
 
 
 class SimulatedMicrophone(Microphone):
-    """Microphone in the middle of the robot; hears equally well to all sides."""
+    """Omnidirectional microphone in the middle of the robot."""
 
     def __init__(
         self, section: MicrophoneSection, hull: Hull, air: Air, clock: Clock, random: np.random.Generator
@@ -41,7 +41,7 @@ class SimulatedMicrophone(Microphone):
         return self._feed.subscribe()
 
     def close(self) -> None:
-        """Hear no more."""
+        """Stop listening."""
         self._feed.close()
 
     def _begin(self) -> None:

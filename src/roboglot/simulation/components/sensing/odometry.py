@@ -1,4 +1,4 @@
-"""Dead reckoning: way from the wheels (wrong scale, noise, slip), heading from the gyro. Never jumps, always drifts."""
+"""Dead reckoning: distance from the wheels (scale error, noise, slip), heading from the gyro. Drifts without jumps."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ DRAWN = 64  # ticks for which noise is drawn at once
 
 
 class DescribedNoise(Struct, frozen=True, forbid_unknown_fields=True):
-    """Noise as the robot's maker describes it: see ``OdometryNoise``."""
+    """Noise by the manufacturer's description: see ``OdometryNoise``."""
 
     still: Positive = USUAL.still
     along: NotNegative = USUAL.along
@@ -31,10 +31,10 @@ class DescribedNoise(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class OdometrySection(Struct, frozen=True, forbid_unknown_fields=True):
-    """Standard deviations of the wheels' scale error and of the noise per way travelled; ``described``: as believed.
+    """``scale_error`` of the wheels, ``noise`` per distance: standard deviations; ``described``: by the manufacturer.
 
-    ``turn_slip``: m/s that wheels slide ahead per rad/s of turning; an encoder jumps by ``jump`` m every ``jump_every``
-    s on average while it drives (0: never).
+    ``turn_slip``: m/s of sliding ahead per rad/s of turning; an encoder jumps by ``jump`` m every ``jump_every`` s on
+    average while driving (0: never).
     """
 
     scale_error: NotNegative
@@ -47,7 +47,7 @@ class OdometrySection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedOdometry(Odometry):
-    """Starts at (0, 0, 0) in odom, wherever the robot stands."""
+    """Odometry that starts at (0, 0, 0) in odom."""
 
     def __init__(
         self, section: OdometrySection, base: SimulatedBase, imu: SimulatedImu, random: np.random.Generator
@@ -68,12 +68,12 @@ class SimulatedOdometry(Odometry):
 
     @property
     def pose(self) -> Pose:
-        """The reading's, without making the rest of it."""
+        """Pose of the reading in odom (m, rad), without building the whole reading."""
         _, x, y, yaw, *_ = self._state
         return Pose(x, y, yaw) if self._reading is None else self._reading.pose
 
     def _disturbed(self, x: float, y: float, yaw: float, seconds: float) -> tuple[float, float]:
-        """Return the way with the errors of slip and encoder jumps."""
+        """Return the position (odom, m) with the errors of slip and encoder jumps."""
         section, off = self._section, 0.0
         if section.turn_slip:
             off += section.turn_slip * abs(self._imu.rate) * math.copysign(seconds, self._base.velocity.x)
@@ -86,11 +86,11 @@ class SimulatedOdometry(Odometry):
         return OdometryNoise(**structs.asdict(self._section.described))
 
     def forget_noise(self) -> None:
-        """Draw anew: chance begins from another seed."""
+        """Discard the drawn noise: the seed has changed."""
         self._noises.clear()
 
     def sense(self, stamp: float, seconds: float) -> None:
-        """Add one tick's way."""
+        """Add one tick's motion."""
         wheels = self._base.velocity
         _, x, y, yaw, _, _, _, way = self._state
         still = not (wheels.x or wheels.y or wheels.yaw)

@@ -39,7 +39,7 @@ class RangeSensorsSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedRangeSensors(RangeSensors):
-    """Casts no ray while they are switched off."""
+    """Range sensors; cast no rays while switched off."""
 
     def __init__(
         self, section: RangeSensorsSection, hull: Hull, rays: Rays, random: np.random.Generator, tick: float
@@ -71,7 +71,7 @@ class SimulatedRangeSensors(RangeSensors):
         return None if name in self.silent else self._readings.get(name)
 
     def sense(self, stamp: float, _seconds: float) -> None:
-        """Measure all of them when it is time."""
+        """Measure with all sensors when due."""
         if not self.duty.on:
             return
         self._until_next -= 1
@@ -95,7 +95,7 @@ class SimulatedRangeSensors(RangeSensors):
 
 
 def _fan(angles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Level unit vectors, n x 3."""
+    """Return level unit vectors (n x 3) in these directions (rad)."""
     return np.column_stack((np.cos(angles), np.sin(angles), np.zeros(len(angles))))
 
 

@@ -1,6 +1,6 @@
-"""Reflecting strips as a lidar with intensities makes them out: a ray that meets one comes back bright.
+"""Detection of reflecting strips by a lidar with intensities: rays that hit a strip return bright.
 
-Works on the scans themselves: what hides a strip from the lidar, or takes the lidar away, hides it here.
+Works on the scans themselves: strips hidden from the lidar, or all without scans, are not detected.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class ReflectorsSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ReflectorDetector(Detector[ReflectorSeen]):
-    """Reports what each scan shows."""
+    """Detector that reports the strips in each scan."""
 
     def __init__(
         self, hull: Hull, above_belly: float, world: WorldDescription, events: EventStream, rate: float
@@ -80,7 +80,7 @@ class ReflectorDetector(Detector[ReflectorSeen]):
 
 
 def _seen(strip: Reflector, scan: LaserScan, pose: Pose) -> ReflectorSeen | None:
-    """The strip as the mean of the rays that met it."""
+    """Return a strip as the mean of the rays that hit it; None: no ray did."""
     at = Pose(*strip.at, math.radians(strip.facing)).relative_to(pose.compose(scan.mount))
     distance, bearing = math.hypot(at.x, at.y), math.atan2(at.y, at.x)
     slant = abs(math.remainder(at.yaw - bearing - math.pi, math.tau))
@@ -99,7 +99,7 @@ def _seen(strip: Reflector, scan: LaserScan, pose: Pose) -> ReflectorSeen | None
 
 
 class SimulatedReflectors(Reflectors):
-    """Reflectors as the robot's lidar sees them, so high above the belly (m)."""
+    """Reflectors in the scans of the lidar, which is ``above_belly`` m above the belly."""
 
     def __init__(self, hull: Hull, above_belly: float, world: WorldDescription, robot: Robot) -> None:
         self._detector = ReflectorDetector(hull, above_belly, world, robot.events, robot[Lidar].rate)

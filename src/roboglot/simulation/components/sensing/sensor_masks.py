@@ -1,4 +1,4 @@
-"""Masks of bumpers, cliff sensors and depth cameras: those that are switched off."""
+"""Masks that switch off bumpers, cliff sensors and depth cameras."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from roboglot.simulation.components.sensing.depth_camera import SimulatedDepthCa
 
 
 class SimulatedSensorMasks(SensorMasks):
-    """Numbers the robot's maskable sensors from 0 and switches them."""
+    """Masks of the robot's maskable sensors, numbered from 0."""
 
     def __init__(
         self, bumper: SimulatedBumper | None, cliff: SimulatedCliff | None, depth: SimulatedDepthCamera | None

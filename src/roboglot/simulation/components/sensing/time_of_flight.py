@@ -1,4 +1,4 @@
-"""Time-of-flight sensors on the torso: 8 x 8 rays each, cast when they are read."""
+"""Time-of-flight sensors on the torso: 8 x 8 rays each, cast when read."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Eye(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class TimeOfFlightSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """Grids of 8 x 8 zones over a square ``field_of_view`` (rad)."""
+    """Grids of 8 x 8 zones over a square ``field_of_view`` (rad); ``rate`` in Hz, ranges and ``noise`` in m."""
 
     rate: Annotated[float, Meta(gt=0, le=60)]
     field_of_view: Annotated[float, Meta(gt=0, lt=2)]
@@ -48,7 +48,7 @@ class TimeOfFlightSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class _Held(NamedTuple):
-    """Sensors as the torso is held: eyes (n, 3) and rays in base_link, both also as readings have them."""
+    """Sensors at one posture of the torso: eyes (n, 3; m) and rays in base_link, both also in the readings' form."""
 
     posture: tuple[Orientation, Point, float]
     eyes: Floats
@@ -58,7 +58,7 @@ class _Held(NamedTuple):
 
 
 class SimulatedTimeOfFlight(TimeOfFlight):
-    """The torso's attitude turns them along."""
+    """Sensors that turn with the torso."""
 
     def __init__(
         self, section: TimeOfFlightSection, hull: Hull, rays: Rays, clock: Clock, random: np.random.Generator
@@ -101,7 +101,7 @@ class SimulatedTimeOfFlight(TimeOfFlight):
             self._readings[name] = ZoneDistances(stamp, grid, low, high, rays, eye)
 
     def _hold(self, posture: tuple[Orientation, Point, float]) -> _Held:
-        """Compute where the sensors look from and to, once for as long as the legs hold the torso like this."""
+        """Compute the sensors' positions and rays, once per posture of the torso."""
         hull, (_, shift, belly) = self._hull, posture
         eyes, ahead = hull.held(self._mounts) + np.array((shift.x, shift.y, belly)), hull.held(self._bundles)
         rays = ahead.astype(np.float32)
@@ -111,7 +111,7 @@ class SimulatedTimeOfFlight(TimeOfFlight):
 
 
 def _bundle(field_of_view: float) -> Floats:
-    """A ray through the middle of every zone, of length 1: x ahead, y left, z up; from above, from the left."""
+    """Return unit vectors (n x 3) through the zones' middles: x ahead, y left, z up; from the top left, by rows."""
     edge = math.tan(field_of_view / 2) * (1.0 - 1.0 / ZONES)
     steps = np.linspace(edge, -edge, ZONES)
     y, z = np.meshgrid(steps, steps)

@@ -1,4 +1,4 @@
-"""The touch pad, touched by hands of the world."""
+"""The touch pad, touched by the world's hands."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class TouchSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedTouch(Touch):
-    """Pad that ``Hands.touch`` presses."""
+    """Touch pad pressed by ``Hands.touch``."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot

@@ -1,4 +1,4 @@
-"""Ultra-wideband ranging of the connected bracelet: exact in sight, longer and vaguer through walls."""
+"""Ultra-wideband ranging of the connected bracelet: exact in line of sight, longer and noisier through walls."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ WALLS_MAX = 3  # beyond this many, no signal arrives
 
 
 class UltraWidebandSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """Standard deviations of distance (m) and azimuth (rad) in sight."""
+    """``noise`` of the distance (m), ``angle_noise`` of the azimuth (rad): standard deviations in line of sight."""
 
     range_max: Positive
     noise: NotNegative
@@ -31,7 +31,7 @@ class UltraWidebandSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedUltraWideband(UltraWideband):
-    """Measures when asked, at most ``rate`` times a second. Only bracelets carry tags."""
+    """Ranging that measures when read, at most ``rate`` times a second. Only bracelets have tags."""
 
     def __init__(
         self,

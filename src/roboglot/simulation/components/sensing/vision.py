@@ -1,6 +1,6 @@
 """Detectors of the camera's pictures: each looks at its rate while it has viewers, and reports a moment later.
 
-They need no picture to be drawn: what it would show follows from the camera's view and the world's geometry.
+No picture is drawn: detections follow from the camera's view and the world's geometry.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ QUEUE_MAX = 4  # sightings by which a viewer may lag
 
 
 class VisionSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """Detectors that look at the camera's pictures ``rate`` times a second."""
+    """Detectors on the camera's pictures, ``rate`` times a second."""
 
     rate: Annotated[float, Meta(gt=0, le=30)] = 12.5
 
 
 class SimulatedDetector(Detector[T]):
-    """``look`` answers what there is to see now. ``looks`` counts."""
+    """Detector; ``look`` returns the present detections, ``looks`` counts its calls."""
 
     def __init__(self, name: str, rate: float, clock: Clock, look: Callable[[], list[T]]) -> None:
         self.rate = rate
@@ -59,7 +59,7 @@ class SimulatedDetector(Detector[T]):
         return self._feed.subscribe()
 
     def close(self) -> None:
-        """Look no more."""
+        """Stop detecting."""
         self._feed.close()
 
     def _begin(self) -> None:
@@ -87,7 +87,7 @@ class SimulatedDetector(Detector[T]):
 
 
 class SimulatedVision(Vision):
-    """A robot's number for a person is the same in all detectors."""
+    """Vision that numbers people alike in all detectors."""
 
     def __init__(
         self, section: VisionSection, robot: Robot, camera: Camera, hull: Hull, around: Surroundings, chances: Chances
@@ -122,7 +122,7 @@ class SimulatedVision(Vision):
         return detector
 
     def _faces(self) -> dict[bytes, str]:
-        """Names of the members whose faces were entered."""
+        """Return the names of members by their enrolled faces."""
         if Members not in self._robot:
             return {}
         return {member.face: member.name for member in self._robot[Members].all() if member.face is not None}

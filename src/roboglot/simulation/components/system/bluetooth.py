@@ -1,4 +1,4 @@
-"""Bluetooth: hears the gadgets of the world through walls and slabs, keeps one connection, updates its firmware."""
+"""Bluetooth: receives the world's gadgets through walls and slabs, keeps one connection, updates the device."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ UPDATE_BATTERY = 1 / 3
 
 
 class BluetoothSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """``sensitivity``: dBm from which it hears; ``connect_time`` in s."""
+    """``sensitivity``: weakest signal that is received, dBm; ``connect_time`` in s."""
 
     sensitivity: Annotated[float, Meta(ge=-120, le=0)] = -92.0
     connect_time: NotNegative = 2.0
 
 
 class SimulatedBluetooth(Bluetooth):
-    """The history lives in the robot's settings."""
+    """Bluetooth with its history in the robot's settings."""
 
     def __init__(self, section: BluetoothSection, hull: Hull, gadgets: Gadgets, robot: Robot) -> None:
         self._section, self._hull, self._gadgets, self._robot = section, hull, gadgets, robot
@@ -56,7 +56,7 @@ class SimulatedBluetooth(Bluetooth):
 
     @property
     def gadget(self) -> GadgetInWorld | None:
-        """The connected one itself, for what measures it by another radio."""
+        """The connected gadget in the world, for components that range it by another radio; None: none."""
         return self._wanted if self._linked else None
 
     @property
@@ -141,7 +141,7 @@ class SimulatedBluetooth(Bluetooth):
         return self._robot.actions.start("bluetooth update", run, resources=[BLUETOOTH], source=source)
 
     def sense(self, stamp: float, _seconds: float) -> None:
-        """Check periodically whether the device is still there, or there again."""
+        """Check periodically whether the device is in range."""
         if self._wanted is None or stamp < self._next:
             return
         self._next = stamp + LOOK
@@ -167,7 +167,7 @@ class SimulatedBluetooth(Bluetooth):
         return self._gadgets.signal(gadget, self._hull.pose.point, self._hull.floor)
 
     def _advertised(self, gadget: GadgetInWorld) -> BluetoothDevice:
-        """Return what the gadget advertises; more if it is known."""
+        """Return the gadget as advertised, with the stored details of a known one."""
         heard = BluetoothDevice(
             gadget.gadget.address, gadget.gadget.name, gadget.gadget.random, round(self._signal(gadget), 1)
         )

@@ -19,7 +19,7 @@ FETCHING = 0.5  # s
 
 
 class SimulatedDeveloper(Developer):
-    """Kept in the settings."""
+    """Developer access, kept in the settings."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot

@@ -1,4 +1,4 @@
-"""A disk of a fixed size, in part used by the system; something may fill it up."""
+"""A disk of fixed size, partly used by the system; a fault may fill it up."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ NAMES_MAX = 10_000
 
 
 class SimulatedDisk(Disk):
-    """Every robot has one. ``rubbish``: bytes that something else has written."""
+    """Disk of every robot. ``rubbish``: bytes written by a fault."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot

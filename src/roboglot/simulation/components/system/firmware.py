@@ -1,4 +1,4 @@
-"""Firmware: downloads at the link's pace, installs at the disk's, reboots."""
+"""Firmware: downloads at the link's rate, installs at the disk's, reboots."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ RESTART_SECONDS = {Module.SOFTWARE: 8.0, Module.BASE: 3.0}
 
 
 class FirmwareSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """``modules``: factory versions; ``offered``: what the maker offers; rates in bytes per s, ``reboot_time`` in s."""
+    """``modules``: factory versions; ``offered``: version for download; rates in bytes/s, ``reboot_time`` in s."""
 
     version: str
     modules: dict[str, str]
@@ -57,7 +57,7 @@ class FirmwareSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedFirmware(Firmware):
-    """Firmware of a simulated robot: the record has what runs, the body's description has the offer."""
+    """Firmware of a simulated robot: the record holds the running versions, the section the offered one."""
 
     def __init__(self, section: FirmwareSection, robot: Robot, base: SimulatedBase) -> None:
         self._section, self._robot, self._base = section, robot, base
@@ -173,7 +173,7 @@ class SimulatedFirmware(Firmware):
         await self._record.put_downloaded(None)
 
     async def _go_through(self, action: Action, state: FirmwareState, package: FirmwarePackage, rate: float) -> None:
-        """A percent at a time; given up, it is as if it had not begun; failed, it says why."""
+        """Advance percent by percent; if cancelled, restore the old progress; if failed, report the reason."""
         before = self._progress
         fetched = state is FirmwareState.DOWNLOADING and bool(package.url)
         steps = 100 if fetched or state is FirmwareState.INSTALLING else 0
@@ -243,7 +243,7 @@ class SimulatedFirmware(Firmware):
         )
 
     def sense(self, stamp: float, _seconds: float) -> None:
-        """Begin a due update now and then: of a robot that updates itself, docked and idle."""
+        """Check periodically for an update, and begin it on a robot that updates itself, is docked and idle."""
         if stamp < self._next_look:
             return
         self._next_look = stamp + LOOK_EVERY
@@ -263,13 +263,13 @@ class SimulatedFirmware(Firmware):
             self.reboot()
 
     def close(self) -> None:
-        """The world ends."""
+        """Stop: the world is being closed."""
         for task in (self._restarting, self._updating):
             if task:
                 task.cancel()
 
     def _wake(self) -> None:
-        """Take up what an earlier life left, once: starting this program is a reboot, too."""
+        """Restore the state of the previous run, once: a start of this program is a reboot, too."""
         if package := self._record.wake():
             self._robot[Disk].take(PACKAGE, package.size)
             self._progress = FirmwareProgress(FirmwareState.DOWNLOADED, 1.0, package)

@@ -1,4 +1,4 @@
-"""Record of a robot's firmware over reboots and crashes: in its settings, where it has some."""
+"""Record of a robot's firmware over reboots and crashes, kept in its settings, if it has any."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class FirmwareRecord:
         self._booted: Versions | None = None  # the versions installed before the last reboot: they are running by now
 
     def wake(self) -> FirmwarePackage | None:
-        """Take up what an earlier life left, once; return what it had downloaded."""
+        """Restore the state of the previous run, once; return its downloaded package."""
         if self._awake or Settings not in self._robot:
             return None
         self._awake, self._booted = True, self._versions(PENDING)
@@ -39,7 +39,7 @@ class FirmwareRecord:
 
     @property
     def installed(self) -> Versions:
-        """Versions of the whole and of its modules, as they run now."""
+        """Running versions of the whole and of its modules."""
         return self._booted or self._versions(INSTALLED) or self._factory
 
     @property
@@ -48,19 +48,19 @@ class FirmwareRecord:
         return bool(self._read(AUTOMATIC))
 
     async def set_automatic(self, on: bool) -> None:
-        """Have the robot update itself, or not."""
+        """Switch automatic updates."""
         await self._write(AUTOMATIC, on)
 
     async def put_downloaded(self, package: FirmwarePackage | None) -> None:
-        """Keep what was downloaded; None: nothing."""
+        """Keep the downloaded package; None: there is none."""
         await self._write(DOWNLOADED, to_builtins(package))
 
     async def put_pending(self, version: str, modules: Mapping[str, str]) -> None:
-        """Keep what runs after the next reboot."""
+        """Keep the versions that run after the next reboot."""
         await self._write(PENDING, [version, modules])
 
     async def boot(self) -> None:
-        """Make what waited for a reboot the running version."""
+        """Make the pending versions the running ones."""
         if pending := self._read(PENDING):
             await self._write(INSTALLED, pending)
             await self._write(PENDING, None)

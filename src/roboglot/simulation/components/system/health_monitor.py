@@ -36,9 +36,9 @@ SCANLESS_AFTER = 1.0  # s
 
 @dataclass(frozen=True, slots=True)
 class _Watch:
-    """One thing that may be wrong with a part: under which name, how bad, in which words, and how one sees it.
+    """A possible fault of a part: name, level, message, and ``wrong``: its test.
 
-    ``lasting``: how one sees that it is still wrong, where that differs.
+    ``lasting``: test whether a present fault lasts, if different.
     """
 
     interface: type[Component]
@@ -54,12 +54,12 @@ WARNING, ERROR, FATAL = FaultLevel.WARNING, FaultLevel.ERROR, FaultLevel.FATAL
 
 
 def _netless(card: Network) -> bool:
-    """True if it should be in a network and isn't."""
+    """True for a station that is not in a network."""
     return not card.connected and card.state.mode is NetworkMode.STATION
 
 
 def _is_in_doubt(localization: Localization, quality: float) -> bool:
-    """True if it should know the place, has looked, and is less sure than ``quality``."""
+    """True if localization is enabled and started, but its quality is below ``quality`` (0..1)."""
     known = localization.lost is None and localization.quality >= quality
     return localization.enabled and localization.started and not known
 
@@ -88,7 +88,7 @@ WATCHES = (
 
 
 class HealthWatch:
-    """Looks at what the robot has when it looks first: parts that are added later (localization) count too."""
+    """Watch over the parts that the robot has at the first check, including later added ones (localization)."""
 
     def __init__(self, robot: Robot, health: Health, hull: Hull) -> None:
         self._robot, self._health, self._hull = robot, health, hull
@@ -99,7 +99,7 @@ class HealthWatch:
         self._scanned = 0.0
 
     def sense(self, stamp: float, _seconds: float) -> None:
-        """Look."""
+        """Check all parts."""
         if self._watches is None:
             robot, self._scanned = self._robot, stamp
             self._watches = [(watch, robot[watch.interface]) for watch in WATCHES if watch.interface in robot]
@@ -123,7 +123,7 @@ class HealthWatch:
         return now - self._scanned >= SCANLESS_AFTER
 
     def _bumper_stuck(self, now: float) -> bool:
-        """A zone that is pressed for long with nothing touching the hull."""
+        """Return whether a zone has been pressed for long without a contact at the hull."""
         pressed = () if self._hull.touches else self._robot[Bumper].pressed
         if not pressed and not self._pressed_since:
             return False

@@ -1,6 +1,6 @@
 """Wi-Fi: log-distance path loss from the access points, walls and slabs in between; joining, roaming, losing; a modem.
 
-What a real card would shut out (a client of a network that the robot left) goes on here: doors listen on this machine.
+Clients in a network that the robot left keep their connections here: doors listen on this machine.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ KEY = "network"
 
 
 class Modem(Struct, frozen=True, forbid_unknown_fields=True):
-    """A mobile modem: the access point name that it was made with, and the weakest signal (dBm) that it can use."""
+    """A mobile modem: the default access point name, and the weakest usable signal, dBm."""
 
     apn: str
     sensitivity: Annotated[float, Meta(ge=-140, le=-40)] = -110.0
@@ -53,9 +53,9 @@ class Modem(Struct, frozen=True, forbid_unknown_fields=True):
 class NetworkSection(Struct, frozen=True, forbid_unknown_fields=True):
     """A Wi-Fi card; ``noise`` in dB. ``known``: the networks (ssid: password) that a new robot joins.
 
-    ``maker``: the first half of its hardware address; ``name``, ``password`` and ``address`` are those of its own
-    network when it is an access point (the name is followed by the end of its hardware address); ``wired``: address
-    and prefix length of the socket on the hull.
+    ``maker``: first half of the hardware address; ``name`` (followed by the hardware address' end), ``password`` and
+    ``address``: of its own network as an access point; ``wired``: address and prefix length of the socket on the
+    hull.
     """
 
     noise: NotNegative
@@ -69,7 +69,7 @@ class NetworkSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedNetwork(Network):
-    """Measures once a second, as drivers do. Its settings are one document in the robot's settings."""
+    """Network that measures once a second. Its settings are one document in the robot's settings."""
 
     def __init__(
         self, section: NetworkSection, hull: Hull, radio: Radio, robot: Robot, random: np.random.Generator
@@ -197,7 +197,7 @@ class SimulatedNetwork(Network):
         await self._keep(apn=apn)
 
     def sense(self, stamp: float, _seconds: float) -> None:
-        """Measure if it is time."""
+        """Measure when due, and publish changes."""
         if stamp < self._next:
             return
         self._next = stamp + PERIOD
@@ -211,7 +211,7 @@ class SimulatedNetwork(Network):
             self._published = state
 
     def _best(self, noise: float) -> tuple[float, str]:
-        """The network that it is in, as long as it holds; else the first known one that is strong enough."""
+        """Return signal (dBm) and name of the present network, else of the first known one that is strong enough."""
         strongest = FLOOR_OF_NOISE
         for ssid in sorted(self._passwords, key=lambda ssid: ssid != self._ssid):
             point = self._radio.network(ssid)
@@ -225,7 +225,7 @@ class SimulatedNetwork(Network):
 
     @property
     def _heard(self) -> dict[str, float]:
-        """dBm of every network, here."""
+        """Signal of every network at the robot's place, dBm."""
         hull = self._hull
         place = hull.x, hull.y, hull.floor
         if self._levels is None or self._levels[0] != place:
@@ -233,7 +233,7 @@ class SimulatedNetwork(Network):
         return self._levels[1]
 
     def _address(self) -> str:
-        """Return its address in the network that it is in."""
+        """Return the robot's address in its present network."""
         return self._kept("address", "") or self._radio.lease(self._ssid, self._mac)
 
     @property

@@ -1,4 +1,4 @@
-"""PWM outputs: registers, as in the real chip. What hangs on them is up to users."""
+"""PWM outputs: registers only, with nothing connected."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class PwmPortsSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedPwmPorts(PwmPorts):
-    """All ports begin alike."""
+    """PWM ports, all with the same signal at power-on."""
 
     def __init__(self, section: PwmPortsSection) -> None:
         self.count = section.count

@@ -1,4 +1,4 @@
-"""The system's log: a line an event. Uploads take as long as their bytes on the link; the maker is always at home."""
+"""The system's log: one line per event. Uploads take as long as the link needs; the maker's server is always up."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ WRITTEN: tuple[type[Event], ...] = (
 
 
 class SimulatedSystemLog(SystemLog):
-    """Keeps words, not events: those would keep alive what they refer to."""
+    """Log of lines, not events, which would keep objects alive."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
