@@ -86,7 +86,7 @@ async def test_a_browser_shows_moving_pictures(tmp_path: Path) -> None:
                 async with asyncio.timeout(PATIENCE) as limit, dog.servo(Motion.TROT_SLOW) as joystick:
                     joystick.set(0.0, 0.0, 0.5)
                     frames = 0
-                    while not (seen and seen[-1]["moved"] > 2):  # of 40 pictures
+                    while not (seen and seen[-1]["frames"] > 60 and seen[-1]["moved"] > 2):
                         await asyncio.sleep(0.2)
                         if seen and seen[-1]["frames"] > frames:  # a busy machine shows less than one a second
                             frames = seen[-1]["frames"]
