@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 class ProgramError(Exception):
-    """The operation was not done; the message says why, in words for the user."""
+    """An operation was not done; the message gives the reason in words for the user."""
 
 
 class NotAllowed(ProgramError):

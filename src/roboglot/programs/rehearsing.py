@@ -11,7 +11,7 @@ from roboglot.model.geometry import Point, Pose, Twist
 
 @dataclass(frozen=True, slots=True)
 class Act:
-    """Event ``at`` so many seconds: ``who`` does ``kind`` (say, gesture, walk; touch and box need no one)."""
+    """Event at ``at`` s: person ``who`` does ``kind`` (say, gesture, walk); touch and box need no person."""
 
     at: float
     kind: str
@@ -22,7 +22,7 @@ class Act:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """A world, and what is where in it; m and rad. ``longest``: seconds of robot time after which it is over."""
+    """A world with the poses of robot, boxes and people (m, rad). ``longest``: most robot time that it lasts, s."""
 
     world: str = "empty"
     body: str = "cyberdog2"
@@ -48,9 +48,9 @@ class Spot:
 class Played:
     """Record of a program.
 
-    ``error`` is empty if it came to its end; ``late``: it was ended for taking too long.
-    ``outlines``: of walls and furniture on its floor. ``colours``: zone and red, green, blue of every look of the
-    lights. ``said``: texts and names of sounds.
+    ``error`` is empty if the program finished; ``late``: it was ended because it took too long.
+    ``outlines``: walls and furniture on the robot's floor. ``colours``: zone and red, green, blue of every state of
+    the lights. ``said``: texts and names of sounds.
     """
 
     printed: str = ""
@@ -69,7 +69,7 @@ class Played:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One step of a plan: drive to ``goal`` (base_link at the plan's start), or with ``twist`` for ``seconds``."""
+    """One step of a plan: drive to ``goal`` (frame: base_link at the plan's start), or at ``twist`` for ``seconds``."""
 
     goal: Point | None = None
     twist: Twist | None = None
@@ -78,7 +78,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Hit:
-    """The hull touched something: seconds since the start, where the robot really was, what it was."""
+    """Contact of the hull: seconds since the start, true position of the robot (m), name of the object."""
 
     at: float
     x: float
@@ -88,9 +88,9 @@ class Hit:
 
 @dataclass(slots=True)
 class Tried:
-    """Result of a plan: the end of each step (the first that fails is the last), and what the robot touched."""
+    """Result of a plan: outcome of each step up to the first failure, and contacts of the hull."""
 
-    steps: list[tuple[str, str]] = field(default_factory=list)  # SUCCEEDED or ABORTED, and why
+    steps: list[tuple[str, str]] = field(default_factory=list)  # SUCCEEDED or ABORTED, and the reason
     hits: list[Hit] = field(default_factory=list)
     path: list[Spot] = field(default_factory=list)
     seconds: float = 0.0
@@ -101,7 +101,7 @@ class Rehearse(Protocol):
     """Plays a program or a plan in a copy of a world."""
 
     async def try_plan(self, steps: Sequence[Step], scene: Scene) -> Tried:
-        """Do the steps in turn, as fast as it goes. Raises as ``play`` does."""
+        """Do the steps in turn, as fast as possible. Raises as ``play`` does."""
 
     async def play(
         self,
@@ -112,8 +112,8 @@ class Rehearse(Protocol):
         speed: float = 10.0,
         notice: Callable[[dict[str, object]], None] | None = None,
     ) -> Played:
-        """Play to the end. Raises ValueError for a scene that cannot be, RuntimeError where too many wait."""
+        """Play to the end. Raises ValueError for an impossible scene, RuntimeError if too many rehearsals wait."""
 
 
 SceneOf = Callable[[str], Scene]
-"""The scene around a robot as it is now, by its name. Raises ValueError where it is not simulated."""
+"""Return the current scene around the named robot. Raises ValueError if it is not simulated."""

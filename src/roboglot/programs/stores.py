@@ -1,7 +1,7 @@
 """Interfaces of the programs' stores, and the records kept there. `roboglot.storage` implements them.
 
-When a write returns, it survives a crash. Every method raises StoreError (`roboglot.programs.errors`) where the store
-fails; methods that end in ``_now`` block and are for start-up.
+Once a write has returned, it survives a crash. Every method raises StoreError (`roboglot.programs.errors`) if the
+store fails; methods that end in ``_now`` block and are for start-up.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ LOG_TEXT_MAX = 4000
 
 @dataclass(frozen=True, slots=True)
 class StoredProgram:
-    """A task or module as it was saved.
+    """A saved task or module.
 
-    ``style`` is the editor's own text, ``state`` a word of the state table. ``due``: when a scheduled task runs, in
-    seconds since 1970; None: no time is set. ``owner``: who wrote or ran a task last, and so what it may do; empty:
-    no one was asked.
+    ``style`` is the editor's own text, ``state`` a word of the state table. ``due``: start of a scheduled task, Unix s;
+    None: no time is set. ``owner``: identity that last wrote or ran a task, whose rights it has; empty: no identity
+    was required.
     """
 
     id: str

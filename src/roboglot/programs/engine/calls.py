@@ -1,6 +1,6 @@
-"""The calls of one run: one at a time, no faster than its limits, answered by the host or from an earlier life.
+"""The calls of one run: one at a time, no faster than its limits, answered by the host or from an interrupted run.
 
-Every value of the worker is hostile. Knows no process; time here is the machine's.
+Every value of the worker is hostile. Knows no process; times are in the machine's time.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from roboglot.programs.worker.link import HALT, REPLY_MAX
 from roboglot.programs.worker.values import drained, pack
 
 BURST = 0.1
-"""Seconds worth of calls that may come at once before the call rate is held."""
+"""Burst that the call rate allows, in seconds of calls."""
 CALL_BYTES_RATE_MAX = 2 * 1024 * 1024
 """Bytes of arguments a second."""
 SHORT = 256
-"""Bytes of a frame whose cost is not measured: reading the clock twice would take as long."""
+"""Largest frame, in bytes, whose cost is not measured: reading the clock twice would take as long."""
 NONE_REPLY = b'{"t":"value","value":null}'  # the answer to most calls
 Values = tuple[tuple[object, ...], dict[str, object]]
 
@@ -46,14 +46,14 @@ class CallHost(Protocol):
         """Hand an event to the reader."""
 
     def end(self, reason: ExitReason, kind: str, message: str) -> None:
-        """End the run for a reason of the host's."""
+        """End the run by a decision of the host."""
 
     def abort(self, error: ProtocolViolation) -> None:
         """End the run of a worker that broke the protocol, and drop its socket."""
 
 
 class CallRate:
-    """Computes how early each call is, given the calls and bytes allowed a second."""
+    """Computes by how much each call must be delayed to keep the rates of calls and bytes."""
 
     __slots__ = ("_call_cost", "_loop", "_paid_until")
 
@@ -63,7 +63,7 @@ class CallRate:
         self._paid_until = 0.0
 
     def delay(self, size: int = 0) -> float:
-        """Count a call of ``size`` bytes; return the seconds by which it is early, not above 0 if it is not."""
+        """Count a call of ``size`` bytes; return its delay in seconds, 0 or less for none."""
         now = self._loop.time()
         cost = max(self._call_cost, size / CALL_BYTES_RATE_MAX)
         self._paid_until = max(self._paid_until, now - BURST) + cost
@@ -71,7 +71,7 @@ class CallRate:
 
 
 class Calls:
-    """Takes calls of the worker and sends the answers. ``names`` may be called; ``history`` is answered from itself."""
+    """Takes calls of the worker and sends the answers. ``names`` may be called; ``history`` holds recorded answers."""
 
     def __init__(
         self,
@@ -91,25 +91,25 @@ class Calls:
         self._loop = asyncio.get_running_loop()
         self._waiting: Call | Halted | None = None
         self.answered: Callable[[str, bytes], None] | None = None
-        """Called with every answer that is sent and its call's name, to continue the program after a crash."""
+        """Called with the call's name and each answer sent, to continue the program after a crash."""
         self.keeps_last = False
-        """Keep the last answer of ``history`` back until ``go_on``: the program waits where its earlier life ended."""
+        """Keep the last answer of ``history`` back until ``go_on``, so that the program waits at its earlier end."""
         self._kept = b""
 
     def reply(self, id: int, value: object = None) -> None:
         """Answer a call with None, bool, int, float, str, Record, or lists and dicts of these.
 
-        Raises TypeError or ValueError for values that cannot cross (the call still waits), LookupError if no such call
-        waits.
+        Raises TypeError or ValueError for values that cannot be sent (the call still waits), LookupError if no such
+        call waits.
         """
         self._answer(id, NONE_REPLY if value is None else msgspec.json.encode({"t": "value", "value": pack(value)}))
 
     def fail(self, id: int, type: str, message: str) -> None:
-        """Answer a call with an error: a built-in exception's name, or another, which becomes a kind of RobotError."""
+        """Answer a call with an error: the name of a built-in exception, or another, made a subclass of RobotError."""
         self._answer(id, msgspec.json.encode({"t": "raise", "type": type, "message": message}))
 
     def go_on(self) -> None:
-        """Send the answer that was kept back, if there is one, and keep none back from here on."""
+        """Send the answer that was kept back, if any, and keep none back from now on."""
         self.keeps_last = False  # the program may read that answer later
         kept, self._kept = self._kept, b""
         if kept and not self._host.over:
@@ -134,7 +134,7 @@ class Calls:
     def _read(
         self, call: CallMessage, size: int, values: Generator[None, None, Values], *, in_turn: bool = False
     ) -> None:
-        """Read the values of a long call, with turns for others in between; its first part is charged by the run."""
+        """Read the values of a long call in steps, so that others get turns; the run charges the first step."""
         if self._host.over:
             return
         began, until = time.thread_time(), time.perf_counter() + STEP
@@ -169,7 +169,7 @@ class Calls:
             self._account.go_on(deliver)
 
     def _halt(self, call: CallMessage) -> None:
-        """Report a halt, but not while the program repeats its earlier life."""
+        """Report a halt, except during a replay."""
         self._waiting = halted = Halted(call.id, self._position.line, self._position.unit)
         if self._history:
             self.reply(call.id)
@@ -178,7 +178,7 @@ class Calls:
         self._loop.call_later(max(0.0, self._rate.delay()), self._put, halted)
 
     def _replay(self, call: CallMessage, args: tuple[object, ...], kwargs: dict[str, object]) -> bool:
-        """Answer a call as in the earlier life; return True if it was cut off there and needs a new answer."""
+        """Answer a call from the history; return True if it was interrupted there and needs a new answer."""
         known = self._history.popleft()
         if known.name != call.name:
             words = f"the program asked for {call.name} where it had asked for {known.name} before"

@@ -1,4 +1,4 @@
-"""A worker asked to check a program instead of running it: one message, then the end. Knows no process."""
+"""Dialogue with a worker that checks a program instead of running it: one message, then the end. Knows no process."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from roboglot.programs.language import Problem, ProblemKind
 class Checking:
     """The answer of a checking worker: ``problems`` once ``closed`` is done, None if it ended without one.
 
-    ``uses`` are the names among those asked for that the program reads without defining them.
+    ``uses``: requested names that the program reads without defining them.
     """
 
     def __init__(self) -> None:
@@ -23,11 +23,11 @@ class Checking:
 
     @property
     def full(self) -> bool:
-        """One message never fills anything."""
+        """False: a single message needs no back-pressure."""
         return False
 
     def take(self, body: bytes) -> bool:
-        """The worker's message. Raises ProtocolViolation."""
+        """Take the worker's message. Raises ProtocolViolation."""
         match decode(body):
             case CheckedMessage(problems=found, uses=uses):
                 try:
@@ -45,6 +45,6 @@ class Checking:
         self.problems = None
 
     def settle(self) -> None:
-        """The socket has ended."""
+        """Note that the socket has ended."""
         if not self.closed.done():
             self.closed.set_result(None)

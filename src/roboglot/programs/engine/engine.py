@@ -1,12 +1,12 @@
-"""Runs people's programs, each in a process of its own that can do nothing but compute and ask.
+"""Runs users' programs, each in a process of its own that can only compute and send calls.
 
 A clean zygote is started once and forked for every program; the fork is locked down (system call filter, no files, no
 network, limits) before it sees the program's text. Parsing happens in there too. Where the
 filter cannot be loaded, ``open``, ``start`` and ``check`` raise SandboxUnavailable with the reason, unless the
 configuration allows it.
 
-Knows no robot: programs call names, the reader of the run answers. Lives on the running asyncio loop (uvloop
-too), blocks nowhere.
+Knows no robot: programs call names, the reader of the run answers. Runs on the current asyncio loop (or uvloop) and
+never blocks.
 """
 
 from __future__ import annotations
@@ -56,17 +56,17 @@ log = logging.getLogger(__name__)
 T = TypeVar("T")
 
 FILTER = "seccomp"
-"""The wall among the layers that only the operator can do without."""
+"""The layer of the jail that only the operator's settings can make optional."""
 RUNS_MAX = 512
 """Programs running at once, suspended and checked ones included."""
 MODULES_MAX = 1000
 """Modules of one program."""
 ANSWER_MAX = 60.0
-"""Seconds (of the machine) for a worker to be born, and for a program to be checked."""
+"""Longest wait for a worker's start and for a program's check, in the machine's seconds."""
 ENDS_MAX = 5.0
-"""Seconds (of the machine) for killed programs to be gone before the zygote is ended, too."""
+"""Longest wait for killed programs before the zygote is ended, in the machine's seconds."""
 STEPS_BACK_AFTER = 0.5
-"""Seconds (of the machine) after which a program moves to the group of programs; the kernel takes its time for it."""
+"""Delay before a program moves to the control group, which is slow in the kernel; in the machine's seconds."""
 
 _CHECK_MEMORY, _CHECK_CPU = 256 * 1024 * 1024, 10
 _EMPTY = Prelude()
@@ -74,11 +74,10 @@ _DEFAULT = Limits()
 
 
 class Engine:
-    """The program engine of a server. ``open`` (or ``open_soon``) starts the zygote, the first use does otherwise;
-    ``close`` ends everything.
+    """The program engine of a server. ``open``, ``open_soon`` or the first use starts the zygote, ``close`` ends all.
 
-    ``policy=False`` switches the language's rules off and leaves Python whole inside the jail; it exists so that
-    tests can show that the jail alone holds. ``filter_required=False`` runs programs also where the kernel can't filter
+    ``policy=False`` switches the language's rules off and allows all of Python inside the jail; it exists so that
+    tests can show that the jail alone holds. ``filter_required=False`` runs programs even if the kernel can't filter
     their system calls; ``layers`` then lacks FILTER. ``memory_together``: bytes for all programs, 0 for the default.
     """
 
@@ -96,7 +95,7 @@ class Engine:
         self._group = ProcessorGroup()
         self._share = Share()
         self.layers: list[str] = []
-        """The walls of the jail on this machine, once open."""
+        """Layers of the jail on this machine, once open."""
 
     async def __aenter__(self) -> Engine:
         await self.open()
@@ -111,7 +110,7 @@ class Engine:
         return len(self._runs)
 
     def open_soon(self) -> None:
-        """Start the zygote in the background; a failure shows at the first use."""
+        """Start the zygote in the background; a failure is raised at the first use."""
         if self._background is None:
             self._background = asyncio.create_task(self._try_open())
 
@@ -134,10 +133,10 @@ class Engine:
 
         ``modules`` (name to source) run first, in their order, and share the program's names. ``seed`` fixes
         ``random``. With the ``history`` of a lost run (from ``Run.calls.answered``) and the same program, modules and
-        seed, the program continues where that one was: calls are answered from it and reported as Replayed, and
-        output is repeated. With ``stops`` it is watched: slower, but it halts there, reported as Halted, and can be
-        stepped through. Raises SandboxUnavailable, EngineError (too many runs, no process), ValueError
-        (larger than any program may be), LookupError (a stop at a line that is not there).
+        seed, the program continues where that run ended: recorded calls are answered from the history and reported
+        as Replayed, and output is repeated. ``stops`` makes the program watched: slower, but it halts there (reported
+        as Halted) and can be stepped through. Raises SandboxUnavailable, EngineError (too many runs, no process),
+        ValueError (program too large), LookupError (a stop at a line that does not exist).
         """
         modules = modules or {}
         if len(modules) > MODULES_MAX:
@@ -186,7 +185,7 @@ class Engine:
     async def check(
         self, source: str, prelude: Prelude = _EMPTY, *, functions: frozenset[str] = frozenset()
     ) -> list[Problem]:
-        """Return what is wrong with a program, found by a jailed worker; ``functions`` are names its modules define.
+        """Return the problems of a program, found by a jailed worker; ``functions``: names defined by its modules.
 
         Raises as ``start``.
         """
@@ -196,7 +195,7 @@ class Engine:
     async def examine(
         self, source: str, prelude: Prelude = _EMPTY, *, functions: frozenset[str] = frozenset()
     ) -> tuple[list[Problem], frozenset[str]]:
-        """The same, and which of ``functions`` the program uses (none if it cannot be parsed)."""
+        """Return the problems and those of ``functions`` that the program uses (none if it cannot be parsed)."""
         return await self._in_time(self._examine(source, prelude, functions))
 
     async def _examine(
@@ -226,7 +225,7 @@ class Engine:
         return checking.problems, functions.intersection(checking.uses)
 
     async def close(self) -> None:
-        """End every run and the zygote; nothing of theirs is left. Idempotent."""
+        """End every run and the zygote, and remove their resources. Idempotent."""
         self._closed = True
         if self._background is not None:
             self._background.cancel()  # a zygote that is still loading has no state to lose
@@ -267,7 +266,7 @@ class Engine:
             return self._launcher
 
     async def _open_group(self) -> list[str]:
-        """Open the group of programs; not left in the middle, or ``close`` would miss it."""
+        """Open the control group; a cancellation waits for the end, so that ``close`` finds the group."""
         opening = asyncio.ensure_future(asyncio.to_thread(self._group.open))
         try:
             return await asyncio.shield(opening)
@@ -276,7 +275,7 @@ class Engine:
             raise
 
     def _forget(self, launcher: Launcher) -> None:
-        """Forget a zygote that ended by itself: the next program starts another."""
+        """Forget a zygote that ended by itself; the next program starts another."""
         if self._launcher is launcher:
             self._launcher = None
             reaping = asyncio.get_running_loop().create_task(launcher.close())
@@ -299,7 +298,7 @@ class Engine:
             ours.setblocking(False)
             transport, _ = await asyncio.get_running_loop().create_unix_connection(lambda: protocol, sock=ours)
         except BaseException:
-            ours.close()  # a worker already forked notices that its host is gone and exits
+            ours.close()  # a worker that was forked already detects this and exits
             if worker is None:
                 self._release()
             raise
@@ -307,7 +306,7 @@ class Engine:
         return worker
 
     async def _in_time(self, work: Coroutine[object, None, T]) -> T:
-        """Return the result of ``work``, or raise EngineSilent: no one waits for ever for a worker never born."""
+        """Return the result of ``work``. Raises EngineSilent after ``ANSWER_MAX``, as a worker may never start."""
         task = asyncio.ensure_future(work)
         self._asked.add(task)
         task.add_done_callback(self._asked.discard)
@@ -320,7 +319,7 @@ class Engine:
         return task.result()
 
     def _step_back(self, worker: Worker) -> None:
-        """A program that lasts is weighed together with all others that do."""
+        """Move a program that is still running to the control group."""
         if self._group.there and not worker.died.done() and self._launcher is not None and not self._closed:
             moving = asyncio.get_running_loop().create_task(
                 asyncio.to_thread(self._group.take, worker.pid, self._launcher.pid)

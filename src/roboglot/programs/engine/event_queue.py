@@ -1,4 +1,4 @@
-"""Events waiting for a run's one reader, with consecutive output joined. Knows no process."""
+"""Queue of a run's events for its one reader; consecutive output is joined. Knows no process."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from roboglot.programs.engine.events import Event, Output
 EVENTS_MAX = 256
 """Events kept for a slow reader before the worker has to wait."""
 OUTPUT_EVENT_MAX = 64 * 1024
-"""Characters that pieces of output are joined up to."""
+"""Most characters of joined output in one event."""
 OUTPUT_MAX = 4 * OUTPUT_EVENT_MAX
 """Characters of output kept for a slow reader before the worker has to wait."""
 
 
 class Inbox:
-    """A queue that only asks its writer to pause: ``full`` says when."""
+    """A queue that never blocks its writer: the writer should pause while ``full``."""
 
     __slots__ = ("_events", "_loop", "_pieces", "_reader", "_size", "_unread", "closed")
 
@@ -51,7 +51,7 @@ class Inbox:
         self._wake()
 
     def drop(self) -> None:
-        """Forget what was not taken yet."""
+        """Discard all events."""
         self._events.clear()
         self._pieces.clear()
         self._size = self._unread = 0
@@ -62,7 +62,7 @@ class Inbox:
         self._wake()
 
     async def take(self) -> Event | None:
-        """The next event; None when closed and empty."""
+        """Return the next event; None when closed and empty."""
         while not self._events:
             self._join()
             if not self._events:

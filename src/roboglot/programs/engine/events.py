@@ -12,10 +12,10 @@ import msgspec
 class Limits:
     """Limits of one run.
 
-    ``memory`` counts bytes beyond an empty program's, ``cpu`` seconds of processor in its whole life (waiting costs
-    nothing), ``output`` characters printed in its whole life, ``recursion`` calls inside calls. A program that calls
-    the robot more often than ``call_rate`` times a second is slowed down to it, not ended. ``wall`` counts seconds of
-    the machine's clock since the start, suspended ones excepted; 0 is no limit.
+    ``memory``: bytes beyond those of an empty program; ``cpu``: processor seconds in all (waiting costs nothing);
+    ``output``: printed characters in all; ``recursion``: depth of calls; ``call_rate``: calls of the robot a second,
+    a faster program is slowed down, not ended. ``wall``: seconds of the machine's clock since the start, without
+    suspensions; 0: no limit.
     """
 
     memory: int = 64 * 1024 * 1024
@@ -36,8 +36,8 @@ class Limits:
 class Stops:
     """Stops of a watched program: ``lines`` of a module or of the program (""), ``blocks``, its ``first`` statement.
 
-    The host sees to blocks, whose begin it knows. ``first_block``: at the begin of its next block. ``watched`` alone:
-    nowhere, but it can be stepped through.
+    ``first_block``: the begin of its next block. ``watched`` alone: no stops, but stepping is possible. The engine
+    handles lines; the host handles blocks, as it knows their begin.
     """
 
     lines: frozenset[tuple[str, int]] = frozenset()
@@ -52,7 +52,7 @@ class ExitReason(StrEnum):
 
     FINISHED = "finished"
     ERROR = "error"
-    """An error of the program that it didn't catch, or text that isn't a program."""
+    """An uncaught error of the program, or text that isn't a program."""
     KILLED = "killed"
     """``kill`` was called."""
     MEMORY = "memory limit"
@@ -60,14 +60,14 @@ class ExitReason(StrEnum):
     OUTPUT = "output limit"
     WALL = "time limit"
     DIVERGED = "diverged"
-    """A program that was to go on where it had been asked for other things than the first time."""
+    """A replayed program made other calls than in its history."""
     PROTOCOL = "protocol"
-    """Frames that no program sends: the worker was tampered with from inside.
+    """Frames that no intact worker sends: a program tampered with it.
 
-    Calls without waiting for replies are among them.
+    Example: a call before the reply to the last one.
     """
     CRASHED = "crashed"
-    """The process ended without a word."""
+    """The process ended without a report."""
     LOST = "engine lost"
     """The zygote ended, or the engine was closed."""
 
@@ -80,11 +80,10 @@ class Output:
 
 
 class Call(msgspec.Struct, frozen=True):  # one per call: a frozen dataclass takes six times as long to create
-    """The program waits for ``reply`` or ``fail`` with this id. The name is one the prelude offers; the values are
-    unchecked.
+    """A call; the program waits for ``reply`` or ``fail`` with this id. The prelude offers the name.
 
-    ``unit`` names the module the line belongs to, "" for the program itself. ``interrupted``: an earlier life of the
-    run was lost while this call was under way; how far it came is unknown, and it is not repeated.
+    ``args`` and ``kwargs`` are unchecked. ``unit``: module of the line, "" for the program itself. ``interrupted``: the
+    server ended during this call in an earlier run; its progress is unknown, and it is not repeated.
     """
 
     id: int
@@ -117,7 +116,7 @@ class Replayed:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """Answer to a call of an earlier life of a run: the call's name and the frame's body, None if it was cut off."""
+    """Recorded answer to a call of an interrupted run: the call's name and the frame's body, None without an answer."""
 
     name: str
     body: bytes | None
@@ -130,7 +129,7 @@ class Finished:
 
 @dataclass(frozen=True, slots=True)
 class Failed:
-    """The program ended otherwise. ``line`` is 0 where no line is to blame; ``source_line`` is that line's text."""
+    """The program ended early. ``line``: its last line, 0 if unknown; ``source_line``: the text of that line."""
 
     type: str
     message: str

@@ -1,8 +1,8 @@
-"""The journal of a run: with it, the program goes on after the server was killed.
+"""The journal of a run: lets the program continue after the server was killed.
 
-Before a call that does something begins, the journal says so on the disk, and with it all that was answered before:
-what is under way at a crash is therefore known, and never done twice. Answers follow a moment later; one that was lost
-is asked for again if the call only reads, and reported as cut off if it does more. Knows no process.
+Before a call with an effect begins, the call and all earlier answers are written to disk, so that a call interrupted
+by a crash is known and never made twice. Its answer is written a moment later. If an answer was lost, a call that only
+reads is made again, and any other is reported as interrupted. Knows no process.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ log = logging.getLogger(__name__)
 
 CALLS_MAX = 100_000
 BYTES_MAX = 32 * 1024 * 1024
-"""Longer runs are not kept: to go on, a program does all its calls again."""
+"""Longer runs cannot be continued, as a program replays all its calls."""
 _READING = (
     *(".state", ".data", ".params", ".set_log", ".block", ".breakpoint_block"),
     *(".get_data", ".get_volume", ".get_preset", ".get_training_words_set", ".instant_recognized"),
@@ -30,9 +30,9 @@ _READING = (
 
 
 class Header(msgspec.Struct, frozen=True):
-    """Start conditions of a run; they and its answers determine all that it does.
+    """Start conditions of a run; together with its answers they determine its behaviour.
 
-    ``watched``: it could be stepped through, and can be again.
+    ``watched``: True if the program can be stepped through.
     """
 
     body: str
@@ -44,8 +44,9 @@ class Header(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class History:
-    """An earlier life: ``interrupted`` is the call that was under way at its end, "" for none; it is the last of the
-    ``answers``, without a body.
+    """Record of a lost run.
+
+    ``interrupted``: the call in progress at its end, "" for none; it is the last of ``answers``, without a body.
     """
 
     header: Header
@@ -61,7 +62,7 @@ def does_something(name: str) -> bool:
 def header_of(
     body: str, modules: Mapping[str, str], utc_offset: int, *, watched: bool = False, seed: int | None = None
 ) -> Header:
-    """Return the header of a new run; without a seed it gets one by chance."""
+    """Return the header of a new run; the seed is random if None."""
     return Header(body, dict(modules), utc_offset, secrets.randbits(63) if seed is None else seed, watched)
 
 
@@ -76,14 +77,14 @@ class Journal:
         self._order = asyncio.Lock()
         self._writing: asyncio.Task[None] | None = None
         self.kept = True
-        """Whether the run can go on after a crash."""
+        """True if the run can continue after a crash."""
 
     async def open(self, header: Header) -> None:
-        """A new run."""
+        """Begin the journal of a new run."""
         await self._store.begin(self._id, msgspec.json.encode(header).decode())
 
     async def reopen(self, header: str) -> History:
-        """The lost run, whose journal is continued. Raises ValueError for a header of another version."""
+        """Return the lost run and continue its journal. Raises ValueError for a header of another version."""
         entries = await self._store.entries(self._id)
         answers = [Answer(entry.name, entry.answer) for entry in entries]
         interrupted = answers[-1].name if answers and answers[-1].body is None else ""
@@ -92,13 +93,13 @@ class Journal:
         return History(msgspec.json.decode(header, type=Header), answers, interrupted)
 
     async def begin(self, name: str) -> None:
-        """A call is about to be made: returns when a crash would find it here, if it does something."""
+        """Record a call before it is made; if it has an effect, return once the record survives a crash."""
         if self.kept and does_something(name):
             self._pending.append(JournalEntry(self._seq, name, None))
             await self._flush()
 
     def answered(self, name: str, body: bytes) -> None:
-        """Record an answer that was sent; it is written soon."""
+        """Record an answer that was sent; it is written in the background."""
         if not self.kept:
             return
         self._pending.append(JournalEntry(self._seq, name, body))
@@ -108,7 +109,7 @@ class Journal:
             self._writing = asyncio.create_task(self._flush(), name=f"journal {self._id}")
 
     async def written(self) -> None:
-        """Return when a crash would find all answers here."""
+        """Return once all answers survive a crash."""
         await self._flush()
 
     async def close(self) -> None:

@@ -1,8 +1,6 @@
-"""The zygote process as the server sees it: started with nothing, asked for workers, listened to, and gone with its
-socket.
+"""The server's end of the zygote process: starts it, requests workers, reads its reports; it ends with its socket.
 
-Everything is non-blocking on the running loop (asyncio or uvloop). It knows no program: a worker is a number, a
-socket and a signal handle.
+Never blocks the running loop (asyncio or uvloop). Knows no program: a worker is a number, a socket and a signal handle.
 """
 
 from __future__ import annotations
@@ -36,15 +34,12 @@ os._exit(0)  # all is said: to take the interpreter apart would only let the ser
 _FLAGS = ["-s", "-S", "-P", "-B"]
 _ENVIRONMENT = {"PYTHONHASHSEED": "0"}
 EXIT_MAX = 5.0
-"""Seconds (of the machine) for the zygote to end by itself."""
+"""Longest wait for the zygote to end by itself, in the machine's seconds."""
 _HERE = Path(__file__).resolve().parents[3]
 
 
 class SandboxUnavailable(RuntimeError):
-    """This machine cannot lock a program in, so none is run. The text says what is missing.
-
-    There is no way around it.
-    """
+    """This machine cannot confine programs, so none is run; the text says what is missing."""
 
 
 class EngineError(RuntimeError):
@@ -52,7 +47,7 @@ class EngineError(RuntimeError):
 
 
 class EngineSilent(EngineError):
-    """The machine did not come to it in time."""
+    """The engine did not answer in time."""
 
 
 class _Message(msgspec.Struct):
@@ -78,7 +73,7 @@ class Death:
 
 @dataclass(slots=True)
 class Worker:
-    """One forked process: its state as last reported, and the handle its signals go through."""
+    """One forked process: its last reported state, and the handle for its signals."""
 
     number: int
     died: asyncio.Future[Death]
@@ -95,7 +90,7 @@ class Worker:
                 signal.pidfd_send_signal(self._handle, number)
 
     async def until(self, *, stopped: bool) -> None:
-        """Wait for the kernel's word that the process is stopped (or runs again), or that it has ended."""
+        """Wait until the kernel has confirmed that the process is stopped (or runs again), or has ended."""
         while self.stopped is not stopped and not self.died.done():
             self._changed.clear()
             await self._changed.wait()
@@ -131,7 +126,7 @@ class Launcher:
         self.pid = 0
 
     async def open(self) -> list[str]:
-        """Start the zygote; the names of the layers of its jail. Raises SandboxUnavailable."""
+        """Start the zygote; return the names of its jail's layers. Raises SandboxUnavailable."""
         self._loop = asyncio.get_running_loop()
         self._ready = self._loop.create_future()
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -139,7 +134,7 @@ class Launcher:
         self._control = ours
         try:
             with theirs:
-                # Never cancelled halfway: the zygote would receive any file that reuses the number.
+                # Not cancelled halfway: the zygote would inherit any file that reuses the descriptor's number.
                 starting = asyncio.ensure_future(
                     asyncio.to_thread(_start_process, theirs.fileno(), self._filter_required)
                 )
@@ -153,7 +148,7 @@ class Launcher:
         except BaseException:
             self._ready.cancel()  # the caller has stopped waiting
             if self._process is not None:
-                self._process.kill()  # it has no workers yet and may not read its socket for seconds
+                self._process.kill()  # a zygote without workers, which may not read its socket for seconds
             await self.close()
             raise
 
@@ -242,7 +237,7 @@ class Launcher:
         _close_all(handles)
 
     def _lose(self) -> None:
-        """The zygote is gone: the kernel has killed the workers, and no more reports of their end will come."""
+        """Settle all workers of a zygote that has ended: the kernel has killed them, without further reports."""
         control, self._control = self._control, None
         if control is not None:
             self._loop.remove_reader(control.fileno())

@@ -1,6 +1,6 @@
-"""One budget of memory for all programs: the kernel bounds each of them, this bounds their sum.
+"""One memory budget for all programs: the kernel limits each program, this module their sum.
 
-Time here is the machine's.
+Times are in the machine's time.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from roboglot.programs.engine.usage import machine_memory, usage_of
 log = logging.getLogger(__name__)
 
 LOOK_EVERY = 0.25
-"""Seconds: in which all of them together can take some hundred megabytes."""
+"""Period of checks, s; meanwhile all programs together can take some hundred megabytes."""
 TOGETHER = 2 * 1024**3
-"""Bytes, unless the settings say otherwise; half of the machine's memory where that is less."""
+"""Default budget in bytes; half of the machine's memory if that is less."""
 
 
 class Spender(Protocol):
@@ -29,13 +29,13 @@ class Spender(Protocol):
         """Process id."""
 
     def end(self, reason: ExitReason, kind: str, message: str) -> None:
-        """End it for this reason."""
+        """End the run for this reason."""
 
 
 class MemoryBudget:
-    """Looks at ``runs`` as long as there are any, and ends the largest while their sum is above the budget.
+    """Checks ``runs`` as long as there are any, and ends the largest while their sum is above the budget.
 
-    ``total`` is in bytes, 0 for the default. ``empty`` is the memory of a program that does nothing, which is shared.
+    ``total``: bytes, 0 for the default. ``empty``: memory of an empty program, shared by all, bytes.
     """
 
     def __init__(self, runs: Collection[Spender], total: int = 0, usage: Callable[[int], int] | None = None) -> None:
@@ -46,12 +46,12 @@ class MemoryBudget:
         self._watching: asyncio.Task[None] | None = None
 
     def watch(self) -> None:
-        """Look from now on, until no run is left."""
+        """Start checking, until no run is left."""
         if self._watching is None or self._watching.done():
             self._watching = asyncio.get_running_loop().create_task(self._watch(), name="memory of programs")
 
     async def close(self) -> None:
-        """Look no more."""
+        """Stop checking."""
         if self._watching is not None:
             self._watching.cancel()
             await asyncio.gather(self._watching, return_exceptions=True)

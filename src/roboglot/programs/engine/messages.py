@@ -1,6 +1,6 @@
-"""Messages of a worker, checked: the host's end of the frame contents.
+"""Messages of a worker, decoded and checked.
 
-Every byte is hostile. Knows the shapes and the small limits; what follows from a message is the run's business.
+Every byte is hostile. Knows the messages' fields and their limits; the run acts on them.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from roboglot.programs.worker.variables import TEXT_MAX, VARIABLES_MAX
 NAME_MAX = 200
 """Characters of a call's or an error type's name."""
 ARGUMENTS_MAX = 64
-"""Arguments of one call, and as many with names."""
+"""Most positional arguments of one call, and most keyword arguments."""
 VALUES_MAX = SEPARATORS_MAX + 2  # including the brackets around the arguments
 
 
@@ -26,7 +26,7 @@ VariableText = Annotated[str, msgspec.Meta(max_length=TEXT_MAX)]
 
 
 class ProtocolViolation(ValueError):
-    """A frame no honest worker sends."""
+    """A frame that no honest worker sends."""
 
 
 class OutputMessage(msgspec.Struct, tag_field="t", tag="output", forbid_unknown_fields=True):
@@ -36,7 +36,7 @@ class OutputMessage(msgspec.Struct, tag_field="t", tag="output", forbid_unknown_
 
 
 class CallMessage(msgspec.Struct, tag_field="t", tag="call", forbid_unknown_fields=True):
-    """A host call; the values are packed, and not even decoded."""
+    """A host call; the values are packed and not yet decoded."""
 
     id: int
     name: str
@@ -44,7 +44,7 @@ class CallMessage(msgspec.Struct, tag_field="t", tag="call", forbid_unknown_fiel
     kwargs: msgspec.Raw
 
     def values(self) -> Generator[None, None, tuple[tuple[object, ...], dict[str, object]]]:
-        """The arguments, unpacked in steps. Raises ProtocolViolation, for too many values before any is made."""
+        """Unpack the arguments in steps. Raises ProtocolViolation, for too many values before the first is made."""
         if self.size > SEPARATORS_MAX and separators(bytes(self.args)) + separators(bytes(self.kwargs)) > VALUES_MAX:
             raise ProtocolViolation("more values than a call may have")
         args, kwargs = [], {}
@@ -86,7 +86,7 @@ class FailedMessage(msgspec.Struct, tag_field="t", tag="failed", forbid_unknown_
 
 
 class CheckedMessage(msgspec.Struct, tag_field="t", tag="checked", forbid_unknown_fields=True):
-    """The problems of a program (line, column, kind, English, Chinese), and which modules' functions it uses."""
+    """Problems of a program (line, column, kind, English, Chinese), and the modules' functions that it uses."""
 
     problems: list[tuple[int, int, str, str, str]]
     uses: list[str]
@@ -94,13 +94,13 @@ class CheckedMessage(msgspec.Struct, tag_field="t", tag="checked", forbid_unknow
 
 Message = OutputMessage | CallMessage | VariablesMessage | FinishedMessage | FailedMessage | CheckedMessage
 _decoder: msgspec.json.Decoder[Message] = msgspec.json.Decoder(Message)
-_ALONE = {bool, float, str, type(None)}  # types that are packed as they are, whatever the value
+_ALONE = {bool, float, str, type(None)}  # types whose values are sent unpacked
 _list = msgspec.json.Decoder(list).decode
 _dict = msgspec.json.Decoder(dict).decode
 
 
 def decode(body: bytes) -> Message:
-    """The message of a frame. Raises ProtocolViolation."""
+    """Return the message of a frame. Raises ProtocolViolation."""
     try:
         return _decoder.decode(body)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:

@@ -1,4 +1,4 @@
-"""Position and stops of a run's program: the places of its shared memory by module and line."""
+"""Position and stops of a run's program, by module and line, in its shared memory."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from roboglot.programs.library.program import Program
 
 
 class Position:
-    """The program's own account of its place: a hostile worker can lie.
+    """Position as reported by the worker, which may be hostile and lie.
 
     ``watched``: True if the program can be stepped through and halts at lines.
     """
@@ -24,23 +24,23 @@ class Position:
 
     @property
     def now(self) -> tuple[str, int]:
-        """The unit and the line in one look."""
+        """Unit and line, read together."""
         unit, line = self._page.place
         return self._program.unit_name(unit), line
 
     @property
     def line(self) -> int:
-        """The line that is running or waiting now, 0 before the first."""
+        """Current line, 0 before the first."""
         return self._page.place[1]
 
     @property
     def unit(self) -> str:
-        """The module of the line, "" for the program itself."""
+        """Module of the current line, "" for the program itself."""
         return self._program.unit_name(self._page.place[0])
 
     @property
     def source_line(self) -> str:
-        """The text of the line, "" if there is no such line."""
+        """Text of the current line, "" if there is no such line."""
         return self._program.source_line(*self._page.place)
 
     def source_of(self, unit: int, line: int) -> tuple[str, str]:
@@ -48,19 +48,19 @@ class Position:
         return self._program.unit_name(unit), self._program.source_line(unit, line)
 
     def step(self, step: Step = Step.INTO) -> None:
-        """Halt after a step from here; a waiting or suspended program has to be continued besides."""
+        """Halt after a step from here; does not resume a waiting or suspended program."""
         if self.watched:
             self._page.order(step)
 
     @property
     def at_stop(self) -> bool:
-        """True if it halts at this line each time."""
+        """True if the current line has a breakpoint."""
         return self._page.stops(*self._page.place)
 
     def stop_at(self, lines: Iterable[tuple[str, int]]) -> None:
         """Halt before the statements at these lines (module or "", line) and no others.
 
-        A line without a statement means the next one with one. Raises LookupError for a line that does not exist.
+        A line without a statement stands for the next statement. Raises LookupError for a line that does not exist.
         """
         names = self._program.names
         places = [(names.index(unit) if unit in names else -1, line) for unit, line in lines]
@@ -75,5 +75,5 @@ class Position:
         self._page.take_back()
 
     def close(self) -> None:
-        """Release the shared memory; the last place stays."""
+        """Release the shared memory; the last position stays readable."""
         self._page.close()

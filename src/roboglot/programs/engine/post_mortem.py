@@ -1,4 +1,4 @@
-"""Causes of death of a worker's process that did not report its end itself."""
+"""Causes of an end that the worker did not report itself."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from roboglot.programs.engine.launcher import Death
 from roboglot.programs.worker.link import EXIT_MEMORY
 
 CPU_SHARE = 0.5
-"""Of its limit that a killed process has used at least if the kernel killed it for that.
+"""Part of the processor limit above which the limit is taken as the cause of a kill.
 
 The kernel's limit counts whole ticks, the accounting does not: on a busy machine they differ by some tenths.
 """

@@ -1,8 +1,8 @@
-"""One control group for all programs, so that they step back behind the server together when processors are short.
+"""One control group for all programs, so that together they yield to the server if processor time is short.
 
 Niceness weighs a process against its neighbours: three hundred nice ones still outweigh one server. Needs a kernel with
-control groups and the right to make one (root, or a delegated hierarchy); without, niceness has to do. Everything here
-blocks, for tens of milliseconds at times: call it in a thread. Knows process numbers and nothing of programs.
+control groups and the right to make one (root, or a delegated hierarchy); otherwise only niceness is used. Every call
+may block for tens of milliseconds: make it in a thread. Knows process numbers, no programs.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ import os
 from pathlib import Path
 
 WEIGHTS = (("cpu", "cpu.shares", "256"), ("cpu,cpuacct", "cpu.shares", "256"), ("", "cpu.weight", "25"))
-"""Where the processor controller may be, the file of the weight, and a quarter of what others have: with the least
-that is possible, programs would stand still on a machine that something else keeps busy."""
+"""Possible processor controllers, their weight files, and a quarter of the default weight: with the least possible
+weight, programs would stand still on a machine that something else keeps busy."""
 
 SESSION_NICENESS = 10
-"""Of the zygote's session: kernels with autogroups do not look at the niceness of its processes."""
+"""Niceness of the zygote's session: kernels with autogroups weigh sessions by it, not by that of processes."""
 
 
 class ProcessorGroup:
-    """The group of this server's programs, below the server's own. ``there`` is whether it could be made."""
+    """Control group of this server's programs, inside the server's own; ``there``: True if it could be made."""
 
     def __init__(self, root: Path = Path("/sys/fs/cgroup"), proc: Path = Path("/proc")) -> None:
         self._root = root
@@ -29,11 +29,11 @@ class ProcessorGroup:
 
     @property
     def there(self) -> bool:
-        """True if programs can be moved into it."""
+        """True if the group exists, so that programs can be moved into it."""
         return self._folder is not None
 
     def open(self) -> list[str]:
-        """Make the group; its name among the engine's layers, nothing if that isn't permitted."""
+        """Make the group; return its name as a layer of the engine, or nothing if that is not permitted."""
         paths: dict[str, str] = {}
         with contextlib.suppress(OSError):
             for line in (self._proc / "self" / "cgroup").read_text().splitlines():
@@ -47,7 +47,7 @@ class ProcessorGroup:
         return ["cpu group"] if self._folder else []
 
     def step_aside(self, pid: int) -> None:
-        """Have the process's session weigh as little as its programs, where sessions are weighed instead of them."""
+        """Lower the weight of the process's session, for kernels with autogroups."""
         with contextlib.suppress(OSError):
             (self._proc / str(pid) / "autogroup").write_text(str(SESSION_NICENESS))
 
@@ -59,7 +59,7 @@ class ProcessorGroup:
                 (self._folder / "cgroup.procs").write_text(str(pid))
 
     def close(self) -> None:
-        """Remove the group, which is empty once the programs have ended. Idempotent."""
+        """Remove the group, once all programs have ended. Idempotent."""
         if self._folder is not None:
             with contextlib.suppress(OSError):
                 self._folder.rmdir()
@@ -75,7 +75,7 @@ class ProcessorGroup:
                 folder.rmdir()  # the controller for processor time is not available here
 
     def _remove_abandoned(self, parent: Path) -> None:
-        """Groups of servers that were killed; the kernel refuses to remove one that is in use."""
+        """Remove the groups of killed servers; the kernel refuses to remove a group in use."""
         for folder in parent.glob("roboglot-programs-*"):
             if not (self._proc / folder.name.rpartition("-")[2]).exists():
                 with contextlib.suppress(OSError):

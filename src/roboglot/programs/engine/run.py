@@ -1,8 +1,7 @@
-"""One run of a program, seen from the server: its events, its limits, and the control of its process.
+"""The server's end of one run of a program: its events, its limits, and the control of its process.
 
-Every frame of the worker is hostile: lengths, rates and counts are checked, and the first that breaks a rule ends the
-run. Calls are in ``calls.py``, places in ``position.py``. Knows no robot. Time here is the machine's: it measures
-load, not the robot.
+Every frame of the worker is hostile: lengths, rates and counts are checked, and the first breach ends the run. Calls
+are in ``calls.py``, places in ``position.py``. Knows no robot. Times are in the machine's time, as they measure load.
 """
 
 from __future__ import annotations
@@ -44,16 +43,16 @@ from roboglot.programs.library.program import Program
 from roboglot.programs.worker.child import MESSAGE_MAX
 
 SHORT_COST = 50e-6
-"""Seconds of the server's thread charged for a short frame and all that follows from it."""
+"""Seconds of the server's thread charged for a short frame and its handling."""
 OUTPUT_COST = 15e-6
-"""The same for a piece of output."""
+"""Seconds of the server's thread charged for a short piece of output."""
 
 
 class Run:
     """A started program. Iterate over it for its events (one reader); the last one is Finished or Failed.
 
-    ``calls`` answers the program, ``position`` is its place. Read a run to its end or call ``kill``: until then its
-    process lives.
+    ``calls`` answers the program, ``position`` is its place. Read the run to its end or call ``kill``; otherwise its
+    process stays alive.
     """
 
     def __init__(
@@ -83,7 +82,7 @@ class Run:
         rate = CallRate(limits.call_rate)
         self.calls = Calls(self, callable_names, rate, self.position, self.account, history)
         self.noticed: Callable[[dict[str, str]], None] | None = None
-        """Called with what the variables of a watched program hold, as text, at halts and calls."""
+        """Called with the values of a watched program's variables, as text, at halts and calls."""
         self.write = self.wire.write
         self.put = self._inbox.put
 
@@ -124,7 +123,7 @@ class Run:
         return None
 
     async def suspend(self) -> None:
-        """Stop the process wherever it is; return when the kernel has confirmed. Replies sent meanwhile wait."""
+        """Stop the process at once; return when the kernel has confirmed. Replies sent meanwhile wait."""
         async with self._switch:
             if self._worker and not self._worker.stopped and not self._worker.died.done():
                 self._worker.signal(signal.SIGSTOP)
@@ -157,7 +156,7 @@ class Run:
     # Used by the engine and the socket.
 
     def attach(self, worker: Worker) -> None:
-        """Take the process that was forked for this run. On a busy machine the run may be over by then."""
+        """Attach the process that was forked for this run; kill it if the run is over already."""
         self._worker = worker
         if self._ending is not None:
             worker.signal(signal.SIGKILL)
@@ -189,13 +188,13 @@ class Run:
         self.wire.drop()
 
     def end(self, reason: ExitReason, kind: str, message: str) -> None:
-        """End the run for a reason of the host's; the first reason counts."""
+        """End the run by a decision of the host; the first reason counts."""
         source = self.position.source_line
         line = self.position.line if source else 0
         self._finish(Failed(kind, message, line, source, reason, self.position.unit))
 
     def settle(self) -> None:
-        """Emit the last event once the process is dead and the socket read to its end."""
+        """Emit the last event once the process is dead and the socket has been read to its end."""
         worker = self._worker
         if worker is None or not worker.died.done() or not self.wire.closed or self._ended.done():
             return
@@ -245,4 +244,4 @@ class Run:
         if self._ending is None:
             self._ending = ending
             if self._worker:
-                self._worker.signal(signal.SIGKILL)  # a worker that reports its end may still not exit
+                self._worker.signal(signal.SIGKILL)  # a worker may report its end and not exit

@@ -1,6 +1,6 @@
-"""The share of the server's thread that all programs have together: who takes more than a part of it has to wait.
+"""Limits the share of all programs in the server's thread: a program that takes more than its part has to wait.
 
-What programs send is read, and what they call is done, in the thread that serves everybody. Time here is the machine's.
+The thread that serves all clients also reads the programs' frames and makes their calls. Times are in machine time.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from typing import TypeVar
 T = TypeVar("T")
 
 SHARE_MAX = 0.2
-"""Of the server's thread, for all programs together."""
+"""Part of the server's thread for all programs together."""
 BURST = 0.1
 """Seconds of the share that may be used in advance without waiting; programs still take turns."""
 LIGHT_BURST = 0.02
-"""Seconds worth of LIGHT that a program may take before it has to queue."""
+"""Burst that LIGHT allows a program before it has to queue, s."""
 STEP = 0.0005
 """Seconds of work after which the others get their turn."""
 GAP = 0.0005
 """Seconds between two turns, for all other work."""
 LIGHT = 0.05
-"""Of the server's thread: a program that takes less does not queue, however many others do."""
+"""Part of the server's thread below which a program never queues, even if others do."""
 
 
 class Share:
-    """``account`` for each program. Those that have taken much queue up, and get turns one after the other."""
+    """Maker of one ``account`` for each program. Programs that have used much queue up and get turns one by one."""
 
     def __init__(self) -> None:
         self._queue: deque[Callable[[], None]] = deque()
@@ -41,11 +41,11 @@ class Share:
         return Account(self)
 
     def charge(self, seconds: float, now: float) -> None:
-        """So much work was done for one of them."""
+        """Count ``seconds`` of work for any program."""
         self._paid_until = max(self._paid_until, now - BURST) + seconds / SHARE_MAX
 
     def queue(self, turn: Callable[[], None]) -> None:
-        """Call ``turn`` when it is its turn; never at once."""
+        """Append ``turn`` to the queue; it is never called at once."""
         self._queue.append(turn)
         if self._timer is None:
             self._set_timer()
@@ -65,7 +65,7 @@ class Share:
 
 
 class Account:
-    """Account of one program's time: ``charge`` it, and ``go_on`` with more when it is allowed to."""
+    """Account of one program's time: ``charge`` work to it; ``go_on`` continues when the program may."""
 
     __slots__ = ("_loop", "_paid_until", "_share")
 
@@ -75,14 +75,14 @@ class Account:
         self._paid_until = 0.0
 
     def charge(self, seconds: float) -> None:
-        """So much work was done for it."""
+        """Count ``seconds`` of work for this program."""
         now = self._loop.time()
         self._share.charge(seconds, now)
         self._paid_until = max(self._paid_until, now - LIGHT_BURST) + seconds / LIGHT
 
     @property
     def spent(self) -> bool:
-        """True if it has to wait for its turn."""
+        """True if the program has to wait for its turn."""
         return self._paid_until > self._loop.time()
 
     def go_on(self, work: Callable[[], None]) -> None:
@@ -102,7 +102,7 @@ class Account:
         self._share.queue(turn)
 
     async def turn(self) -> None:
-        """Wait for one's turn."""
+        """Wait for this program's turn."""
         granted: asyncio.Future[None] = self._loop.create_future()
         self.queue(lambda: None if granted.done() else granted.set_result(None))
         await granted
@@ -123,24 +123,24 @@ class Meter:
         return time.perf_counter() > self._until
 
     async def turn(self) -> None:
-        """Pay, and let others have their turn."""
+        """Charge the work so far, and wait for the next turn."""
         self.stop()
         await self._account.turn()
         self._begin()
 
     def stop(self) -> None:
-        """Pay."""
+        """Charge the work so far."""
         self._account.charge(time.thread_time() - self._began)
 
     def _begin(self) -> None:
         self._began = time.thread_time()
-        self._until = time.perf_counter() + STEP  # a cheaper clock; it does not matter which thread runs here
+        self._until = time.perf_counter() + STEP  # a cheaper clock, good enough for the end of a step
 
 
 @coroutine
 def metered(work: Coroutine[object, None, T], charge: Callable[[float], None]) -> Generator[object, None, T]:
-    """The result of ``work``, charging for what each of its steps takes of the thread."""
-    step: Callable[[], object] = lambda: work.send(None)  # noqa: E731 - what comes next depends on how the last wait ended
+    """Return the result of ``work``; charge the thread time of each of its steps."""
+    step: Callable[[], object] = lambda: work.send(None)  # noqa: E731 - the next step depends on the last wait's end
     try:
         while True:
             began = time.thread_time()

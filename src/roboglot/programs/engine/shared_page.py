@@ -1,6 +1,6 @@
-"""The server's end of the memory that it shares with one worker: where the program is, and where it is to halt.
+"""The server's end of the memory shared with one worker: the program's place and its stops.
 
-A hostile worker writes there what it likes: all that is read means a place at most.
+A hostile worker can write anything there; the server only interprets it as a place.
 """
 
 from __future__ import annotations
@@ -13,18 +13,18 @@ from numpy.typing import NDArray
 from roboglot.programs.language.places import WORD, Places, Step
 
 SEARCHED_MAX = 256 * 1024
-"""Places that are searched; later ones count as unknown. A longer search would hold up the server."""
+"""Most places that are searched; later places count as unknown. A longer search would delay the server."""
 STEP_BITS, ORDERS = 2, 64  # the order in a step is one byte
 FOUND_MAX = 4096
-"""Addresses whose places are remembered: a program calls from the same few lines again and again."""
+"""Most addresses whose places are cached: a program calls from the same few lines again and again."""
 
 
 class Page:
-    """``memory``: a descriptor of shared memory of ``places.memory()`` bytes, which the caller closes."""
+    """Mapped shared memory. ``memory``: descriptor of ``places.memory()`` bytes, closed by the caller."""
 
     def __init__(self, memory: int, places: Places) -> None:
         self._memory = mmap.mmap(memory, places.memory())
-        # Aligned words: in bytes, a worker could craft a pattern that matches at every second one.
+        # Aligned words: in a search by bytes, a worker could craft a pattern that matches at every second byte.
         self._words: NDArray[np.uint64] = np.frombuffer(self._memory, np.uint64, 1 + min(places.count, SEARCHED_MAX))
         self._places = places
         self._found: dict[int, int] = {}
@@ -33,7 +33,7 @@ class Page:
 
     @property
     def place(self) -> tuple[int, int]:
-        """The unit and the line, as the worker has it now; once closed, the last one."""
+        """Current unit and line, as reported by the worker; after ``close`` the last ones."""
         if self._memory.closed:
             return self._last
         words = self._words
@@ -51,16 +51,16 @@ class Page:
         self._set(0, self._orders << STEP_BITS | step)
 
     def take_back(self) -> None:
-        """Go on without halting after a step."""
+        """Cancel the ordered step."""
         self._set(0, 0)
 
     def stops(self, unit: int, line: int) -> bool:
-        """Return whether it halts there each time."""
+        """Return whether the line has a breakpoint."""
         number = self._places.number(unit, line)
         return not self._memory.closed and number > 0 and bool(self._memory[self._places.stops + number])
 
     def stop_at(self, unit: int, line: int) -> None:
-        """Halt there, or where the next statement of the unit begins. ValueError for a line that is not there."""
+        """Halt at the line, or at the unit's next statement. Raises ValueError for a line that does not exist."""
         number = self._places.number(unit, line)
         if not number:
             raise ValueError(f"there is no line {line}")
@@ -68,14 +68,14 @@ class Page:
         self._set(self._places.next_marked(number, self._marked) or number, 1)
 
     def clear_stops(self) -> None:
-        """Halt nowhere."""
+        """Remove all breakpoints."""
         if not self._memory.closed:
             self._memory[self._places.stops + 1 :] = bytes(self._places.count - 1)
 
     def close(self) -> None:
-        """The worker is gone."""
+        """Keep the last place and release the memory."""
         self._last = self.place
-        self._words = self._words[:0].copy()  # no view may remain of memory that is released
+        self._words = self._words[:0].copy()  # no view of the memory may remain
         self._memory.close()
 
     def _search(self, address: int) -> int:

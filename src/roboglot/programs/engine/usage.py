@@ -1,4 +1,4 @@
-"""Resource use of a worker, as the kernel counts it. Blocks for some microseconds a process."""
+"""Resource use of a process, as counted by the kernel. Blocks for some microseconds per process."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ _TICK = 1.0 / os.sysconf("SC_CLK_TCK")
 
 @dataclass(frozen=True, slots=True)
 class Usage:
-    """``cpu``: seconds of processor; ``memory``: bytes that no file stands behind."""
+    """Resource use. ``cpu``: processor seconds; ``memory``: resident bytes that are not shared."""
 
     cpu: float = 0.0
     memory: int = 0
 
 
 def usage_of(pid: int, proc: Path = Path("/proc")) -> Usage:
-    """Return the use of one process; nothing for one that is gone."""
+    """Return the use of one process; zeros if it is gone."""
     with contextlib.suppress(OSError, ValueError, IndexError):
         _, resident, shared, *_ = (proc / str(pid) / "statm").read_text().split()
         fields = (proc / str(pid) / "stat").read_text().rpartition(")")[2].split()
@@ -30,5 +30,5 @@ def usage_of(pid: int, proc: Path = Path("/proc")) -> Usage:
 
 
 def machine_memory() -> int:
-    """Bytes of the whole machine."""
+    """Return the machine's memory in bytes."""
     return os.sysconf("SC_PHYS_PAGES") * _PAGE

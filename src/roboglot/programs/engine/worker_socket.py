@@ -1,4 +1,4 @@
-"""The loop's end of a worker's socket. Knows frames and their rate, not their contents. Time here is the machine's."""
+"""The server's end of a worker's socket. Knows frames and their rate, not their contents. Times are in machine time."""
 
 from __future__ import annotations
 
@@ -11,32 +11,32 @@ from roboglot.programs.engine.share import Account, Share
 from roboglot.programs.worker.frames import FrameReader, FrameTooLong
 
 FRAME_RATE_MAX = 10_000
-"""Frames a second, printing included, that a worker is listened to; a faster one has to wait."""
+"""Most frames a second, printing included, read from a worker; a faster worker has to wait."""
 _BURST = 0.1
-"""Seconds worth of frames that may come at once before the rate is held."""
+"""Burst that the frame rate allows, in seconds of frames."""
 
 
 class Listener(Protocol):
     """Receiver of a wire's frames."""
 
     def take(self, body: bytes) -> bool:
-        """One frame; False when no more frames matter. Raises ProtocolViolation."""
+        """Take one frame; return False when no more frames matter. Raises ProtocolViolation."""
 
     @property
     def full(self) -> bool:
         """True while reading should pause until ``read_on``."""
 
     def broken(self, error: Exception) -> None:
-        """The worker broke the protocol."""
+        """Handle a breach of the protocol by the worker."""
 
     def settle(self) -> None:
-        """The socket has ended."""
+        """Note that the socket has ended."""
 
 
 class Wire(asyncio.Protocol):
-    """One worker's socket: cuts frames, holds the frame rate, pauses for a slow listener.
+    """One worker's socket: cuts frames, limits their rate, pauses for a slow listener.
 
-    Frames wait for their turn while what the worker has taken of the server, by its ``account``, is not paid for.
+    Frames wait for their turn while the worker's ``account`` is overdrawn.
     """
 
     def __init__(self, listener: Listener, account: Account | None = None) -> None:
@@ -56,7 +56,7 @@ class Wire(asyncio.Protocol):
             self._transport.write(data)
 
     def read_on(self) -> None:
-        """Go on if the listener has caught up and the frame rate allows it."""
+        """Continue reading if the listener has caught up and the frame rate allows it."""
         if self.paused and self._transport is not None and not self._throttled and not self._listener.full:
             self.paused = False
             self._transport.resume_reading()
@@ -68,11 +68,11 @@ class Wire(asyncio.Protocol):
             self._transport.abort()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """The socket is ours."""
+        """Keep the transport."""
         self._transport = cast(asyncio.Transport, transport)  # uvloop's transport does not inherit from it
 
     def data_received(self, data: bytes) -> None:
-        """Bytes of the worker."""
+        """Take bytes of the worker."""
         try:
             self._bodies += self._reader.feed(data)
         except FrameTooLong as error:
@@ -82,7 +82,7 @@ class Wire(asyncio.Protocol):
         self._take()
 
     def _take(self) -> None:
-        """Hand on as many frames as may be, then see whether more can be read."""
+        """Pass on as many frames as allowed, then decide whether to read on."""
         taken = self._take_some()
         if self.closed or self._transport is None:
             return
@@ -117,7 +117,7 @@ class Wire(asyncio.Protocol):
         self.drop()
 
     def connection_lost(self, _exc: Exception | None) -> None:
-        """The socket has ended; the process may still be dying."""
+        """Pass on the remaining frames and settle; the process may still be dying."""
         self._take_all()
         self._transport = None
         self.closed = True

@@ -20,7 +20,7 @@ from roboglot.programs.worker.values import Record
 PLAYED, FAILED = 0, 1  # AudioPlaySeviceResponse.response.status
 UNCHANGED = -1
 BARKS = {4000: 620.0, 4001: 260.0}  # Hz of their first tone
-PIECES: Mapping[int, Callable[[], Sound]] = {6000: cache(romp), 6001: cache(evening_waltz)}  # of a tenth of a second
+PIECES: Mapping[int, Callable[[], Sound]] = {6000: cache(romp), 6001: cache(evening_waltz)}  # slow to make: 0.1 s
 
 
 @ABILITIES.on("cyberdog.audio.play", needs=(Speaker,))
@@ -68,20 +68,20 @@ async def set_volume(session: Session, volume: int = UNCHANGED) -> Record:
 
 
 def turn_to(speaker: Speaker, volume: int) -> None:
-    """Raises InvalidGoal beyond 0 to 100; -1 changes nothing."""
+    """Set the volume, percent; -1 changes nothing. Raises InvalidGoal beyond 0 to 100."""
     if volume != UNCHANGED:
         speaker.set_volume(usable_volume(volume) / 100)
 
 
 def usable_volume(volume: int) -> int:
-    """Percent as in table 4.1; raises InvalidGoal beyond 0 to 100."""
+    """Return a volume in percent (table 4.1). Raises InvalidGoal beyond 0 to 100."""
     if not 0 <= volume <= 100:
         raise InvalidGoal(f"volume = {volume} is outside of 0 to 100 %")
     return volume
 
 
 async def say(session: Session, what: str | int, volume: int = UNCHANGED) -> None:
-    """Wait for one's turn, then say a text or play a sound to its end. Raises RobotError."""
+    """Wait until the speaker is free, then say a text or play a sound to its end. Raises RobotError."""
     for other in session.robot.actions.running(SPEAKER):
         await other.done()
     await session.unpaused()
@@ -107,7 +107,7 @@ def _started(session: Session, what: str | int, volume: int) -> Record:
 
 
 def _begin(session: Session, what: str | int, volume: int) -> Action:
-    """A text that is said, or the number of a sound that is played."""
+    """Start saying a text, or playing the sound of a number."""
     speaker = session.robot[Speaker]
     if isinstance(what, int) and what not in BARKS.keys() | PIECES.keys():
         raise NotFound(f"there is no sound {what}; there are: {', '.join(map(str, [*BARKS, *PIECES]))}")
@@ -120,7 +120,7 @@ def _begin(session: Session, what: str | int, volume: int) -> Action:
 
 @cache
 def bark(number: int) -> Sound:
-    """Two woofs: a rough voice that falls and dies away."""
+    """Return two woofs: a rough voice that falls and dies away."""
     time = np.arange(round(0.22 * SAMPLE_RATE)) / SAMPLE_RATE
     phase = 2 * np.pi * BARKS[number] * (time - 1.2 * time**2)
     voice = sum(np.sin(overtone * phase) / overtone for overtone in range(1, 7))

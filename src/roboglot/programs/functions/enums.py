@@ -1,4 +1,4 @@
-"""The manual's enumerations, which programs find by name (4.2). Numbers only."""
+"""The manual's enumerations, available to programs by name (4.2). Numbers only."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An example for every function: for the reference page, and for the tests that play them. Knows no robot."""
+"""Examples of all functions, for the reference page and for the tests that play them. Knows no robot."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from roboglot.programs.functions.moving.performing import RESULT_MOTIONS
 from roboglot.programs.functions.table import ABILITIES
 
-# A quick call of each group for its log.
+# A quick call of each group, as an example of its log.
 _LOGGED = {
     "audio": "audio.set_volume(40)",
     "bms": "bms.get_data()",
@@ -35,7 +35,7 @@ _LOGGED = {
 
 @dataclass(frozen=True, slots=True)
 class Example:
-    """A program, what it prints, a part of a line that it leaves in the task's log, and what people do meanwhile."""
+    """A program, its output, a part of its line in the task's log, and the people's actions meanwhile."""
 
     code: str
     prints: str = ""

@@ -48,7 +48,7 @@ GROUPS = ("motion", "task", *PARTS)
 
 
 def state_of(session: Session, group: str) -> Record:
-    """Return how the group is: its sensor's health, else how its last call went."""
+    """Return the state of a group: its sensor's if that fails, else the result of its last call."""
     component = PARTS.get(group)
     if component is None:
         return session.states.get(group, state())

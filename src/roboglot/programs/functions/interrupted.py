@@ -1,7 +1,7 @@
-"""Results of calls that the end of the server cut off. They are not repeated: their robot is out of reach.
+"""Results of calls that the end of the server interrupted; such a call is not repeated.
 
-Each function reports a failure in its own result; here that becomes a failure that leaves open how far the robot came.
-Knows no process and no journal.
+Each function reports failures in its own type of result, so it runs with a robot that fails at every use, and its
+failure becomes one that leaves the robot's progress open. Knows no process and no journal.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from roboglot.programs.worker.values import Record
 
 
 class CallInterrupted(RobotError):
-    """The server ended while the call was under way; how far the robot came is not known."""
+    """The server ended during the call; the robot's progress is not known."""
 
 
 class _OutOfReach:
-    """Stand-in for a robot out of reach: every use raises ``error``, whoever it is by."""
+    """Stand-in for a robot out of reach: every use raises ``error``, for every client."""
 
     admission = Admission()
 
@@ -41,9 +41,9 @@ class _OutOfReach:
 
 
 async def call_cut_off(session: Session, name: str, args: Sequence[object], kwargs: Mapping[str, object]) -> object:
-    """The function's result with a failing ``state``, SPIN_FUTURE_INTERRUPTED; a success is one that needs no robot.
+    """Return the function's result with the failing state SPIN_FUTURE_INTERRUPTED; success if it needs no robot.
 
-    Raises CallInterrupted where a result has no state, and otherwise as ``call`` for arguments that do not fit.
+    Raises CallInterrupted for a result without a state, and like ``call`` for wrong arguments.
     """
     error = CallInterrupted(f"the server ended while {name} was under way; it was not repeated")
     elsewhere = Session(cast(Robot, _OutOfReach(error)), session.task, session.host)

@@ -64,27 +64,27 @@ SYSTEM_EYES: dict[int, tuple[Look, Colour]] = {
 
 
 class HeldLights:
-    """The zones that the program has taken, and what they showed before."""
+    """Zones that the program has taken, with their earlier states."""
 
     def __init__(self, session: Session) -> None:
         self._light = session.robot[Light]
         self._before: dict[str, ZoneState] = {}
 
     def shine(self, zone: str, look: Look, colour: Colour) -> None:
-        """Take the zone; raises as Light does."""
+        """Take the zone and show an effect. Raises like ``Light.shine``."""
         before = self._light.state(zone)
         effect, frequency = look
         self._light.shine(zone, colour, effect, frequency=frequency)
         self._before.setdefault(zone, before)
 
     def free(self, zone: str) -> None:
-        """Give it back; nothing happens to what is not held."""
+        """Restore a zone's earlier state; do nothing if it is not held."""
         before = self._before.pop(zone, None)
         if before:
             self._light.shine(zone, before.colour, before.effect, frequency=before.frequency)
 
     def close(self) -> None:
-        """Give all back."""
+        """Restore all zones."""
         for zone in tuple(self._before):
             self.free(zone)
 
@@ -116,7 +116,7 @@ async def freed(session: Session, target: int) -> Record:
 
 
 def _show(session: Session, target: int, look: Look | None, colour: Colour) -> Record:
-    """Show in the order of the vendor's checks. Low power comes before programs: it keeps the lights for itself."""
+    """Show an effect after the vendor's checks, in their order. At low power programs get no lights."""
     robot = session.robot
     if target not in ZONES:
         return _answer(TARGET_ERROR, "no such light")

@@ -1,7 +1,7 @@
-"""Everything that programs find besides the language: the ability set's names and types.
+"""Names and types of the ability set, available to programs in addition to the language.
 
-All names of the manual are there, so that a program that uses one not built yet can be saved; calling it raises
-NotImplementedError.
+All names of the manual are included, so that programs with functions that are not built yet can be saved; calling them
+raises NotImplementedError.
 """
 
 from __future__ import annotations
@@ -40,17 +40,17 @@ from roboglot.wire.contracts import contract
 
 
 def ability_set() -> Prelude:
-    """The prelude of every run."""
+    """Return the prelude of every run."""
     names = {row.key for row in contract("visual")} | set(SPELLINGS)
     attributes = {name for name in names if name.endswith(ATTRIBUTES)}
     return Prelude(frozenset(names - attributes), frozenset(attributes), RECORDS, ENUMS)
 
 
 def implemented() -> set[str]:
-    """The manual's names that work as a whole, for the coverage page."""
+    """Return the manual's names that work fully, for the coverage page."""
     return ABILITIES.implemented()
 
 
 def partly() -> dict[str, str]:
-    """The manual's names that work in part, with what they cannot do yet."""
+    """Return the manual's names that work in part, with their missing features."""
     return ABILITIES.partly()

@@ -1,6 +1,6 @@
-"""The types that functions and programs hand to each other, with the manual's field names and defaults (4.2).
+"""Types of the values between functions and programs, with the manual's field names and defaults (4.2).
 
-Only shapes; what fills them is in the groups' files.
+Fields only; the groups' files fill them.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from roboglot.programs.worker.values import Record
 
 
 def _fields(names: str, default: object) -> dict[str, object]:
-    """Fields with a common default; ``names`` are parted by blanks."""
+    """Return fields with a common default; ``names`` are separated by blanks."""
     return dict.fromkeys(names.split(), default)
 
 
 _XYZ = {"x": 0.0, "y": 0.0, "z": 0.0}
 _LEVEL = Record("Pose", {"orientation": Record("Quaternion", {"w": 0.0})})
 _MOTION: Mapping[str, object] = {"motion_id": 0, "result": False, "code": 0}
-# Results of a State and a ``response`` with these fields.
+# Results with a State and a ``response`` of these fields.
 _RESPONSES: dict[str, dict[str, object]] = {
     "MotionSequenceServiceResponse": {"result": False, "code": 0, "describe": ""},
     "LedSeviceResponse": {"code": 0},

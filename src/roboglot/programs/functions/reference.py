@@ -1,4 +1,4 @@
-"""The reference of all functions as a page, made from their declarations: ``python -m`` this module writes it."""
+"""Reference page of all functions, made from their declarations; ``python -m`` this module writes it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Names without parentheses are read, not called. Every example is played by the t
 
 
 def page() -> str:
-    """The text of the page, Markdown."""
+    """Return the text of the page, Markdown."""
     return "\n".join([_HEAD, *_lines()])
 
 

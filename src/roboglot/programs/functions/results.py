@@ -1,4 +1,4 @@
-"""The pieces that many results have: states, points, headers (4.2). The groups' files make whole results."""
+"""Common parts of results: states, points, headers (4.2). The groups' files make whole results."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ class StateCode(IntEnum):
 
 
 def state(code: StateCode = StateCode.SUCCESS, describe: str = "success") -> Record:
-    """A State."""
+    """Return a State."""
     return Record("State", {"code": int(code), "describe": describe})
 
 
 def in_short(value: object, depth: int = 3) -> str:
-    """A function's answer as text of at most ``SHORT_MAX`` characters, for people: fields by name, long lists cut."""
+    """Return a function's result as readable text of at most ``SHORT_MAX`` characters, with long lists cut."""
     match value:
         case Record(fields=fields):
             inner = ", ".join(f"{name} {in_short(item, depth - 1)}" for name, item in list(fields.items())[:12])
@@ -52,24 +52,24 @@ def in_short(value: object, depth: int = 3) -> str:
 
 
 def point(x: float, y: float, z: float = 0.0) -> Record:
-    """A Point, m."""
+    """Return a Point, m."""
     return Record("Point", {"x": x, "y": y, "z": z})
 
 
 def vector(value: Vector3) -> Record:
-    """A Vector3 in the unit of its field."""
+    """Return a Vector3, in the same unit."""
     return Record("Vector3", {"x": value.x, "y": value.y, "z": value.z})
 
 
 def header(epoch: float, frame: str) -> Record:
-    """A Header: seconds since 1970 and the frame of what follows."""
+    """Return a Header: Unix time in s, and the frame of the values."""
     nanoseconds = round(epoch * 1e9)
     stamp = Record("Time", {"sec": nanoseconds // 10**9, "nanosec": nanoseconds % 10**9})
     return Record("Header", {"stamp": stamp, "frame_id": frame})
 
 
 def quaternion(attitude: Orientation) -> Record:
-    """A Quaternion of roll, pitch, yaw in rad (turned about the fixed axes in this order)."""
+    """Return a Quaternion of roll, pitch, yaw in rad (turned about the fixed axes in this order)."""
     cr, sr = math.cos(attitude.roll / 2), math.sin(attitude.roll / 2)
     cp, sp = math.cos(attitude.pitch / 2), math.sin(attitude.pitch / 2)
     cy, sy = math.cos(attitude.yaw / 2), math.sin(attitude.yaw / 2)

@@ -1,4 +1,4 @@
-"""The tables that the groups' functions register in, and how a program's call finds its function."""
+"""Tables of the groups' functions, and dispatch of a program's calls to them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ABILITIES: OperationTable[str] = OperationTable("visual", Right.PROGRAM)
 TIME: OperationTable[str] = OperationTable("time", Right.PROGRAM)  # Python's own module, on the robot's clock
 
 ATTRIBUTES = (".state", ".data", ".params")  # read without calling
-NO_ABILITIES = (*ATTRIBUTES, ".set_log")  # they are no abilities of the robot
+NO_ABILITIES = (*ATTRIBUTES, ".set_log")  # not abilities of the robot
 
 # Names in the manual's examples that differ from its interface tables, and the firmware's keywords.
 SPELLINGS = {
@@ -42,10 +42,10 @@ JOINED = frozenset({"cyberdog.audio.play", "cyberdog.audio.instantly_play"})  # 
 
 
 async def call(session: Session, name: str, args: Sequence[object], kwargs: Mapping[str, object]) -> object:
-    """Run the function that a program calls and keep its group's state.
+    """Run the function that a program calls; keep its group's state.
 
-    Raises what the program is to see: TypeError for arguments that do not fit, NotImplementedError for functions that
-    the manual has and this robot does not, RobotError, ValueError.
+    Raises errors for the program: TypeError for wrong arguments, NotImplementedError for functions of the manual that
+    are not built yet, RobotError, ValueError.
     """
     if (timing := TIME.get(name)) is not None:
         return await timing.handler(session, **bind(timing, args, kwargs))
@@ -53,7 +53,7 @@ async def call(session: Session, name: str, args: Sequence[object], kwargs: Mapp
     if operation is None:
         raise NotImplementedError(f"{name} is not built yet")
     try:
-        if session.robot.admission.asks and identity():  # a program without a client belongs to the robot
+        if session.robot.admission.asks and identity():  # programs without a client's identity belong to the robot
             session.robot.admission.check("visual", operation.key, operation.right)
         result = await operation.handler(session, **bind(operation, args, kwargs))
     except RobotError as error:
@@ -65,7 +65,7 @@ async def call(session: Session, name: str, args: Sequence[object], kwargs: Mapp
 
 
 def remember(session: Session, name: str, result: object) -> None:
-    """Keep the state of the function's group: what its result has of one, or FAIL for an error."""
+    """Keep the state of the function's group: the State of its result, or FAIL for an error."""
     name = SPELLINGS.get(name, name)
     group = name.split(".")[-2]
     if isinstance(result, RobotError):
@@ -77,7 +77,7 @@ def remember(session: Session, name: str, result: object) -> None:
 
 
 def log_call(session: Session, name: str, args: Sequence[object], kwargs: Mapping[str, object], result: object) -> None:
-    """Write the call to the task's log if its group's are written there."""
+    """Write the call to the task's log if its group is logged."""
     if name.split(".")[-2] in session.logging and not name.endswith(NO_ABILITIES):
         given = ", ".join([*map(repr, args), *(f"{key}={value!r}" for key, value in kwargs.items())])
         outcome = state_of(result)
@@ -86,7 +86,7 @@ def log_call(session: Session, name: str, args: Sequence[object], kwargs: Mappin
 
 
 def bind(operation: Operation[str], args: Sequence[object], kwargs: Mapping[str, object]) -> dict[str, object]:
-    """The arguments by name, converted, as Python would bind them; raises TypeError in Python's words."""
+    """Return the arguments by name, converted, bound as in Python. Raises TypeError with Python's texts."""
     names = operation.names
     if operation.key in JOINED and len(args) > 1 and all(isinstance(arg, str) for arg in args):
         args = ["".join(map(str, args))]
@@ -107,7 +107,7 @@ def bind(operation: Operation[str], args: Sequence[object], kwargs: Mapping[str,
 
 
 def state_of(result: object) -> Record | None:
-    """The State that a result is or has."""
+    """Return the State that a result is or contains; None without one."""
     match result:
         case Record(type="State"):
             return result

@@ -1,4 +1,4 @@
-"""Python's ``time`` on the robot's clock: a program sleeps and reads the time as the robot does."""
+"""Python's ``time`` on the robot's clock: sleeping and reading the time."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""The pupils' language: Python 3 with a short list of what may be imported, named and reached, checked before it runs.
+"""The pupils' language: Python 3 with short lists of allowed imports, names and attributes, checked before it runs.
 
-It knows no robot, no process and no file: text in, problems or code out. It is for good messages and for depth; the
-boundary that keeps a hostile program in is the worker's jail, never this package.
+Knows no robot, no process and no file: text in, problems or code out. The check gives good messages and a second
+layer of defence; the boundary that confines a hostile program is the worker's jail, never this package.
 """
 
 from roboglot.programs.language.check import check, compile_unit, uses

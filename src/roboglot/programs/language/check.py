@@ -1,7 +1,7 @@
-"""Text to problems or to code.
+"""Turns text into problems or code.
 
-Parsing a stranger's text costs time and memory: the server leaves it to a jailed worker (``Engine.check``); calling
-``check`` here is for command lines and tests.
+Parsing untrusted text costs time and memory, so the server leaves it to a jailed worker (``Engine.check``); only
+command lines and tests call ``check`` directly.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ _LOOKED_AT_MAX = 4 * PROBLEMS_MAX
 
 
 def check(source: str, names: Names | None = None) -> list[Problem]:
-    """Return what is wrong with a program, in the order of its lines; empty if it can run.
+    """Return the problems of a program, in the order of its lines; empty if it can run.
 
-    ``names`` is what the host offers; without it, unknown names are not looked for.
+    ``names``: names that the host offers; None skips the search for unknown names.
     """
     tree, problem = _parse(source)
     if tree is None:
@@ -47,7 +47,7 @@ def check(source: str, names: Names | None = None) -> list[Problem]:
 
 
 def uses(source: str, functions: frozenset[str]) -> list[str]:
-    """Return which of ``functions`` a program reads without defining them, sorted; none if it cannot be parsed."""
+    """Return those of ``functions`` that a program reads and does not define, sorted; none if it cannot be parsed."""
     tree, _ = _parse(source)
     return [] if tree is None else sorted(free_names(tree) & functions)
 
@@ -55,9 +55,9 @@ def uses(source: str, functions: frozenset[str]) -> list[str]:
 def compile_unit(
     source: str, filename: str, unit: int, marks: Marks, *, policy: bool = True
 ) -> CodeType | list[Problem]:
-    """Code that marks its lines (see ``instrument``), or the problems that forbid it.
+    """Return code that marks its lines (see ``instrument``), or the problems of the text.
 
-    ``policy`` off keeps only the syntax.
+    With ``policy`` off only the syntax is checked.
     """
     tree, problem = _parse(source)
     if tree is None:
@@ -114,7 +114,7 @@ def _too_deep() -> Problem:
 
 
 def _in_characters(problem: Problem, lines: list[str]) -> Problem:
-    """The tree counts columns in UTF-8 bytes; people count characters."""
+    """Return the problem with its column in characters; the tree counts UTF-8 bytes."""
     if problem.kind is ProblemKind.SYNTAX or not 1 <= problem.line <= len(lines):
         return problem
     head = lines[problem.line - 1].encode("utf-8", "replace")[: problem.column - 1]

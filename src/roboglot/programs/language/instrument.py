@@ -1,8 +1,8 @@
 """Rewrites a checked syntax tree so that the running program reports its line and keeps to the language.
 
-Before each statement goes ``cell[0] = mark``: one store into a list, the cheapest thing CPython can do. Both stand in
-the tree as constants that cannot be guessed; ``Marks.bind`` puts the worker's own objects there once it is code, so
-that no name of the program leads to them. Knows nothing of how the worker shares the list's memory with the host.
+Each statement gets ``cell[0] = mark`` before it: one store into a list, the cheapest operation in CPython. In the tree,
+both are constants that cannot be guessed; after compilation ``Marks.bind`` replaces them by the worker's own objects,
+so that no name of the program leads to them. Knows nothing about the memory that the worker shares with the host.
 """
 
 from __future__ import annotations
@@ -14,26 +14,26 @@ from types import CodeType
 from typing import Protocol
 
 METHODS = {"format": "$format", "has_key": "$has_key"}
-"""Attributes read through a function of the worker: text formatting reaches attributes by text.
+"""Attributes read through a function of the worker, as text formatting reaches attributes by text.
 
-Dictionaries know ``has_key`` here.
+``has_key`` exists for dictionaries here.
 """
 
-# Statements that take no time and cannot fail: programs never wait in them.
+# Statements that take no time and cannot fail, so programs never wait in them.
 _INSTANT = (ast.Break, ast.Continue, ast.Global, ast.Nonlocal)
 _BLOCKS = ("body", "orelse", "finalbody")
 
 
 class Cell(Protocol):
-    """A list of one item, or what takes stores as one does."""
+    """A list of one item, or an object that can be stored to like one."""
 
     def __setitem__(self, item: int, mark: object, /) -> None: ...
 
 
 class Marks:
-    """The placeholders of one run's code, and what they stand for.
+    """The placeholders of one run's code, and their objects.
 
-    ``cell`` is the list whose item 0 says where the program is; ``mark(unit, line)`` the object for a place.
+    ``cell``: the list whose item 0 is the mark of the current place; ``mark(unit, line)``: returns a place's mark.
     """
 
     __slots__ = ("_cell", "_mark", "_nonce")
@@ -44,7 +44,7 @@ class Marks:
         self._nonce = os.urandom(16)
 
     def statement(self, unit: int, line: int, at: ast.stmt) -> ast.stmt:
-        """``cell[0] = mark``, standing where ``at`` stands."""
+        """Return the statement ``cell[0] = mark`` at the position of ``at``."""
         target = ast.Subscript(ast.Constant(self._nonce), ast.Constant(0), ast.Store())
         mark = ast.Constant(self._nonce + unit.to_bytes(4, "big") + line.to_bytes(4, "big"))
         statement = ast.copy_location(ast.Assign([target], mark), at)
@@ -52,7 +52,7 @@ class Marks:
         return statement
 
     def bind(self, code: CodeType) -> CodeType:
-        """The code with the real objects in place of the placeholders."""
+        """Return the code with the real objects in place of the placeholders."""
         return code.replace(co_consts=tuple(self._bound(constant) for constant in code.co_consts))
 
     def _bound(self, constant: object) -> object:
@@ -65,7 +65,7 @@ class Marks:
 
 
 def instrument(tree: ast.Module, unit: int, marks: Marks, *, rewrite: bool = True) -> ast.Module:
-    """The tree with line marks, and (``rewrite``) with the methods of ``METHODS`` led through the worker."""
+    """Return the tree with line marks and, with ``rewrite``, the attributes of ``METHODS`` read through the worker."""
     if rewrite:
         tree = _Methods().visit(tree)
     marker = _Marker(unit, marks)
@@ -74,8 +74,8 @@ def instrument(tree: ast.Module, unit: int, marks: Marks, *, rewrite: bool = Tru
 
 
 class _Marker:
-    """Puts marks into blocks. ``loop`` is the line of the loop whose condition calls, 0 without one: such a condition
-    runs again after the body's last line or a ``continue``, and its calls are not to be reported there.
+    """Puts marks into blocks. ``loop``: line of the enclosing loop if its condition makes calls, otherwise 0. Such a
+    condition runs again after the body's last line or a ``continue``, so the loop's line is marked there.
     """
 
     def __init__(self, unit: int, marks: Marks) -> None:
@@ -83,7 +83,7 @@ class _Marker:
         self._marks = marks
 
     def marked(self, block: list[ast.stmt], loop: int, *, keep_first: bool = False) -> list[ast.stmt]:
-        """The block with a mark before each statement, docstrings (``keep_first``) excepted."""
+        """Return the block with a mark before each statement, except for a docstring (``keep_first``)."""
         result: list[ast.stmt] = []
         for index, statement in enumerate(block):
             if isinstance(statement, ast.Continue) and loop:
@@ -126,7 +126,7 @@ def _calls(test: ast.expr) -> bool:
 
 
 class _Methods(ast.NodeTransformer):
-    """``x.format`` becomes ``$format(x)``: a call, so that a text's own method never gets loose."""
+    """Turns ``x.format`` into the call ``$format(x)``, so that a program never holds a text's own method."""
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
         self.generic_visit(node)

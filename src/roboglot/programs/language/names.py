@@ -1,6 +1,6 @@
 """Names that a program may use: the built-in ones, its own, and those the host offers.
 
-Knows only the names' spelling. Finds unknown ones in a syntax tree and guesses what was meant.
+Knows only the names' spelling. Finds unknown names in a syntax tree and suggests known ones.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from roboglot.programs.language.problems import Problem, ProblemKind
 
 MODULES = frozenset({"time", "math", "random", "numbers"})
-"""What may be imported. ``time`` needs no import: the vendor's programs use it without."""
+"""Modules that may be imported. ``time`` needs no import, as the vendor's programs have none."""
 
 
 def words(text: str) -> frozenset[str]:
-    """The blank-separated words of a table."""
+    """Return the blank-separated words of a table."""
     return frozenset(text.split())
 
 
@@ -35,9 +35,9 @@ RecursionError ReferenceError RuntimeError StopIteration SystemExit TimeoutError
 UnicodeError ValueError ZeroDivisionError Warning UserWarning ConnectionError PermissionError BlockingIOError
 InterruptedError
 """)
-"""Exception types a program sees under their own name; the host may raise them too."""
+"""Exception types available to programs; the host may raise them too."""
 BUILTINS = _FUNCTIONS | EXCEPTIONS | words("NotImplemented Ellipsis true false RobotError")
-"""Every name a program finds without defining or importing it. ``true`` and ``false`` are the vendor's spelling."""
+"""All names available without a definition or import. ``true`` and ``false`` are the vendor's spelling."""
 
 _STAR_NAMES = {"math": frozenset(name for name in dir(math) if not name.startswith("_"))}
 
@@ -54,12 +54,12 @@ class Names:
 
     @property
     def roots(self) -> frozenset[str]:
-        """The first parts of the dotted names."""
+        """First parts of the dotted names."""
         return frozenset(name.partition(".")[0] for name in self.dotted)
 
 
 def unknown_names(tree: ast.Module, names: Names) -> Iterator[Problem]:
-    """Problems for undefined names and for misspelt parts of dotted names (``cyberdog.motion.trun``)."""
+    """Yield problems for undefined names and for misspelt parts of dotted names (``cyberdog.motion.trun``)."""
     bound = set(_bound(tree))
     roots = names.roots
     known = bound | BUILTINS | names.plain | roots | {"time", "__name__"}
@@ -70,8 +70,7 @@ def unknown_names(tree: ast.Module, names: Names) -> Iterator[Problem]:
                 yield _unknown(node, name, "", known)
             case ast.Attribute():
                 chain = _chain(node)
-                # Report only the misspelt part of the whole chain: the shorter chains inside it are visited on their
-                # own.
+                # Report only the misspelt last part: the shorter chains inside this one are visited on their own.
                 if chain and chain[0] in roots and chain[0] not in bound:
                     owner, part = ".".join(chain[:-1]), chain[-1]
                     path = f"{owner}.{part}"
@@ -81,7 +80,7 @@ def unknown_names(tree: ast.Module, names: Names) -> Iterator[Problem]:
 
 
 def free_names(tree: ast.Module) -> frozenset[str]:
-    """The names a program reads and binds nowhere."""
+    """Return the names that a program reads and binds nowhere."""
     read = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
     return frozenset(read.difference(_bound(tree)))
 
@@ -92,7 +91,7 @@ def _prefixes(name: str) -> Iterator[str]:
 
 
 def _chain(node: ast.expr) -> list[str] | None:
-    """``a.b.c`` as ["a", "b", "c"]; None for anything that doesn't start with a name."""
+    """Return ``a.b.c`` as ["a", "b", "c"]; None if it doesn't start with a name."""
     parts: list[str] = []
     while isinstance(node, ast.Attribute):
         parts.append(node.attr)
@@ -103,7 +102,7 @@ def _chain(node: ast.expr) -> list[str] | None:
 
 
 def _bound(tree: ast.Module) -> Iterator[str]:
-    """Every identifier the program binds anywhere; scopes are left to the running program."""
+    """Yield every identifier that the program binds, regardless of scopes."""
     for node in ast.walk(tree):
         match node:
             case ast.Name(id=name, ctx=ast.Store() | ast.Del()):
@@ -123,7 +122,7 @@ def _bound(tree: ast.Module) -> Iterator[str]:
 
 
 def _imported(module: str | None, aliases: Iterable[ast.alias]) -> Iterator[str]:
-    """The names that ``from module import …`` binds."""
+    """Yield the names that ``from module import …`` binds."""
     for alias in aliases:
         if alias.name == "*":
             yield from _STAR_NAMES.get(module or "", _everything(module))
@@ -132,7 +131,7 @@ def _imported(module: str | None, aliases: Iterable[ast.alias]) -> Iterator[str]
 
 
 def _everything(module: str | None) -> frozenset[str]:
-    """The names ``from module import *`` brings for the small modules."""
+    """Return the names that ``from module import *`` binds, for the small modules."""
     return {
         "time": frozenset({"sleep", "time", "monotonic", "localtime", "gmtime", "strftime", "strptime", "mktime"}),
         "random": frozenset({"random", "randint", "choice", "shuffle", "uniform", "sample", "randrange", "seed"}),

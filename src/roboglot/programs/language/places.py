@@ -1,6 +1,6 @@
 """Places of a program and its stops: a place is a line of a unit (0 is the program, 1... its modules).
 
-Both ends of the shared memory number all places of a run in one row, from the same texts. Pure arithmetic.
+Both ends of the shared memory number all places of a run in one sequence, from the same texts. Pure arithmetic.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ class Step(IntEnum):
     """Kind of a step: the statement before which the program halts next."""
 
     INTO = 1
-    """The next one, in whichever function."""
+    """The next statement, in any function."""
     OVER = 2
-    """The next one of the function where it is, or of one that called that."""
+    """The next statement in the current function or one of its callers."""
     OUT = 3
-    """The next one of a function that called the one where it is."""
+    """The next statement in a caller of the current function."""
 
 
 class Places:
-    """The row of all places of a run; number 0 is "nowhere yet"."""
+    """The sequence of all places of a run; number 0 means "no place yet"."""
 
     __slots__ = ("_starts", "count")
 
@@ -37,7 +37,7 @@ class Places:
         self.count = self._starts.pop()
 
     def number(self, unit: int, line: int) -> int:
-        """The place's number, 0 if there is no such line."""
+        """Return the number of a place, 0 if there is no such line."""
         if not 0 <= unit < len(self._starts):
             return 0
         number = self._starts[unit] + line
@@ -45,27 +45,27 @@ class Places:
         return number if line > 0 and number < end else 0
 
     def place(self, number: int) -> tuple[int, int]:
-        """The unit and the line of a number; (0, 0) for one that means nothing."""
+        """Return the unit and the line of a number; (0, 0) for an invalid one."""
         if not 0 < number < self.count:
             return 0, 0
         unit = bisect_right(self._starts, number) - 1
         return unit, number - self._starts[unit]
 
     def memory(self) -> int:
-        """Bytes that both ends share: the word for the present place, one for each place, and a byte for each."""
+        """Return the size of the shared memory, bytes: the current place's word, and a word and a byte per place."""
         return self.stops + self.count
 
     @property
     def stops(self) -> int:
-        """Offset of the bytes of stops: not 0 where a watched program is to halt.
+        """Offset of the stops, one byte per place; not 0: a watched program halts there.
 
-        The first has the order of a step: a ``Step`` in its lowest two bits, and above them a number that differs from
-        the last order's.
+        The first byte orders a step: a ``Step`` in its lowest two bits, above them a number that changes with each
+        order.
         """
         return WORD * (1 + self.count)
 
     def next_marked(self, number: int, marked: Callable[[int], bool]) -> int:
-        """The first place from ``number`` on, in the same unit, at which a statement begins; 0 without one."""
+        """Return the first place from ``number`` on, in the same unit, at which a statement begins; 0 without one."""
         unit = bisect_right(self._starts, number)
         end = self._starts[unit] if unit < len(self._starts) else self.count
         return next((place for place in range(number, end) if marked(place)), 0)

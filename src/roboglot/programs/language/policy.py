@@ -1,7 +1,7 @@
 """Syntax of the robot language: an allow-list over Python's syntax tree.
 
-Anything not listed is refused, so a construct of a future Python is refused until someone has looked at it. It makes
-for clear messages and a second wall; a program that slips past it is still in the worker's jail.
+Anything not listed is refused, including constructs of future Pythons. The list gives clear messages and a second
+layer of defence; a program that gets past it is still in the worker's jail.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ __float__ __index__ __round__ __reversed__
 """)
 _READABLE = frozenset({"__init__", "__name__", "__enter__", "__exit__", "__len__", "__str__", "__repr__", "__eq__"})
 
-# Attributes that lead from a value to its frames and code, and text formatting that reaches attributes.
+# Attributes that lead from a value to its frames and code, and text formatting, which reaches attributes.
 _BLOCKED = words("""
 ag_await ag_code ag_frame co_code co_consts cr_await cr_code cr_frame gi_code gi_frame gi_yieldfrom tb_frame tb_next
 f_back f_builtins f_code f_generator f_globals f_lasti f_lineno f_locals f_trace format_map mro with_traceback
@@ -70,14 +70,14 @@ _IDENTIFIERS: dict[type[ast.AST], tuple[str, ...]] = {
 
 
 def attribute_allowed(name: str) -> bool:
-    """Return whether ``object.name`` may be read; ``getattr`` asks the same question while the program runs."""
+    """Return whether ``object.name`` may be read; also used by ``getattr`` in running programs."""
     if name.startswith("__") and name.endswith("__"):
         return name in _READABLE
     return name not in _BLOCKED
 
 
 def violations(tree: ast.Module) -> Iterator[Problem]:
-    """Every place where the program leaves the language."""
+    """Yield a problem for each construct outside the language."""
     for node in ast.walk(tree):
         if not isinstance(node, _ALLOWED):
             yield _construct(node)

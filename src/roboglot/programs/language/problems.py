@@ -25,7 +25,7 @@ class ProblemKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One finding. ``line`` and ``column`` count from 1, columns in characters; the sentences need no other context."""
+    """One problem. ``line`` and ``column`` (in characters) count from 1; the sentences need no other context."""
 
     line: int
     column: int
@@ -160,7 +160,7 @@ _SYNTAX = [tuple(entry.split("\n")) for entry in _SENTENCES.strip().split("\n\n"
 
 
 def from_syntax_error(message: str, line: int, column: int) -> Problem:
-    """The problem for one of CPython's syntax messages; an unknown message is kept as it is."""
+    """Return the problem for one of CPython's syntax messages; an unknown message is quoted."""
     for pattern, english, chinese in _SYNTAX:
         found = re.search(pattern, message)
         if found:

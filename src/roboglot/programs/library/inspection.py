@@ -1,4 +1,4 @@
-"""Asks the engine what is wrong with a program and which modules it calls, and words the findings as a refusal."""
+"""Checks programs with the engine: their problems, the modules that they call, and a refusal with the problems."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from roboglot.programs.language import BUILTINS, MODULES, Problem, ProblemKind
 from roboglot.programs.worker.prelude import Prelude
 
 PROBLEMS_SHOWN = 3
-KEPT_MAX = 64  # judgements of the newest programs
-KEPT_CHARACTERS_MAX = 16 * 1024  # of a program whose judgement is kept
+KEPT_MAX = 64  # cached judgements, those of the newest programs
+KEPT_CHARACTERS_MAX = 16 * 1024  # longest program whose judgement is cached
 Judgement = tuple[list[Problem], frozenset[str]]
 
 
 class Inspector:
-    """Looks at programs that find ``prelude``; at the same text once: it is checked while typed, saved, and run."""
+    """Checks programs against ``prelude``; caches results, as a text is checked while typed, saved and run."""
 
     def __init__(self, engine: Engine, prelude: Prelude) -> None:
         self._engine = engine
@@ -31,12 +31,12 @@ class Inspector:
         self._judged: OrderedDict[tuple[str, frozenset[str]], asyncio.Future[Judgement]] = OrderedDict()
 
     def reserved(self, name: str) -> bool:
-        """Return whether the language or the robot's functions use this name already."""
+        """Return whether the language or the robot's functions already use this name."""
         names = self._prelude.names()
         return name in BUILTINS or name in names.plain or name in names.roots or name in MODULES
 
     async def inspect(self, source: str, functions: frozenset[str]) -> Judgement:
-        """Return its problems, and which of ``functions`` it uses; raises ProgramError if that fails."""
+        """Return a program's problems and those of ``functions`` that it uses. Raises ProgramError if that fails."""
         if len(source) > KEPT_CHARACTERS_MAX:
             return await self._examine(source, functions)
         key = (source, functions)
@@ -48,7 +48,7 @@ class Inspector:
                 self._judged.popitem(last=False)
         else:
             self._judged.move_to_end(key)
-        return await asyncio.shield(judging)  # others may wait for the same
+        return await asyncio.shield(judging)  # others may wait for the same future
 
     def _forget(self, key: tuple[str, frozenset[str]]) -> None:
         self._judged.pop(key, None)
@@ -65,14 +65,14 @@ class Inspector:
 
 
 def _holds(judged: asyncio.Future[Judgement]) -> bool:
-    """Return whether a judgement is the text's alone: time and memory of a busy machine may count in others."""
+    """Return whether a judgement depends on the text alone; failures and SIZE may come from a busy machine."""
     if judged.cancelled() or judged.exception() is not None:
         return False
     return all(problem.kind is not ProblemKind.SIZE for problem in judged.result()[0])
 
 
 def refuse_wrong(problems: Sequence[Problem]) -> None:
-    """Raise what the feedback to a wrong program says, if it is wrong."""
+    """Raise ProgramProblems with the first problems, if there are any."""
     if problems:
         shown = "; ".join(
             f"line {p.line}, column {p.column}: {p.english} {p.chinese}" for p in problems[:PROBLEMS_SHOWN]

@@ -1,6 +1,6 @@
-"""The modules of one robot: saved, listed and deleted as the manual's table allows, and handed to who calls them.
+"""The modules of one robot: saved, listed and deleted as the manual's table allows, and provided to their callers.
 
-Knows who calls whom; runs nothing.
+Knows the calls between modules; runs nothing.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class _Known:
 
 
 class ModuleLibrary:
-    """``lock`` is the one under which tasks change, too: what they call must not vanish meanwhile.
+    """Store of modules. ``lock``: shared with the tasks, whose modules must not vanish during a change.
 
     ``allow`` raises ProgramError if the robot's mode forbids an operation.
     """
@@ -65,11 +65,11 @@ class ModuleLibrary:
 
     @property
     def functions(self) -> frozenset[str]:
-        """The names under which modules are called, wrong ones included."""
+        """Names under which modules are called, including those of modules with problems."""
         return frozenset(module.name for module in self._known.values())
 
     def ids(self, names: Iterable[str]) -> frozenset[str]:
-        """The modules of these names. Raises ProgramError if one is gone."""
+        """Return the ids of the modules with these names. Raises ProgramError if one is gone."""
         by_name = {module.name: id for id, module in self._known.items()}
         try:
             return frozenset(by_name[name] for name in names)
@@ -86,7 +86,7 @@ class ModuleLibrary:
         return await self._store.get(id)
 
     async def save(self, module: StoredProgram) -> None:
-        """Add or replace a module (its ``state`` is not looked at). One that is wrong is kept, too, and refused."""
+        """Add or replace a module; ``state`` is ignored. One with problems is stored, too, but raises ProgramError."""
         self._allow(TaskOperation.SAVE)
         try:
             interface = parse_interface(module.condition)
@@ -110,7 +110,7 @@ class ModuleLibrary:
         refuse_wrong(problems)
 
     async def delete(self, id: str) -> None:
-        """Forget a module that nothing calls."""
+        """Delete a module. Raises NotAllowed if it is called by a task or module."""
         self._allow(TaskOperation.DELETE)
         async with self._lock:
             before = self._state(id)
@@ -141,7 +141,7 @@ class ModuleLibrary:
         return known.state if known else ModuleState.NULL
 
     def _check_name(self, id: str, name: str) -> None:
-        """An interface's name is the module's own, and stays it: callers know the module by it."""
+        """Raise InvalidCondition if the name is taken, or differs from the earlier one that callers use."""
         own = self._known.get(id)
         if own is not None and own.name != name:
             raise InvalidCondition(
@@ -158,7 +158,7 @@ class ModuleLibrary:
             raise RecursiveModule(f"the module {id} would call itself through others")
 
     def _reach(self, ids: Iterable[str]) -> set[str]:
-        """These, and all that they call."""
+        """Return these modules and all that they call."""
         reached: set[str] = set()
         open_ends = list(ids)
         while open_ends:

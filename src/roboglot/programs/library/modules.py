@@ -1,5 +1,4 @@
-"""Modules: functions that tasks and other modules call. Their states, the manual's table of them (0.2.2.2), and the
-text that the language sees of one.
+"""Modules, functions that tasks and other modules call: states, the manual's table (0.2.2.2), and source text.
 
 Pure data and text; knows no store and no robot.
 """
@@ -18,7 +17,7 @@ INDENT = 4
 
 
 class ModuleState(StrEnum):
-    """State of a module; one in ``ERROR`` is kept, but cannot be called."""
+    """State of a module; in ``ERROR`` it is stored, but cannot be called."""
 
     NULL = "null"
     ERROR = "error"
@@ -51,9 +50,9 @@ MODULE_TRANSITIONS: dict[ModuleState, dict[ModuleOperation, tuple[ModuleState, .
 def next_module_state(
     state: ModuleState, operation: ModuleOperation, *, correct: bool = True, used: bool = False
 ) -> ModuleState | None:
-    """The state after ``operation``, or None if it is illegal.
+    """Return the state after ``operation``, or None if it is illegal.
 
-    ``correct``: the body passes the check; ``used``: something calls the module.
+    ``correct``: the body passes the check; ``used``: a task or module calls this one.
     """
     results = MODULE_TRANSITIONS[state].get(operation)
     if not results:
@@ -64,12 +63,12 @@ def next_module_state(
 
 
 def function_of(interface: Interface, body: str) -> str:
-    """The module as a Python function: one line of header, the body indented by four blanks."""
+    """Return the module as a Python function: one header line, the body indented by four blanks."""
     lines = body.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     indented = (" " * INDENT + line if line.strip() else line for line in lines)
     return "\n".join([f"def {interface.name}({', '.join(interface.parameters)}):", *indented])
 
 
 def in_the_body(problem: Problem) -> Problem:
-    """A problem of the function, at its place in the body as the user wrote it."""
+    """Return a problem of the function with its place in the user's body."""
     return replace(problem, line=max(1, problem.line - HEADER_LINES), column=max(1, problem.column - INDENT))

@@ -1,4 +1,4 @@
-"""The texts of which a program consists, and the places in them. Knows no process."""
+"""The texts of a program, and the places in them. Knows no process."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from roboglot.programs.language.places import Places
 class Program:
     """Texts that a run executes: unit 0 is the program, the others its modules.
 
-    ``names`` are the modules' ("" for the program).
+    ``names``: names of the modules, "" for the program.
     """
 
     units: tuple[str, ...]
@@ -22,11 +22,11 @@ class Program:
         object.__setattr__(self, "places", Places(self.units))
 
     def unit_name(self, unit: int) -> str:
-        """The module of a unit; "" for the program and for numbers that can't be."""
+        """Return the module of a unit; "" for the program and for invalid numbers."""
         return self.names[unit] if 0 <= unit < len(self.names) else ""
 
     def source_line(self, unit: int, line: int) -> str:
-        """A line's text, "" if there is no such line."""
+        """Return a line's text, "" if there is no such line."""
         if not 0 <= unit < len(self.units):
             return ""
         lines = self.units[unit].splitlines()

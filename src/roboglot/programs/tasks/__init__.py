@@ -1,1 +1,1 @@
-"""Tasks: their states, schedule, runs and records, as the manual's table allows."""
+"""Tasks: states, schedule, runs and records, according to the manual's table."""

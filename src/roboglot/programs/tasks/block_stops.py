@@ -1,7 +1,7 @@
-"""At which blocks a run halts: those with a breakpoint, the next one, and the next one after a step.
+"""Blocks at which a run halts: those with a breakpoint, the next one, and the next one after a step.
 
-A step over or out of a call is the worker's, which knows what called what and halts before statements only. Here the
-halts before it has come to the begin of a block are passed over.
+The worker does steps over and out of calls: it knows the call stack, but halts before statements only. This module
+skips its halts until the begin of a block.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ class BlockStops:
         self._blocks, self._next = stops.blocks, stops.first_block
 
     def step(self, step: Step) -> None:
-        """Halt at the begin of the block that comes next after a step."""
+        """Halt at the begin of the first block after a step."""
         self._next = step is Step.INTO
         self._seeking = step is not Step.INTO
         if self._seeking:
             self._position.step(step)
 
     def passes(self) -> bool:
-        """Return whether a halt before a statement only leads to the block that is looked for."""
+        """Return whether to skip a halt before a statement, because the step goes to a block."""
         if not self._seeking or self._position.at_stop:
             self._seeking = False
             return False

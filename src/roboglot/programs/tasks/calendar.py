@@ -8,21 +8,21 @@ from datetime import date, datetime, time, timedelta, tzinfo
 from roboglot.conditions import Cycle, Moment, parse_cycle, parse_moment
 
 DAYS_AHEAD = 9 * 366
-"""A day of any month and week day comes within this many days, or never (29 February, around the year 2100)."""
+"""Every possible day of month and week recurs within this many days (worst: 29 February around the year 2100)."""
 _PLAIN = {"minutes", "hours", "days", "weeks"}
 
 
 def due_of(mode: str, condition: str, now: float, zone: tzinfo) -> float | None:
-    """Return a task's next start; None: never, or at the next start. Raises BadCondition if the mode has none such."""
+    """Return a task's next start, Unix s; None: never, or at server start. Raises BadCondition."""
     if mode == "cycle":
         return due_next(parse_cycle(condition), now, zone)
     return due_once(parse_moment(condition), now, zone)
 
 
 def due_once(moment: Moment, now: float, zone: tzinfo) -> float | None:
-    """Return when ``moment`` is, in seconds since 1970; None: it is past, or after the end of the calendar.
+    """Return the time of ``moment``, Unix s; None: it is past, or beyond the year 9999.
 
-    A clock time without a date is today's, or tomorrow's if today's is past; what is added counts from there.
+    A clock time without a date is today's, or tomorrow's if today's is past; an amount is added to that time.
     """
     here = datetime.fromtimestamp(now, zone)
     base = here.replace(tzinfo=None)
@@ -32,7 +32,7 @@ def due_once(moment: Moment, now: float, zone: tzinfo) -> float | None:
             if moment.day is None and base < here.replace(tzinfo=None):
                 base += timedelta(days=1)
         due = _later(base, moment.amount, moment.unit).replace(tzinfo=zone).timestamp()
-    except (OverflowError, ValueError):  # after the year 9999
+    except (OverflowError, ValueError):  # beyond the year 9999
         return None
     if moment.immediate:
         return now
@@ -40,9 +40,9 @@ def due_once(moment: Moment, now: float, zone: tzinfo) -> float | None:
 
 
 def due_next(cycle: Cycle, after: float, zone: tzinfo) -> float | None:
-    """The first time after ``after`` that ``cycle`` names, in seconds since 1970; None: never.
+    """Return the first time of ``cycle`` after ``after``, both Unix s; None: never.
 
-    Hours that a change of clocks skips count as the hour after; those it repeats count once.
+    Hours skipped by a change of clocks count as the hour after; repeated hours count once.
     """
     if cycle.at_start:
         return None
@@ -62,7 +62,7 @@ def due_next(cycle: Cycle, after: float, zone: tzinfo) -> float | None:
 
 
 def _day_matches(cycle: Cycle, day: date) -> bool:
-    """Return whether the day matches as in cron: where day and week day are both restricted, either will do."""
+    """Return whether the day matches as in cron: if day and week day are both restricted, one match suffices."""
     if day.month not in cycle.months:
         return False
     by_day, by_weekday = day.day in cycle.days, day.isoweekday() % 7 in cycle.weekdays
@@ -70,7 +70,7 @@ def _day_matches(cycle: Cycle, day: date) -> bool:
 
 
 def _later(base: datetime, amount: int, unit: str) -> datetime:
-    """``amount`` units after ``base``; a month without such a day ends earlier."""
+    """Return ``base`` plus ``amount`` units; in months too short for the day, their last day."""
     if unit in _PLAIN:
         return base + timedelta(**{unit: amount})
     months = base.month - 1 + amount * (12 if unit == "years" else 1)

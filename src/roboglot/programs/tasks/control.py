@@ -1,4 +1,4 @@
-"""Reports what a program could not do because another client controls the robot. Knows no process and no task."""
+"""Reports motions refused to a program because another client controls the robot. Knows no process and no task."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ class ControlWatch:
         self._leave: Callable[[], None] = lambda: None
 
     def start(self) -> None:
-        """Count from now on."""
+        """Start counting."""
         self._leave = self._robot.events.listen(ControlRefused, self._refused)
 
     def close(self) -> None:
-        """Count no more."""
+        """Stop counting."""
         self._leave()
 
     @property
     def summary(self) -> str:
-        """Number of motions refused or ended, and why; empty without any."""
+        """Number of motions refused or ended, and the last reason; empty without any."""
         if not self._count:
             return ""
         motions = "1 motion was" if self._count == 1 else f"{self._count} motions were"

@@ -1,4 +1,4 @@
-"""Debugging as text: where a task is to halt, and to go on by a statement or a block. It is ours, for any carrier."""
+"""Debugging commands as JSON: breakpoints, and steps by statement or block. Our own protocol, for any carrier."""
 
 from __future__ import annotations
 
@@ -23,9 +23,10 @@ Line = Annotated[int, msgspec.Meta(ge=1, le=1_000_000)]
 
 
 class Wish(msgspec.Struct, forbid_unknown_fields=True):
-    """``lines`` of the task's own text, and by name those of ``modules``; ``first``: before the next statement.
+    """Breakpoints at ``lines`` of the task's own text and of ``modules`` (by name) and at the begin of ``blocks``.
 
-    ``first_block``: at the next begin of a block. ``watched``: it can be stepped through although it halts nowhere yet.
+    ``first``: halt before the next statement. ``first_block``: halt at the next begin of a block. ``watched``: allow
+    stepping even without breakpoints.
     """
 
     target_id: Annotated[str, msgspec.Meta(min_length=1, max_length=ID_MAX)]
@@ -42,7 +43,7 @@ _decode = msgspec.json.Decoder(Wish).decode
 
 
 async def answer(service: ProgramService, text: str) -> str:
-    """Do it; where the task is then, and in ``error`` why it was not done, empty if it was."""
+    """Execute a command; return the task's position afterwards, with the reason of a failure in ``error``."""
     try:
         wish = _decode(text.encode("utf-8", "replace"))
     except (msgspec.MsgspecError, RecursionError) as error:
@@ -53,7 +54,7 @@ async def answer(service: ProgramService, text: str) -> str:
     except ProgramError as error:
         why = str(error)
     where = dataclasses.asdict(await service.whereabouts(wish.target_id))
-    del where["began"], where["variables"]  # of the studio
+    del where["began"], where["variables"]  # only for the studio
     return json.dumps({"target_id": wish.target_id, "operate": wish.operate, "error": why} | where, ensure_ascii=False)
 
 

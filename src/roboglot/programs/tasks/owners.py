@@ -1,4 +1,4 @@
-"""Tasks that start by themselves, at their time: they may do what their owner may at that moment."""
+"""Rights of tasks that start at their scheduled time: those that their owner has at that moment."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Computing time of a program's process. Lockstep time stands still meanwhile: its speed changes nothing."""
+"""Computing time of a program's process. Lockstep time stands still meanwhile, so the machine's speed has no effect."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ class ProcessTime:
         self._over = True
 
     def begin(self) -> None:
-        """The process starts."""
+        """Note that the process starts."""
         self._over = False
         self._look()
 
     def ask(self, waiting: bool) -> None:
-        """Note that it waits for the answer to a call, or has it."""
+        """Note that the process starts or stops waiting for the answer to a call."""
         self._asks = waiting
         self._look()
 
     def stop(self, stopped: bool) -> None:
-        """Note that it is suspended or resumed."""
+        """Note that the process is suspended or resumed."""
         self._stopped = stopped
         self._look()
 
     def end(self) -> None:
-        """Note that it is gone, and what became of it is written down."""
+        """Note that the process is gone and its end is recorded."""
         self._over = True
         self._look()
 

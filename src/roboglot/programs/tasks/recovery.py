@@ -11,7 +11,7 @@ log = logging.getLogger(__name__)
 
 
 def settle(stores: Stores, now: float) -> dict[str, str]:
-    """Settle tasks that ran when the server ended, at ``now`` (Unix s); return journals of those that can continue."""
+    """Settle tasks that ran when the server ended, at ``now`` (Unix s); return journal headers of those to continue."""
     left = stores.tasks.in_states_now([TaskState.RUN, TaskState.SUSPEND])
     # No front end is attached any more to watch a debug run.
     left += [task for task in stores.tasks.in_states_now([TaskState.RUN_WAIT]) if task.id == DEBUG]

@@ -1,4 +1,4 @@
-"""A revived program makes its calls again: the host makes none, but must know afterwards what it knew of them."""
+"""Replay of a revived program: its calls get their recorded answers, from which the host's state is restored."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from roboglot.programs.tasks.block_stops import MARKS
 from roboglot.programs.tasks.run_host import RunHost
 from roboglot.programs.worker.values import unpack
 
-_REMEMBERED_MAX = 16 * 1024  # bytes of an answer; states of longer ones (measurements, lists) are not kept
+_REMEMBERED_MAX = 16 * 1024  # bytes of an answer; the states of longer answers (measurements, lists) are not restored
 
 
 class Replay:
-    """Restores what a session and its host knew. ``left``: calls until the program is where it was lost.
+    """Restores the state of a session and its host. ``left``: recorded calls that are still to be replayed.
 
-    ``ahead``: s that the program's ``time.monotonic`` is ahead of the clock, which began anew after a crash.
+    ``ahead``: lead of the program's ``time.monotonic`` over the clock, which restarted after the crash, s.
     """
 
     def __init__(self, session: Session, host: RunHost, left: int) -> None:
@@ -28,7 +28,7 @@ class Replay:
         self.ahead = 0.0
 
     async def follow(self, call: Replayed) -> None:
-        """Keep what the host knew of a call that is not made again."""
+        """Restore the effects on the host of a call that is not made again."""
         if call.name in MARKS and call.args:
             self._host.restore_block(str(call.args[0]))
         elif call.name.endswith(".set_log"):

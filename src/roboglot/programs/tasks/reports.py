@@ -1,4 +1,4 @@
-"""Reports of the program service: changes of tasks, their position, and the use of the machine. Plain data."""
+"""Reports of the program service: changes of tasks, their positions, and their use of resources. Plain data."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from roboglot.programs.tasks.states import TaskOperation, TaskState
 
 @dataclass(frozen=True, slots=True)
 class TaskReport:
-    """Something happened to a task without a request.
+    """Unrequested report of a change of a task.
 
-    ``error`` is the failure, None if it went well. ``block`` is ("begin" or "end", the block's id) on reports of
-    blocks, and ``block_status`` then how the last ability call went.
+    ``error`` is the failure, None for success. In reports of blocks, ``block`` is ("begin" or "end", the block's id)
+    and ``block_status`` the status of the last ability call.
     """
 
     task: str
@@ -30,10 +30,10 @@ class TaskReport:
 
 @dataclass(frozen=True, slots=True)
 class Whereabouts:
-    """A task's state, the line it is at (in ``module``, or in its own text), and the block that is open.
+    """State of a task, its current line (in ``module``, or in its own text), and its open block.
 
-    ``watched``: whether it can be stepped through. ``began``: its start in seconds since 1970, 0 for one that a crash
-    interrupted; its log entries are those since then. ``variables`` are those last reported.
+    ``watched``: True if it can be stepped through. ``began``: its start, Unix s, from which its log entries count;
+    0 for a task that a crash interrupted. ``variables``: the last reported values.
     """
 
     state: TaskState
@@ -80,7 +80,7 @@ class RunFigures:
 
 
 def done(operation: TaskOperation, id: str, state: TaskState) -> TaskReport:
-    """The second feedback of suspend, recover and shutdown."""
+    """Return the second feedback of suspend, recover and shutdown."""
     return TaskReport(id, operation, f"Task loop feedback, now state is {state}")
 
 
@@ -107,7 +107,7 @@ class Audience(Generic[P]):
 
     @property
     def listening(self) -> bool:
-        """True if there are listeners: without them their reports need not be made."""
+        """True if there are listeners; without any, no reports need to be made."""
         return bool(self._listeners)
 
     def publish(self, *args: P.args, **kwargs: P.kwargs) -> None:

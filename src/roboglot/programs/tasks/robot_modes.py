@@ -1,7 +1,7 @@
 """Operations that the robot allows in each of its modes: the manual's table (0.2.2.3), and the current mode.
 
-Knows the battery, the power mode and the firmware. No client can reach a robot that boots (Uninitialized); self-tests
-happen while it works (SelfCheck); one with a fault still does what it can (Error): these are in the table only.
+Knows the battery, the power mode and the firmware. Three modes are in the table only: no client can reach a booting
+robot (Uninitialized), self-tests run during normal work (SelfCheck), and a robot with a fault stays in use (Error).
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ ALLOWED: dict[RobotMode, frozenset[TaskOperation]] = {
 
 
 def mode_of(robot: Robot) -> RobotMode:
-    """The mode that the robot is in now; what it has no part for does not count."""
+    """Return the robot's current mode; missing components do not affect it."""
     power = robot[Power].mode if Power in robot else PowerMode.AWAKE
     firmware = robot[Firmware].progress.state if Firmware in robot else FirmwareState.IDLE
     if power is PowerMode.OFF or firmware is FirmwareState.REBOOTING:
@@ -74,7 +74,7 @@ def mode_of(robot: Robot) -> RobotMode:
 
 
 def check_mode(robot: Robot, operation: TaskOperation) -> None:
-    """Raise ProgramError if the robot's mode forbids ``operation`` (0.2.2.3), or a full disk does."""
+    """Raise ProgramError if the robot's mode (0.2.2.3) or a full disk forbids ``operation``."""
     mode = mode_of(robot)
     if operation not in ALLOWED[mode]:
         raise NotAllowed(

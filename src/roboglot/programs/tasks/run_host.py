@@ -12,7 +12,7 @@ from roboglot.programs.tasks.states import TaskOperation
 
 
 class RunHost:
-    """The ``Host`` of one run's ``session``. Begin and end of blocks, which ``report`` hears of, always alternate."""
+    """The ``Host`` of one run's ``session``. Reports begin and end of blocks to ``report``, always alternating."""
 
     session: Session
 
@@ -22,31 +22,31 @@ class RunHost:
 
     @property
     def block(self) -> str:
-        """The block that is open, "" for none."""
+        """Id of the open block, "" for none."""
         return self._block or ""
 
     def restore_block(self, id: str) -> None:
-        """This one was open when the run was interrupted."""
+        """Restore the block that was open when the run was interrupted."""
         self._block = id
 
     def begin_block(self, id: str) -> None:
-        """End the block before, begin this one (0.2.1.2.2.2)."""
+        """End the open block and begin this one (0.2.1.2.2.2)."""
         self.end_block()
         self._block = id
         self._report_block("begin", id)
 
     def end_block(self) -> None:
-        """End the block that is open, if one is."""
+        """End the open block, if any."""
         if self._block is not None:
             self._report_block("end", self._block)
             self._block = None
 
     async def breakpoint(self) -> None:
-        """The program asked to be suspended here, or is to halt."""
+        """Suspend the program at a breakpoint."""
         await self._at_breakpoint()
 
     def write(self, level: str, text: str) -> None:
-        """Add to the log what a function has to say."""
+        """Add a function's message to the log."""
         self._log.write(level, text)
 
     def _report_block(self, kind: str, id: str) -> None:

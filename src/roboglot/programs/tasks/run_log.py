@@ -1,4 +1,4 @@
-"""The log of a run: whole lines, as fast as the program's share of the server and those who follow allow."""
+"""The log of a run: whole lines, as fast as the program's share of the server and the log's readers allow."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class RunLog:
         self._clock, self._run, self._logged = clock, run, logged
         self._entries: deque[LogEntry] = deque(maxlen=LOG_MAX)
         self._line = ""  # printed without a line end so far
-        self._catching_up: asyncio.Future[None] | None = None  # readers for which the program is waiting
+        self._catching_up: asyncio.Future[None] | None = None  # the program's wait for readers
 
     async def print(self, text: str) -> None:
         """Write whole lines, as fast as the program's share of the server allows."""
@@ -43,18 +43,18 @@ class RunLog:
         meter.stop()
 
     async def _let_readers_catch_up(self) -> None:
-        """Wait for readers of the log, at most while the program runs."""
+        """Wait for readers of the log; ``hurry`` cuts the wait short."""
         self._catching_up = asyncio.ensure_future(self.pace.wait())
         await asyncio.wait((self._catching_up,))
         self._catching_up = None
 
     def hurry(self) -> None:
-        """Wait for no reader any more: the program was ended."""
+        """Stop waiting for readers, as the program was ended."""
         if self._catching_up is not None:
             self._catching_up.cancel()
 
     def close(self) -> None:
-        """End the last line: what was printed without an end is a line, too."""
+        """Write printed text without a line end as the last line."""
         if self._line:
             self._end_line()
 
@@ -70,11 +70,11 @@ class RunLog:
         self._logged(entry)
 
     def newest(self) -> list[LogEntry]:
-        """Return what was written since the last ``take``."""
+        """Return the entries since the last ``take``."""
         return list(self._entries)
 
     def take(self) -> list[LogEntry]:
-        """Return what was written since the last time."""
+        """Return the entries since the last ``take`` and forget them."""
         entries = list(self._entries)
         self._entries.clear()
         return entries

@@ -1,6 +1,6 @@
-"""Brings tasks to life and to their end, and writes down what becomes of them. Knows no schedule.
+"""Starts and ends tasks, and stores their states. Knows no schedule.
 
-Its caller decides what may happen when, and holds the lock meanwhile.
+The caller decides which operations are allowed, and holds the lock meanwhile.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Background:
         task.add_done_callback(self._tasks.discard)
 
     async def done(self) -> None:
-        """Wait for all of it."""
+        """Wait for all tasks."""
         await asyncio.gather(*self._tasks)
 
 
@@ -71,8 +71,10 @@ class RunTerms:
 
 
 class Runner:
-    """``runs``: what runs or is suspended, by the task's id; ``stops``: where tasks halt that start from now on.
-    ``ended`` hears of each task in its new state.
+    """Starter and supervisor of runs.
+
+    ``runs``: running and suspended tasks by id; ``stops``: breakpoints of later starts by the task's id.
+    ``ended`` is called with each ended task and its new state.
     """
 
     def __init__(
@@ -114,7 +116,7 @@ class Runner:
         await self._library.sources(uses)
 
     async def start(self, task: StoredProgram, uses: Collection[str]) -> None:
-        """Bring a task in run_wait to life; its own news come after the caller's. Raises ProgramError."""
+        """Start a task in run_wait; its reports come after those of the caller. Raises ProgramError."""
         here = datetime.fromtimestamp(self._robot.clock.epoch(), self._terms.zone).utcoffset()
         journal = Journal(self._journals, task.id)
         clock = self._robot.clock
@@ -126,7 +128,7 @@ class Runner:
                 seed = crc32(f"{task.id} {clock.time()}".encode()) if clock.repeats else None
                 header = header_of(task.body, modules, offset, watched=stops is not None, seed=seed)
                 living = await self._begin(task, header, journal, stops)
-            except Exception as error:  # noqa: BLE001 - whatever fails, the task is as if it had ended
+            except Exception as error:  # noqa: BLE001 - after any failure the task is as if it had ended
                 state = TaskState.RUN_WAIT if task.mode == "cycle" else TaskState.SHUTDOWN
                 words = _reason(error)
                 await self._give_back(task.id, state, words, journal)
@@ -135,7 +137,7 @@ class Runner:
         self._supervisors.add(self._supervise(living), f"task {task.id}")
 
     async def _begin(self, task: StoredProgram, header: Header, journal: Journal, stops: Stops | None) -> TaskRun:
-        """Fork while the disk writes; what the program says waits for both."""
+        """Fork while the journal is written; the program's events wait for both."""
         opening = asyncio.ensure_future(journal.open(header))
         try:
             living = await self._living(task, header, journal, stops=stops)
@@ -151,7 +153,7 @@ class Runner:
         return living
 
     async def _give_back(self, id: str, state: TaskState, words: str, journal: Journal) -> None:
-        """Write down that a program did not come to life; a store that fails, too, is no reason to keep anything."""
+        """Store the state of a program that did not start; a failure of the store is only logged."""
         note = LogEntry(self._robot.clock.epoch(), "error", words)
         for step in (self._store.set_state(id, state, [note]), journal.close()):
             try:
@@ -160,7 +162,7 @@ class Runner:
                 log.warning("cannot write down that task %s did not start: %s", id, error)
 
     async def revive(self, task: StoredProgram, header: str) -> None:
-        """Bring a task back that ran or was suspended when the server was killed: suspended, where it was."""
+        """Restore a task that was running or suspended when the server was killed; suspend it at the same place."""
         journal = Journal(self._journals, task.id)
         try:
             history = await journal.reopen(header)
@@ -207,7 +209,7 @@ class Runner:
                 task, run, self._robot, listeners=listeners, journal=journal, replaying=replaying, stops=stops
             )
         except BaseException:
-            await run.kill()  # no client could learn about it
+            await run.kill()  # no client could know of it
             raise
         self.runs[task.id] = living
         return living
@@ -230,18 +232,18 @@ class Runner:
         self.reports.publish(done(TaskOperation.SUSPEND, run.task.id, run.state))
 
     async def recover(self, run: TaskRun, step: Callable[[], None] | None = None) -> None:
-        """Continue a run and report it; ``step`` says up to where."""
+        """Continue a run and report it; ``step`` sets the next halt."""
         run.state = TaskState.RUN
         if step:
             step()
         with self._robot.clock.holding():
             await self._store.set_state(run.task.id, run.state)
-        # First: a program that continues may begin a block and halt there before this one is asked.
+        # Report first: a resumed program may halt at a block before this coroutine runs again.
         self.reports.publish(done(TaskOperation.RECOVER, run.task.id, run.state))
         await run.resume()
 
     async def _supervise(self, run: TaskRun) -> None:
-        """Follow a run from start to stop, unless it is ended in between."""
+        """Follow a run from start to stop, unless it is ended meanwhile."""
         id = run.task.id
         async with self._lock:
             if self.runs.get(id) is run and run.state is TaskState.RUN_WAIT:
@@ -276,7 +278,7 @@ class Runner:
         self.reports.publish(TaskReport(id, TaskOperation.STOP, "stop task"))
 
     async def _put_away(self, run: TaskRun, before: TaskState, operation: TaskOperation) -> TaskState:
-        """Return what becomes of a task whose program is gone; its mode may have been changed while it ran."""
+        """Store and return the state of a task whose program is gone; its mode may have changed meanwhile."""
         id = run.task.id
         self.runs.pop(id, None)
         task = await self._store.get(id) or run.task
@@ -295,7 +297,7 @@ class Runner:
 
 
 def _reason(error: Exception) -> str:
-    """Return why a program did not start; what is no one's refusal goes to the server's log, too."""
+    """Return why a program did not start; unexpected errors also go to the server's log."""
     if not isinstance(error, EXPECTED):
         log.error("a program could not be started", exc_info=error)
     return str(error) or type(error).__name__

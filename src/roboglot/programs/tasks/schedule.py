@@ -1,4 +1,4 @@
-"""Schedule of tasks by the robot's clock: one timer, always for the earliest. Knows ids and times."""
+"""Schedule of tasks by the robot's clock: one timer, always for the earliest task. Knows ids and times."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Schedule:
         self._timer: Timer | None = None
 
     def set(self, id: str, due: float) -> None:
-        """Let ``id`` wait for ``due`` (seconds since 1970), and for nothing else; soon, if that is past."""
+        """Schedule ``id`` for ``due`` (Unix s), in place of any earlier time; a past time fires soon."""
         self._due[id] = due
         heapq.heappush(self._heap, (due, id))
         if len(self._heap) > 2 * len(self._due) + STALE_MAX:
@@ -53,7 +53,7 @@ class Schedule:
 
     def _look(self) -> None:
         self._timer = None
-        now = self._clock.epoch() + 1e-6  # calendar times are large numbers: a timer can fire this much early
+        now = self._clock.epoch() + 1e-6  # rounding of large Unix times: a timer can fire this much early
         while self._heap and self._heap[0][0] <= now:
             due, id = heapq.heappop(self._heap)
             if self._due.get(id) == due:

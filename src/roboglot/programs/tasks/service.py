@@ -1,6 +1,6 @@
 """The tasks of one robot: saved, run at their time, debugged, suspended, ended, deleted, as the manual's tables allow.
 
-What is to be acknowledged is in the store first. Knows no frame and no socket: doors call it and hear its reports.
+Changes are stored before they are acknowledged. Knows no frame and no socket: doors call it and listen to its reports.
 """
 
 from __future__ import annotations
@@ -46,10 +46,10 @@ TASKS_MAX = 10_000
 
 
 class ProgramService:
-    """The tasks and modules of one robot. The constructor settles in place what a crash left behind.
+    """The tasks and modules of one robot. The constructor settles tasks that a crash interrupted.
 
-    ``reports`` publishes changes of tasks, ``log_entries`` new lines of their logs, ``insights`` what functions
-    answered and variables hold. Programs wait for the front ends in ``pace`` after each block, for the readers in
+    ``reports`` publishes changes of tasks, ``log_entries`` new lines of their logs, ``insights`` results of functions
+    and values of variables. Programs wait for the front ends in ``pace`` after each block, for the readers in
     ``log_pace`` after each line. ``zone`` is the time zone of conditions and of ``time.localtime``.
     """
 
@@ -61,7 +61,7 @@ class ProgramService:
         self._store = stores.tasks
         self._journals = stores.journals
         self._inspector = Inspector(engine, ability_set())
-        # Changes of state happen one at a time; slow work (checking a body) is done before.
+        # Changes of state happen one at a time; slow work (checking a body) is done before taking the lock.
         self._lock = asyncio.Lock()
         self._timetable = Timetable(robot.clock, zone, lambda id, _: self._fires.add(self._fire(id), f"fire {id}"))
         self.library = ModuleLibrary(stores.modules, self._inspector, self._lock, partial(check_mode, robot))
@@ -81,7 +81,7 @@ class ProgramService:
         self._turns = Turns(robot.clock, self._lock, stores.tasks, self._runner, settle(stores, robot.clock.epoch()))
 
     def start(self) -> None:
-        """Let tasks run when their time comes, first those whose time came meanwhile, and ``@reboot``.
+        """Start the schedule: first overdue tasks and those with ``@reboot``, then the others at their time.
 
         The engine warms up in the background, so that the first program starts as fast as the others.
         """
@@ -108,7 +108,7 @@ class ProgramService:
         self._timetable.clear()
 
     async def tasks(self, ids: Collection[str] = ()) -> list[ListedProgram]:
-        """Return those of ``ids`` that exist, or all, by id; the debug task is hidden."""
+        """Return the existing tasks of ``ids``, or all if it is empty, by id; the debug task is hidden."""
         check_mode(self.robot, TaskOperation.INQUIRY)
         return [task for task in await self._store.all(ids) if task.id != DEBUG]
 
@@ -142,7 +142,7 @@ class ProgramService:
         return problems
 
     async def save(self, task: StoredProgram) -> None:
-        """Add or replace a task (its ``state`` is not looked at). One that is wrong is kept, too, and refused."""
+        """Add or replace a task; ``state`` is ignored. A task with problems is stored, too, but raises ProgramError."""
         await self._check_table(TaskOperation.SAVE, task.id)
         problems, names = await self._inspector.inspect(task.body, self.library.functions)
         async with self._turns.take():
@@ -170,7 +170,7 @@ class ProgramService:
             await self._runner.start(kept, uses)
 
     async def run(self, id: str, mode: str = "", condition: str = "") -> None:
-        """Run a saved task at its time; ``mode`` and ``condition``, where given, replace what is stored."""
+        """Run a saved task at its time; ``mode`` and ``condition``, if given, replace the stored ones."""
         async with self._turns.take():
             state = await self._check_table(TaskOperation.RUN, id)
             task = await self._store.get(id)
@@ -219,9 +219,9 @@ class ProgramService:
             await self._runner.recover(self._runs[id])
 
     async def stop_at(self, id: str, stops: Stops) -> None:
-        """Have a task suspended wherever ``stops`` says, in place of what was said before; forgotten with the server.
+        """Set the places where a task halts, in place of earlier ones; not stored beyond the server's life.
 
-        Counts from its next start, or at once if it is watched. Raises ProgramError.
+        Applies at once to a watched run, otherwise from the next start. Raises ProgramError.
         """
         async with self._turns.take():
             run = self._runs.get(id)
@@ -238,7 +238,7 @@ class ProgramService:
                 self._runner.stops[id] = stops
 
     async def step(self, id: str, step: Step = Step.INTO, *, to_block: bool = False) -> None:
-        """Run a task to the next statement, or block, after a step, and suspend it there. Raises ProgramError."""
+        """Run a task by one step, to a statement or a block, and suspend it there. Raises ProgramError."""
         async with self._turns.take():
             await self._check_table(TaskOperation.RECOVER, id)
             run = self._runs.get(id)
@@ -251,7 +251,7 @@ class ProgramService:
                 run.step(step, to_block=to_block)
 
     async def shutdown(self, ids: Collection[str]) -> dict[str, ProgramError]:
-        """End programs and cancel what they do, all before waiting for any; return the refused ones by id."""
+        """End programs and cancel their motions, all before waiting for any; return refusals by id."""
         refused: dict[str, ProgramError] = {}
         async with self._turns.take():
             states: dict[str, TaskState] = {}
@@ -284,7 +284,7 @@ class ProgramService:
             self._runner.stops.pop(id, None)
 
     async def end_of(self, owner: str, why: str) -> None:
-        """End what runs for ``owner``."""
+        """End all runs of ``owner``."""
         for id in [id for id, run in self._runs.items() if run.task.owner == owner]:
             async with self._turns.take():
                 if id in self._runs:

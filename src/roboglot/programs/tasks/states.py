@@ -29,7 +29,7 @@ class TaskState(StrEnum):
 
 
 class TaskOperation(StrEnum):
-    """Operation on a task by users; ``START`` and ``STOP`` happen by themselves."""
+    """Operation on a task; ``START`` and ``STOP`` happen without a user."""
 
     INQUIRY = "inquiry"
     SAVE = "save"
@@ -96,10 +96,9 @@ TRANSITIONS: dict[TaskState, dict[TaskOperation, tuple[TaskState, ...]]] = {
 def next_state(
     state: TaskState, operation: TaskOperation, *, mode: str = "single", correct: bool = True
 ) -> TaskState | None:
-    """The state after ``operation``, or None if it is illegal.
+    """Return the state after ``operation``, or None if it is illegal.
 
-    ``mode`` decides what is left of a task that ends, ``correct`` (the body passes the check) what becomes of a saved
-    one.
+    ``mode`` decides the state of an ended task, ``correct`` (the body passes the check) that of a saved one.
     """
     results = TRANSITIONS[state].get(operation)
     if not results:
@@ -110,7 +109,7 @@ def next_state(
 
 
 def state_after(state: TaskState, operation: TaskOperation, mode: str, *, correct: bool = True) -> TaskState:
-    """The state after a legal operation."""
+    """Return the state after a legal operation."""
     following = next_state(state, operation, mode=mode, correct=correct)
     assert following is not None, f"{state} x {operation} was allowed"
     return following

@@ -1,6 +1,6 @@
-"""One task while it runs: the engine's run, the session that its calls act through, its blocks and its log.
+"""One running task: the engine's run, the session of its calls, its blocks and its log.
 
-Knows no table of states and no store: the service that started it writes down what becomes of it.
+Knows no table of states and no task store: the runner that started it stores its states.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """End of a run; ``error`` is empty if the program came to its end or ended itself."""
+    """End of a run; ``error`` is empty if the program finished or ended itself."""
 
     reason: ExitReason
     error: str = ""
@@ -69,7 +69,7 @@ class Outcome:
 class RunListeners:
     """Listeners to a run: to its state and blocks, to each log entry, and to halts at a breakpoint.
 
-    The program waits for those in ``pace`` after each block, for those in ``log_pace`` after each line of its log.
+    The program waits for ``pace`` after each block, for ``log_pace`` after each line of its log.
     """
 
     report: Report
@@ -113,7 +113,7 @@ class TaskRun:
         self._replay = Replay(self._session, self.host, replaying)
         self._block_stops = BlockStops(run.position, stops)
         self._insights = listeners.insights
-        self.started = 0.0 if replaying else robot.clock.epoch()  # its log since then is this run's
+        self.started = 0.0 if replaying else robot.clock.epoch()  # this run's log begins here
         self.variables: dict[str, str] = {}
 
         def notice(held: dict[str, str]) -> None:
@@ -126,37 +126,37 @@ class TaskRun:
 
     @property
     def line(self) -> int:
-        """Current line of the program, in its own text or in that of the module ``module``."""
+        """Current line, in the text of ``module`` or, if that is empty, in the program's own text."""
         return self._run.position.line - HEADER_LINES if self._run.position.unit else self._run.position.line
 
     @property
     def module(self) -> str:
-        """The module that the line belongs to, "" for the program's own text."""
+        """Module of the current line, "" for the program's own text."""
         return self._run.position.unit
 
     @property
     def watched(self) -> bool:
-        """True if it can be stepped through, and halts at lines."""
+        """True if the program can be stepped through and halts at lines."""
         return self._run.position.watched
 
     def figures(self) -> RunFigures:
-        """Return what it takes just now."""
+        """Return the run's current use of resources."""
         usage = usage_of(self._run.pid)
         return RunFigures(self.task.id, self.state, usage.cpu, usage.memory, self._clock.time() - self._began)
 
     def check_watched(self) -> None:
-        """Raise ProgramError for one that cannot be stepped through."""
+        """Raise ProgramError if the program cannot be stepped through."""
         if not self.watched:
             words = f"{self.task.id} runs at full speed: set breakpoints before it starts, or debug it"
             raise NotAllowed(words)
 
     @property
     def block(self) -> str:
-        """The block that is open, "" for none."""
+        """Id of the open block, "" for none."""
         return self.host.block
 
     async def execute(self) -> Outcome:
-        """Answer the program's calls until it is over; what it had begun on the robot is called off then."""
+        """Answer the program's calls until it ends, then cancel the actions that it started."""
         outcome = Outcome(ExitReason.LOST, "the program was lost")
         ask_for(f"visual {self.task.id}", identity=self.task.owner)
         self.control.start()
@@ -189,7 +189,7 @@ class TaskRun:
         return Outcome(ExitReason.FINISHED) if self._ended_itself else outcome
 
     async def revive(self) -> None:
-        """Instead of a start: the program does again what it did, and is found suspended where it was lost."""
+        """Replay the program's calls instead of a start, and suspend it where it was interrupted."""
         self.state = TaskState.SUSPEND
         self._session.pause()
         self._run.calls.keeps_last = True
@@ -197,17 +197,17 @@ class TaskRun:
             await self._hold()
 
     async def close_journal(self) -> None:
-        """The run is over and written down: nothing will go on from here."""
+        """Delete the journal of a run whose end is stored."""
         await self._journal.close()
 
     async def suspend(self) -> None:
-        """Stop the process wherever it is, then hold what it does on the robot."""
+        """Stop the process at once, then pause its actions on the robot."""
         await self._run.suspend()
         self.time.stop(True)
         self._session.pause()
 
     async def resume(self) -> None:
-        """Let both go on."""
+        """Continue the actions and the process."""
         self._session.resume()
         self.time.stop(False)
         await self._run.resume()
@@ -218,32 +218,32 @@ class TaskRun:
         (self._block_stops if to_block else self._run.position).step(step)
 
     def stop_at(self, stops: Stops) -> None:
-        """Halt there and nowhere else; LookupError for a line that isn't there. Lines need a watched program."""
+        """Replace the breakpoints; lines need a watched program. Raises LookupError for a line that does not exist."""
         self._run.position.stop_at(in_units(stops).lines)
         self._block_stops.set(stops)
         if stops.first:
             self.step()
 
     def call_off(self) -> None:
-        """Stop what it does on the robot, and end the process: ``kill`` waits until it is gone."""
+        """Cancel the program's actions and start ending the process; ``kill`` also waits for its end."""
         self._session.cancel("the program was ended")
         self._run.end_now()
         self.log.hurry()
 
     async def kill(self) -> None:
-        """End the process now and call off what it does on the robot."""
+        """Cancel the program's actions, end the process and wait for its end."""
         self.call_off()
         await self._run.wait()
         self.log.close()
 
     async def _followed(self) -> None:
-        """One call more that is behind the program; after the last it is held where it was lost."""
+        """Count a replayed call; after the last one, hold the program where it was interrupted."""
         self._replay.left -= 1
         if not self._replay.left and self.state is TaskState.SUSPEND:
             await self._hold()
 
     async def _hold(self) -> None:
-        """Stop where it was lost, and report it: front ends that were back before it saw no program."""
+        """Suspend the program where it was interrupted, and report it to front ends that connected earlier."""
         self.time.stop(True)
         await self._run.suspend()
         self._report(done(TaskOperation.SUSPEND, self.task.id, TaskState.SUSPEND))
@@ -277,7 +277,7 @@ class TaskRun:
             self.time.ask(False)
 
     async def _value(self, request: Call) -> object:
-        """Make the call; return its value when the program may have it."""
+        """Make the call; return its value once the program may continue."""
         await self._session.unpaused()
         if request.interrupted:
             value = await call_cut_off(self._session, request.name, request.args, request.kwargs)
@@ -300,7 +300,7 @@ class TaskRun:
     async def _answer(self, request: Call) -> None:
         try:
             value = await self._value(request)
-            if self._halts:  # first: the answer belongs to an earlier command and must not resume the program
+            if self._halts:  # before the reply: it must not let the program run on
                 with self._clock.holding():
                     await self._run.suspend()
             self._run.calls.reply(request.id, value)
@@ -318,7 +318,7 @@ class TaskRun:
 
 
 def in_units(stops: Stops) -> Stops:
-    """With the lines as the engine counts them: a module's text has a header before it."""
+    """Return ``stops`` with the engine's line numbers: a module's text has a header before it."""
     lines = {(module, line + HEADER_LINES if module else line) for module, line in stops.lines}
     return replace(stops, lines=frozenset(lines))
 

@@ -25,7 +25,7 @@ class Timetable(Schedule):
         self._zone = zone
 
     def due(self, task: StoredProgram) -> float | None:
-        """Return when the task runs next, None: never or at the next start. Raises InvalidCondition."""
+        """Return the task's next start, Unix s; None: never, or at server start. Raises InvalidCondition."""
         try:
             return due_of(task.mode, task.condition, self._clock.epoch(), self._zone)
         except BadCondition as error:
@@ -42,7 +42,7 @@ class Timetable(Schedule):
             self.set(task.id, due)
 
     def wait_again(self, task: StoredProgram, state: TaskState) -> None:
-        """A run has ended: a cycle waits for its next round."""
+        """Schedule an ended task again if it is a cycle."""
         if state is TaskState.RUN_WAIT:
             self.wait(task)
         else:

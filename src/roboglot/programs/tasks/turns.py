@@ -1,4 +1,4 @@
-"""Changes of tasks, one after the other; runs that the end of the server interrupted are restored before the first."""
+"""Changes of tasks, one at a time; runs interrupted by the server's end are restored before the first."""
 
 from __future__ import annotations
 
@@ -34,6 +34,6 @@ class Turns:
                 yield
 
     async def restore(self) -> None:
-        """Restore what was interrupted."""
+        """Restore the interrupted runs."""
         async with self.take():
             pass

@@ -1,5 +1,4 @@
-"""The other end of a run: a clean zygote process, the jail it forks programs into, and what a program finds inside.
+"""The worker's end of a run: a clean zygote process, the jail of its forked programs, and their environment.
 
-Standard library only, and Linux only. It knows no robot: what a program can call is a list of names that came over
-its one socket.
+Standard library only, and Linux only. Knows no robot: the callable names are a list received over the one socket.
 """

@@ -1,4 +1,4 @@
-"""The life of one program inside the jail: receive it, check it, run it, say how it ended. Knows no robot."""
+"""The life of one program inside the jail: receive it, check it, run it, report its end. Knows no robot."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from roboglot.programs.worker.variables import UNIT, Variables
 from roboglot.programs.worker.whereabouts import Whereabouts
 
 EXIT_DONE, EXIT_BROKEN, EXIT_UNTOLD = 0, 70, 72
-"""How the process ends: as it should, by a fault of ours, and (a test program) on a Python whose lists are unknown."""
+"""Exit codes: success, a fault of ours, and (of the probe) a Python with an unknown layout of lists."""
 MESSAGE_MAX = 2000
-"""Characters of an error's text."""
+"""Most characters of an error's text."""
 
 _RESERVE = 512 * 1024
 _OWN_DEPTH = 16
 
 
 def main(descriptor: int, whereabouts: Whereabouts) -> int:
-    """Serve the one request on the socket; the exit code. The jail is already closed."""
+    """Serve the one request on the socket; return the exit code. The jail is already closed."""
     link = HostLink(descriptor)
     reserve = bytearray(_RESERVE)  # released when memory runs out, so that the report can still be written
     try:
@@ -55,7 +55,7 @@ def main(descriptor: int, whereabouts: Whereabouts) -> int:
 
 
 def probe(whereabouts: Whereabouts) -> int:
-    """Probe the lockdown in a throw-away child: 0 if the filter refuses what it should, and lines can be reported."""
+    """Probe the lockdown in a throw-away child; return 0 if the filter works and lines can be reported."""
     if not whereabouts.works():
         return EXIT_UNTOLD
     for attempt in (partial(os.open, "/", os.O_RDONLY), os.fork, os.getppid):
@@ -70,7 +70,7 @@ def probe(whereabouts: Whereabouts) -> int:
 
 
 def rehearse() -> None:
-    """Do once, in the process that programs are forked from, what else each would do for the first time."""
+    """Warm up in the process that programs are forked from, so that no program pays for first uses."""
     source = "def f(x):\n    return [x + 1]\nfor i in range(2):\n    print(f(i))\n"
     compile_unit(source, "", 0, Marks([None], lambda *_: object()), policy=True)
     check(source, Prelude().names())
@@ -113,7 +113,7 @@ def _run(link: HostLink, request: dict[str, Any], whereabouts: Whereabouts) -> d
         return _report(stop)
     except MemoryError:
         raise
-    except BaseException as error:  # noqa: BLE001 - whatever it was, the program has ended by it
+    except BaseException as error:  # noqa: BLE001 - any error ends the program
         return _report(error)
     return {"t": "finished"}
 
@@ -149,7 +149,7 @@ def _failure(kind: str, message: str, unit: int, line: int) -> dict[str, object]
 
 
 def _place(error: BaseException) -> tuple[int, int]:
-    """The innermost place in the program's own text."""
+    """Return the innermost place in the program's own text."""
     unit = line = 0
     traceback = error.__traceback__
     while traceback is not None:

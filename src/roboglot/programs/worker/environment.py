@@ -1,5 +1,4 @@
-"""The built-in names of a program: Python's, less what reaches out of the language, plus ``RobotError``, ``true`` and
-``false``.
+"""The built-in names of a program: Python's, without those that leave the language, and the robot's additions.
 
 Knows the language's rules about attributes; knows no robot.
 """
@@ -23,11 +22,11 @@ _INTERNAL = frozenset({"_pylong", "_strptime"})
 
 
 class RobotError(Exception):
-    """Something the robot refused or could not do; the host names finer types, all of them caught by this one."""
+    """Refusal or failure of the robot; base class of all error types that the host names."""
 
 
 def build_builtins(write: Callable[[str], None], modules: Mapping[str, ModuleType]) -> dict[str, object]:
-    """The ``__builtins__`` of one run."""
+    """Return the ``__builtins__`` of one run."""
     own: dict[str, object] = {
         "print": _printer(write),
         "getattr": _getattr,
@@ -113,7 +112,7 @@ def _delattr(value: object, name: str) -> None:
 
 
 def _type(value: object, *more: object) -> object:
-    """The type of a value. Never a metaclass: with one, ``case`` patterns would read any attribute."""
+    """Return the type of a value, but no metaclass: with one, ``case`` patterns could read any attribute."""
     if more:
         raise TypeError("type() takes 1 argument in robot programs")
     kind = type(value)
@@ -123,7 +122,7 @@ def _type(value: object, *more: object) -> object:
 
 
 class _Formatter(string.Formatter):
-    """``str.format`` whose fields follow the language's rules about attributes."""
+    """``str.format`` with fields limited by the language's rules about attributes."""
 
     def get_field(self, field_name: str, args: Sequence[object], kwargs: Mapping[str, object]) -> object:
         for part in field_name.replace("[", ".[").split(".")[1:]:
@@ -136,7 +135,7 @@ _formatter = _Formatter()
 
 
 def _format_of(value: Any) -> Any:
-    """``value.format`` of anything (text, a type, ``super()`` ...): where it is text's own, the safe one."""
+    """Return ``value.format`` of any value (text, a type, ``super()`` ...), with a safe version of text's own."""
     method = value.format
     if method is str.format:
         return lambda text, *args, **kwargs: _formatter.vformat(text, args, kwargs)
@@ -147,5 +146,5 @@ def _format_of(value: Any) -> Any:
 
 
 def _has_key_of(value: Any) -> Any:
-    """``value.has_key``: the vendor's way to ask a dictionary."""
+    """Return ``value.has_key``; the vendor's programs use it on dictionaries."""
     return value.__contains__ if isinstance(value, dict) else value.has_key

@@ -1,26 +1,26 @@
-"""Frames on a worker's socket: four bytes of length, big-endian, then JSON in UTF-8. Both ends use it.
+"""Frames on a worker's socket: four bytes of length, big-endian, then JSON in UTF-8. Used at both ends.
 
-It knows no message.
+Knows no message.
 """
 
 from __future__ import annotations
 
 FRAME_MAX = 1024 * 1024
-"""Bytes of one frame from a worker; a longer one ends its run."""
+"""Most bytes of a frame from a worker; a longer frame ends its run."""
 HEADER = 4
 
 
 class FrameTooLong(ValueError):
-    """The announced length is above the limit; nothing after it can be trusted."""
+    """The length of a frame is above the limit; no byte after it can be trusted."""
 
 
 def frame(body: bytes) -> bytes:
-    """The bytes to send for a body."""
+    """Return the frame of a body."""
     return len(body).to_bytes(HEADER, "big") + body
 
 
 class FrameReader:
-    """Cuts a byte stream into bodies. Holds at most one frame plus the piece fed last."""
+    """Cuts a byte stream into bodies. Holds at most one frame and the last piece."""
 
     __slots__ = ("_limit", "_pending")
 
@@ -29,7 +29,7 @@ class FrameReader:
         self._pending = bytearray()
 
     def feed(self, data: bytes) -> list[bytes]:
-        """The bodies completed by this piece; raises FrameTooLong as soon as a header announces too much."""
+        """Return the bodies completed by this piece. Raises FrameTooLong as soon as a header exceeds the limit."""
         if not self._pending and len(data) == HEADER + int.from_bytes(data[:HEADER], "big") <= HEADER + self._limit:
             return [data[HEADER:]]  # one whole frame: the usual case
         self._pending += data

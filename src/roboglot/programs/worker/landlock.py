@@ -1,4 +1,4 @@
-"""No files at all, by Landlock, where the kernel has it: one more wall behind seccomp. Knows nothing of programs."""
+"""Denies all files by Landlock, if the kernel has it: one more layer behind seccomp. Knows nothing about programs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _NETWORK, _SCOPES = 0b11, 0b11
 
 
 def deny_everything(libc: ctypes.CDLL) -> int:
-    """Give up every right Landlock can take; needs no_new_privs. Returns the ABI version, 0 where there is none."""
+    """Give up every right that Landlock covers; needs no_new_privs. Return the ABI version, 0 if unavailable."""
     version = int(libc.syscall(_CREATE_RULESET, None, 0, _VERSION_QUERY))
     if version <= 0:
         return 0

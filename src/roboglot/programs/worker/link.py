@@ -1,4 +1,4 @@
-"""A program's one socket, seen from inside: frames out, replies in, one call at a time. Knows no names and no robot."""
+"""The worker's end of a program's one socket: frames out, replies in, one call at a time. Knows no robot."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from roboglot.programs.worker.records import Records
 from roboglot.programs.worker.values import SEPARATORS, SEPARATORS_MAX, pack, separators, unpack
 
 REPLY_MAX = 16 * 1024 * 1024
-"""Bytes of one frame from the host."""
+"""Most bytes of a frame from the host."""
 TEXT_MAX = 128 * 1024
-"""Characters of one output frame; longer text goes in pieces."""
+"""Most characters of an output frame; longer text is sent in pieces."""
 HALT = "$halt"
-"""What a watched program calls before a statement at which it is to halt; no program can write this name."""
+"""Call by which a watched program halts before a statement; not a name that a program can use."""
 EXIT_LOST, EXIT_MEMORY = 0, 71
-"""Exit codes when the host has gone, and when memory runs out where nothing can be said any more."""
+"""Exit codes when the host is gone, and when memory runs out where no report is possible."""
 
 _READ = 64 * 1024
-# The C encoder, built once: json's own wrapper builds it anew for each text; packed values contain nothing else.
+# The C encoder, built once, as json's own wrapper builds one per text; it covers all packed values.
 _pieces = json.encoder.c_make_encoder(  # type: ignore[attr-defined]  # not in the type stubs
     None, None, json.encoder.encode_basestring, None, ":", ",", False, False, True
 )
@@ -49,7 +49,7 @@ class HostLink:
         self.records = Records({})
 
     def receive(self) -> dict[str, Any]:
-        """The next message of the host."""
+        """Return the host's next message."""
         message: dict[str, object] = _scan(self._body().decode(), 0)[0]
         return message
 
@@ -62,7 +62,7 @@ class HostLink:
         return self._bodies.pop(0)
 
     def send(self, message: dict[str, object]) -> None:
-        """One message to the host; ValueError if it is too large. Lone surrogates become question marks."""
+        """Send a message to the host. Raises ValueError if it is too large. Lone surrogates become question marks."""
         self._send("".join(_pieces(message, 0)))
 
     def _send(self, text: str) -> None:
@@ -78,12 +78,12 @@ class HostLink:
             os._exit(EXIT_LOST)
 
     def write(self, text: str) -> None:
-        """Text a program printed."""
+        """Send text that the program printed."""
         for start in range(0, len(text), TEXT_MAX):
             self.send({"t": "output", "text": text[start : start + TEXT_MAX]})
 
     def call(self, name: str, /, *args: object, **kwargs: object) -> object:
-        """Ask the host; returns its value or raises its error."""
+        """Call the host; return its value or raise its error."""
         limit = sys.getrecursionlimit()
         sys.setrecursionlimit(limit + _HEADROOM)  # a program at its depth limit must not fail in the middle of a call
         try:
@@ -111,10 +111,10 @@ class HostLink:
         try:
             return self._body()
         except MemoryError:
-            os._exit(EXIT_MEMORY)  # the reply is lost: program and host would be out of step from here on
+            os._exit(EXIT_MEMORY)  # without the reply, program and host would be out of step
 
     def _json(self, values: tuple[Any, ...]) -> str:
-        """Most arguments are short numbers and texts: those are written without the detour over ``pack``."""
+        """Return arguments as JSON; short numbers and texts, the usual ones, bypass ``pack`` for speed."""
         texts = []
         for value in values:
             kind = type(value)
@@ -131,7 +131,7 @@ class HostLink:
 
 
 def _sparse(values: str) -> str:
-    """The same values, with separators between them only: inside of texts they are escaped, so that none counts."""
+    """Return the values with the separators inside of texts escaped, so that only those between values count."""
     return _TEXT.sub(lambda text: text[0].translate(_ESCAPES), values)
 
 

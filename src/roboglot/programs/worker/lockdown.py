@@ -1,9 +1,8 @@
-"""The jail, in two steps: what the zygote gives up once for all programs, and what each program gives up before its
-first line.
+"""The jail, in two steps: rights that the zygote gives up for all programs, and rights that each program gives up.
 
 The order matters: descriptors, then namespaces and user, no_new_privs, Landlock, limits, and the system call filter
-last. The filter is required; every other layer is added where the machine has it. Knows nothing of programs or
-sockets' contents.
+last. The filter is required; every other layer is added if the machine has it. Knows nothing about programs or the
+contents of sockets.
 """
 
 from __future__ import annotations
@@ -24,19 +23,19 @@ _NOBODY = 65534
 _NICENESS = 10
 
 CPU_GRACE = 1
-"""Seconds between the polite and the final end of a program over its CPU limit (RLIMIT_CPU soft and hard)."""
+"""Seconds between SIGXCPU and SIGKILL for a program over its CPU limit (RLIMIT_CPU soft and hard)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Quota:
-    """Kernel limits of one program: bytes on top of an empty program's, and seconds of CPU."""
+    """Kernel limits of one program: bytes in addition to an empty program's, and CPU seconds."""
 
     memory: int
     cpu: int
 
 
 def open_libc() -> ctypes.CDLL:
-    """The C library, with errno kept for us."""
+    """Return the C library, with errno saved after each call."""
     libc = ctypes.CDLL(None, use_errno=True)
     libc.prctl.argtypes = [ctypes.c_int, *[ctypes.c_ulong] * 4]
     libc.syscall.restype = ctypes.c_long
@@ -44,7 +43,7 @@ def open_libc() -> ctypes.CDLL:
 
 
 def confine_zygote(libc: ctypes.CDLL) -> list[str]:
-    """Give up what no program needs; the names of the layers that hold. Everything must be imported before."""
+    """Give up rights that no program needs; return the names of the layers. Import all modules before."""
     layers = []
     isolated = _CLONE_NEWNET | _CLONE_NEWIPC | _CLONE_NEWUTS
     if libc.unshare(isolated) == 0 or libc.unshare(isolated | _CLONE_NEWUSER) == 0:
@@ -64,16 +63,16 @@ def confine_zygote(libc: ctypes.CDLL) -> list[str]:
 
 
 def confine_program(libc: ctypes.CDLL, parent: int, used: int, quota: Quota, code: bytes) -> None:
-    """Everything a fresh child gives up; after this only its socket is left.
+    """Confine a new child; afterwards it can use only its socket.
 
-    ``used`` is the address space taken so far, in bytes; ``code`` the filter, empty for none. Raises OSError
-    (SeccompUnavailable): the child must then exit.
+    ``used``: address space in use, bytes; ``code``: the filter, empty for none. Raises OSError (SeccompUnavailable);
+    the child must then exit.
     """
     _prctl(libc, _PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:  # the zygote died before the line above took effect
+    if os.getppid() != parent:  # the zygote died before the line above
         os._exit(1)
     with contextlib.suppress(OSError):
-        os.nice(_NICENESS)  # below the server and the zygote, which must fork and report whatever programs do
+        os.nice(_NICENESS)  # below the server and the zygote, which must stay responsive
     _prctl(libc, _PR_SET_NO_NEW_PRIVS, 1)
     _prctl(libc, _PR_SET_DUMPABLE, 0)
     limits = {
@@ -96,7 +95,7 @@ def confine_program(libc: ctypes.CDLL, parent: int, used: int, quota: Quota, cod
 
 
 def filter_code() -> bytes:
-    """The filter for this machine; raises SeccompUnavailable."""
+    """Return the filter for this machine. Raises SeccompUnavailable."""
     return seccomp.program(platform.machine())
 
 

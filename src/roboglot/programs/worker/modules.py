@@ -1,7 +1,7 @@
 """Modules that a program can import: time, math, random and numbers.
 
-``time`` runs on the robot's clock, so what reads or waits is a host call; ``random`` starts from the run's seed. Only
-public functions are copied: the real modules stay out of reach.
+``time`` runs on the robot's clock, so reading it and waiting are host calls; ``random`` starts from the run's seed.
+Only public functions are copied: the real modules stay out of reach.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ HostCall = Callable[..., Any]
 
 
 def build_modules(call: HostCall, seed: int, utc_offset: int) -> dict[str, ModuleType]:
-    """The modules of one run; ``call(name, *arguments)`` asks the host."""
+    """Return the modules of one run; ``call(name, *arguments)`` calls the host."""
     return {
         "time": _module("time", _time_members(call, utc_offset)),
         "math": _module("math", _MATH),
@@ -48,7 +48,7 @@ def _random_members(seed: int) -> dict[str, object]:
     generator = random.Random(seed)
 
     def reseed(a: Any = None) -> None:
-        """Without a number, the next state still follows from the run's own seed: a run can be repeated."""
+        """Seed the generator; without a number from its own state, so that runs stay repeatable."""
         generator.seed(generator.getrandbits(64) if a is None else a)
 
     members = {name: getattr(generator, name) for name in _RANDOM}

@@ -1,6 +1,6 @@
 """Names that the host offers a program: pure data, sent when a run starts.
 
-Knows names and shapes only; what a call does is the host's business.
+Knows names and fields only; the host makes the calls.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from roboglot.programs.language.names import Names
 from roboglot.programs.worker.values import pack, unpack
 
 TIME_CALLS = frozenset({"time.sleep", "time.time", "time.monotonic"})
-"""Host calls every program can make.
+"""Host calls that every program can make: sleep (s), Unix time (s), and seconds since a fixed moment.
 
-Sleep(seconds), seconds since 1970, and seconds since any fixed moment, all on the robot's clock.
+All use the robot's clock.
 """
 
 
@@ -25,8 +25,8 @@ class RecordType:
 
     ``fields``: every field and its default (a value, a list, a dict, or ``Record("Point")`` for another type's
     defaults); defaults are copied for each new record. ``aliases``: other names of fields; the target ``""`` is the
-    record itself. ``constructible``: programs may build it by calling its name (all fields optional); others only
-    come out of calls.
+    record itself. ``constructible``: programs may build it by calling its name (all fields optional); other types are
+    only returned by calls.
     """
 
     fields: Mapping[str, object] = field(default_factory=dict)
@@ -36,11 +36,11 @@ class RecordType:
 
 @dataclass(frozen=True, slots=True)
 class Prelude:
-    """Everything a program finds besides the language.
+    """All names available to a program in addition to the language.
 
     ``calls``: dotted names of functions (``cyberdog.motion.turn``). ``attributes``: dotted names fetched from the
-    host each time they are read (``cyberdog.motion.state``); the host sees a call without arguments. ``records`` and
-    ``enums``: by name. ``utc_offset``: seconds east of UTC for ``time.localtime`` and its like.
+    host at each read (``cyberdog.motion.state``), by a call without arguments. ``records`` and ``enums``: by name.
+    ``utc_offset``: seconds east of UTC for ``time.localtime`` and the like.
     """
 
     calls: frozenset[str] = frozenset()
@@ -55,17 +55,17 @@ class Prelude:
             raise ValueError(f"both a call and an attribute: {', '.join(sorted(both))}")
 
     def callable_names(self) -> frozenset[str]:
-        """Every name a call of the program may carry."""
+        """Return the names that the program may call."""
         return self.calls | self.attributes | TIME_CALLS
 
     def names(self, functions: frozenset[str] = frozenset()) -> Names:
-        """The names for the checker; ``functions`` are those of the program's modules."""
+        """Return the names for the checker; ``functions``: those of the program's modules."""
         members = {f"{enum}.{member}" for enum, values in self.enums.items() for member in values}
         constructible = {name for name, kind in self.records.items() if kind.constructible}
         return Names(frozenset(constructible | set(self.enums) | functions), self.calls | self.attributes | members)
 
     def to_wire(self) -> dict[str, object]:
-        """Return it as JSON, for the worker."""
+        """Return the prelude in JSON types, for the worker."""
         return {
             "calls": sorted(self.calls),
             "attributes": sorted(self.attributes),
@@ -79,7 +79,7 @@ class Prelude:
 
     @classmethod
     def from_wire(cls, wire: Mapping[str, Any]) -> Prelude:
-        """The prelude ``to_wire`` wrote; the worker trusts its host."""
+        """Return the prelude of a ``to_wire``, unchecked: the worker trusts its host."""
         return cls(
             calls=frozenset(wire["calls"]),
             attributes=frozenset(wire["attributes"]),

@@ -1,6 +1,6 @@
-"""Records, vectors and dictionaries as a program sees them.
+"""Records, vectors and dictionaries of a program.
 
-Knows their shapes from the prelude, and nothing of what they mean.
+Knows the records' fields from the prelude, but not their meaning.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from roboglot.programs.worker.values import Record
 
 
 class Vector(list[object]):
-    """A list with the vendor's vector operations besides Python's own."""
+    """A list with the vendor's vector operations in addition to Python's own."""
 
     __slots__ = ()
 
     def push_back(self, item: object) -> None:
-        """Append a copy: programs fill one object again and again."""
+        """Append a copy, as programs fill the same object again and again."""
         self.append(copy.deepcopy(item))
 
     def pop_back(self) -> None:
@@ -26,15 +26,15 @@ class Vector(list[object]):
         self.pop()
 
     def front(self) -> object:
-        """The first item."""
+        """Return the first item."""
         return self[0]
 
     def back(self) -> object:
-        """The last item."""
+        """Return the last item."""
         return self[-1]
 
     def at(self, index: int) -> object:
-        """The item at an index; IndexError outside, also below zero."""
+        """Return the item at an index. Raises IndexError outside, also below zero."""
         if index < 0:
             raise IndexError("vector index out of range")
         return self[index]
@@ -52,7 +52,7 @@ class Vector(list[object]):
         return 2**60 - 1
 
     def capacity(self) -> int:
-        """Room taken: as many as there are."""
+        """Return the capacity, which is the size here."""
         return len(self)
 
 
@@ -75,7 +75,7 @@ class Dictionary(dict[object, object]):
 
 
 class ProgramRecord:
-    """The base of every record type; a subclass has one slot per field."""
+    """Base of every record type; a subclass has one slot per field."""
 
     __slots__: tuple[str, ...] = ()
 
@@ -90,33 +90,33 @@ class ProgramRecord:
 
 
 class Records:
-    """The record types of one run, built when first needed."""
+    """The record types of one run, built on first use."""
 
     def __init__(self, types: Mapping[str, RecordType]) -> None:
         self._types = types
         self._classes: dict[str, type[ProgramRecord]] = {}
 
     def class_of(self, name: str) -> type[ProgramRecord]:
-        """The class of a record type."""
+        """Return the class of a record type."""
         known = self._classes.get(name)
         if known is None:
             known = self._classes[name] = self._build(name, self._types[name])
         return known
 
     def join(self, name: str, fields: dict[str, object]) -> object:
-        """A record that came from the host; an undeclared type becomes a plain dictionary."""
+        """Return a record from the host; of an undeclared type, a plain dictionary."""
         if name not in self._types:
             return self.enrich(fields)
         return self.class_of(name)(**fields)
 
     def split(self, value: object) -> tuple[str, Mapping[str, object]] | None:
-        """A record on its way to the host."""
+        """Return type and fields of a record for the host; None for other values."""
         if not isinstance(value, ProgramRecord):
             return None
         return type(value).__name__, {name: getattr(value, name) for name in type(value).__slots__}
 
     def enrich(self, value: object) -> object:
-        """Lists and dictionaries from outside, with the vendor's operations; records from the host's form."""
+        """Return lists and dictionaries with the vendor's operations, and host records as the program's."""
         match value:
             case Record(type=name, fields=fields):
                 return self.join(name, dict(fields))
@@ -133,7 +133,7 @@ class Records:
         def initialise(self: ProgramRecord, **fields: object) -> None:
             for field in defaults:
                 given = fields.pop(field, _MISSING)
-                # The default is created anew each time: two records share nothing.
+                # The default is copied each time, so that records share nothing.
                 setattr(self, field, enrich(copy.deepcopy(defaults[field])) if given is _MISSING else enrich(given))
             if fields:
                 raise TypeError(f"{name} has no field '{next(iter(fields))}'")

@@ -1,6 +1,6 @@
-"""The objects a program reaches the host through: ``cyberdog`` and whatever else the prelude's dotted names begin with.
+"""The objects by which a program calls the host: ``cyberdog`` and the other first parts of the prelude's dotted names.
 
-Knows the names only: a name that is a call becomes a function, one that is an attribute is fetched at every read.
+Knows names only: calls become functions, attributes are fetched at every read.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ HostCall = Callable[..., object]
 
 
 def build_roots(prelude: Prelude, call: HostCall) -> dict[str, object]:
-    """The root objects by name; ``call(name, *args, **kwargs)`` asks the host."""
+    """Return the root objects by name; ``call(name, *args, **kwargs)`` calls the host."""
     tree: dict[str, Any] = {}
     for name in sorted(prelude.calls | prelude.attributes):
         *path, leaf = name.split(".")
@@ -27,12 +27,12 @@ def build_roots(prelude: Prelude, call: HostCall) -> dict[str, object]:
 
 
 def build_enums(prelude: Prelude) -> dict[str, object]:
-    """Objects whose attributes are the members' numbers."""
+    """Return an object for each enum, with the members' numbers as attributes."""
     return {name: _Namespace(name, dict(members), None) for name, members in prelude.enums.items()}
 
 
 class _Attribute:
-    """Marks a name that is fetched when read."""
+    """Marker of a name that is fetched at every read."""
 
     __slots__ = ("name",)
 
@@ -65,7 +65,7 @@ class _Namespace:
         object.__setattr__(self, "_Namespace__name", name)
         object.__setattr__(self, "_Namespace__members", members)
         object.__setattr__(self, "_Namespace__call", call)
-        # Found directly, without ``__getattr__``, which handles lazily fetched and missing names.
+        # Found without ``__getattr__``, which handles only fetched and missing names.
         self.__dict__.update({key: member for key, member in members.items() if not isinstance(member, _Attribute)})
 
     def __getattr__(self, part: str) -> Any:

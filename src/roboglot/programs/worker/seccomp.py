@@ -1,8 +1,8 @@
-"""The last wall: a seccomp filter that leaves a program almost no system calls.
+"""The last layer: a seccomp filter that leaves a program almost no system calls.
 
-Pure ctypes, no library. A program may read and write its one socket, ask for memory that cannot be executed, read
-clocks, get random bytes and exit. Everything else answers EPERM; a foreign architecture's call kills. Knows x86_64
-and aarch64.
+Pure ctypes, no library. A program may read and write its one socket, allocate memory that cannot be executed, read
+clocks, get random bytes and exit. All other calls return EPERM; a call of another architecture kills the process.
+Knows x86_64 and aarch64.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import platform
 import struct
 
 SOCKET_FD = 3
-"""The only descriptor a program has."""
+"""A program's only descriptor."""
 
 _PR_SET_SECCOMP = 22
 _SECCOMP_MODE_FILTER = 2
@@ -26,7 +26,7 @@ _NUMBER, _ARCHITECTURE, _ARGUMENTS = 0, 4, 16
 
 _LOAD, _EQUAL, _BITS, _RETURN = 0x20, 0x15, 0x45, 0x06  # BPF: LD|W|ABS, JMP|JEQ|K, JMP|JSET|K, RET|K
 
-# name: (x86_64, aarch64); None where the architecture lacks the call.
+# name: (x86_64, aarch64); None if the architecture lacks the call.
 _FREE: dict[str, tuple[int | None, int | None]] = {
     "munmap": (11, 215),
     "brk": (12, 214),
@@ -53,9 +53,9 @@ class SeccompUnavailable(OSError):
 
 
 def program(machine: str) -> bytes:
-    """The filter as BPF instructions for a machine (``platform.machine()``).
+    """Return the filter as BPF instructions for a machine (``platform.machine()``).
 
-    Raises SeccompUnavailable for one without a table.
+    Raises SeccompUnavailable for a machine without a table.
     """
     if machine not in _AUDIT_ARCHITECTURE:
         raise SeccompUnavailable(errno.ENOSYS, f"no system call table for {machine}")
@@ -98,7 +98,7 @@ class _SockFprog(ctypes.Structure):
 
 
 def load(libc: ctypes.CDLL, code: bytes | None = None) -> None:
-    """Install the filter for this thread, for good. Needs no_new_privs. Raises SeccompUnavailable."""
+    """Install the filter for this thread, irrevocably. Needs no_new_privs. Raises SeccompUnavailable."""
     code = program(platform.machine()) if code is None else code
     buffer = ctypes.create_string_buffer(code, len(code))
     fprog = _SockFprog(len(code) // 8, ctypes.cast(buffer, ctypes.c_void_p))

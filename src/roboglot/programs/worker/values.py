@@ -1,7 +1,7 @@
-"""Values that cross between a program and its host, as JSON.
+"""Values sent between a program and its host, as JSON.
 
-Plain values stand for themselves. What JSON can't say is an object with the key ``$``: non-finite numbers,
-dictionaries whose keys aren't text, and records (a type's name and its fields). Knows nothing of which records exist.
+Plain values stay as they are. Values outside JSON become an object with the key ``$``: non-finite numbers, integers
+beyond 63 bits, dictionaries whose keys aren't text, and records (type name and fields). Knows no record types.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from typing import Any, TypeVar
 T = TypeVar("T")
 
 DEPTH_MAX = 32
-"""Containers inside containers, in both directions."""
+"""Deepest nesting of containers, in both directions."""
 PAIRS_MAX = 128
-"""Entries of a dictionary whose keys aren't text: numbers can be chosen so that each costs as much as all before it."""
+"""Most entries of a dictionary whose keys aren't text: numbers can be chosen so that all their hashes collide."""
 SEPARATORS = b",[{"
-"""Every value of a JSON text but the first follows one of these, and so does every key."""
+"""Characters before every key and every value, but the first, of a JSON text."""
 SEPARATORS_MAX = 100_000
-"""In one call's frame: the longest dance has fewer. Texts do not count, see ``Link``."""
+"""Most separators in a call's frame, more than in the longest dance. Those in texts do not count, see ``link``."""
 _INT_BITS = 63
 _INT_BITS_MAX = 4096
 _PLAIN = (str, bool, type(None))
@@ -29,9 +29,9 @@ _SMALL = 1 << _INT_BITS
 
 @dataclass(slots=True)
 class Record:
-    """A record as the host sees it: its type's name and the fields that are given.
+    """The host's form of a record: its type's name and the given fields.
 
-    The rest have the type's defaults.
+    All other fields have the type's defaults.
     """
 
     type: str
@@ -43,14 +43,15 @@ Join = Callable[[str, "dict[str, object]"], object]
 
 
 def split_record(value: object) -> tuple[str, Mapping[str, object]] | None:
-    """The host's ``split`` for ``pack``."""
+    """Return type and fields of a host record, None for other values; the host's ``split`` for ``pack``."""
     return (value.type, value.fields) if isinstance(value, Record) else None
 
 
 def pack(value: object, split: Split = split_record, depth: int = 0) -> object:
-    """JSON-ready form.
+    """Return a value in JSON types.
 
-    Raises TypeError for what can't cross (functions, complex numbers ...), ValueError for too deep or too large.
+    Raises TypeError for types that can't be sent (functions, complex numbers ...), ValueError for values nested too
+    deeply or too large.
     """
     if type(value) in _PLAIN or (type(value) is int and -_SMALL < value < _SMALL):
         return value
@@ -93,14 +94,14 @@ def _pack_int(value: int) -> object:
 
 
 def separators(text: bytes) -> int:
-    """Return how many values a JSON text can have at most, without looking at any."""
+    """Return an upper bound for the number of values in a JSON text, without parsing it."""
     return len(text) - len(text.translate(None, SEPARATORS))
 
 
 def unpack(packed: object, join: Join = Record) -> Any:
-    """The value of a packed form. Raises ValueError for anything ``pack`` doesn't produce.
+    """Return the value of a packed form. Raises ValueError for anything that ``pack`` doesn't produce.
 
-    The other end may be hostile.
+    The sender may be hostile.
     """
     if type(packed) in _PLAIN or (type(packed) is int and -_SMALL < packed < _SMALL):
         return packed  # the usual case
@@ -108,7 +109,7 @@ def unpack(packed: object, join: Join = Record) -> Any:
 
 
 def drained(steps: Generator[None, None, T]) -> T:
-    """Return what ``steps`` give in the end."""
+    """Run ``steps`` to the end; return their result."""
     try:
         while True:
             next(steps)
@@ -118,7 +119,7 @@ def drained(steps: Generator[None, None, T]) -> T:
 
 
 def unpacking(packed: object, join: Join = Record, depth: int = 0) -> Generator[None, None, object]:
-    """``unpack`` in steps, one for each container, so that other work can be done between them."""
+    """Unpack in steps, one per container, so that other work can be done in between; return the value."""
     if depth > DEPTH_MAX:
         raise ValueError("nested too deeply")
     kind = type(packed)

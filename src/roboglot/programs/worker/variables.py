@@ -1,6 +1,6 @@
-"""Tells the host what a watched program's variables hold, as short text, at halts and before calls. Knows no robot.
+"""Reports the values of a watched program's variables as short text, at halts and before calls. Knows no robot.
 
-No code of the program runs for it: an object of the program's own class is shown by its type's name.
+Runs no code of the program: an object of the program's own class is shown by its type's name.
 """
 
 from __future__ import annotations
@@ -12,21 +12,21 @@ from collections.abc import Callable, Mapping
 from types import BuiltinFunctionType, FrameType, FunctionType, ModuleType
 
 UNIT = "<unit "
-"""How the file names of the program's code objects begin."""
+"""Prefix of the file names of the program's code objects."""
 VARIABLES_MAX = 40
 NAME_MAX, TEXT_MAX = 64, 160
-"""Characters."""
+"""Most characters of a name and of a value."""
 PAUSE = 0.05
-"""Seconds of the machine between two reports before calls; halts, and marks of blocks, always report."""
+"""Least time between two reports before calls, in the machine's seconds; halts and block marks always report."""
 MARKS = "block"
-"""How the names of the calls end by which editors mark blocks: the host may halt there."""
+"""Suffix of the calls by which editors mark blocks, where the host may halt."""
 
 _HIDDEN = (FunctionType, BuiltinFunctionType, ModuleType, type)
 _PLAIN = frozenset({int, float, complex, bool, str, bytes, type(None), list, tuple, dict, set, frozenset, range})
 
 
 class _Short(reprlib.Repr):
-    """Python's own spelling of plain values, cut; anything else is its type's name."""
+    """Shortened ``repr`` of plain values; for other values the type's name."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -38,7 +38,7 @@ class _Short(reprlib.Repr):
 
 
 class Variables:
-    """Reports to ``send``; names that are in ``hide``'s scope are the host's own and are left out."""
+    """Reports variables to ``send``, without the host's own names, which are given to ``hide``."""
 
     def __init__(self, send: Callable[[dict[str, object]], None]) -> None:
         self._send = send
@@ -48,11 +48,11 @@ class Variables:
         self._due = 0.0
 
     def hide(self, scope: Mapping[str, object]) -> None:
-        """Leave these names out."""
+        """Omit these names from reports."""
         self._own = frozenset(scope)
 
     def before(self, call: Callable[..., object]) -> Callable[..., object]:
-        """The same call, with a report before it if the last one is old."""
+        """Return ``call`` with a report before it if the last report is old."""
 
         def reporting(name: str, /, *args: object, **kwargs: object) -> object:
             if name.endswith(MARKS) or time.monotonic() >= self._due:
@@ -62,7 +62,7 @@ class Variables:
         return reporting
 
     def report(self) -> None:
-        """Send what the innermost function of the program sees, if it has changed."""
+        """Send the variables of the program's innermost function and the globals, if they have changed."""
         frame: FrameType | None = sys._getframe(1)
         while frame is not None and not frame.f_code.co_filename.startswith(UNIT):
             frame = frame.f_back

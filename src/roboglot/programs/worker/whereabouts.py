@@ -1,8 +1,8 @@
 """Reports the program's position to the host without a call: a store into shared memory.
 
-``cell`` is a list of one item whose item lies in the shared memory: what a program's marks store there is the address
-of an object that stands for a place. The rest of the memory says which address stands for which place. Nothing is
-converted at run time, which makes a mark as cheap as ``x[0] = y``. Knows CPython's memory layout, and no program.
+``cell`` is a list of one item that lies in the shared memory: a mark stores the address of an object there that stands
+for a place. The rest of the memory maps addresses to places. Nothing is converted at run time, so a mark is as cheap
+as ``x[0] = y``. Knows CPython's memory layout, and no program.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from types import FrameType
 from roboglot.programs.language.places import WORD, Places, Step
 
 _ITEMS = ctypes.sizeof(ctypes.c_ssize_t) * 2 + ctypes.sizeof(ctypes.c_void_p)
-"""Where a list keeps the address of its items: behind its count of references, its type and its size."""
+"""Offset of the address of a list's items, bytes: after reference count, type and size."""
 
 
 class Whereabouts:
@@ -34,19 +34,19 @@ class Whereabouts:
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(nowhere))  # the reference that the first store releases
         self._table[0] = id(nowhere)
         ctypes.c_void_p.from_address(id(self.cell) + _ITEMS).value = ctypes.addressof(self._table)
-        ctypes.pythonapi.Py_IncRef(ctypes.py_object(self))  # or freeing the list would free memory that it does not own
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(self))  # freeing the list would free memory it does not own
 
     def lay_out(self, places: Places) -> None:
-        """The program's texts are known now."""
+        """Set the places of the program's texts."""
         self._places = places
 
     def mark(self, unit: int, line: int) -> object:
-        """The object that stands for a line."""
+        """Return the object that stands for a line."""
         number = self._places.number(unit, line)
         return self._marked(number if number + 1 < len(self._table) else 0)
 
     def watched(self, halt: Callable[[], object]) -> Watched:
-        """In place of ``cell``, for a program that halts where the host's end of the memory says."""
+        """Return a replacement for ``cell``, for a program that halts at the host's stops."""
         self._watched = Watched(self.cell, self._numbers, self._stops(), halt)
         return self._watched
 
@@ -56,7 +56,7 @@ class Whereabouts:
             self._watched.forget()
 
     def settle(self) -> None:
-        """All marks are made: where the host wants a halt and no statement begins, it is the next that does."""
+        """Move stops at lines without a statement to the next statement, once all marks are made."""
         stops = self._stops()
         for number in [number for number in range(1, len(stops)) if stops[number] and number not in self._marks]:
             stops[number] = 0
@@ -67,7 +67,7 @@ class Whereabouts:
         return memoryview(self._memory)[self._places.stops : self._places.memory()]
 
     def works(self) -> bool:
-        """Return whether this Python keeps lists as expected; if not, no line could be reported."""
+        """Return whether this Python stores lists as expected; otherwise no line can be reported."""
         other = self._marked(1) if len(self._table) > 2 else self._marks[0]
         before, self.cell[0] = self.cell[0], other
         held = self._table[0] == id(other)
@@ -83,7 +83,7 @@ class Whereabouts:
 
 
 class Watched:
-    """Takes marks as ``cell`` does, and looks at each whether to halt: dearer, for watched programs."""
+    """Takes marks like ``cell``, and checks at each whether to halt; slower, for watched programs."""
 
     __slots__ = ("_cell", "_frame", "_halt", "_numbers", "_order", "_origin", "_stops")
 
@@ -104,7 +104,7 @@ class Watched:
             self._halt()
 
     def _stepped(self, order: int, here: FrameType) -> bool:
-        """Return whether the step is done: over a call, no running one was called from where the order was given."""
+        """Return whether the step is done: none for OVER and OUT while calls from its start are running."""
         if order != self._order:
             self._order, self._origin = order, self._frame
         step = order & max(Step)
@@ -119,5 +119,5 @@ class Watched:
         return True
 
     def forget(self) -> None:
-        """Release the frames, and what they hold."""
+        """Release the frames and their variables."""
         self._frame = self._origin = None

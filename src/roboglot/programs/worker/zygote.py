@@ -1,4 +1,4 @@
-"""The process every program is forked from: clean, confined, single-threaded, with everything imported.
+"""The process that every program is forked from: clean, confined, single-threaded, with everything imported.
 
 It reads spawn requests from its control socket, forks, and reports births, stops, continuations and deaths. It ends
 when the socket ends, and the programs end with it. It knows no program's text and no robot.
@@ -37,7 +37,7 @@ _PAGE = resource.getpagesize()
 
 
 class Zygote:
-    """The fork server's state: its control socket, the filter, and which run each child belongs to."""
+    """The fork server's state: its control socket, the filter, and the run of each child."""
 
     def __init__(self, control: socket.socket, *, filter_required: bool) -> None:
         self._control, self._filter_required = control, filter_required
@@ -75,7 +75,7 @@ class Zygote:
                 return
 
     def end_programs(self) -> None:
-        """The kernel ends them with us; one that was stopped before it could ask for that would stay for ever."""
+        """Kill all programs: the kernel misses those that were stopped before their PR_SET_PDEATHSIG."""
         for pid in self._runs:
             with contextlib.suppress(OSError):
                 os.kill(pid, signal.SIGKILL)
@@ -150,7 +150,7 @@ class Zygote:
                 self._send({"run": run, "event": "dead", "status": os.waitstatus_to_exitcode(status), "cpu": used})
 
     def _probe(self) -> None:
-        """Lock a child down and let it try to open a file. Raises SeccompUnavailable if it may, OSError."""
+        """Probe the filter in a confined child. Raises SeccompUnavailable if the filter fails, OSError otherwise."""
         parent, used = os.getpid(), self._used()
         pid = os.fork()
         if pid == 0:
@@ -188,7 +188,7 @@ def _keep_only(connection: int) -> None:
 
 
 def _import_ahead() -> None:
-    """Import what programs make CPython import by itself; in the jail it can open no file."""
+    """Import the modules that CPython itself imports for programs, as the jail allows no files."""
     for codec in _CODECS:
         codecs.lookup(codec)
     for module in ("_strptime", "unicodedata", "_pylong"):
@@ -197,13 +197,13 @@ def _import_ahead() -> None:
 
 
 def _ignore(number: int, frame: FrameType | None) -> None:
-    """A handler must exist for the wake-up descriptor to be written."""
+    """Do nothing; without a handler the wake-up descriptor is not written."""
 
 
 def main(descriptor: int, *, filter_required: bool) -> None:
-    """Serve on an inherited SEQPACKET socket. Without ``filter_required`` programs run also where none can be used.
+    """Serve on an inherited SEQPACKET socket. Without ``filter_required``, programs run even without a filter.
 
-    The first message sent says which layers hold, or why no program can be run here.
+    The first message sent names the layers, or the reason why no program can be run.
     """
     control = socket.socket(fileno=descriptor)
     fcntl.fcntl(descriptor, fcntl.F_SETFD, fcntl.FD_CLOEXEC)

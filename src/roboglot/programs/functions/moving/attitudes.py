@@ -1,7 +1,7 @@
-"""cyberdog.motion: how the body is held above its feet (4.4.04). Metres and degrees.
+"""cyberdog.motion: height and attitude of the body above its feet (4.4.04). Metres and degrees.
 
-Roll to the right, pitch down and yaw to the left are positive, as in the model. Table 4.1 says what may be asked for; a
-body that cannot go that far goes as far as it can.
+Roll to the right, pitch down and yaw to the left are positive, as in the model. Table 4.1 limits the parameters; within
+them, a body that cannot reach a pose goes as far as it can.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ async def relatively_position_control_attitude(
 
 
 def held(body: BodyPose, limits: LegLimits) -> BodyPose:
-    """``body``, cut to what the legs can hold."""
+    """Return ``body``, clamped to the legs' limits."""
     turn, shift, height = body.attitude, body.shift, body.height
     return BodyPose(
         None if height is None else max(limits.lowest, min(limits.highest, height)),
@@ -118,7 +118,7 @@ def _attitude(roll: float, pitch: float, yaw: float) -> Orientation:
 
 
 def _turned(point: tuple[float, float, float], by: Orientation) -> tuple[float, float, float]:
-    """``point`` turned about the fixed axes x, y, z in this order."""
+    """Return ``point`` turned about the fixed axes x, y, z in this order."""
     x, y, z = point
     y, z = _around(y, z, by.roll)
     z, x = _around(z, x, by.pitch)

@@ -1,4 +1,4 @@
-"""choreographer and dancer: ready-made dances with a few parameters (4.5). Values outside of their ranges are cut."""
+"""choreographer and dancer: ready-made dances with a few parameters (4.5). Values outside their ranges are clamped."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ from roboglot.programs.functions.session import Session
 from roboglot.programs.functions.table import ABILITIES
 
 ROCK = 0.08  # rad by which the body rocks in a moonwalk
-SINK = 0.02  # m by which the body is lowered meanwhile
+SINK = 0.02  # m by which the body is lowered in a moonwalk
 BEAT = 0.24  # s per step in place
 BEAT_MIN, BEAT_MAX = 0.12, 1.0  # s
-SLIDING = 0.015  # m by which its feet are lifted
-SWING, SWING_MAX = 0.8, 0.5  # share of a step for which a pair is in the air; s at most
-PAIRS = (frozenset({Foot.LEFT_FRONT, Foot.RIGHT_REAR}), frozenset({Foot.RIGHT_FRONT, Foot.LEFT_REAR}))  # stand in turn
-ENDS = 0.4  # s to get into position and out of it
-DEPTH = 0.08  # m that a push-up goes down
+SLIDING = 0.015  # m by which the feet are lifted in a moonwalk
+SWING, SWING_MAX = 0.8, 0.5  # part of a step with a pair in the air, and its maximum, s
+PAIRS = (frozenset({Foot.LEFT_FRONT, Foot.RIGHT_REAR}), frozenset({Foot.RIGHT_FRONT, Foot.LEFT_REAR}))  # take turns
+ENDS = 0.4  # s to get into position, and out of it
+DEPTH = 0.08  # m by which a push-up lowers the body
 
 
 class Choreography:
-    """Steps and footfalls that the program prepared last; heights are offsets from the robot's stand."""
+    """Last prepared steps and footfalls; heights are offsets from the robot's standing height, m."""
 
     def __init__(self, _session: Session) -> None:
         self.steps: list[Step] = []
         self.footfalls: list[Footfall] = []
 
     def close(self) -> None:
-        """Do nothing: nothing is held."""
+        """Do nothing, as nothing is held."""
 
 
 @ABILITIES.on("choreographer.moonwalk")

@@ -18,11 +18,11 @@ from roboglot.programs.worker.values import Record
 DISTANCE_MIN, DISTANCE_DEFAULT, DISTANCE_MAX = 0.5, 1.0, 5.0  # m
 PERIOD = 0.1  # s
 GIVE_UP_AFTER = 30.0  # s without seeing a person
-SKILL_SEARCHES = 15.0  # s of that, during which the skill itself searches where they were
+SKILL_SEARCHES = 15.0  # part of GIVE_UP_AFTER in which the skill itself searches, s
 
 
 class FollowedMember:
-    """The person followed, of those allowed. Faces identify people, the robot's skill stays near them."""
+    """The followed person, one of those added. Faces identify people; the robot's skill follows them."""
 
     def __init__(self, session: Session) -> None:
         self.people: set[str] = set()
@@ -32,7 +32,7 @@ class FollowedMember:
         self.name = ""
 
     def start(self, name: str, distance: float) -> None:
-        """Follow this person and no other. Raises ComponentMissing."""
+        """Follow this person, in place of any other. Raises ComponentMissing."""
         robot = self._session.robot
         vision, skill = robot[Vision], robot[Following]
         self.stop()
@@ -52,7 +52,7 @@ class FollowedMember:
         self.stop()
 
     async def _follow(self, vision: Vision, skill: Following, name: str, distance: float) -> None:
-        """Look for the face; walk after the person who has it, until they are lost; look for the face again."""
+        """Look for the face, follow its person until they are lost, and look for the face again."""
         clock, left, who, why = self._session.robot.clock, GIVE_UP_AFTER, None, ""
         with vision.faces.subscribe() as faces:
             while left > 0 and not why:
@@ -75,7 +75,7 @@ class FollowedMember:
         self._task, self.name = None, ""
 
     async def _ended(self, walk: Action) -> tuple[str, bool]:
-        """Return why all of it is over (empty: it is not), and whether the person was lost."""
+        """Return why following is over (empty: it continues), and whether the person was lost."""
         match walk.error:
             case NotFound():
                 return "", True

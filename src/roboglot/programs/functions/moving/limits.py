@@ -1,4 +1,4 @@
-"""Limits of motions: the manual's table 4.1. Numbers only; outside of them nothing moves."""
+"""Limits of motions: the manual's table 4.1. Numbers only; outside of them the robot does not move."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ WALK_DURATION = Range(0.0, 1.0, WALK_DURATION_MAX, "s")
 
 
 def outside(**values: float) -> str:
-    """Return which value leaves its range, in plain words; empty if none does. NaN is outside of everything."""
+    """Return the first violation of a range, in plain words; empty without one. NaN is outside of all ranges."""
     ranges = LIMITS | OTHERS | {"angle": TURN_ANGLE, "walk_duration": WALK_DURATION}
     for name, value in values.items():
         if value not in ranges[name]:

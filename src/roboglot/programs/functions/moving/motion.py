@@ -1,7 +1,7 @@
 """cyberdog.motion: limits, standing, lying, stopping (4.4.04).
 
-A call returns when the robot has finished. What the limits forbid or the robot refuses moves nothing and is reported in
-``state`` and ``response.code``; the program goes on.
+A call returns when the robot has finished. A refusal by the limits or the robot moves nothing and is reported in
+``state`` and ``response.code``; the program continues.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""cyberdog.navigation: to the places that people marked on a saved map (4.4.05). Metres and rad in map."""
+"""cyberdog.navigation: drives to places marked on a saved map (4.4.05). Metres and rad in the map frame."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ from roboglot.programs.worker.values import Record
 SUCCESS, UNAVAILABLE, FAILED, REFUSED, CANCELLED = 0, 2, 3, 4, 5  # NavigationActionResponse.response.result
 COORDINATE_MAX = 10_000.0  # m
 SAME_WALLS = 0.5  # share of a stored map's walls also present in the current map, if both have the same origin
-WALL = 20  # log odds from which a cell counts as a wall
+WALL = 20  # log odds at which a cell counts as a wall
 NEAR = 2  # cells by which walls may differ
 HELP_SECONDS = 60.0  # s for a person to push the robot to a place that it recognizes
-ASKED_EVERY = 20.0  # s between two calls for help
+ASKED_EVERY = 20.0  # s between two requests for help
 REQUEST = "I do not know where I am. Please take me to a place that I know"
 
 
 class NavigationMode:
-    """The map that the program has switched navigation on with; a newer one may have its points elsewhere."""
+    """The map for which the program switched navigation on; a newer map may have its points elsewhere."""
 
     def __init__(self, _session: Session) -> None:
         self.map: str | None = None
 
     def close(self) -> None:
-        """Forget the map; the program's end calls off its drive."""
+        """Forget the map; the program's end cancels its drive."""
         self.map = None
 
 
@@ -170,7 +170,7 @@ async def _turn_on(session: Session, outdoor: bool, assisted: bool, interact: bo
 
 
 async def _find_itself(session: Session, stored: StoredMap, assisted: bool, interact: bool) -> None:
-    """Look around until the place is found; ``assisted``: as long as a person may still be helping."""
+    """Relocalize the robot; ``assisted``: retry for ``HELP_SECONDS`` while a person may help. Raises NotLocalized."""
     clock, localization = session.robot.clock, session.robot[Localization]
     deadline, asked = clock.time() + HELP_SECONDS, -ASKED_EVERY
     while True:
@@ -203,7 +203,7 @@ async def _cancel(robot: Robot) -> None:
 
 
 async def _with_words(session: Session, doing: Coroutine[object, object, None], interact: bool, volume: int) -> None:
-    """Carry it out; with ``interact``, say the outcome aloud."""
+    """Wait for ``doing``; with ``interact``, say the outcome."""
     try:
         usable_volume(volume)
         if interact:
@@ -240,7 +240,7 @@ async def _outcome(doing: Coroutine[object, object, None]) -> Record:
 
 
 def _map_in_use(session: Session) -> str:
-    """The map's name. Raises Refused while navigation is off, NotLocalized while the robot is lost."""
+    """Return the map's name. Raises Refused while navigation is off, NotLocalized while the robot is lost."""
     if (name := session.part(NavigationMode).map) is None:
         raise Refused("navigation is off")
     localization = session.robot[Localization]
@@ -259,7 +259,7 @@ def _preset(stored: StoredMap, name: str) -> Point:
 
 
 async def _newest(robot: Robot, *, outdoor: bool | None = None) -> StoredMap:
-    """The map saved last, of that kind if one is given; or NotFound."""
+    """Return the map saved last, of the given kind if any. Raises NotFound."""
     library = robot[MapLibrary]
     names = await library.names(outdoor=outdoor)
     if not names:
@@ -268,7 +268,7 @@ async def _newest(robot: Robot, *, outdoor: bool | None = None) -> StoredMap:
 
 
 def same_origin(stored: OccupancyGrid, used: OccupancyGrid) -> bool:
-    """Return whether the walls of ``stored`` lie where ``used`` has them: a map of an earlier life lies elsewhere."""
+    """Return whether both maps have their walls at the same places; the origin changes with every restart."""
     rows, columns = np.nonzero(stored.log_odds >= WALL)
     if not len(rows) or not used.width:
         return False

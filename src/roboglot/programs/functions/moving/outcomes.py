@@ -1,4 +1,4 @@
-"""Outcomes of motions, in the manual's two shapes of answers and its numbers of errors (4.2, 4.4.04)."""
+"""Outcomes of motions, in the manual's two types of results and with its error codes (4.2, 4.4.04)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from roboglot.programs.functions.results import StateCode, state
 from roboglot.programs.functions.session import Session
 from roboglot.programs.worker.values import Record
 
-PROTECTED_UP_TO = 0.20  # charge up to which the robot protects its legs
+PROTECTED_UP_TO = 0.20  # charge at or below which the robot protects its legs
 TOO_EMPTY, MOTOR_FAULTY = 3026, 3032
 ALWAYS = frozenset({0, 101, 111})  # no state of the robot forbids stopping, lying down or standing up
 
@@ -35,13 +35,13 @@ _CODES: tuple[tuple[type[RobotError], int], ...] = (
 
 
 async def result(session: Session, motion: int, doing: Coroutine[object, object, None], wrong: str = "") -> Record:
-    """Do it unless a parameter is ``wrong`` and say how it went, as MotionResultServiceResponse."""
+    """Execute ``doing`` unless a parameter is ``wrong``; return the outcome as MotionResultServiceResponse."""
     outcome, response = await report_outcome(session, motion, wrong, doing)
     return Record("MotionResultServiceResponse", {"state": outcome, "response": Record("MotionResult", response)})
 
 
 async def servo(session: Session, motion: int, doing: Coroutine[object, object, None], wrong: str = "") -> Record:
-    """Do it unless a parameter is ``wrong`` and say how it went, as MotionServoCmdResponse."""
+    """Execute ``doing`` unless a parameter is ``wrong``; return the outcome as MotionServoCmdResponse."""
     outcome, response = await report_outcome(session, motion, wrong, doing)
     response["order_process_bar"] = 100 if response["result"] else 0
     return Record("MotionServoCmdResponse", {"state": outcome, "response": Record("MotionServoCmd", response)})
@@ -50,7 +50,7 @@ async def servo(session: Session, motion: int, doing: Coroutine[object, object, 
 async def report_outcome(
     session: Session, motion: int, wrong: str, doing: Coroutine[object, object, None]
 ) -> tuple[Record, dict[str, object]]:
-    """The State, and the fields that all answers share."""
+    """Execute ``doing`` unless a parameter is ``wrong``; return the State and the common fields of all results."""
     code = 0
     try:
         if not wrong and motion not in ALWAYS:
@@ -69,7 +69,7 @@ async def report_outcome(
 
 
 def _unfit(session: Session) -> tuple[int, str]:
-    """The number and the words of what forbids this robot to move now; 0 if nothing does."""
+    """Return code and text of the robot's condition that forbids motions; 0 without one."""
     robot = session.robot
     if Battery in robot and robot[Battery].state.percentage <= PROTECTED_UP_TO:
         return TOO_EMPTY, "the battery is too low for this"
@@ -79,7 +79,7 @@ def _unfit(session: Session) -> tuple[int, str]:
 
 
 def code_of(session: Session, error: RobotError) -> int:
-    """The manual's number of an error."""
+    """Return the manual's code of an error."""
     robot = session.robot
     if type(error) is Refused and Battery in robot and robot[Battery].state.percentage <= PROTECTED_UP_TO:
         return TOO_EMPTY

@@ -1,4 +1,4 @@
-"""cyberdog.motion: the motions with a result that take no parameters, in one table, and walking on a leash (4.4.04)."""
+"""cyberdog.motion: all motions without parameters, in one table, and walking on a leash (4.4.04)."""
 
 from __future__ import annotations
 
@@ -70,13 +70,13 @@ RESULT_MOTIONS: tuple[tuple[str, int, Motion], ...] = (
 
 
 class Leash:
-    """The program has the robot walk on a leash."""
+    """Walking on a leash, until the program ends."""
 
     def __init__(self, session: Session) -> None:
         self._legs = session.robot[Legs]
 
     def close(self) -> None:
-        """Walk its own way again, unless that was changed since."""
+        """Restore the normal gait, unless the gait was changed meanwhile."""
         if self._legs.gait is Gait.TROT_PASSIVE:
             self._legs.walk(None)
 

@@ -1,6 +1,6 @@
-"""cyberdog.motion.run_sequence: a choreography that the program wrote, pace by pace (4.4.04).
+"""cyberdog.motion.run_sequence: a choreography written by the program, pace by pace (4.4.04).
 
-What a program fills in is hostile: kinds, counts and times are checked here, ranges by the robot's legs.
+A program's values are hostile: types, counts and times are checked here, ranges by the robot's legs.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ async def run_sequence(session: Session, sequence: object) -> Record:
 
 
 def _footfalls(sequence: Record) -> Sequence[Footfall]:
-    """Raises InvalidGoal for a sequence without a name or paces, and for gaits that make no sense."""
+    """Return the gait list. Raises InvalidGoal for a sequence without a name or paces, or with invalid gaits."""
     name = sequence.fields.get("name")
     if not isinstance(name, str) or not name.isidentifier() or len(name) > NAME_MAX:
         raise InvalidGoal("a sequence's name follows the rules of variables' names")
@@ -93,7 +93,7 @@ def _footfall(gait: Record) -> Footfall:
 
 @dataclass(frozen=True, slots=True)
 class _Pace:
-    """Step with the height as an offset, and the axes that are followed (x y z roll pitch yaw)."""
+    """Step with the height as an offset, m, and flags of the axes that it changes (x y z roll pitch yaw)."""
 
     step: Step
     followed: tuple[bool, ...]
@@ -123,13 +123,13 @@ def _pace(pace: Record) -> _Pace:
 
 
 def _footholds(pace: Record) -> tuple[Foothold, ...]:
-    """A foot that rises does so by FOOT_LIFT_MIN at least."""
+    """Return the feet's places, m; a lifted foot rises by FOOT_LIFT_MIN at least."""
     numbers = ([_number(pace, name, axis) for axis in "xyzw"] for name in FEET.values())
     return tuple(Foothold(x, y, z, FOOT_LIFT_MIN if 0.0 <= lift < FOOT_LIFT_MIN else lift) for x, y, z, lift in numbers)
 
 
 def _steps(paces: Sequence[_Pace], legs: Legs) -> list[Step]:
-    """With heights above the floor, counted from how the robot stands now; cut to what the legs can hold."""
+    """Return steps with heights above the floor, offset from the current stand, clamped to the legs' limits."""
     stood, twist, body, steps = legs.body_height, STILL, BodyPose(0.0), []
     for pace in paces:
         x, y, z, roll, pitch, yaw = pace.followed

@@ -1,7 +1,7 @@
 """cyberdog.motion: turning and walking, each in its gait (4.4.04).
 
-A gait walks no faster than it can, axis by axis; what the limits of table 4.1 forbid moves nothing. A body without legs
-drives instead: it has no gait and lifts no feet.
+Each gait limits its speed axis by axis; parameters outside of table 4.1 are refused. A body without legs drives
+instead: it has no gait and lifts no feet.
 """
 
 from __future__ import annotations
@@ -154,7 +154,7 @@ async def _walk(
 
 
 async def _walk_along(session: Session, twist: Twist, distance: float) -> None:
-    """Walk an arc of this length."""
+    """Walk an arc of this length, m, by odometry. Raises RobotError if stuck."""
     odometry = session.robot[Odometry]
     top = session.robot[Base].limits.twist
     action = session.robot[Driving].drive(twist, source=session.source)

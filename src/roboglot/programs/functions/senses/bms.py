@@ -14,7 +14,7 @@ from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.worker.values import Record
 
 FULL = 0.995  # charge
-TOPPED = 0.97  # a finished charger stays off while the charge is above this
+TOPPED = 0.97  # charge above which a charger that has finished stays off
 # power_supply and status: the manual gives names without numbers. The numbers are ours.
 SUPPLIES = {Supply.NONE: 0, Supply.WIRE: 1, Supply.CONTACTS: 2, Supply.WIRELESS: 3}
 IN_USE, CHARGING, CHARGED, LOCKED = range(4)
@@ -57,7 +57,7 @@ async def get_data(session: Session, timeout: int = 5) -> Record:  # noqa: ARG00
 
 
 def _measured(battery: BatteryState) -> dict[str, object]:
-    """In mV, mA, percent and degrees; what is switched is 0 or 1. The power board's line never fails here: 0."""
+    """Return the measured fields in mV, mA, percent and degrees; switches are 0 or 1."""
     return {
         "batt_volt": round(battery.voltage * 1000),
         "batt_curr": round(battery.current * 1000),
@@ -72,6 +72,6 @@ def _measured(battery: BatteryState) -> dict[str, object]:
 
 
 def _motors_off(robot: Robot) -> bool:
-    """True while the motors have no power: the robot sleeps, or its button was pressed."""
+    """Return whether the motors have no power: the robot sleeps, or its emergency stop is engaged."""
     asleep = Power in robot and robot[Power].mode is not PowerMode.AWAKE
     return asleep or (EmergencyStop in robot and robot[EmergencyStop].engaged)

@@ -1,4 +1,4 @@
-"""cyberdog.gesture: gestures of people (4.4.18), no matter whose."""
+"""cyberdog.gesture: gestures of any person (4.4.18)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from roboglot.programs.functions.session import Session
 from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.worker.values import Record
 
-DURATION_MIN, DURATION_MAX = 30, 300  # s for which recognition may stay on
+DURATION_MIN, DURATION_MAX = 30, 300  # limits of the time for which recognition stays on, s
 LOOK_EVERY = 0.04  # s
 HELD = 1.0  # s for which a sighting counts
 
@@ -32,7 +32,7 @@ KINDS: dict[Gesture, str] = dict(
 
 
 class GestureWatch:
-    """Looks for gestures until its time is up; knows when it saw each of them last."""
+    """Looks for gestures until its time is up; keeps the time of each gesture's last sighting."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -42,24 +42,24 @@ class GestureWatch:
 
     @property
     def on(self) -> bool:
-        """True while it looks."""
+        """True while looking for gestures."""
         return self._viewer is not None and self._session.robot.clock.time() < self._until
 
     def open(self, seconds: float) -> None:
-        """Look for so long from now on. Raises ComponentMissing, Busy."""
+        """Look for gestures for ``seconds`` from now. Raises ComponentMissing, Busy."""
         if self._viewer is None:
             self._viewer = self._session.robot[Vision].gestures.subscribe()
             self._seen.clear()
         self._until = self._session.robot.clock.time() + seconds
 
     def close(self) -> None:
-        """Look away."""
+        """Stop looking for gestures."""
         if self._viewer:
             self._viewer.close()
             self._viewer = None
 
     def seen(self, within: float) -> set[str]:
-        """Return what was seen in the last so many seconds, by the manual's names."""
+        """Return the gestures seen within the last ``within`` seconds, by the manual's names."""
         for sighting in self._viewer.drain() if self._viewer else ():
             for gesture in sighting.seen:
                 if gesture.gesture in KINDS:

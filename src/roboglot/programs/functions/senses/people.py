@@ -1,4 +1,4 @@
-"""cyberdog.personnel and cyberdog.train: members known by face and voice, and words that are known (4.4.07, 4.4.20)."""
+"""cyberdog.personnel and cyberdog.train: members known by face and voice, and trained words (4.4.07, 4.4.20)."""
 
 from __future__ import annotations
 
@@ -22,26 +22,26 @@ LOOK_EVERY = 0.04  # s
 HEARD_MAX = 100  # utterances kept
 SENSITIVITY_MAX = 60  # s
 EMOTIONS = tuple(Emotion)  # a face's emotion is its index here, as at the app's door
-# Commands that an untrained robot understands: end, pause and continue the tasks.
+# Words of an untrained robot: end, pause and continue the tasks.
 WORDS = tuple(
     TrainedWord(*word) for word in (("终止任务", "shutdown"), ("暂停任务", "suspend"), ("继续任务", "recover"))
 )
 
 
 class Ear:
-    """Hears what people say from the first time it is asked for until the program ends."""
+    """Speech of people, kept from the first use until the program ends."""
 
     def __init__(self, session: Session) -> None:
         self._viewer = session.robot[Hearing].speech()
         self._heard: deque[SpeechHeard] = deque(maxlen=HEARD_MAX)
 
     def heard(self, since: float) -> list[SpeechHeard]:
-        """Return what ended after ``since`` (robot time, s)."""
+        """Return the utterances that ended after ``since`` (robot time, s)."""
         self._heard.extend(self._viewer.drain())
         return [speech for speech in self._heard if speech.stamp > since]
 
     def close(self) -> None:
-        """Listen no more."""
+        """Stop listening."""
         self._viewer.close()
 
 
@@ -124,7 +124,7 @@ async def training_words_recognized(session: Session, timeout: int = 5) -> Recor
 
 
 def known_words(robot: Robot) -> list[TrainedWord]:
-    """The words the robot listens for; a taught word replaces its own."""
+    """Return the words that the robot listens for; a taught word replaces a built-in one."""
     words = {word.trigger: word for word in WORDS}
     if TrainingWords in robot:
         words |= {word.trigger: word for word in robot[TrainingWords].all()}
@@ -141,7 +141,7 @@ def _seen(face: FaceSeen) -> Record:
 
 
 def _named(robot: Robot, people: list[str]) -> set[str]:
-    """The members' names, from names or else ids; all of them for none. Raises NotFound, ComponentMissing."""
+    """Return the members' names for names or ids; all members for an empty list. Raises NotFound, ComponentMissing."""
     members = robot[Members].all()
     names = {member.name for member in members}
     if not people:

@@ -1,4 +1,4 @@
-"""cyberdog.tof, cyberdog.ultrasonic and cyberdog.gps: how far things are, and where on earth (4.4.11 to 4.4.15)."""
+"""cyberdog.tof, cyberdog.ultrasonic and cyberdog.gps: distances, and the place on earth (4.4.11 to 4.4.15)."""
 
 from __future__ import annotations
 
@@ -55,20 +55,20 @@ def _single(session: Session, name: str) -> Record:
 
 
 class RangesOn:
-    """The range sensors are on while a program that reads them runs."""
+    """Keeps the range sensors on while a program that reads them runs."""
 
     def __init__(self, session: Session) -> None:
         self._sensors = session.robot[RangeSensors]
         self._were_on = self._sensors.measuring
 
     def reading(self) -> RangeReading | None:
-        """The newest; another program that ended may have switched them off."""
+        """Return the newest reading; switch the sensors on, as another program's end may have switched them off."""
         if not self._sensors.measuring:
             self._sensors.measure(True)
         return self._sensors.reading(ULTRASONIC)
 
     def close(self) -> None:
-        """Switch the sensors back as they were before."""
+        """Restore the sensors' earlier switch."""
         if not self._were_on:
             self._sensors.measure(False)
 

@@ -109,7 +109,7 @@ async def next_scan(session: Session, timeout: int = 5) -> Record:
 
 
 async def newer(session: Session, stamp: Callable[[], float], timeout: int) -> None:
-    """Wait for a reading that is younger than the present one, at most ``timeout`` seconds."""
+    """Wait for a newer reading than the current one, at most ``timeout`` seconds."""
     present, left = stamp(), float(min(timeout, TIMEOUT_MAX))
     while left > 0 and stamp() == present:
         await session.sleep(min(LOOK_EVERY, left))
@@ -117,6 +117,6 @@ async def newer(session: Session, stamp: Callable[[], float], timeout: int) -> N
 
 
 def epoch(session: Session, stamp: float) -> float:
-    """Calendar time of a moment of robot time."""
+    """Return a moment of robot time as Unix time, both in s."""
     clock = session.robot.clock
     return clock.epoch() - clock.time() + stamp

@@ -36,7 +36,7 @@ class Switch(IntEnum):
 
 
 class ExerciseWatch:
-    """Counts while the program does something else, until there are enough or the time is up."""
+    """Counts in the background, until the wanted number is reached or the time is up."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -49,7 +49,7 @@ class ExerciseWatch:
 
     @property
     def progress(self) -> tuple[Switch, int, int, int]:
-        """algo_switch, sport_type, counts and duration (s)."""
+        """Values of algo_switch, sport_type, counts and duration (s)."""
         if self._switch is Switch.OPEN and self._session.robot.clock.time() >= self._until:
             self._end(Switch.TIMEOUT)
         counter = self._counter
@@ -57,7 +57,7 @@ class ExerciseWatch:
         return self._switch, self._sport_type, counts, seconds
 
     def open(self, sport_type: int, counts: int, timeout: int) -> None:
-        """Begin to count; what was counted before is forgotten. Raises InvalidGoal, ComponentMissing, Busy."""
+        """Start counting from 0. Raises InvalidGoal, ComponentMissing, Busy."""
         if sport_type not in SPORTS:
             raise InvalidGoal(f"sport_type = {sport_type} does not exist")
         if not 1 <= counts <= COUNTS_MAX:
@@ -91,7 +91,7 @@ class ExerciseWatch:
     def _end(self, why: Switch) -> None:
         self._switch = why
         if self._viewer:
-            self._viewer.close()  # this also ends the search
+            self._viewer.close()  # this also ends ``_watch``
 
 
 @ABILITIES.on("cyberdog.skeleton.turn_on_recognition", needs=(Vision,))
@@ -164,7 +164,7 @@ async def sports_recognition(
 
 
 async def _change(session: Session, watch: ExerciseWatch, seconds: float) -> bool:
-    """Wait for anything new; whether something more was counted."""
+    """Wait for any progress, at most ``seconds``; return whether counts or duration changed."""
     before, left = watch.progress, seconds
     while watch.progress == before and left > 0:
         await session.sleep(LOOK_EVERY)
@@ -173,7 +173,7 @@ async def _change(session: Session, watch: ExerciseWatch, seconds: float) -> boo
 
 
 def usable(timeout: int) -> float:
-    """Raises InvalidGoal beyond 5 to 300 s."""
+    """Return a timeout, s. Raises InvalidGoal beyond 5 to 300 s."""
     if not TIMEOUT_MIN <= timeout <= TIMEOUT_MAX:
         raise InvalidGoal(f"timeout = {timeout} is outside of {TIMEOUT_MIN} to {TIMEOUT_MAX} s")
     return float(timeout)
