@@ -20,7 +20,7 @@ from roboglot.model.geometry import Point, Pose, wrap_angle
 
 
 class Forward(Protocol):
-    """Lets robot time pass as fast as the machine can."""
+    """Advances robot time as fast as the machine can."""
 
     async def __call__(self, *, seconds: float) -> None: ...
 
@@ -34,7 +34,7 @@ def assert_pose(
     within: float = 0.05,
     within_deg: float = 2.0,
 ) -> None:
-    """Fail unless ``pose`` lies within ``within`` m of what is given and ``within_deg`` degrees of ``deg``."""
+    """Fail unless ``pose`` is within ``within`` m of each given coordinate and ``within_deg`` degrees of ``deg``."""
     off = [f"{name} is {have:.3f}, not {want:.3f}" for name, have, want in (("x", pose.x, x), ("y", pose.y, y))
            if want is not None and abs(have - want) > within]  # fmt: skip
     if deg is not None and abs(math.degrees(wrap_angle(pose.yaw - math.radians(deg)))) > within_deg:
@@ -43,9 +43,9 @@ def assert_pose(
 
 
 def passed_in_order(track: Iterable[Point | Pose], goals: Sequence[Point], within: float) -> int:
-    """Return how many of ``goals`` a robot on ``track`` came to within so many m, in their order.
+    """Return the number of ``goals`` that a robot on ``track`` reached in their order, each to ``within`` m.
 
-    Between two places of the track it went straight.
+    The track is taken as straight between two points.
     """
     passed = 0
     for start, end in pairwise(track):
@@ -55,7 +55,7 @@ def passed_in_order(track: Iterable[Point | Pose], goals: Sequence[Point], withi
 
 
 def _beside(place: Point, start: Point | Pose, end: Point | Pose) -> float:
-    """Metres from ``place`` to the straight line between the two."""
+    """Return the distance (m) from ``place`` to the segment from ``start`` to ``end``."""
     dx, dy = end.x - start.x, end.y - start.y
     share = ((place.x - start.x) * dx + (place.y - start.y) * dy) / max(dx * dx + dy * dy, 1e-12)
     share = min(1.0, max(0.0, share))

@@ -1,4 +1,4 @@
-"""Loopback addresses for robots, with every vendor's ports free, and free ports: each xdist worker has its own."""
+"""Loopback addresses with every vendor's ports free, and single free ports; each xdist worker has its own."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ _ports_given = itertools.count()
 
 
 def give_back(addresses: Iterable[str]) -> None:
-    """Let others of this process have them."""
+    """Release addresses for other users in this process."""
     _given.difference_update(addresses)
 
 
 def free_addresses(count: int) -> str:
-    """Return the first of so many loopback addresses in a row that no one on this machine uses for robots."""
+    """Return the first of ``count`` consecutive loopback addresses whose robot ports are free. Raises OSError."""
     worker = _worker() % 250
     for attempt in range(FREE_TRIES):
         block = (os.getpid() + 7 * attempt) % 120
@@ -49,10 +49,10 @@ def _is_free(address: str) -> bool:
 
 
 def free_port() -> int:
-    """Return a port that is free now on every address, for TCP and UDP, and that no one else is given soon.
+    """Return a port that is free on every address, for TCP and UDP, and not given out again soon.
 
-    It lies below those that the system gives to outgoing connections. Each xdist worker has its own; a process gets
-    none twice before it has had all of its own. Raises OSError if none is free.
+    It lies below the system's ports for outgoing connections. Each xdist worker has its own; a process gets
+    none twice before it has used all of them. Raises OSError if none is free.
     """
     worker, count = _worker() % PORT_SHARES, len(PORTS) // PORT_SHARES
     for _ in range(count):

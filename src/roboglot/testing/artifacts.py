@@ -22,7 +22,7 @@ def folder_of(root: Path, test: str) -> Path:
 
 
 def save(server: RobotServer, folder: Path, title: str, failure: str) -> Sequence[Path]:
-    """Write all three, and return what could be written. Never raises: the test's own failure must be seen."""
+    """Write all three and return the files written. Never raises: the test's own failure must stay visible."""
     saved: list[Path] = []
     drawn: bytes | None = None
     try:

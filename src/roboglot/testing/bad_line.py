@@ -1,8 +1,8 @@
-"""A bad line for real connections: packets get lost and take a while, and the kernel's TCP at both ends bears it.
+"""A bad line for real connections: packets are lost and delayed, and the kernel's TCP copes at both ends.
 
-Behind ``far`` there is this machine again, as if at the end of that line: a network device (tun) hands every packet to
-a thread, which drops it or sends it back later with both addresses exchanged. So it needs no second network, but the
-right to make a device (Linux, CAP_NET_ADMIN).
+The address ``far`` leads back to this machine, over that line: a network device (tun) hands every packet to
+a thread, which drops it or returns it later with both addresses exchanged. It needs no second network, only the
+right to create a device (Linux, CAP_NET_ADMIN).
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ _UP = 0x41  # IFF_UP, IFF_RUNNING
 
 
 class BadLine:
-    """Listen at ``near``, connect to ``far``. ``delay`` (s) is one way's, ``loss`` each packet's chance.
+    """Listen at ``near``, connect to ``far``. ``delay``: s, one way; ``loss``: probability per packet, 0 to 1.
 
-    ``cut``: nothing passes any more, and neither end hears why. Raises OSError where no device can be made.
+    ``cut``: drop every packet; neither end gets an error. Raises OSError if no device can be created.
     """
 
     def __init__(self, *, delay: float = 0.05, loss: float = 0.05, seed: int = 1) -> None:
@@ -81,12 +81,12 @@ class BadLine:
                     self.lost += 1
                     continue
                 self.passed += 1
-                turned = packet[:12] + packet[16:20] + packet[12:16] + packet[20:]  # checksums stay right
+                turned = packet[:12] + packet[16:20] + packet[12:16] + packet[20:]  # keeps the checksums valid
                 heapq.heappush(underway, (time.perf_counter() + self.delay, self.passed, turned))
 
 
 def _set_up(tun: int) -> tuple[str, str]:
-    """Make the device; the addresses here and behind it."""
+    """Configure the device; return its own address and the one behind it."""
     name = fcntl.ioctl(tun, _MAKE, struct.pack("16sH22x", b"", _PLAIN_TUN))[:16].rstrip(b"\0")
     number = int(name.removeprefix(b"tun")) % 256
     near, far = f"{PREFIX}.{number}.1", f"{PREFIX}.{number}.2"

@@ -1,4 +1,4 @@
-"""Objects of another thread's event loop for tests that have none: each call waits for its result."""
+"""Blocking access, for tests without an event loop, to objects in the event loop of another thread."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PATIENCE = 60.0  # real s after which a test's call fails
 
 
 class Loop:
-    """A loop that runs in another thread."""
+    """An event loop that runs in another thread."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self.loop = loop
@@ -22,7 +22,7 @@ class Loop:
     def run(
         self, function: Callable[..., object], *arguments: object, within: float = PATIENCE, **named: object
     ) -> Any:
-        """Call it there, wait for what it awaits, and return its result. Raises what it raises, and TimeoutError."""
+        """Run a function or coroutine function in the loop; return its result. Raises its errors, and TimeoutError."""
 
         async def call() -> object:
             result = function(*arguments, **named)
@@ -41,7 +41,7 @@ class Loop:
 
 
 class Blocking:
-    """An asyncio object whose methods block. What they return can be waited for (``wait``) and iterated over, too."""
+    """An asyncio object with blocking methods. Their results, too, can be waited for (``wait``) and iterated over."""
 
     def __init__(self, target: object, loop: Loop) -> None:
         self._target, self._loop = target, loop
@@ -80,11 +80,11 @@ class Blocking:
                 return
 
     def next(self, within: float = PATIENCE) -> Any:
-        """Return the next of what it yields. Raises TimeoutError, StopAsyncIteration."""
+        """Return the next item. Raises TimeoutError, StopAsyncIteration."""
         return self._loop.run(_next, self._target, within=within)
 
     def wait(self, within: float = PATIENCE) -> Any:
-        """Wait for the end of an action or task; raises as ``await`` would, and TimeoutError."""
+        """Wait for the end of an action or task. Raises its error, and TimeoutError."""
 
         return self._loop.run(_end, self._target, within=within)
 
@@ -93,7 +93,7 @@ class Blocking:
 
 
 def _is_kept(value: object) -> bool:
-    """Return whether it is an object with methods to await, not a value."""
+    """Return whether ``value`` is an object with methods to await rather than plain data."""
     if inspect.isasyncgen(value):
         return True
     kind = type(value)

@@ -1,4 +1,4 @@
-"""unittest: a robot for each test of a class, with clients that block; no event loop, no pytest."""
+"""A robot for each test of a unittest class, with blocking clients; no event loop, no pytest."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class RobotTestCase(unittest.TestCase):
     """``class TestPatrol(RobotTestCase): world = "empty"``; then ``self.server``, ``self.rest``, ``self.robomaster``…
 
     ``world``, ``robots``, ``body``, ``seed``, ``speed``, ``lockstep``, ``recording``, ``doors`` are as in the pytest
-    marker; ``faults`` are names of faults, or pairs of name and options. What a failed test leaves is in
+    marker; ``faults`` are names of faults, or pairs of name and options. Artifacts of a failed test are in
     ``roboglot-failures``, or in the folder that ROBOGLOT_FAILURES names.
     """
 
@@ -34,7 +34,7 @@ class RobotTestCase(unittest.TestCase):
     server: RobotServer
 
     def run(self, result: unittest.TestResult | None = None) -> unittest.TestResult | None:
-        """Start the robot, run the test, keep what it leaves if it fails."""
+        """Start the robot, run the test, save artifacts if it fails."""
         names = ("world", "robots", "body", "seed", "speed", "lockstep", "recording", "doors")
         faults = tuple(
             WantedFault(fault) if isinstance(fault, str) else WantedFault(fault[0], None, tuple(fault[1].items()))
@@ -44,7 +44,7 @@ class RobotTestCase(unittest.TestCase):
             return super().run(result)
 
     def doCleanups(self) -> None:  # noqa: N802 - unittest's name
-        """Clean up; unittest still knows here whether the test failed."""
+        """Save artifacts and clean up: unittest knows here whether the test failed, and the robot is still up."""
         super().doCleanups()
         if not getattr(getattr(self, "_outcome", None), "success", True):
             folder = folder_of(Path(os.environ.get("ROBOGLOT_FAILURES", FOLDER)), self.id())

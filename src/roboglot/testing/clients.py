@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 
 class Clients:
-    """Makes clients of the robots at ``addresses``, the first's unless another one is named.
+    """Makes clients of the robots at ``addresses``; of the first unless another is named.
 
-    ``data`` is the server's folder, ``app_port`` where a dog calls its app, ``loop`` where the robots run.
+    ``data``: the server's folder; ``app_port``: port of the dog's app; ``loop``: event loop of the robots.
     """
 
     def __init__(self, addresses: Mapping[str, str], data: Path, app_port: int, loop: Loop) -> None:
@@ -52,7 +52,7 @@ class Clients:
         return ProgramClient(self._address(robot))
 
     def certificates(self) -> Certificates:
-        """Return what an app of the dog needs to connect; the files are in ``data/app``."""
+        """Return the certificates of a dog's app; the files are in ``data/app``."""
         from roboglot.clients.cyberdog import Certificates
         from roboglot.protocols.cyberdog.certificates import export_client
         from roboglot.protocols.cyberdog.server import FOLDER
@@ -63,11 +63,11 @@ class Clients:
         return Certificates.load(folder)
 
     def open(self, client: object) -> Blocking:
-        """Connect an asyncio client where the robots run; its methods block. ``close`` ends it, as does ``reset``."""
+        """Connect an asyncio client in the robots' loop; its methods block. ``close`` and ``reset`` close it."""
         return self._opened.enter_context(Blocking(client, self._loop))
 
     def close(self) -> None:
-        """Close those that were opened."""
+        """Close all open clients."""
         self._opened.close()
 
     def _address(self, robot: str) -> str:

@@ -18,7 +18,7 @@ COLUMNS = ("robot time", "robot", "door", "", "operation", "message", "status")
 
 
 def page(title: str, failure: str, exchanges: Iterable[Exchange], picture: bytes | None) -> str:
-    """Return the page; messages are shown as text, never as anything else."""
+    """Return the page; messages are escaped, so that they show as text only."""
     shown = list(exchanges)[-SHOWN_MAX:]
     image = f'<img alt="map" src="data:image/png;base64,{base64.b64encode(picture).decode()}">' if picture else ""
     head = "".join(f"<th>{name}</th>" for name in COLUMNS)

@@ -1,4 +1,4 @@
-"""The world from above with the ways that the robots went, as a PNG."""
+"""The world from above with the robots' tracks, as a PNG."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Track = Sequence[tuple[float, float]]
 
 
 def picture(floor: FloorPlan, robots: Sequence[Placed], people: Sequence[Placed], tracks: Mapping[str, Track]) -> bytes:
-    """Return the floor with where everyone stands; x to the right, y up."""
+    """Return a PNG of the floor with robots, people and tracks; x to the right, y up."""
     from PIL import Image, ImageDraw, ImageFont
 
     spots = [point for polygon in (*floor.walls, *floor.furniture) for point in polygon]

@@ -2,7 +2,7 @@
 
 Real ports: ``robot_server``, and its clients ``rest``, ``robomaster``, ``cyberdog``, ``program``. In-process and in
 lockstep, for asyncio tests: ``clock``, ``forward``, ``fleet``, ``world``, ``robot``. Markers: ``world``, ``body``,
-``seed``, ``fault``, ``recording``. Of a test that fails, recording, map picture and exchanges are kept.
+``seed``, ``fault``, ``recording``. A failed test leaves its recording, a picture of the map and the exchanges.
 """
 
 from __future__ import annotations
@@ -56,12 +56,12 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
-    """Have pytest leave roboglot's asserts alone.
+    """Keep pytest from rewriting roboglot's asserts.
 
-    It would rewrite every module of a package that brings a plugin: 800 here, seconds at each start, for nothing.
+    It would rewrite every module of a package with a plugin: 800 here, seconds at each start, without benefit.
     """
     hook = getattr(early_config.pluginmanager, "rewrite_hook", None)
-    marked = getattr(hook, "_must_rewrite", None)  # there is no public way; without it, this only takes longer
+    marked = getattr(hook, "_must_rewrite", None)  # no public API; without it, the start only takes longer
     if hook is not None and isinstance(marked, set):
         marked.discard("roboglot")
         hook.mark_rewrite("roboglot.testing")
@@ -77,7 +77,7 @@ def clock() -> LockstepClock:
 
 @pytest.fixture
 def forward(clock: LockstepClock) -> Forward:
-    """``await forward(seconds=3)``: robot time passes, real time hardly."""
+    """``await forward(seconds=3)``: advance robot time; little real time passes."""
 
     async def pass_time(*, seconds: float) -> None:
         await clock.advance(seconds)
@@ -86,7 +86,7 @@ def forward(clock: LockstepClock) -> Forward:
 
 
 def _compile_kernels(config: pytest.Config) -> None:
-    """Compile what is not compiled yet, the first time after an installation, with a line for each kernel."""
+    """Compile missing kernels at the first start after an installation, with a line for each."""
     from roboglot.kernels.ahead import compile_ahead, missing
 
     if not missing():
@@ -148,9 +148,9 @@ def _wanted(request: pytest.FixtureRequest) -> Wanted:
 
 @pytest.fixture
 def robot_server(request: pytest.FixtureRequest) -> Iterator[RobotServer]:
-    """Robots with all their doors on real ports, at loopback addresses of their own; new for each test.
+    """Robots with all their doors on real ports, each at its own loopback address; new for each test.
 
-    With ``@pytest.mark.world(shared=True)`` the tests of a session that want the same share one; it is reset between.
+    With ``@pytest.mark.world(shared=True)``, tests of a session with equal requirements share a server, reset between.
     """
     from roboglot.testing.server import RobotServer
 
@@ -173,31 +173,31 @@ def robot_server(request: pytest.FixtureRequest) -> Iterator[RobotServer]:
 
 @pytest.fixture
 def reset(robot_server: RobotServer) -> Callable[[], None]:
-    """``reset()`` puts robots and world back as at the start of the test, faults of its markers left out."""
+    """``reset()`` restores robots and world to the start of the test, without the faults of its markers."""
     return robot_server.reset
 
 
 @pytest.fixture
 def rest(robot_server: RobotServer) -> Blocking:
-    """A client of the first robot's REST API (``SlamwareClient``) whose methods block."""
+    """A blocking client of the first robot's REST API (``SlamwareClient``)."""
     return robot_server.clients.open(robot_server.clients.new_rest())
 
 
 @pytest.fixture
 def robomaster(robot_server: RobotServer) -> Blocking:
-    """A client of its text protocol (``RoboMasterClient``), in SDK mode, whose methods block."""
+    """A blocking client of the first robot's text protocol (``RoboMasterClient``), in SDK mode."""
     return robot_server.clients.open(robot_server.clients.new_robomaster())
 
 
 @pytest.fixture
 def cyberdog(robot_server: RobotServer) -> Blocking:
-    """A client of its app protocol (``CyberDogClient``), by TLS, whose methods block."""
+    """A blocking client of the first robot's app protocol (``CyberDogClient``), over TLS."""
     return robot_server.clients.open(robot_server.clients.new_cyberdog())
 
 
 @pytest.fixture
 def program(robot_server: RobotServer) -> Blocking:
-    """A client of its block programs (``ProgramClient``) whose methods block."""
+    """A blocking client of the first robot's block programs (``ProgramClient``)."""
     return robot_server.clients.open(robot_server.clients.new_program())
 
 
@@ -219,7 +219,7 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
 
 
 def _attach(item: pytest.Item, report: pytest.TestReport, server: RobotServer) -> None:
-    """Keep what there is while the robot still stands there; JUnit's readers find it by the properties."""
+    """Save artifacts while the robot is still up, and list them in the report's properties, for JUnit."""
     from roboglot.testing.artifacts import folder_of, save
 
     root = Path(item.config.getoption(OPTION))

@@ -1,4 +1,4 @@
-"""A real ``roboglot up`` in a process of its own, for end-to-end tests, benchmarks and the demo."""
+"""A real ``roboglot up`` in its own process, for end-to-end tests, benchmarks and the demo."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class NotUp(RuntimeError):
 
 @dataclass(frozen=True, slots=True)
 class ServedRobot:
-    """A running roboglot: its process, data folder, first address, and how long it took to be ready (s)."""
+    """A running roboglot: process, data folder, first address, and start time until ready (s)."""
 
     process: subprocess.Popen[str]
     data: Path
@@ -32,13 +32,13 @@ class ServedRobot:
 
     @property
     def cpu_seconds(self) -> float:
-        """Processor time that it used so far, all threads (children not counted)."""
+        """Processor time used so far (s), all threads, without children."""
         fields = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
         return (int(fields[11]) + int(fields[12])) / 100
 
     @property
     def resident_megabytes(self) -> float:
-        """Memory that it holds now."""
+        """Resident memory (MiB)."""
         status = Path(f"/proc/{self.process.pid}/status").read_text()
         return int(status.partition("VmRSS:")[2].split()[0]) / 1024
 
@@ -67,9 +67,9 @@ def served(data: Path, *arguments: str, address: str = "127.0.0.1", log: Path | 
 
 @contextlib.contextmanager
 def child(code: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
-    """A Python process that runs ``code``; its output is a pipe. Killed at the end, or when it takes too long.
+    """Run ``code`` in a Python process with its output in a pipe. Killed at the end or after ``CHILD_SECONDS_MAX``.
 
-    So reading its output takes at most ``CHILD_SECONDS_MAX``, even if it fails.
+    So reading its output ends by then, even if it fails.
     """
     command = [sys.executable, "-c", code, *arguments]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:

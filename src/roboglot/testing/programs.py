@@ -1,4 +1,4 @@
-"""A client of block programs for tests: saves one, runs it, and tells which blocks it went through."""
+"""A client of block programs for tests: saves a program, runs it and returns the blocks it went through."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class ProgramFailed(AssertionError):
 
 @dataclass(frozen=True, slots=True)
 class ProgramRun:
-    """Blocks in the order in which they began, and what was printed, line by line."""
+    """Blocks in the order in which they began, and the printed lines."""
 
     blocks: list[str] = field(default_factory=list)
     printed: list[str] = field(default_factory=list)
@@ -43,7 +43,7 @@ class ProgramClient:
                 await link.close()
 
     async def run(self, source: str, *, task: str = "test", within: float = SECONDS_MAX) -> ProgramRun:
-        """Save and run it; returns when it has ended. Raises ProgramFailed, TimeoutError (real seconds), LinkLost."""
+        """Save a program and run it to its end. ``within``: real s. Raises ProgramFailed, TimeoutError, LinkLost."""
         return await RealClock().wait_for(self._run(source, task), within)
 
     async def _run(self, source: str, task: str) -> ProgramRun:

@@ -1,4 +1,4 @@
-"""A robot with all its doors on real ports, in a thread of the test's own process: any client may drive it."""
+"""Robots with all their doors on real ports, in a thread of the test's process; any client may drive them."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ START_SECONDS_MAX = 240.0  # including the time to compile kernels
 
 
 class NotInTime(AssertionError):
-    """Condition that a test waited for in vain."""
+    """A condition did not hold in time."""
 
 
 class RobotServer:
-    """A world and its robots, each at an address of its own, with every vendor's ports.
+    """A world and its robots, each at its own address, with every vendor's ports.
 
-    ``address`` is the first robot's. Its methods may be called from any thread but its own; they block.
+    Methods block, and may be called from any thread but the server's own.
     """
 
     clients: Clients  # set by ``start``
@@ -69,7 +69,7 @@ class RobotServer:
         self.close()
 
     def start(self) -> RobotServer:
-        """Start it; returns when every door answers and the robots know where they are. Raises as ``up`` does."""
+        """Start; return when every door answers and the robots are localised. Raises the errors of ``up``."""
         configs = self.wanted.configs(free_addresses(len(self.wanted.robots)))
         self.addresses = {robot.name: robot.address for robot in configs}
         self.app_port = free_port()
@@ -86,7 +86,7 @@ class RobotServer:
         return self
 
     def close(self) -> None:
-        """Close its clients, stop it, and throw its data away."""
+        """Close the clients, stop, and delete the data."""
         if self._loop is None or self._thread is None:
             return
         self.clients.close()
@@ -132,7 +132,7 @@ class RobotServer:
 
     @property
     def runtime(self) -> Runtime:
-        """The program itself; touch it in its own thread only (``call``)."""
+        """The program itself; use it in its own thread only (``call``)."""
         if self._runtime is None:
             raise RuntimeError("the robot is not up")
         return self._runtime
@@ -151,23 +151,23 @@ class RobotServer:
         within: float = PATIENCE,
         **named: object,
     ) -> T:
-        """Call a function, or run a coroutine function, where the robots run; returns its result."""
+        """Call a function, or run a coroutine function, in the robots' loop; return its result."""
         result: T = self.loop.run(function, *arguments, within=within, **named)
         return result
 
     @property
     def address(self) -> str:
-        """The first robot's."""
+        """The first robot's address."""
         return next(iter(self.addresses.values()))
 
     @property
     def url(self) -> str:
-        """The first robot's REST API."""
+        """URL of the first robot's REST API."""
         return f"http://{self.address}:1448"
 
     @property
     def programs_url(self) -> str:
-        """The first robot's WebSocket of block programs."""
+        """URL of the first robot's WebSocket of block programs."""
         return f"ws://{self.address}:50053/programs"
 
     @property
@@ -182,16 +182,16 @@ class RobotServer:
 
     @property
     def stage(self) -> _There:
-        """Hands in the world: place, push, add_obstacle, inject_fault, person (``roboglot.model.stage``)."""
+        """Interventions in the world: place, push, add_obstacle, inject_fault, person (``roboglot.model.stage``)."""
         return _There(self.runtime.fleet.world.hands, self.loop)
 
     def pose(self, robot: str = "") -> Pose:
-        """Return where a robot (the first) really is, in the world's frame."""
+        """Return the true pose of a robot (default: the first) in the world's frame."""
         found: Pose = self.truth.pose_of(robot or next(iter(self.addresses)))
         return found
 
     def moved(self, robot: str = "") -> Pose:
-        """Return where it really is as seen from where it started: x ahead, y to the left."""
+        """Return a robot's true pose relative to its start: x ahead, y to the left."""
         name = robot or next(iter(self.addresses))
         return self.pose(name).relative_to(self._ways.origins[name])
 
@@ -203,11 +203,11 @@ class RobotServer:
     # -- time ----------------------------------------------------------------------------------------------------------
 
     def forward(self, seconds: float) -> None:
-        """Let so much robot time pass: as fast as it can in lockstep, else at the clock's speed."""
+        """Let ``seconds`` of robot time pass: in lockstep as fast as possible, else at the clock's speed."""
         self.loop.run(pass_time, self.runtime.clock, seconds, within=PATIENCE + seconds / self.wanted.speed)
 
     def wait_until(self, condition: Callable[[], object], *, within: float, what: str = "") -> None:
-        """Wait until ``condition()`` holds, looked at where the robots run. Raises NotInTime after robot seconds."""
+        """Wait until ``condition()``, called in the robots' loop, holds. Raises NotInTime after ``within`` robot s."""
         end = self.time + within
         while not self.loop.run(condition):
             if self.time >= end:
@@ -217,7 +217,7 @@ class RobotServer:
     # -- between tests -------------------------------------------------------------------------------------------------
 
     def reset(self) -> None:
-        """Put all back: actions end, robots stand charged where they started and know it; no faults, no boxes."""
+        """Restore the start: actions end; robots are charged, in place and localised; no faults, no boxes."""
         self.clients.close()
         self.loop.run(self._reset)
         self.exchanges.clear()
@@ -236,7 +236,7 @@ class RobotServer:
         self._ways.put_back()
 
     def prepare(self, wanted: Wanted) -> None:
-        """Begin another test on this server: reset it, then break what that test wants broken."""
+        """Prepare this server for another test: reset it, then inject that test's faults."""
         self.reset()
         self.wanted = wanted
         self.loop.run(self._break_things)
@@ -248,7 +248,7 @@ class RobotServer:
 
 
 class _There:
-    """An object whose methods are called where the robots run, and so are those of what they return."""
+    """A proxy that calls an object's methods, and those of the results, in the robots' loop."""
 
     def __init__(self, target: object, loop: Loop) -> None:
         self._target, self._loop = target, loop
@@ -294,7 +294,7 @@ def _can_record() -> bool:
 
 @contextlib.contextmanager
 def serving(**values: object) -> Iterator[RobotServer]:
-    """Start a robot for a ``with``: ``with serving(world="empty", speed=8) as server``."""
+    """Start robots for a ``with``: ``with serving(world="empty", speed=8) as server``."""
     from roboglot.testing.wanted import wanted_of
 
     with RobotServer(wanted_of(values)) as server:

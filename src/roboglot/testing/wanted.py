@@ -16,7 +16,7 @@ SPEED = 4.0  # seconds of robot time per second of the test
 
 @dataclass(frozen=True, slots=True)
 class WantedFault:
-    """A fault that acts from the start of the test; ``robot`` None: wherever the part is."""
+    """A fault that is active from the start of the test; ``robot`` None: every robot with that part."""
 
     kind: str
     robot: str | None = None
@@ -25,7 +25,7 @@ class WantedFault:
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """One world with its robots. ``recording``: the robots answer as in that file. ``shared``: by several tests."""
+    """One world with its robots. ``recording``: file whose answers the robots give. ``shared``: by several tests."""
 
     world: str = "office"
     robots: tuple[str, ...] = ("a",)
@@ -39,19 +39,19 @@ class Wanted:
     doors: Mapping[str, object] = field(default_factory=dict, hash=False)
 
     def configs(self, first: str) -> tuple[RobotConfig, ...]:
-        """Return the robots' configuration, the first one at that address."""
+        """Return the robots' configurations at consecutive addresses from ``first`` on."""
         body = f"recording:{self.recording}" if self.recording else self.body
         host, _, last = first.rpartition(".")
         return tuple(RobotConfig(name, body, f"{host}.{int(last) + number}") for number, name in enumerate(self.robots))
 
     @property
     def place(self) -> Wanted:
-        """Requirements that a running server must have been started with."""
+        """Requirements without faults, which a running server can get later."""
         return replace(self, faults=())
 
 
 def wanted_by(markers: Iterable[pytest.Mark]) -> Wanted:
-    """Read the markers of a test, the nearest first. Raises ValueError for what they do not know."""
+    """Read the markers of a test, the nearest first. Raises ValueError for unknown values."""
     values: dict[str, object] = {}
     faults: list[WantedFault] = []
     for mark in markers:
@@ -72,7 +72,7 @@ def wanted_by(markers: Iterable[pytest.Mark]) -> Wanted:
 
 
 def wanted_of(values: Mapping[str, Any], faults: tuple[WantedFault, ...] = ()) -> Wanted:
-    """Return what these values mean. Raises ValueError naming one that is none."""
+    """Return the requirements with these values. Raises ValueError for an unknown or wrong one."""
     known = Wanted.__dataclass_fields__.keys() - {"faults"}
     if unknown := values.keys() - known:
         raise ValueError(f"world has no {', '.join(sorted(unknown))}; there are {', '.join(sorted(known))}")

@@ -1,4 +1,4 @@
-"""Starts of a test's robots, and the ways that they really went."""
+"""True start poses and tracks of a test's robots."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ TRACK_PERIOD = 0.2  # s of robot time between two points of a track
 
 
 async def pass_time(clock: Clock, seconds: float) -> None:
-    """Let so much robot time pass: as fast as it can in lockstep, else at the clock's speed."""
+    """Let ``seconds`` of robot time pass: in lockstep as fast as possible, else at the clock's speed."""
     await (clock.advance(seconds) if isinstance(clock, LockstepClock) else clock.sleep(seconds))
 
 
 class Ways:
-    """``origins``: where each robot really stood at first; ``tracks``: points of its way (m, world), for the picture.
+    """``origins``: true start pose of each robot; ``tracks``: points of its true way (m, world), for the picture.
 
-    All but these are for the thread in which the robots run.
+    Use everything else in the robots' thread only.
     """
 
     def __init__(self) -> None:
@@ -35,12 +35,12 @@ class Ways:
         self._tracking: asyncio.Task[None] | None = None
 
     def begin(self, fleet: Fleet, clock: Clock) -> None:
-        """Remember where the robots of ``fleet`` stand before it starts."""
+        """Remember the poses of the robots of ``fleet`` before it starts."""
         self._fleet, self._clock = fleet, clock
         self.origins = {placed.name: placed.pose for placed in fleet.world.hands.robots}
 
     async def wait_for_places(self) -> None:
-        """Wait until each robot that makes maps has one, and remember where it believes to stand."""
+        """Wait until each mapping robot has a map, and remember its estimated pose."""
         from roboglot.model.components.mapping.localization import Localization
         from roboglot.model.components.mapping.mapping import Mapping
 
@@ -51,11 +51,11 @@ class Ways:
                 self._starts[name] = robot[Localization].pose
 
     def follow(self) -> None:
-        """Begin to keep tracks."""
+        """Begin to record tracks."""
         self._tracking = asyncio.ensure_future(self._track())
 
     def put_back(self) -> None:
-        """Have the robots stand where they began, charged as then, and know it."""
+        """Return the robots to their start poses, charge and pose estimates."""
         from roboglot.model.components.mapping.localization import Localization
 
         for name, robot in self._fleet.robots.items():

@@ -1,8 +1,7 @@
-"""Plays trials on a cluster of Ray: each is a task, placed where a processor is free, tried again if its node dies.
+"""Plays trials on a Ray cluster: each is a task, placed on a free processor and tried again if its node dies.
 
-A task plays its trial as a campaign on one machine would: in a process of its own, forked from one that has everything
-loaded. The scenarios' folders travel with the tasks, for nodes that have no such files; what a failed trial leaves
-comes back.
+A task plays its trial like a campaign on one machine: in its own process, forked from a preloaded one. The folders
+of the scenarios travel with the tasks, for nodes without those files; the artifacts of failed trials come back.
 """
 
 from __future__ import annotations
@@ -29,14 +28,14 @@ Files = dict[str, bytes]
 
 
 class TooLarge(ValueError):
-    """Folder holds more than travels over the network."""
+    """The folder is too large to send over the network."""
 
 
 class Reference(Protocol):
     """Ray's result of a task."""
 
     def future(self) -> Future[tuple[bytes, Files]]:
-        """Return the answer to come."""
+        """Return a future of the task's result."""
 
 
 def play_on(
@@ -48,9 +47,9 @@ def play_on(
     leave: Leave,
     ended: Ended,
 ) -> None:
-    """Play all of ``trials`` on the cluster ``where``, ``workers`` at a time; 0: as many as it has processors.
+    """Play ``trials`` on the cluster ``where``, ``workers`` at a time; 0: one per processor.
 
-    ``paths``: files and folders that they need. Raises KeyboardInterrupt at SIGINT, once what was under way is
+    ``paths``: files and folders that they need. Raises KeyboardInterrupt at SIGINT, once running trials are
     cancelled; OSError if there is no such cluster; TooLarge.
     """
     waiting: dict[Reference, tuple[Trial, Path | None]] = {}
@@ -86,7 +85,7 @@ def _result(reference: Reference, place: Path | None) -> Result:
 
 
 def _play(trial: Trial, files: Files, seconds_max: float, *, keep: bool) -> tuple[bytes, Files]:
-    """Play one trial on a node; return its result and, if wanted, what it left."""
+    """Play one trial on a node; return its encoded result and, with ``keep``, its artifacts."""
     results: list[Result] = []
     with tempfile.TemporaryDirectory(prefix="roboglot-task-") as folder:
         scenarios, left = Path(trial.folder), Path(folder, "left")
@@ -105,7 +104,7 @@ def _play(trial: Trial, files: Files, seconds_max: float, *, keep: bool) -> tupl
 
 
 def _as_here(files: Files, folder: Path) -> bool:
-    """Return whether this machine has the same files at the same place, and so what they refer to."""
+    """Return whether this machine has the same files in ``folder``, and thus the files that they refer to."""
     places = ((folder / name, content) for name, content in files.items())
     return all(place.is_file() and place.read_bytes() == content for place, content in places)
 

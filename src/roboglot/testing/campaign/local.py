@@ -1,4 +1,4 @@
-"""Plays trials on this machine: each in a process of its own, forked from one that has everything loaded."""
+"""Plays trials on this machine, each in its own process, forked from a preloaded one."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ class _Running:
 
 
 def play_here(trials: Iterator[Trial], workers: int, seconds_max: float, leave: Leave, ended: Ended) -> None:
-    """Play all of ``trials``, ``workers`` at a time; ``ended`` hears of each. Call it from the main thread.
+    """Play ``trials``, ``workers`` at a time; ``ended`` is called after each. Call it from the main thread.
 
-    Raises KeyboardInterrupt at SIGINT, once what was under way is ended.
+    Raises KeyboardInterrupt at SIGINT, once running trials have ended.
     """
     os.environ.update(ENVIRONMENT)
     context = multiprocessing.get_context("forkserver")
@@ -80,7 +80,7 @@ def play_here(trials: Iterator[Trial], workers: int, seconds_max: float, leave: 
 
 
 def _start_fork_server() -> None:
-    """Start the process from which trials are forked: Ctrl-C is for the campaign alone, also while that one loads."""
+    """Start the process from which trials are forked; it blocks Ctrl-C from the start, which is for the campaign."""
     resource_tracker.ensure_running()  # it would unblock SIGINT
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # a new program inherits it; none is lost here
     try:
@@ -91,7 +91,7 @@ def _start_fork_server() -> None:
 
 @contextlib.contextmanager
 def interruptions() -> Iterator[Connection]:
-    """Have SIGINT be read from a pipe: raised anywhere, it could lose a process that has just been started."""
+    """Deliver SIGINT through a pipe: raised anywhere, it could lose a process that has just been started."""
     ear, mouth = multiprocessing.Pipe(duplex=False)
     before = signal.signal(signal.SIGINT, lambda *_: mouth.send_bytes(b"!"))
     try:
@@ -107,7 +107,7 @@ def _now() -> float:
 
 
 def _result(one: _Running, seconds_max: float) -> Result:
-    """Return what its process reported before it ended; ends one that is late."""
+    """Return the result that the trial's process reported; end the process if it is late."""
     try:
         if not one.ear.poll():
             return Result(Outcome.LATE, f"it was ended after {seconds_max:.0f} s", seconds_max)
@@ -121,7 +121,7 @@ def _result(one: _Running, seconds_max: float) -> Result:
 
 
 def _end(process: BaseProcess) -> None:
-    """End the process: kindly, so that it ends what it started, then by force with its whole group."""
+    """Terminate the process, so that it can end its children; then kill its whole group."""
     process.terminate()
     process.join(END_SECONDS_MAX)
     if process.pid is not None:
@@ -132,7 +132,7 @@ def _end(process: BaseProcess) -> None:
 
 
 def _play(trial: Trial, leave: Path | None, mouth: Connection) -> None:
-    """Play in the forked process: a group of its own, so that Ctrl-C reaches the campaign alone; it ends with that."""
+    """Play in the forked process, in its own group, so that Ctrl-C reaches the campaign alone; it ends with that."""
     os.setpgid(0, 0)
     signal.signal(signal.SIGINT, signal.default_int_handler)  # for the commands of its scenario
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
@@ -143,7 +143,7 @@ def _play(trial: Trial, leave: Path | None, mouth: Connection) -> None:
 
 
 def _end_with_campaign() -> None:
-    """Wait for the campaign's end, also by ``kill -9``, then have the main thread end what the trial started."""
+    """Wait for the campaign to end, even by ``kill -9``, then have the main thread end the trial's children."""
     campaign = multiprocessing.parent_process()
     assert campaign is not None
     campaign.join()

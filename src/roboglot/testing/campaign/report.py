@@ -1,4 +1,4 @@
-"""The report of a campaign: how often each scenario passed, how sure that is, and what went wrong with which seeds."""
+"""The report of a campaign: each scenario's pass rate with its confidence interval, and failures by reason and seed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ REASONS_MAX, SEEDS_MAX = 5, 10
 
 
 def report(rows: Sequence[Row], folder: Path, wanted: int) -> str:
-    """Return it as Markdown; scenarios are in ``folder``; ``wanted``: trials that there are to be."""
+    """Return the report as Markdown; ``folder``: of the scenarios; ``wanted``: planned number of trials."""
     by_scenario: dict[str, list[Row]] = defaultdict(list)
     for row in rows:
         by_scenario[row.scenario].append(row)
@@ -37,7 +37,7 @@ def report(rows: Sequence[Row], folder: Path, wanted: int) -> str:
 
 
 def interval(passed: int, count: int) -> tuple[float, float]:
-    """Between which shares the truth lies, 95 % sure (Wilson's score interval)."""
+    """Return the 95 % confidence interval of the pass rate, 0 to 1 (Wilson's score interval)."""
     if not count:
         return 0.0, 1.0
     share, spread = passed / count, Z * Z / count
@@ -47,7 +47,7 @@ def interval(passed: int, count: int) -> tuple[float, float]:
 
 
 def _reasons(scenario: Path, failed: Sequence[Row]) -> Iterator[str]:
-    """Yield the most frequent reasons, and how to see the first of each again."""
+    """Yield the most frequent reasons, each with the command that plays its first case again."""
     if not failed:
         return
     kinds: dict[str, list[Row]] = defaultdict(list)

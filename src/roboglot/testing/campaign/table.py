@@ -1,4 +1,4 @@
-"""The table of a campaign: a CSV file to which every trial adds a row as soon as it has ended."""
+"""The table of a campaign: a CSV file that gets a row at the end of each trial."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ HEAD = ("scenario", "name", "seed", "outcome", "why", "seconds", "attempts", "fi
 
 
 class OtherCampaign(ValueError):
-    """The folder holds something else than the beginning of this campaign; the message says what."""
+    """The table is not the beginning of this campaign, or no table; the message says why."""
 
 
 class Row(NamedTuple):
@@ -35,7 +35,7 @@ class Row(NamedTuple):
 
 
 class Table:
-    """Open from the beginning to ``close``. Raises OtherCampaign for what is no table, or in use."""
+    """An open table, until ``close``. Raises OtherCampaign for a file that is no table or is in use."""
 
     def __init__(self, path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -57,7 +57,7 @@ class Table:
             self._write(HEAD)
 
     def done(self, trial: Trial) -> bool:
-        """Return whether the trial is in the table and need not be played again. Raises OtherCampaign."""
+        """Return whether the table has a final result of the trial. Raises OtherCampaign for another version of it."""
         row = self._found.get((trial.scenario, trial.seed))
         if row is not None and row.fingerprint != trial.fingerprint:
             raise OtherCampaign(
@@ -66,10 +66,10 @@ class Table:
         return row is not None and row.outcome in FINAL
 
     def add(self, trial: Trial, result: Result) -> Row:
-        """Write how it went; the disk has it when this returns."""
+        """Write the row of a trial to disk and return it."""
         row = Row(
             trial.scenario,
-            " ".join(trial.name.split()),  # each row is written at once, so that no partial one is read
+            " ".join(trial.name.split()),  # each row is written in one go, so that no partial one is read
             trial.seed,
             result.outcome,
             " ".join(result.why.split()),
@@ -88,7 +88,7 @@ class Table:
         return list(self._found.values())
 
     def close(self) -> None:
-        """Leave one row of each trial, and let others have the file."""
+        """Keep one row per trial, and unlock the file."""
         try:
             if self._written > len(self._found):
                 self._leave_the_last()
@@ -96,7 +96,7 @@ class Table:
             self._file.close()
 
     def _leave_the_last(self) -> None:
-        """Put a file without the rows of trials that were played again into the place of this one."""
+        """Replace the file by one without superseded rows of trials that were played again."""
         fresh = self.path.with_name(f"{self.path.name}.new")
         with fresh.open("wb") as file:
             for values in (HEAD, *self._found.values()):

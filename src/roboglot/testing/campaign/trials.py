@@ -1,4 +1,4 @@
-"""One scenario with one seed: what is played, how it went, and how a process plays it."""
+"""One scenario with one seed: the trial, its result, and its play in a process."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ FINAL = (Outcome.PASSED, Outcome.FAILED, Outcome.BROKEN)  # playing it again wou
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """``scenario``: its path below ``folder``; ``fingerprint``: of it, its files and this version of roboglot."""
+    """``scenario``: path below ``folder``; ``fingerprint``: hash of the scenario, its files and roboglot's version."""
 
     folder: str
     scenario: str
@@ -51,7 +51,7 @@ class Result(msgspec.Struct, frozen=True):
 
 
 def trials_of(found: Sequence[Found], folder: Path, seeds: range) -> Iterator[Trial]:
-    """Yield every scenario with every seed, seed by seed: a campaign that is stopped early has some of each."""
+    """Yield every scenario with every seed, seed by seed, so that a campaign stopped early has all scenarios."""
     prints = [_fingerprint(each) for each in found]
     for seed in seeds:
         for each, fingerprint in zip(found, prints, strict=True):
@@ -60,7 +60,7 @@ def trials_of(found: Sequence[Found], folder: Path, seeds: range) -> Iterator[Tr
 
 
 def _fingerprint(found: Found) -> str:
-    """Tell one state of a scenario from another: its text, its world, recording and programs, and who plays it."""
+    """Return a hash of a scenario's text, world, recording and programs, and of roboglot's version."""
     digest = hashlib.sha256(version("roboglot").encode() + found.path.read_bytes())
     given, folder = found.scenario.given, found.path.parent
     for name in (given.world, given.recording, *(step.program for step in found.scenario.when)):
@@ -70,7 +70,7 @@ def _fingerprint(found: Found) -> str:
 
 
 def play_trial(trial: Trial, leave: Path | None) -> Result:
-    """Play it in this process; what a failed one leaves goes below ``leave``, if that is given."""
+    """Play a trial in this process; artifacts of a failed one go below ``leave``, if given."""
     from roboglot.testing.scenarios.runner import play
 
     found = with_seed(read(Path(trial.folder) / trial.scenario), trial.seed)

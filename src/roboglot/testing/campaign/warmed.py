@@ -1,4 +1,4 @@
-"""Loads what a trial needs when it is imported: by the process from which trials are forked."""
+"""Loads all modules that a trial needs; imported by the process from which trials are forked."""
 
 from __future__ import annotations
 

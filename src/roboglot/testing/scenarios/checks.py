@@ -1,4 +1,4 @@
-"""Checks of the world at the end of a scenario: each says what is wrong, or nothing."""
+"""Checks of the world at the end of a scenario; each returns what is wrong, or an empty text."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from roboglot.testing.server import RobotServer
 
 
 class Checker:
-    """Judges one scenario's server. ``printed`` grows while commands and programs print."""
+    """Checks the server of one scenario. ``printed`` grows while commands and programs print."""
 
     def __init__(self, server: RobotServer) -> None:
         self._server = server
@@ -24,7 +24,7 @@ class Checker:
         self._checks: Mapping[str, Callable[[object], str]] = {name: getattr(self, f"_{name}") for name in CHECKS}
 
     def wrong(self, check: Check) -> str:
-        """Return what is wrong in plain words; empty: it is true."""
+        """Return why the check fails, in plain words; empty if it holds."""
         verb = verb_of(check, CHECKS)
         if reason := self._checks[verb](getattr(check, verb)):
             return f"{verb}: {reason}"

@@ -1,4 +1,4 @@
-"""Scenario files: what they may say, read strictly; ``schema`` is the same as a JSON schema for editors."""
+"""Scenario files: their format, read strictly; ``schema`` returns it as a JSON schema for editors."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class BadScenario(ValueError):
 
 
 class _Strict(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """No field may be misspelt."""
+    """Base of structs that refuse unknown fields."""
 
 
 class Given(_Strict, frozen=True, forbid_unknown_fields=True):
@@ -40,7 +40,7 @@ class Given(_Strict, frozen=True, forbid_unknown_fields=True):
     doors: dict[str, Any] = {}
 
     def wanted(self, folder: Path) -> Wanted:
-        """Return it for a server; paths are relative to the scenario's folder. Raises BadScenario."""
+        """Return the requirements for a server; paths are relative to ``folder``. Raises BadScenario."""
         world = str(folder / self.world) if self.world.endswith((".toml", ".yaml")) else self.world
         recording = str(folder / self.recording) if self.recording else ""
         faults = tuple(map(fault_of, self.faults))
@@ -49,7 +49,7 @@ class Given(_Strict, frozen=True, forbid_unknown_fields=True):
 
 
 class Placing(_Strict, frozen=True, forbid_unknown_fields=True):
-    """Place to put a robot by hand: m and degrees of the world."""
+    """Place to put a robot at: m and degrees in the world's frame."""
 
     x: Meters
     y: Meters
@@ -58,7 +58,7 @@ class Placing(_Strict, frozen=True, forbid_unknown_fields=True):
 
 
 class Box(_Strict, frozen=True, forbid_unknown_fields=True):
-    """A box that is put into the world, m."""
+    """A box to put into the world, m."""
 
     x: Meters
     y: Meters
@@ -79,7 +79,7 @@ class Place(_Strict, frozen=True, forbid_unknown_fields=True):
 
 
 class Visits(_Strict, frozen=True, forbid_unknown_fields=True):
-    """Places [x, y] of the world that a robot must have come to, in this order; m."""
+    """Places [x, y] in the world (m) that a robot must have visited, in this order."""
 
     places: Annotated[tuple[tuple[float, float], ...], msgspec.Meta(min_length=1)]
     within: Annotated[float, msgspec.Meta(gt=0)] = 0.3
@@ -95,7 +95,7 @@ class Range(_Strict, frozen=True, forbid_unknown_fields=True):
 
 
 class Exchanged(_Strict, frozen=True, forbid_unknown_fields=True):
-    """Expected number of requests: at a door, of an operation, with that status; empty: any."""
+    """Expected number of requests by door, operation and status; empty: any."""
 
     door: str = ""
     operation: str = ""
@@ -108,8 +108,8 @@ class Exchanged(_Strict, frozen=True, forbid_unknown_fields=True):
 class Check(_Strict, frozen=True, forbid_unknown_fields=True):
     """One thing that must be true; exactly one of its fields is given.
 
-    ``travelled``: metres driven; ``battery``: percent; ``faults``: the robot's own, exactly these; ``refused``: so many
-    requests were refused at most; ``printed``: a text that a program or command printed.
+    ``travelled``: metres driven; ``battery``: percent; ``faults``: exactly the robot's own; ``refused``: maximum number
+    of refused requests; ``printed``: a text that a program or command printed.
     """
 
     pose: Place | None = None
@@ -127,7 +127,7 @@ class Step(_Strict, frozen=True, forbid_unknown_fields=True):
     """One thing that happens; exactly one of ``STEPS`` is given, the rest belongs to it.
 
     ``run``: a command of the shell that must end with 0 within ``within`` real seconds; its variables ROBOGLOT_ADDRESS,
-    ROBOGLOT_URL, ROBOGLOT_PROGRAMS, ROBOGLOT_CERTIFICATES and ROBOGLOT_APP_PORT lead it to the robot. ``rest``: a
+    ROBOGLOT_URL, ROBOGLOT_PROGRAMS, ROBOGLOT_CERTIFICATES and ROBOGLOT_APP_PORT point to the robot. ``rest``: a
     request ("GET /path") with ``body``, expecting ``status`` and an ``answer`` with at least these fields. ``text``: a
     command of the text protocol, expecting ``answer``. ``dog``: a code of the app protocol with ``body`` as its
     parameters, expecting ``answer`` among its answers. ``program``: a file with a block program. ``wait``: s of robot
@@ -157,7 +157,7 @@ CHECKS = tuple(field.name for field in msgspec.structs.fields(Check))
 
 
 class Scenario(_Strict, frozen=True, forbid_unknown_fields=True):
-    """One test: ``given`` a world, ``when`` this happens in order, ``then`` all of that is true."""
+    """One test: ``given`` a world, ``when`` these steps are done in order, ``then`` all of these checks hold."""
 
     name: str
     when: tuple[Step, ...]
@@ -168,7 +168,7 @@ class Scenario(_Strict, frozen=True, forbid_unknown_fields=True):
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Found:
-    """A scenario and where it was."""
+    """A scenario and its file."""
 
     path: Path
     scenario: Scenario
@@ -192,7 +192,7 @@ def fault_of(value: str | Mapping[str, Any]) -> WantedFault:
 
 
 def verb_of(value: Step | Check, verbs: Sequence[str]) -> str:
-    """Return the one verb that is given. Raises BadScenario."""
+    """Return the only one of ``verbs`` that is given. Raises BadScenario."""
     given = [verb for verb in verbs if getattr(value, verb) is not None]
     if len(given) != 1:
         raise BadScenario(f"one of {', '.join(verbs)} is needed, not {' and '.join(given) or 'none'}")
@@ -218,7 +218,7 @@ def read(path: Path) -> Found:
 
 
 def _check(scenario: Scenario) -> None:
-    """Raise BadScenario for what a schema of single fields cannot see."""
+    """Raise BadScenario for errors across fields, which a schema cannot express."""
     parts: list[tuple[str, Step | Check, Sequence[str]]] = []
     for number, step in enumerate(scenario.when, 1):
         parts.append((f"when {number}", step, STEPS))

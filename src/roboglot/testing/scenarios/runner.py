@@ -1,4 +1,4 @@
-"""Plays scenarios one after the other, each on robots of its own; keeps what failed ones leave; writes JUnit."""
+"""Plays scenarios one after the other, each on its own robots; keeps artifacts of failed ones; writes JUnit."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from roboglot.testing.server import RobotServer
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """Outcome of a scenario: ``failures`` in plain words (none: it passed), real seconds, and its artifacts."""
+    """Outcome of a scenario: ``failures`` in plain words (none: passed), duration (real s) and artifacts."""
 
     found: Found
     failures: Sequence[str]
@@ -27,7 +27,7 @@ class Outcome:
 
 
 def play(found: Found, leave: Path) -> Outcome:
-    """Play one scenario; what a failed one leaves goes into a folder below ``leave``."""
+    """Play one scenario; artifacts of a failed one go into a folder below ``leave``."""
     began = time.monotonic()  # noqa: TID251 - what CI shows as the test's time
     try:
         with RobotServer(found.scenario.given.wanted(found.path.parent)) as server:
@@ -62,7 +62,7 @@ def play_all(all_found: Sequence[Found], leave: Path, report: Callable[[Outcome]
 
 
 def junit(outcomes: Sequence[Outcome]) -> bytes:
-    """Return the report as CI systems read it, with what failed scenarios left as attachments."""
+    """Return a JUnit report, with the artifacts of failed scenarios as attachments."""
     failed, broken = sum(bool(o.failures) and not o.broken for o in outcomes), sum(o.broken for o in outcomes)
     suite = ElementTree.Element(
         "testsuite",
@@ -90,5 +90,5 @@ def junit(outcomes: Sequence[Outcome]) -> bytes:
 
 
 def _clean(text: str) -> str:
-    """Return it without what XML cannot carry."""
+    """Replace characters that XML cannot carry."""
     return "".join(c if c in "\t\n" or (c >= " " and not 0xD800 <= ord(c) <= 0xDFFF) else "\ufffd" for c in text)

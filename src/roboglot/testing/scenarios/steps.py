@@ -1,4 +1,4 @@
-"""Steps of a scenario: each does one thing, and raises StepFailed where it does not go as written."""
+"""Steps of a scenario: each does one thing, and raises StepFailed if the result is not the expected one."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ ANSWER_MAX = 16 << 20
 
 
 class StepFailed(AssertionError):
-    """A step did not go as written; the message says how it went."""
+    """A step did not have the expected result; the message names the actual one."""
 
 
 class Steps:
@@ -39,7 +39,7 @@ class Steps:
         self._verbs: Mapping[str, Callable[[Step], None]] = {name: getattr(self, f"_{name}") for name in STEPS}
 
     def play(self, step: Step) -> None:
-        """Do it. Raises StepFailed."""
+        """Play one step. Raises StepFailed."""
         verb = verb_of(step, STEPS)
         try:
             self._verbs[verb](step)
@@ -47,7 +47,7 @@ class Steps:
             raise StepFailed(f"{verb}: {error or type(error).__name__}") from None
 
     def environment(self) -> dict[str, str]:
-        """Return the variables of a command that lead it to the robots."""
+        """Return a command's environment, with variables that point to the robots."""
         server, found = self._server, dict(os.environ)
         for name, address in server.addresses.items():
             found[f"ROBOGLOT_ADDRESS_{name.upper()}"] = address
@@ -82,7 +82,7 @@ class Steps:
             _end_group(process)
             output, _ = process.communicate()
             raise StepFailed(f"{command!r} has not ended after {step.within:g} s\n{output[-SHOWN_MAX:]}") from None
-        except BaseException:  # Ctrl-C, too, must leave no process behind
+        except BaseException:  # even Ctrl-C must leave no process behind
             _end_group(process)
             raise
         self._checker.printed += output[-OUTPUT_MAX:].splitlines()
@@ -162,13 +162,13 @@ class Steps:
 
 
 def _end_group(process: subprocess.Popen[str]) -> None:
-    """End a command and all that it started."""
+    """Kill a command and its children."""
     with contextlib.suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
 
 
 def _has(have: object, wanted: object) -> bool:
-    """Return whether an answer has all that is wanted, and maybe more."""
+    """Return whether ``have`` contains at least ``wanted``."""
     if isinstance(wanted, dict):
         return isinstance(have, dict) and all(key in have and _has(have[key], value) for key, value in wanted.items())
     if isinstance(wanted, list):
