@@ -1,6 +1,6 @@
-"""Components of the model over a real robot, which is reached by a client of its own protocol.
+"""Components of the model over a real robot, connected by a client of its own protocol.
 
-Units and frames are translated once, here; what the robot does not have is not added. Each package is described by its
+Units and frames are converted once, here; components that the robot lacks are not added. Each package exports its
 ``DRIVER``. Another driver is one more line.
 """
 

@@ -25,19 +25,19 @@ class Driver(ABC):
         self.supervisor.touches = touches
 
     async def start(self, *, wait: bool) -> None:
-        """Connect from now on. ``wait``: return when the first try is over; never raises for a robot that is away."""
+        """Connect, and keep trying. ``wait``: return after the first attempt. Never raises for an unreachable robot."""
         self.supervisor.start()
         if wait:
             await self.supervisor.first_try()
 
     async def close(self) -> None:
-        """Disconnect for good. The fleet has cancelled the robot's actions before."""
+        """Brake and disconnect for good. The fleet cancels the robot's actions first."""
         await self.supervisor.close(self.brake())
         await self.hang_up()
 
     @abstractmethod
     async def begin(self) -> None:
-        """Connect and learn what the robot has. Raises ClientError, OSError."""
+        """Connect and probe the robot's components. Raises ClientError, OSError."""
 
     @abstractmethod
     async def serve(self) -> None:
@@ -45,7 +45,7 @@ class Driver(ABC):
 
     @abstractmethod
     async def brake(self) -> None:
-        """Return when the robot has been commanded to stand still, or cannot be reached."""
+        """Command the robot to stand still; return when the command was sent or has failed."""
 
     @abstractmethod
     async def hang_up(self) -> None:

@@ -15,7 +15,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """Address of a real robot: the parts of its URL, whose options are among those of its driver."""
+    """Address of a real robot: the parts of its URL, with options that its driver knows."""
 
     url: str
     host: str
@@ -23,7 +23,7 @@ class Target:
     options: Mapping[str, str]
 
     def port_option(self, name: str, default: int) -> int:
-        """Return an option that is a port. Raises ValueError."""
+        """Return the port number in option ``name``. Raises ValueError."""
         text = self.options.get(name, str(default))
         if not text.isascii() or not text.isdigit() or int(text) > 65_535:
             raise ValueError(f"{self.url}: {name} is a port")
@@ -42,7 +42,7 @@ class Workshop:
     _shared: dict[Hashable, object] = field(default_factory=dict)
 
     def shared(self, key: Hashable, make: Callable[[], T]) -> T:
-        """Return the one thing of this key, made when it is asked for first: a UDP port can be bound once."""
+        """Return the object of this key, made at the first call: a UDP port, for one, can be bound only once."""
         if key not in self._shared:
             self._shared[key] = make()
         return cast(T, self._shared[key])
@@ -53,7 +53,7 @@ class DriverType:
     """One driver. It is imported at every start: ``make`` and ``announced`` import what they need.
 
     ``make`` adds the components to the bare robot; it raises ValueError for a bad URL. ``announced``: the components
-    that a robot of this kind has or may have, each with how it is only nearly the model's, in plain words, or "".
+    that such a robot has or may have, each with a plain description of what is approximate about it, or "".
     ``example``: options without which a URL is refused.
     """
 

@@ -11,7 +11,7 @@ from roboglot.model.errors import RobotError, Unconnected
 
 @contextmanager
 def model_errors(translated: Callable[[ClientError], RobotError | None]) -> Iterator[None]:
-    """Raise the model's error for a client's one. ``translated`` returns None for errors without a special meaning."""
+    """Raise client errors as model errors. ``translated`` returns None for errors without a special meaning."""
     try:
         yield
     except LinkLost as error:

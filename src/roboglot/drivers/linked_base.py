@@ -14,7 +14,7 @@ OFF_DOCK = 0.6  # m straight ahead of a dock: off its contacts, with room to tur
 
 
 class LinkedBase(Base):
-    """Takes velocities only; drivers of robots with controllable wheels override ``set_wheel_speeds``."""
+    """Accepts velocities only; drivers of robots with controllable wheels override ``set_wheel_speeds``."""
 
     wheels = "the wheels of this robot cannot be turned one by one"  # named in refusals
 

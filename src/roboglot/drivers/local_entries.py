@@ -1,4 +1,4 @@
-"""Local side of an EntrySync: places by id, lines and areas by content, as each side numbers them on its own."""
+"""Local side of an EntrySync: places by id; lines and areas by content, as each side numbers them on its own."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ DESCRIBED = Path(__file__).parent / "odometry.toml"
 
 
 class ReportedLidar(Lidar):
-    """Scans as the robot sends them or the driver polls them: five a second."""
+    """Scans pushed by the robot or polled by the driver, five a second."""
 
     rate = 5.0
 
@@ -71,7 +71,7 @@ class ReportedMap(Protocol):
 
 
 class ReportedMapping(Mapping):
-    """The latest map of the robot; drivers add the operations that their protocol has."""
+    """The latest map of the robot; drivers add the operations of their protocol."""
 
     def __init__(self, reported: ReportedMap) -> None:
         self._reported_map = reported

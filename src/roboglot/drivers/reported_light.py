@@ -19,7 +19,7 @@ from roboglot.model.errors import InvalidGoal
 
 
 class ReportedLight(ShownLight):
-    """Subclasses list the ``effects`` of their robot and ``send_zone`` one of them."""
+    """Subclasses list the ``effects`` of their robot, and send them in ``send_zone``."""
 
     effects: Collection[LightEffect]
     singly = True  # whether single lamps of a zone can be set

@@ -14,7 +14,7 @@ OPTIONS_MAX = 16
 
 
 class Drivers:
-    """Makes the drivers of one program and holds what they share. Without ``touches`` robots are only observed.
+    """Makes the drivers of one program and holds their shared state. Without ``touches`` robots are only observed.
 
     ``own``: addresses of the program's own doors, which discovery ignores.
     """

@@ -36,7 +36,7 @@ class OptionalComponents:
         self._power = CyberDogPower(robot, client, supervisor, status)
 
     async def learn(self) -> None:
-        """Probe the dog and add what it has. Raises LinkLost if the dog is gone."""
+        """Probe the dog and add the components found. Raises LinkLost if the dog is gone."""
         with contextlib.suppress(*UNSUPPORTED):
             await self._status.ask()
         robot = self._robot

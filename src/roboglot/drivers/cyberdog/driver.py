@@ -73,7 +73,7 @@ LOOK = 0.1  # s between two looks at the heartbeat
 
 
 class CyberDogDriver(Driver):
-    """Connects ``robot`` to the dog at ``host``; ``app_port`` is where the dog calls back."""
+    """Connects ``robot`` to the dog at ``host``; ``app_port``: port on which the dog calls back."""
 
     def __init__(
         self,

@@ -16,7 +16,7 @@ from roboglot.model.components.system.network import NetworkMode
 from roboglot.model.robot import Robot
 from roboglot.wire.cyberdog.chapters.system import LEGS
 
-UNSUPPORTED = (*ABSENT, NoAnswer)  # how dogs answer for what they lack
+UNSUPPORTED = (*ABSENT, NoAnswer)  # errors for functions that a dog lacks
 PERIOD = 2.0  # s between two polls
 TOPICS = ("wifi", "bat_info", "motor_temper", "volume", "lowpower_control")
 JOINTS = {"hip": "hip", "thigh": "thigh", "crus": "knee"}
@@ -79,7 +79,7 @@ class StatusPoll:
 
 
 def temperatures_of(reply: Mapping[str, object]) -> dict[str, float]:
-    """Return Celsius by motor name; missing ones are left out."""
+    """Return temperatures (degrees Celsius) by motor name; missing motors are left out."""
     warm = {}
     for joint, name in JOINTS.items():
         values = reply.get(joint)

@@ -48,7 +48,7 @@ from roboglot.model.robot import Robot
 
 
 class OptionalComponents:
-    """Holds every optional component. ``refreshed`` lists the polls of those that are present and do not push."""
+    """Holds every optional component. ``refreshed`` lists the polls of present components without pushes."""
 
     def __init__(self, robot: Robot, client: RoboMasterClient, supervisor: Supervisor, reported: ReportedState) -> None:
         clock = robot.clock

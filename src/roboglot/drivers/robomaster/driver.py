@@ -1,7 +1,7 @@
 """The RoboMaster driver: exposes one EP as components of the model.
 
-Autonomy drives it over the wheels and the robot's odometry. The connection is the lease: the robot obeys the connected
-client and stops when that connection ends.
+Autonomy drives it by its wheels and odometry. The connection is the lease: the robot obeys the connected client and
+stops when that connection ends.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ GOOD = 0.002  # m
 
 
 class RoboMasterArm(Arm):
-    """``reach`` and ``home`` are those of a stock EP; the robot refuses positions out of its reach."""
+    """``reach`` and ``home`` are a stock EP's; the robot refuses positions out of reach."""
 
     reach, home = REACH, HOME
 

@@ -1,8 +1,8 @@
 """Mecanum wheels: the latest velocity is sent repeatedly as a short ``chassis move`` that ends by itself.
 
-An EP keeps a ``chassis speed`` while the connection stands, even if the client falls silent. A move that is renewed
+An EP keeps a ``chassis speed`` while the connection lasts, even if the client falls silent. A move that is renewed
 before it ends is its only bounded motion. Unless ``bounded``, velocities are sent by ``chassis speed``.
-One command is under way at a time; a later one replaces the waiting one, so nothing queues behind a slow link.
+One command is in flight at a time; a later one replaces the pending one, so nothing queues behind a slow link.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ class RoboMasterBase(LinkedBase):
         return self._reported.twist
 
     async def stop(self) -> None:
-        """Brake; return when the command was sent, or cannot be."""
+        """Brake; return when the command was sent or has failed."""
         self.set_velocity(STILL)
         if self._sending is not None:
             await asyncio.wait([self._sending])
@@ -119,7 +119,7 @@ class RoboMasterBase(LinkedBase):
             await self._client.chassis.wheel(*wheel_words(target, self._client.as_robots))
 
     async def _push(self, twist: Twist) -> None:
-        """Send a move as far as this velocity goes until the next renewal, with a margin."""
+        """Send a move that covers this velocity until the next renewal, with a margin."""
         slowest, slowest_turn = (SLOWEST, SLOWEST_TURN) if self._client.as_robots else (0.0, 0.0)
         speed, turn = max(twist.speed, slowest), max(abs(twist.yaw), slowest_turn)
         period = max(REMINDER, self._reported.latency)

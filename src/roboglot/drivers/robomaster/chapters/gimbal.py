@@ -34,7 +34,7 @@ LIMITS = GimbalLimits(
 
 
 class RoboMasterGimbal(Gimbal):
-    """Mode and suspension are those that this client set; the robot does not report changes by others."""
+    """Mode and suspension are this client's settings; the robot does not report changes by others."""
 
     limits = LIMITS
 
@@ -44,7 +44,7 @@ class RoboMasterGimbal(Gimbal):
         self._mode, self._suspended = FollowMode.CHASSIS_LEAD, False
 
     async def learn(self) -> None:
-        """Poll the mode. Raises RefusedByRobot if there is no gimbal, which only its attitude shows."""
+        """Poll attitude and mode. Raises RefusedByRobot without a gimbal; only the attitude shows that."""
         await self._client.gimbal.get_attitude()
         words = await self._client.robot.get_mode()
         self._mode = next((mode for mode in FollowMode if mode == words), FollowMode.CHASSIS_LEAD)
@@ -199,7 +199,7 @@ class RoboMasterGimbal(Gimbal):
 
 
 def _degrees(angle: float | None) -> float | None:
-    """Return degrees; pitch up and yaw right are positive for the EP."""
+    """Return degrees with the EP's signs: pitch up and yaw right are positive."""
     return None if angle is None else -math.degrees(angle)
 
 

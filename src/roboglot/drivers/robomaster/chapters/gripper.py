@@ -13,7 +13,7 @@ from roboglot.model.robot import Robot
 
 OPENINGS = {GripperStatus.CLOSED: 0.0, GripperStatus.BETWEEN: 0.05, GripperStatus.OPEN: 0.10}  # m
 CLOSING_SECONDS = 2.8  # at level 1; shorter at higher levels
-SPARE_SECONDS = 0.5  # that a motion may take longer
+SPARE_SECONDS = 0.5  # tolerated delay of a motion
 
 
 class RoboMasterGripper(Gripper):

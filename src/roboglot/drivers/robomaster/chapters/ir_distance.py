@@ -18,7 +18,7 @@ RANGE_MIN, RANGE_MAX, FIELD_OF_VIEW, HEIGHT = 0.05, 10.0, 0.35, 0.07
 
 
 class RoboMasterRanges(RangeSensors):
-    """The sensors that answer, counted from the first."""
+    """The sensors that answer, without gaps from the first on."""
 
     def __init__(self, clock: Clock, client: RoboMasterClient, supervisor: Supervisor) -> None:
         self._clock, self._client, self._supervisor = clock, client, supervisor

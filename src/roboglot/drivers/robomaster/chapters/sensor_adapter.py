@@ -29,7 +29,7 @@ class _Input:
 
 
 class RoboMasterAdapters(SensorAdapters):
-    """The adapters that answer, counted from the first; one input is polled every 0.1 s."""
+    """The adapters that answer, without gaps from the first on; one input is polled every 0.1 s."""
 
     ports, voltage_max = PORTS, VOLTAGE_MAX
 

@@ -19,7 +19,7 @@ GOOD = math.radians(1.0)
 
 
 class RoboMasterServos(Servos):
-    """The servos that answer, counted from the first. The robot sets their pace: ``speed`` of a move is ignored."""
+    """The servos that answer, without gaps from the first on. The robot sets their speed: ``speed`` is ignored."""
 
     limit, speed = math.pi, math.radians(1800)
 

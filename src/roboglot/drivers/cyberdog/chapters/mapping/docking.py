@@ -12,7 +12,7 @@ from roboglot.model.geometry import Pose
 
 
 class CyberDogDocking(Docking):
-    """6004 type 9."""
+    """Docking by task 6004, type 9."""
 
     def __init__(self, skills: Skills) -> None:
         self._skills = skills

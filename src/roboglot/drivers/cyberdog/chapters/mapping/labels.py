@@ -17,7 +17,7 @@ SAME = 0.005  # m
 
 
 class CyberDogPlaces:
-    """6002 and 6003. Unnamed places are no labels; of two with the same name the later counts."""
+    """Labels by 6002 and 6003. Unnamed places are not sent; of two with the same name the later counts."""
 
     def __init__(self, robot: Robot, client: CyberDogClient) -> None:
         self._robot, self._client = robot, client

@@ -9,7 +9,7 @@ from roboglot.model.maps import OccupancyGrid
 
 
 class CyberDogMapping(ReportedMapping):
-    """Pushes 6001 and 6003; read-only."""
+    """Map from pushes 6001 and 6003; read-only."""
 
     @property
     def enabled(self) -> bool:

@@ -17,7 +17,7 @@ FRESH = 1.0  # s: maximum age of a pose for the dog to count as localized
 
 
 class CyberDogNavigation(Navigation):
-    """6004 type 1; the dog has to be localized."""
+    """Navigation by task 6004, type 1; the dog has to be localized."""
 
     def __init__(self, skills: Skills) -> None:
         self._skills = skills
@@ -45,7 +45,7 @@ class CyberDogNavigation(Navigation):
 
 
 class CyberDogLocalization(Localization):
-    """Pushes 6005, and 6004 type 7."""
+    """Poses from pushes 6005; relocalization by task 6004, type 7."""
 
     def __init__(self, skills: Skills) -> None:
         self._skills = skills
@@ -56,7 +56,7 @@ class CyberDogLocalization(Localization):
 
     @property
     def quality(self) -> float:
-        """Return 1 while poses arrive, else 0: the dog reports nothing finer."""
+        """1 while poses arrive, else 0: the dog reports no finer value."""
         return float(self.enabled)
 
     @property

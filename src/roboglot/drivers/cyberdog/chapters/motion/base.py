@@ -1,4 +1,4 @@
-"""Walks by servo frames, twelve a second while a velocity stands. A dog without frames for 0.2 s stands still."""
+"""Walks by servo frames, twelve a second while a velocity is set. A dog without frames for 0.2 s stands still."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class CyberDogBase(LinkedBase):
         return self._reported.reckon(self._clock.time()).twist
 
     async def stop(self) -> None:
-        """Stand still; return when the command was sent, or cannot be."""
+        """Stand still; return when the command was sent or has failed."""
         self.set_velocity(STILL)
         if self._sending is not None:
             await asyncio.wait([self._sending])

@@ -44,7 +44,7 @@ LIMITS = LegLimits(
 )  # beyond these the dog refuses by itself, too
 LONG_MAX = 90.0  # s: the longest dance, with some margin
 LOOK = 0.5  # s between two heartbeats
-POSE = 211  # absolute, in a given time
+POSE = 211  # an absolute body pose, in a given time
 
 
 class CyberDogLegs(Legs):

@@ -13,7 +13,7 @@ from roboglot.wire.slamware.geometry import Pose2D
 
 
 class SlamwarePlaces:
-    """``artifact/v1/pois``."""
+    """Points of interest by ``artifact/v1/pois``."""
 
     def __init__(self, client: SlamwareClient) -> None:
         self._client = client

@@ -1,1 +1,1 @@
-"""Chapter "motion": velocities, moves, navigation, docking: what the robot does as actions."""
+"""Chapter "motion": velocities, moves, navigation and docking, all actions of the robot."""

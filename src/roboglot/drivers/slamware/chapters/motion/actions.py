@@ -30,7 +30,7 @@ Feedback = Callable[[ActionInfo], Awaitable[object]]
 
 @dataclass(frozen=True, slots=True)
 class VendorAction:
-    """An action in the vendor's words, and what makes the model's feedback of its."""
+    """An action in the vendor's words, and the function that converts its feedback to the model's."""
 
     name: str
     options: msgspec.Struct | None

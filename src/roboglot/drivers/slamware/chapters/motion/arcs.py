@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from roboglot.model.geometry import Pose, Twist, wrap_angle
 
-SLICE = 0.3  # s of one straight or turn at least, as a robot needs time to accelerate
+SLICE = 0.3  # minimum s of one straight or turn, as a robot needs time to accelerate
 
 
 class ArcSplitter:

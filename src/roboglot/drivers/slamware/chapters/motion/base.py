@@ -1,6 +1,6 @@
-"""Velocity control for a robot that only has remote control: pulses of MoveBy that end by themselves.
+"""Velocity control for a robot with remote control only: pulses of MoveBy that end by themselves.
 
-A pulse lasts 0.4 s and is renewed while the velocity stands, so the robot stops within half a second when this program,
+A pulse lasts 0.4 s and is renewed while the velocity is set, so the robot stops within half a second if this program,
 its machine or the network is gone. A pulse either drives or turns: an arc becomes short turns between short
 straights. The robot sets the speed of a pulse; its speed limit, restored afterwards, makes it slower.
 """
@@ -79,7 +79,7 @@ class SlamwareBase(LinkedBase):
         self.limits = _limits(speed, yaw_speed)
 
     async def stop(self) -> None:
-        """Brake; return when the command was sent, or cannot be."""
+        """Brake; return when the command was sent or has failed."""
         self.set_velocity(STILL)
         await self._still.wait()
 

@@ -17,7 +17,7 @@ from roboglot.wire.slamware.chapters.motion import ActionInfo, GoHomeOptions
 
 
 class SlamwareDocking(Docking):
-    """``homepose`` and GoHome."""
+    """Docking by ``homepose`` and GoHome."""
 
     def __init__(
         self,

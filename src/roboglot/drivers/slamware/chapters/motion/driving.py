@@ -1,4 +1,4 @@
-"""Manual driving over pulses: velocities, and short moves closed over the robot's odometry.
+"""Manual driving by pulses: velocities, and short moves controlled by the robot's odometry.
 
 Autonomy's driving does not fit: it needs a base that steers and drives at the same time.
 """
@@ -28,7 +28,7 @@ MOVE_MAX, TURN_MAX, LIFETIME_MAX = 1000.0, 1000.0, 86_400.0  # m, rad, s
 GOOD, GOOD_YAW = 0.005, math.radians(0.4)  # m, rad: tolerance of the goal; the latency of the link adds to it
 LEAD = 0.09  # s that braking takes
 SLOW, SLOW_YAW = 0.03, 0.06  # m/s, rad/s: speeds of the last centimetres
-GAIN, GAIN_YAW = 1.2, 1.8  # 1/s: of the way left
+GAIN, GAIN_YAW = 1.2, 1.8  # 1/s: speed per remaining way
 PATIENCE = 3.0  # s without progress before giving up
 SETTLED = 0.3  # s of standstill before the result counts, as odometry is delayed
 TRIES_MAX = 4

@@ -36,13 +36,13 @@ else:
 
 GOALS_MAX, PLACES_MAX = 1000, 500
 MODES = {Tracks.FREE: 0, Tracks.STRICT: 1, Tracks.PREFERRED: 2}
-HERE = 0.5  # m from the robot within which a path may begin: robots search from where they stand
+HERE = 0.5  # m from the robot within which a path may begin: robots plan from their own position
 PRECISE = 0.1  # m of tolerance up to which the precise flag is set
 TOUR_PASSES = 30
 
 
 class SlamwareNavigation(Navigation):
-    """MoveTo and SeriesMoveTo. The robot plans and avoids by itself, also while the link is down."""
+    """Navigation by MoveTo and SeriesMoveTo. The robot plans and avoids by itself, even while the link is down."""
 
     def __init__(self, client: SlamwareClient, runner: ActionRunner, reported: ReportedState) -> None:
         self._client, self._runner, self._reported = client, runner, reported
@@ -75,7 +75,7 @@ class SlamwareNavigation(Navigation):
         return Path.through(found.path_points)
 
     async def visiting_order(self, places: Sequence[Point], *, round_trip: bool = False) -> Sequence[int]:
-        """Order places by straight-line distances: the robot plans only its own paths."""
+        """Return an order of visits by straight-line distances, as the robot plans only from its own position."""
         if len(places) > PLACES_MAX:
             raise InvalidGoal(f"at most {PLACES_MAX} places, not {len(places)}")
         if not places:

@@ -22,7 +22,7 @@ class SpeedLimitRestore:
         self.speed: float | None = None
 
     async def remember(self, speed: float) -> None:
-        """Store the limit before its first change. Return when it is safe on disk."""
+        """Store the limit before its first change; return when it is on disk."""
         if self.speed is None:
             self.speed = speed
             await self._store([self._link.address, speed])

@@ -60,7 +60,7 @@ class SlamwareEmergencyStop(EmergencyStop):
         health.changed = self._take
 
     async def learn(self) -> None:
-        """Probe once, by releasing a stop that is already released. Raises SlamwareRefused if there is none."""
+        """Probe once, by releasing a released stop. Raises SlamwareRefused if there is none."""
         if self._known:
             return
         await self._health.refresh()

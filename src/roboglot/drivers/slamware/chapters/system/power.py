@@ -28,7 +28,7 @@ class SlamwarePower(Power):
         self._mode = PowerMode.AWAKE
 
     async def learn(self) -> None:
-        """Raises SlamwareRefused if the robot cannot sleep. Leaves a sleeping robot asleep."""
+        """Probe sleep; leaves a sleeping robot asleep. Raises SlamwareRefused if the robot cannot sleep."""
         if self._mode is PowerMode.AWAKE:
             await self._client.wakeup()
 
