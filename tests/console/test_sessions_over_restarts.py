@@ -45,7 +45,21 @@ async def test_file_lets_no_one_in_but_the_cookie(tmp_path: Path) -> None:
     assert second.find(cookie) == found
     second.close()
     now += LIFETIME
-    assert Sessions(SessionFile(tmp_path / "s.db"), lambda: now).find(cookie) is None
+    third = Sessions(SessionFile(tmp_path / "s.db"), lambda: now)
+    assert third.find(cookie) is None
+    third.close()
+
+
+async def test_who_is_put_out_while_signing_in_stays_out(tmp_path: Path) -> None:
+    now = 1000.0
+    first = Sessions(SessionFile(tmp_path / "s.db"), lambda: now)
+    await first.open(PROOF, "ben")
+    now += LIFETIME  # his row is to be deleted, for which the next one waits
+    await asyncio.gather(first.open(PROOF, "anna"), first.end_all_of("anna"))
+    first.close()
+    second = Sessions(SessionFile(tmp_path / "s.db"), lambda: now)
+    assert second.all() == []
+    second.close()
 
 
 async def test_a_row_that_was_changed_is_no_session(tmp_path: Path) -> None:
@@ -55,6 +69,7 @@ async def test_a_row_that_was_changed_is_no_session(tmp_path: Path) -> None:
     [kept] = file.load(0.0)
     await file.keep(KeptSession(kept.key, "mx", seal(PROOF, "another cookie"), kept.until, "", ""))
     assert Sessions(file).find(cookie) is None
+    before.close()
 
 
 def me(url: str, cookie: str) -> str:

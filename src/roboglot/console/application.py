@@ -71,7 +71,6 @@ class Application:
         if self._metrics is not None:
             self._metrics.close()
         await self._api.calls.close()
-        await asyncio.to_thread(self._login.close)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "http":

@@ -49,6 +49,7 @@ class Console:
         self._tasks: list[asyncio.Task[None]] = []
         self._server: asyncio.Server | None = None
         self._application: Application | None = None
+        self._login: asyncio.Task[Sessions] | None = None
         self._connections: AbstractSet[asyncio.BaseProtocol] = set()
 
     @property
@@ -89,7 +90,8 @@ class Console:
 
         browsers = Browsers("[console]", self._config.origins, self._config.hosts)
         classroom = await asyncio.to_thread(self._build_classroom)
-        login = await asyncio.to_thread(self._open_sessions)
+        self._login = asyncio.get_running_loop().create_task(asyncio.to_thread(self._open_sessions), name="sessions")
+        login = await asyncio.shield(self._login)  # closed even if this ends before it is open
         self._application = Application(self._desk, browsers, classroom, login, self.address)
         config = Config(
             self._application,
@@ -129,7 +131,12 @@ class Console:
         if self._desk.sessions is None:
             return Sessions()
         try:
-            return Sessions(SessionFile(self._desk.sessions))
+            file = SessionFile(self._desk.sessions)
+            try:
+                return Sessions(file)
+            except RobotError:
+                file.close()
+                raise
         except (OSError, ValueError, sqlite3.Error, RobotError) as error:
             log.error("cannot read who was signed in, all sign in again: %s: %s", self._desk.sessions, error)
             return Sessions()
@@ -172,7 +179,12 @@ class Console:
         for connection in list(self._connections):
             if (transport := getattr(connection, "transport", None)) is not None:
                 transport.abort()
+        await self._close_sessions()  # last: who signs out until now stays signed out
         self.port = 0
+
+    async def _close_sessions(self) -> None:
+        if self._login is not None:
+            await asyncio.to_thread((await self._login).close)
 
 
 def those_due(pages: Sequence[Page], number: int) -> list[Page]:

@@ -60,11 +60,11 @@ class Sessions:
         if len(self._sessions) - len(ended) >= SESSIONS_MAX:
             ended.append(next(key for key in self._sessions if key not in ended))
         token = secrets.token_urlsafe(TOKEN_BYTES)
-        session = self._sessions[_key(token)] = Session(proof, name, now + LIFETIME, robot, code)
+        key, until = _key(token), now + LIFETIME
+        self._sessions[key] = Session(proof, name, until, robot, code)
         await self._drop(ended)
-        if self._file is not None:
-            kept = KeptSession(_key(token), name, seal(proof, token), session.until, robot, code)
-            await self._file.keep(kept)
+        if self._file is not None and key in self._sessions:  # not put out meanwhile
+            await self._file.keep(KeptSession(key, name, seal(proof, token), until, robot, code))
         return token
 
     def find(self, token: str) -> Session | None:
