@@ -1,7 +1,7 @@
 """Components made of other components: driving, localization and mapping, navigation, docking.
 
-They see the robot's own parts (Lidar, Odometry, Base, Legs, DockContact) and nothing of the world behind them, hence
-run the same over a simulated and a real robot.
+They use the robot's own parts (Lidar, Odometry, Base, Legs, DockContact) and never the world behind them, so they run
+alike on simulated and real robots.
 """
 
 from roboglot.extras import explaining

@@ -19,7 +19,7 @@ async def computed(clock: Clock, work: Callable[[], T]) -> T:
 
 
 def compute_soon(clock: Clock, work: Callable[[], T], then: Callable[[T], None]) -> asyncio.Task[None] | None:
-    """Call ``then`` with what ``work`` returns: at once in lockstep, otherwise when a thread is done with it."""
+    """Call ``then`` with the result of ``work``: at once in lockstep, otherwise when a thread has computed it."""
     if isinstance(clock, LockstepClock):
         then(work())
         return None

@@ -1,1 +1,1 @@
-"""Floors of a building: riding the lift, and one stored map, dock and set of annotations a floor."""
+"""Floors of a building: riding the lift, and one stored map, dock and set of annotations per floor."""

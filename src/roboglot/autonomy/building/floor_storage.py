@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(slots=True)
 class Storey:
-    """State of one floor; poses in its map."""
+    """State of one floor; poses are in its map (m, rad)."""
 
     map: EvidenceGrid
     home: Pose | None
@@ -48,14 +48,14 @@ class _File(msgspec.Struct):
 
 
 class StoreyShelf:
-    """Floors by number. Without a FileStore they are kept in memory alone."""
+    """Storage of floors by number; in memory only for a robot without a FileStore."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._storeys: dict[int, Storey] = {}
 
     async def put(self, floor: int, storey: Storey, *, lasting: bool) -> None:
-        """Put it aside; ``lasting``: on disk too, unless that fails."""
+        """Store a floor; ``lasting``: on disk too, with a warning if that fails."""
         self._storeys[floor] = storey
         if lasting and FileStore in self._robot:
             try:
@@ -64,7 +64,7 @@ class StoreyShelf:
                 log.warning("the map of floor %d of robot %s is kept in memory only: %s", floor, self._robot.id, error)
 
     async def take(self, floor: int) -> Storey | None:
-        """The floor's, or None if it was never put aside."""
+        """Remove a floor's state from memory and return it, or read it from disk; None: never stored or unreadable."""
         storey = self._storeys.pop(floor, None)
         if storey is None and FileStore in self._robot:
             with contextlib.suppress(NotFound):

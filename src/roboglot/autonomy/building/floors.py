@@ -1,6 +1,6 @@
-"""Riding the lift, and one map, dock and set of annotations a floor.
+"""Riding the lift, and one map, dock and set of annotations per floor.
 
-Other floors' are on disk, too: after a restart they are there again when the robot comes to them.
+Those of other floors are kept on disk, too, and are restored after a restart when the robot gets there.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ TRIP_MAX = 10.0  # m between the waiting place and the car
 
 
 class LiftFloors(Floors):
-    """Straight through the door by what the lidar sees; the map sleeps in the car."""
+    """Floors reached by lift: straight through the door by the lidar, without mapping in the car."""
 
     def __init__(self, robot: Robot, belief: Belief, navigation: GridNavigation) -> None:
         self.robot, self.belief, self.navigation = robot, belief, navigation
@@ -109,7 +109,7 @@ class LiftFloors(Floors):
         action.report(RideStage.ARRIVED)
 
     async def _comes(self, floor: int) -> None:
-        """Call the lift, or ride, to ``floor``; returns when its door stands open there."""
+        """Call the lift, or ride, to ``floor``; return when its door is open there. Raises Refused, Expired."""
         lift, clock = self.robot[LiftClient], self.robot.clock
         lift.call(floor)
         deadline = clock.time() + COMES_MAX
@@ -124,7 +124,7 @@ class LiftFloors(Floors):
             await clock.sleep(0.2)
 
     async def _through(self, goal: Pose, *, backwards: bool) -> None:
-        """Straight to ``goal``, whose yaw is the way into the car, holding the door."""
+        """Drive straight to ``goal`` (map), whose yaw points into the car, holding the door. Raises Blocked."""
         robot, base, clock = self.robot, self.robot[Base], self.robot.clock
         way, held_until = (-1.0 if backwards else 1.0), -math.inf
         closest, closest_at = math.inf, clock.time()
@@ -149,7 +149,7 @@ class LiftFloors(Floors):
         await stand_still(robot)
 
     def _room(self, way: float) -> float:
-        """Metres that the hull can go ahead (``way`` 1) or back (-1) before what the lidar sees."""
+        """Return the free distance ahead of the hull (``way`` 1) or behind (-1) by the lidar, m; 0 without a scan."""
         scan, radius = self.robot[Lidar].scan, self.robot.description.radius
         if scan is None:
             return 0.0
@@ -159,7 +159,7 @@ class LiftFloors(Floors):
         return float(ahead.min()) - radius if len(ahead) else math.inf
 
     async def _change_to(self, floor: int, redraw: bool) -> None:
-        """Put the present map aside and take that floor's, with the robot where it stands in the car."""
+        """Store the present floor's state and restore that of ``floor``, keeping the robot's place in the car."""
         assert self._places is not None
         robot, belief = self.robot, self.belief
         waiting, inside = self._places
@@ -186,4 +186,4 @@ class LiftFloors(Floors):
 
 
 def _unheard(_: NavigationFeedback) -> None:
-    """The feedback of riding has its own words."""
+    """Ignore the feedback of navigation: a ride reports its own stages."""

@@ -1,4 +1,4 @@
-"""Carries out a robot's orders, one after the other, and takes it to rest when there is nothing to do."""
+"""Carries out a robot's orders, one after the other, and drives it to its resting place when idle."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ BASE_LOOK = 1.0  # s between two checks whether another client still drives the 
 
 
 class Courier:
-    """Works through the book from the first ``wake`` to ``close``. ``changing`` is held to add or call off orders."""
+    """Worker on the book from the first ``wake`` to ``close``. ``changing``: held to add or cancel orders."""
 
     def __init__(self, robot: Robot, book: OrderBook, driver: DeliveryDrive, ears: Ears) -> None:
         self._robot, self._book, self._driver, self._ears = robot, book, driver, ears
@@ -39,7 +39,7 @@ class Courier:
         self._giving_up: asyncio.Task[None] | None = None
 
     def close(self) -> None:
-        """Leave the book as it is."""
+        """Stop working; the book stays as it is."""
         self.readiness.close()
         for task in (self._worker, self._job, self._giving_up):
             if task:
@@ -56,7 +56,7 @@ class Courier:
         return self._worker is not None
 
     def wake(self) -> None:
-        """Look again at what is to be done."""
+        """Check for orders to begin."""
         self._woken.set()
         if self._worker is None:
             self._worker = asyncio.get_running_loop().create_task(self._work(), name=f"{self._robot.id} delivers")
@@ -64,7 +64,7 @@ class Courier:
             self._stop_job()
 
     async def call_off(self, order: Order, failure: Failure | None = None) -> None:
-        """End an order that is under way, or before it begins; ``failure`` says why."""
+        """Cancel an open order; ``failure``: its reason, if any."""
         if order.status.ended or order.status is OrderStatus.CANCELING:
             return
         running = order.id == self.current
@@ -74,7 +74,7 @@ class Courier:
             self._stop_job()
 
     def drop_current(self) -> None:
-        """Do no more for the order under way, whose end is in the book already."""
+        """Stop the order under way, whose end is in the book already."""
         if self.current:
             self._stop_job()
 
@@ -95,7 +95,7 @@ class Courier:
             self._job.cancel()
 
     def _next(self) -> Order | None:
-        """The order to begin now."""
+        """Return the order to begin now; None: there is none, or no order may begin."""
         if not self._driver.allowed or not self.readiness.works:
             return None
         return next((order for order in self._book.open if order.status is OrderStatus.READY), None)
@@ -148,7 +148,7 @@ class Courier:
             await follow_up(self._robot, self._book, self._driver, self.readiness, order)
 
     async def _do(self, work: Coroutine[None, None, None]) -> bool:
-        """Do it as a task that others may cancel; False if they did."""
+        """Run ``work`` as a task that may be cancelled; return False if it was."""
         self._job = job = asyncio.get_running_loop().create_task(work, name=f"{self._robot.id} delivery job")
         try:
             await asyncio.wait({job})
@@ -161,7 +161,7 @@ class Courier:
         return True
 
     async def _rest(self) -> None:
-        """Drive to the parking place, or onto the dock; there at once off work and with a low battery."""
+        """Drive to the parking place, or onto the dock off work and with a low battery."""
         robot, readiness = self._robot, self.readiness
         readiness.rest_due = False
         docked = readiness.docked

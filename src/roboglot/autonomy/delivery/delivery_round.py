@@ -1,4 +1,4 @@
-"""One order from start to end: the stops, the target, the people there."""
+"""One order from start to end: stops, target, and handover to people."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from roboglot.model.robot import Robot
 
 
 class Round:
-    """Carries out ``order``; what became of it goes into the book as it happens."""
+    """Execution of ``order``, with its progress written to the book."""
 
     def __init__(self, robot: Robot, book: OrderBook, driver: DeliveryDrive, ears: Ears, order: Order) -> None:
         self._robot, self._book, self._driver, self._ears = robot, book, driver, ears
         self._order = order
 
     async def run(self) -> None:
-        """Raises Failed with the first thing that went wrong."""
+        """Carry out the order. Raises Failed with the first failure."""
         if self._order.request.kind is OrderKind.DISINFECT:
             raise Failed(Failure.NO_DISINFECTION)
         await self._shut_boxes()
@@ -50,12 +50,12 @@ class Round:
                 raise Failed(result.failure)
 
     def _wait(self, number: int) -> float:
-        """Return how long to wait at a stop, s; 0: until a person ends it."""
+        """Return the waiting time at a stop, s; 0: until a person ends it."""
         waits = self._order.request.waits
         return waits[number] if number < len(waits) else 0.0
 
     async def _load(self, cabinet: str) -> None:
-        """Drive there, open the boxes, and wait until all are filled."""
+        """Drive to a cabinet, open the boxes, and wait until all are filled. Raises Failed."""
         policy, handover, boxes = self._book.policy, self._handover(), self._order.request.boxes
         await self._set(stage=OrderStage.DRIVING_TO_CABINET, stop=cabinet)
         await self._driver.go_to(cabinet, policy, policy.delivery_speed)
@@ -69,7 +69,7 @@ class Round:
         await self._note(PickUp(stop=cabinet))
 
     async def _visit(self, stop: str, seconds: float) -> None:
-        """Drive there and wait until there is nothing more to do; too long is a failure of the stop, not the order."""
+        """Drive to a stop and wait for the people there; a timeout fails the stop, not the order. Raises Failed."""
         policy = self._book.policy
         await self._set(stage=OrderStage.DRIVING_TO_STOP, stop=stop)
         await self._driver.go_to(stop, policy, policy.delivery_speed)
@@ -115,7 +115,7 @@ class Round:
         await handover.all_at_once(boxes)
 
     async def _shut_boxes(self) -> None:
-        """The robot does not drive with an open box."""
+        """Close the order's boxes before driving. Raises Failed."""
         if Cargo in self._robot:
             for box in self._order.request.boxes:
                 if failure := await self._handover().shut(box):

@@ -1,4 +1,4 @@
-"""Driving for the delivery service: off the dock, to places, home; held while people work at the robot's screen."""
+"""Driving for the delivery service: off the dock, to places, home; on hold while people use the robot's screen."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ FAILURES: dict[type[RobotError], Failure] = {
 
 
 class Failed(Exception):
-    """An order comes to nothing."""
+    """An order failed."""
 
     def __init__(self, failure: Failure) -> None:
         super().__init__(failure.value)
@@ -41,7 +41,7 @@ class Failed(Exception):
 
 
 class DeliveryDrive:
-    """One drive at a time. ``hold`` stops it in its place; emergency stops interrupt it, and it goes on after."""
+    """One drive at a time. ``hold`` pauses it; after an emergency stop it starts again."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -51,11 +51,11 @@ class DeliveryDrive:
 
     @property
     def allowed(self) -> bool:
-        """True if it is not held."""
+        """True if driving is not on hold."""
         return self._allowed.is_set()
 
     def hold(self, held: bool) -> None:
-        """Stand still, or go on."""
+        """Pause driving, or resume it."""
         if held:
             self._allowed.clear()
             if self._action:
@@ -66,11 +66,11 @@ class DeliveryDrive:
                 self._action.resume()
 
     def report(self, news: DeliveryNews) -> None:
-        """Publish it."""
+        """Publish ``news``."""
         self._robot.events.publish(DeliveryReported(stamp=self._robot.clock.time(), news=news))
 
     async def go_to(self, name: str, policy: Policy, speed: float | None) -> None:
-        """Drive to the place of that name. Raises Failed."""
+        """Drive to the place with this name, no faster than ``speed`` (m/s). Raises Failed."""
         try:
             place = place_named(self._robot, name)
         except NotFound:
@@ -78,7 +78,7 @@ class DeliveryDrive:
         await self.go(place, policy, speed)
 
     async def go(self, known: StoreyPlace, policy: Policy, speed: float | None) -> None:
-        """Drive to that place, by lift if need be, no faster than ``speed`` (m/s). Raises Failed."""
+        """Drive to a place, by lift if needed, no faster than ``speed`` (m/s). Raises Failed."""
         await self._leave_dock(policy)
         if known.floor:
             await self._ride(known.floor, policy)
@@ -96,7 +96,7 @@ class DeliveryDrive:
         await self._drive(lambda: navigation.navigate_to([place.pose.point], options, source=SOURCE), policy)
 
     async def go_home(self, policy: Policy) -> None:
-        """Onto the dock, on whatever floor it is. Raises Failed."""
+        """Drive onto the dock, by lift if needed. Raises Failed."""
         if Storeys in self._robot and (maps := self._robot[Storeys].maps) is not None:
             await self._ride(maps.home(), policy)
         await self._drive(lambda: self._robot[Docking].dock(source=SOURCE), policy)
@@ -127,7 +127,7 @@ class DeliveryDrive:
         self.report(DeliveryNews.LEFT_DOCK)
 
     async def _drive(self, start: Callable[[], Action], policy: Policy) -> None:
-        """Drive until it succeeds; again after an emergency stop. Raises Failed."""
+        """Drive to the end; start again after an emergency stop. Raises Failed."""
         patience = self._robot.clock.time() + policy.stopped_seconds
         while True:
             await self._wait_until_free(patience)
@@ -152,7 +152,7 @@ class DeliveryDrive:
             patience = self._robot.clock.time() + policy.stopped_seconds
 
     async def _wait_until_free(self, patience: float) -> None:
-        """Wait until the service may drive: no stop holds the robot, and no other client drives it."""
+        """Wait for the end of holds, emergency stops and other clients' drives. Raises Failed after ``patience``."""
         while not self.allowed or self._stopped() or self._robot.actions.running(BASE):
             if not self.allowed:
                 began = self._robot.clock.time()

@@ -21,7 +21,7 @@ from roboglot.model.robot import Robot
 
 
 async def follow_up(robot: Robot, book: OrderBook, driver: DeliveryDrive, readiness: Readiness, order: Order) -> None:
-    """Report that it was not collected, and have a COLLECT order return the parcels."""
+    """Report a failed order, and return its parcels to the reception by a COLLECT order."""
     kind = order.request.kind
     if order.failure is Failure.INTERRUPTED:
         readiness.rest_due = False  # another client is driving the robot
@@ -40,7 +40,7 @@ async def follow_up(robot: Robot, book: OrderBook, driver: DeliveryDrive, readin
 
 
 async def _collect(book: OrderBook, reception: str, untaken: Untaken) -> None:
-    """Add it to the order that waits to go there, or make one."""
+    """Add uncollected boxes to a waiting COLLECT order, or add a new one."""
     waiting = [o for o in book.open if o.request.kind is OrderKind.COLLECT and o.status is OrderStatus.READY]
     if waiting:
         known = waiting[0]

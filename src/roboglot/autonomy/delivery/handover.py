@@ -1,4 +1,4 @@
-"""Handover at the target: people say when they begin and end, boxes open and shut. Knows no driving and no queue."""
+"""Handover at the target: people signal begin and end, boxes open and close. Knows no driving and no queue."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Signal(Enum):
 
 
 class Ears:
-    """One awaited signal at a time."""
+    """Receiver of one awaited signal at a time."""
 
     def __init__(self, robot: Robot) -> None:
         self._clock = robot.clock
@@ -36,13 +36,13 @@ class Ears:
         self._heard: asyncio.Future[None] | None = None
 
     def receive(self, signal: Signal) -> None:
-        """Take a person's signal. Refused unless it is expected."""
+        """Take a person's signal. Raises Refused unless it is awaited."""
         if self._heard is None or self._heard.done() or signal not in self._awaited:
             raise Refused("the robot does not wait for that now")
         self._heard.set_result(None)
 
     async def hear(self, *signals: Signal, seconds: float) -> bool:
-        """Wait for one of them; False when ``seconds`` went by."""
+        """Wait for one of the signals; return False after ``seconds``."""
         self._awaited, self._heard = signals, asyncio.get_running_loop().create_future()
         try:
             await self._clock.wait_for(self._heard, seconds)
@@ -54,14 +54,14 @@ class Ears:
 
 
 class Handover:
-    """People and boxes at one place. ``note`` keeps each box's result as soon as it is there."""
+    """Handover of boxes at one place. ``note`` is called with each box's result."""
 
     def __init__(self, robot: Robot, ears: Ears, note: Note, door_seconds: float) -> None:
         self._robot, self._ears, self._note = robot, ears, note
         self._door_seconds = door_seconds
 
     async def one_by_one(self, boxes: Sequence[BoxChoice], *, opened: bool) -> None:
-        """The person opens the first box, the robot (all, if ``opened``) the others."""
+        """Hand over box by box; a person opens the first one, unless ``opened``, and the robot the others."""
         for number, choice in enumerate(boxes):
             failure = await self.open([choice]) if number or opened else None
             if failure is None:
@@ -69,14 +69,14 @@ class Handover:
             await self._note(PickUp(choice, failure=failure))
 
     async def all_at_once(self, boxes: Sequence[BoxChoice]) -> None:
-        """All boxes are open; people help themselves."""
+        """Wait while people use the open boxes, then close them all."""
         done = await self._ears.hear(Signal.END, seconds=self._door_seconds)
         for choice in boxes:
             failure = None if done or self._empty(choice) else Failure.NOT_TAKEN
             await self._note(PickUp(choice, failure=await self.shut(choice) or failure))
 
     async def open(self, boxes: Sequence[BoxChoice]) -> Failure | None:
-        """Open these at once."""
+        """Open boxes at the same time; return the failure, if any."""
         try:
             actions = [self._robot[Cargo].open_box(choice.box, source=SOURCE) for choice in boxes]
         except NotFound:
@@ -85,7 +85,7 @@ class Handover:
         return Failure.DOOR_STUCK if any(stuck) else None
 
     async def filled(self, boxes: Sequence[BoxChoice], seconds: float) -> Failure | None:
-        """Wait until there is something in each of these."""
+        """Wait up to ``seconds`` until no box is empty; return the failure, if any."""
         clock, cargo = self._robot.clock, self._robot[Cargo]
         patience = clock.time() + seconds
         while any(cargo.box(choice.box).stock is Stock.EMPTY for choice in boxes):
@@ -95,7 +95,7 @@ class Handover:
         return None
 
     async def shut(self, choice: BoxChoice) -> Failure | None:
-        """Shut it, again and again if something is in the door."""
+        """Close a box, again and again if something is in the door; return the failure, if any."""
         cargo, clock = self._robot[Cargo], self._robot.clock
         patience = clock.time() + self._door_seconds
         while cargo.box(choice.box).door is not DoorState.CLOSED:
@@ -107,7 +107,7 @@ class Handover:
         return None
 
     async def _serve(self, choice: BoxChoice) -> Failure | None:
-        """Serve until the person says that it is done, or has waited too long with the door open."""
+        """Wait for the person's end or a timeout, then close the box; return the failure, if any."""
         cargo = self._robot[Cargo]
         try:
             was_open = cargo.box(choice.box).door is not DoorState.CLOSED

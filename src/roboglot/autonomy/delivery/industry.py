@@ -1,4 +1,4 @@
-"""The book of templates and calls. It drives nowhere: clients do what calls ask for, and say how it went."""
+"""The book of templates and calls. It drives nowhere: clients carry out calls and report their outcome."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ TEMPLATES_MAX, OPEN_MAX, ENDED_MAX = 200, 100, 100
 
 
 class CallBook(Industry):
-    """Book of calls: in memory for reading, in the robot's ledger for good."""
+    """Book of calls: read from memory, stored in the robot's ledger."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot, self._ledger = robot, robot[Ledger]

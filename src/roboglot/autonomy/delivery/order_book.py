@@ -1,4 +1,4 @@
-"""The delivery service's orders and policy: in memory for reading, in the robot's ledger for good."""
+"""The delivery service's orders and policy: read from memory, stored in the robot's ledger and settings."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class OrderChanges(TypedDict, total=False):
 
 
 class OrderBook:
-    """Every change is written before it is acknowledged."""
+    """Book of orders; every change is on disk before the call returns."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -54,7 +54,7 @@ class OrderBook:
 
     @property
     def orders(self) -> Sequence[Order]:
-        """Oldest first."""
+        """All orders, oldest first."""
         return tuple(self._orders.values())
 
     @property
@@ -63,14 +63,14 @@ class OrderBook:
         return [order for order in self._orders.values() if not order.status.ended]
 
     def get(self, id: str) -> Order:
-        """Return an order by its id or number, or raise NotFound."""
+        """Return an order by its id or number. Raises NotFound."""
         for order in self._orders.values():
             if id in (order.id, order.number):
                 return order
         raise NotFound(f"there is no order {id}")
 
     async def add(self, requests: Sequence[OrderRequest]) -> Sequence[Order]:
-        """Queue them. Refused when the queue is full."""
+        """Queue orders. Raises Refused if the queue is full."""
         if len(self.open) + len(requests) > OPEN_MAX:
             raise Refused(f"more than {OPEN_MAX} orders")
         now = self._robot.clock.epoch()
@@ -88,28 +88,28 @@ class OrderBook:
         return orders
 
     async def change(self, id: str, **changes: Unpack[OrderChanges]) -> Order:
-        """The changed order, when it is safe on disk."""
+        """Change an order; return it once it is safe on disk."""
         order = replace(self._orders[id], changed_at=self._robot.clock.epoch(), **changes)
         await self._write(order)
         return order
 
     async def end_all(self, **changes: Unpack[OrderChanges]) -> None:
-        """End all that are open, in one transaction; ``changes`` say with which status."""
+        """End all open orders in one transaction; ``changes``: their new status."""
         now = self._robot.clock.epoch()
         await self._write(*(replace(order, changed_at=now, **changes) for order in self.open))
 
     async def set_policy(self, policy: Policy) -> None:
-        """Returns when it is safe on disk."""
+        """Set the policy; return once it is safe on disk."""
         await self._settings.put(POLICY, msgspec.to_builtins(policy))
         self.policy = policy
 
     @property
     def held(self) -> bool:
-        """True if people had the robot hold when it was last asked."""
+        """True if the last ``hold`` put the robot on hold."""
         return bool(self._settings.get(HOLD, False))
 
     async def hold(self, held: bool) -> None:
-        """Returns when it is safe on disk."""
+        """Store whether the robot is on hold; return once it is safe on disk."""
         await self._settings.put(HOLD, held)
 
     async def _write(self, *orders: Order) -> None:
@@ -123,7 +123,7 @@ class OrderBook:
 
 
 def _revived(document: object) -> Order:
-    """Return the order as it continues after the robot was off."""
+    """Return a stored order as it continues after a restart."""
     order = msgspec.convert(document, Order)
     if order.status is OrderStatus.RUNNING:
         return replace(order, status=OrderStatus.READY)

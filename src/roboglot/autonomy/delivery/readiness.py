@@ -19,7 +19,7 @@ RECOVERED = 80  # percent at which the robot resumes work after a low battery
 
 
 class Service(Protocol):
-    """Interface of the delivery service that readiness needs."""
+    """Part of the delivery service that readiness needs."""
 
     @property
     def policy(self) -> Policy: ...
@@ -29,14 +29,14 @@ class Service(Protocol):
         """True once there has been an order."""
 
     def wake(self) -> None:
-        """Look again at what is to be done."""
+        """Check for orders to begin."""
 
     def give_up(self) -> None:
         """Cancel all orders: the battery is low."""
 
 
 class Readiness:
-    """Follows battery, clock and place. ``rest_due``: the robot goes to rest when there is nothing to do."""
+    """Readiness by battery, working hours and localization. ``rest_due``: the robot goes to rest when idle."""
 
     def __init__(self, robot: Robot, service: Service, report: Callable[[DeliveryNews], None]) -> None:
         self._robot, self._service, self._report = robot, service, report
@@ -45,7 +45,7 @@ class Readiness:
         self._endings: list[Callable[[], None]] = []
 
     def start(self) -> None:
-        """Listen to the robot."""
+        """Listen to the robot's events."""
         listen = self._robot.events.listen
         self._endings = [
             listen(BatteryChanged, self._battery_changed),
@@ -54,7 +54,7 @@ class Readiness:
         ]
 
     def close(self) -> None:
-        """Listen no more."""
+        """Stop listening."""
         for end in self._endings:
             end()
 
@@ -71,17 +71,17 @@ class Readiness:
 
     @property
     def parks(self) -> bool:
-        """True if it rests at its parking place; off work and with a low battery it rests on the dock."""
+        """True if the robot rests at its parking place; off work and with a low battery it rests on the dock."""
         return not self._low and not self._off_work
 
     @property
     def docked(self) -> bool:
-        """True while it stands on a dock."""
+        """True while the robot is on a dock."""
         return DockContact in self._robot and self._robot[DockContact].docked
 
     @property
     def has_home(self) -> bool:
-        """True if there is a dock to go to, on this floor or another."""
+        """True if a dock is known, on this floor or another."""
         if Docking not in self._robot:
             return False
         maps = self._robot[Storeys].maps if Storeys in self._robot else None
@@ -93,7 +93,7 @@ class Readiness:
         return self._robot[Battery].state.percentage * 100 if Battery in self._robot else 100.0
 
     def look_at_hours(self) -> None:
-        """Report the beginning and the end of work."""
+        """Report the beginning and the end of working hours."""
         off = not at_work(self._service.policy, self._robot.clock.epoch())
         if off != self._off_work:
             self._off_work = off
@@ -101,7 +101,7 @@ class Readiness:
             self._report(DeliveryNews.WORK_ENDED if off else DeliveryNews.WORK_BEGAN)
 
     def lose(self) -> None:
-        """Wait with orders until the pose is set, or the robot stands on its dock."""
+        """Begin no order until the pose is set or the robot is on its dock."""
         self._lost = True
         self._report(DeliveryNews.PLACE_LOST)
 
@@ -111,12 +111,12 @@ class Readiness:
             self._service.wake()
 
     def _pushed(self, event: DockContactChanged) -> None:
-        """A lost robot on its dock knows where it is."""
+        """Set the pose of a lost robot that is on its dock."""
         if event.docked and self._lost and (home := self._robot[Docking].home) is not None:
             self._robot[Localization].set_pose(home)
 
     def _battery_changed(self, _: BatteryChanged) -> None:
-        """Only a robot that has delivered: the battery of all others is not this service's business."""
+        """Send a robot that delivers home with a low battery, switch it off at the end, and resume when charged."""
         if not self._service.delivers:
             return
         state, level, policy = self._robot[Battery].state, self.level, self._service.policy

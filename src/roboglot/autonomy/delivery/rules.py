@@ -1,4 +1,4 @@
-"""The rules of the delivery service: places by name, working hours, who may order what. Pure decisions."""
+"""The rules of the delivery service: places by name, working hours, acceptable orders. Pure decisions."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ BOXED = (OrderKind.TAKEOUT, OrderKind.DISTRIBUTE, OrderKind.STATION)
 
 
 def known_places(robot: Robot) -> Iterator[StoreyPlace]:
-    """Return the places of this floor (""), then those of all others."""
+    """Yield the places of this floor (""), then those of all others."""
     for place in robot[Places].all():
         yield StoreyPlace("", place)
     if Storeys in robot and (maps := robot[Storeys].maps) is not None:
@@ -34,7 +34,7 @@ def known_places(robot: Robot) -> Iterator[StoreyPlace]:
 
 
 def place_named(robot: Robot, name: str) -> StoreyPlace:
-    """The place of that display name or id, or NotFound."""
+    """Return the place with this display name or id. Raises NotFound."""
     for known in known_places(robot):
         if name in (known.place.metadata.get(NAME), known.place.id):
             return known
@@ -42,12 +42,12 @@ def place_named(robot: Robot, name: str) -> StoreyPlace:
 
 
 def place_of_type(robot: Robot, kind: str) -> StoreyPlace | None:
-    """The first place of that type, on this floor if there is any."""
+    """Return the first place of this type, preferably on this floor; None: there is none."""
     return next((known for known in known_places(robot) if known.place.metadata.get(TYPE) == kind), None)
 
 
 def at_work(policy: Policy, epoch: float) -> bool:
-    """True if ``epoch`` (s since 1970) is within working hours; days and hours are UTC's."""
+    """True if ``epoch`` (s since 1970) is within working hours; days and hours are in UTC."""
     now = datetime.fromtimestamp(epoch, UTC)
     if now.isoweekday() % 7 in policy.rest_days:
         return False
@@ -61,7 +61,7 @@ def at_work(policy: Policy, epoch: float) -> bool:
 def check_requests(
     robot: Robot, policy: Policy, requests: Sequence[OrderRequest], open_orders: Iterable[Order]
 ) -> None:
-    """Refused, NotFound or InvalidGoal if these cannot all be accepted."""
+    """Raise Refused, NotFound or InvalidGoal if any of the requests cannot be accepted."""
     taken = {box: order.number for order in open_orders for box in order.request.boxes}
     for request in requests:
         if policy.work_mode is WorkMode.DISPATCH and not request.remote:

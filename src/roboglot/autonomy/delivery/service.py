@@ -1,4 +1,4 @@
-"""The delivery service: takes orders and calls them off; the courier carries them out. Made of other skills."""
+"""The delivery service: accepts and cancels orders; the courier carries them out. Made of other skills."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from roboglot.model.robot import Robot
 
 
 class QueueDelivery(Delivery):
-    """Touches nothing before the first order: robots that never deliver notice nothing of it."""
+    """Delivery with a queue; inactive before the first order."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -35,13 +35,13 @@ class QueueDelivery(Delivery):
         self._courier = Courier(robot, self._book, self._driver, self._ears)
 
     def start(self) -> None:
-        """Go on with what is in the book."""
+        """Resume the orders in the book."""
         self._courier.readiness.start()
         if self._book.open:
             self._courier.wake()
 
     def close(self) -> None:
-        """Leave the book as it is."""
+        """Stop working; the book stays as it is."""
         self._courier.close()
 
     @property

@@ -1,4 +1,4 @@
-"""The dock as the lidar sees it: a flat front of known width that stands out from what is behind. Knows no robot."""
+"""Docks in a lidar's scan: a flat front of known width that stands out from its background. Knows no robot."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Echoes = NDArray[np.float64]
 
 
 def find_dock(points: Echoes, expected: Pose) -> Pose | None:
-    """The middle of the dock's front, +x away from it, nearest to ``expected``; all in one frame. None if none is seen.
+    """Return the middle of the dock's front nearest to ``expected``, +x away from it, in the same frame; None: none.
 
     ``points`` (n, 2; m) are a scan's echoes in the order of their angle.
     """
@@ -36,7 +36,7 @@ def find_dock(points: Echoes, expected: Pose) -> Pose | None:
 
 
 def dock_fronts(points: Echoes) -> list[Pose]:
-    """Whatever looks like a dock's front within SEARCH_REACH, nearest first: +x away from it; in base_link.
+    """Return all possible dock fronts within SEARCH_REACH, nearest first, +x away from the dock; in base_link.
 
     ``points`` (n, 2; m, base_link) are a scan's echoes in the order of their angle.
     """
@@ -50,7 +50,7 @@ def dock_fronts(points: Echoes) -> list[Pose]:
 
 
 def things_of(echoes: Echoes) -> list[Echoes]:
-    """The echoes of single things, cut where neighbours lie apart."""
+    """Return the echoes of single things, split at gaps between neighbours."""
     if len(echoes) < ECHOES_MIN:
         return []
     steps = np.hypot(*np.diff(echoes, axis=0, append=echoes[:1]).T)
@@ -62,7 +62,7 @@ def things_of(echoes: Echoes) -> list[Echoes]:
 
 
 def front_of(thing: Echoes, facing: float, slack: float) -> Pose | None:
-    """The pose of a flat thing as wide as a dock that faces about there (rad, give or take ``slack``)."""
+    """Return the pose of a flat thing as wide as a dock that faces ``facing`` +- ``slack`` (rad); None: it is not."""
     if len(thing) < ECHOES_MIN or math.hypot(*(thing[-1] - thing[0]).tolist()) > WIDTH + WIDTH_SLACK:
         return None
     middle = thing.mean(axis=0)

@@ -1,6 +1,6 @@
-"""Docking: to a place in front of the dock, a look at where it stands, then backwards onto the contacts at the rear.
+"""Docking: drive in front of the dock, measure its pose by the lidar, then reverse onto the contacts at the rear.
 
-A dock whose place is unknown is looked for nearby: whatever looks like one is tried.
+An unknown dock is searched nearby: everything that looks like one is tried.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ CANDIDATES_MAX = 3  # objects like a dock that are tried, nearest first
 
 
 class RearDocking(Docking):
-    """Knows the dock from having stood on it, or from ``set_home``."""
+    """Docking with rear contacts; the dock is known from the first contact or from ``set_home``."""
 
     def __init__(self, robot: Robot, navigation: GridNavigation) -> None:
         self._robot = robot
@@ -75,7 +75,7 @@ class RearDocking(Docking):
         return start_on_base(self._robot, "undock", self._leave, goal=None, source=source, on_busy=on_busy)
 
     async def _leave(self, action: Action) -> None:
-        """Ahead by odometry: right at the dock, the map may not be there yet."""
+        """Drive ahead by odometry, as there may be no map yet. Raises Blocked."""
         if not self._robot[DockContact].docked:
             return
         action.report("leaving")
@@ -106,14 +106,14 @@ class RearDocking(Docking):
         action.report("docked")
 
     async def _charge(self) -> None:
-        """Return when the battery charges, or soon: a full one takes nothing, a broken dock gives nothing."""
+        """Wait until the battery charges, for a short time: a full one or a broken dock never does."""
         robot = self._robot
         deadline = robot.clock.time() + CHARGE_SECONDS
         while Battery in robot and not robot[Battery].state.charging and robot.clock.time() < deadline:
             await robot.clock.sleep(PERIOD)
 
     async def _search(self, action: Action) -> None:
-        """Look around for what might be a dock and try it. Raises DockNotFound, saying why."""
+        """Try the things nearby that look like a dock. Raises DockNotFound with the reasons."""
         action.report("searching")
         pose, radius = self._robot[Localization].pose, self._robot.description.radius
         scans = await self._scans()
@@ -133,7 +133,7 @@ class RearDocking(Docking):
         raise DockNotFound(f"no dock is known, and nothing touched at {tried} things that look like one{why}")
 
     async def _try(self, action: Action, home: Pose, shift: float) -> None:
-        """Back up once to where the dock should be; ``shift``: m to the left of it, where the lidar sees none."""
+        """Try to dock once at ``home``; ``shift``: m to the left, used if the lidar sees no dock."""
         action.report("approaching")
         await self._approach(action, home)
         seen = await self._look(home)
@@ -151,7 +151,7 @@ class RearDocking(Docking):
         await self._navigation.drive(action, Goal((staging.point,), NavigationOptions(yaw=home.yaw)), _unheard)
 
     async def _look(self, home: Pose) -> Pose | None:
-        """Return base_link's docked pose by the lidar's scans near ``home``; None if they show no dock."""
+        """Return base_link's docked pose (map) by the lidar's scans near ``home``; None if they show no dock."""
         radius, scans = self._robot.description.radius, await self._scans()
         front, pose = home.compose(Pose(-radius)), self._robot[Localization].pose
         sightings = [find_dock(points, front.relative_to(pose)) for points in scans]
@@ -165,7 +165,7 @@ class RearDocking(Docking):
         return pose.compose(Pose(x, y, wrap_angle(found[0].yaw + turn))).compose(Pose(radius))
 
     async def _scans(self) -> list[Echoes]:
-        """The echoes of the next scans, in base_link."""
+        """Return the echoes of the next scans, in base_link (m)."""
         robot, reader = self._robot, ScanReader()
         taken: list[ScanTaken] = []
         stop = robot.events.listen(ScanTaken, taken.append)
@@ -178,7 +178,7 @@ class RearDocking(Docking):
         return [reader.read(event.scan).points for event in taken]
 
     async def _back_up(self, action: Action, home: Pose) -> None:
-        """Slowly backwards along the dock's axis until the contacts touch or nothing moves any more."""
+        """Reverse slowly along the dock's axis until the contacts touch or the robot is stuck."""
         robot, clock = self._robot, self._robot.clock
         base, contact, localization = robot[Base], robot[DockContact], robot[Localization]
         closest, closest_at = math.inf, clock.time()
@@ -210,4 +210,4 @@ def _within(limit: float, value: float) -> float:
 
 
 def _unheard(_: NavigationFeedback) -> None:
-    """The feedback of docking has its own words."""
+    """Ignore the feedback of navigation: docking reports its own stages."""

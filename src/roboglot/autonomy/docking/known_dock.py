@@ -1,7 +1,6 @@
 """Known pose of the dock on the map, and the robot's pose by the dock's contacts. Moves nothing.
 
-A dock with a known pose localizes a robot that has lost its own; a pose given by hand moves no dock until the map
-confirms it.
+A known dock localizes a lost robot; after a pose given by hand, no dock is learned until scans confirm the pose.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ BESIDE = 0.5  # m from the known dock within which a contact is attributed to it
 
 
 class KnownDock:
-    """Knows the dock from having stood on it, or because it was ``put`` there."""
+    """Dock known from the first contact, or set by ``put``."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -49,7 +48,7 @@ class KnownDock:
 
     @property
     def pose(self) -> Pose | None:
-        """base_link's in map when docked; None if no dock is known."""
+        """Pose of the docked base_link in map (m, rad); None if no dock is known."""
         return self._pose
 
     def put(self, pose: Pose | None) -> None:
@@ -76,13 +75,13 @@ class KnownDock:
             self._pose, self._on_it = localization.pose, True
 
     def _moved(self, event: MapReplaced) -> None:
-        """The map has a new origin: the dock stays where it is."""
+        """Transform the dock's pose to the map's new origin; forget it with the map."""
         if self._pose is not None:
             self._pose = None if event.origin is None else self._pose.relative_to(event.origin)
         self._on_it = self._on_it and self._pose is not None
 
     def _straightened(self, event: LoopClosed) -> None:
-        """The map was bent: the dock moves with what is around it."""
+        """Move the dock with the nearest corrected pose of a loop closure."""
         if self._pose is not None and event.moved:
             here = self._pose
             was, now = min(event.moved, key=lambda pair: pair[0].distance_to(here))
@@ -99,7 +98,7 @@ class KnownDock:
         self._learn()
 
     def _anchor(self) -> None:
-        """A robot that has lost its place on this dock is on this dock; said once, for the dock may have been moved."""
+        """Set the pose of a lost robot on this dock to the dock's; only once, as the dock may have been moved."""
         if self._on_it and self._pose is not None and not self._anchored:
             self._anchored = True
             self._robot[Localization].set_pose(self._pose)

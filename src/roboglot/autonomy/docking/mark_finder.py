@@ -1,6 +1,6 @@
-"""Boards and shelves in a scan: what stands out by its shape. Knows no robot.
+"""Boards and shelves in a scan, by their shapes. Knows no robot.
 
-All points and poses are in base_link, m; a mark's pose has +x out of its front, towards who comes.
+All points and poses are in base_link, m; a mark's +x points out of its front, towards the robot.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Points = NDArray[np.float64]
 
 
 def find_board(points: Points) -> Pose | None:
-    """The nearest board ahead that faces the robot."""
+    """Return the pose of the nearest board ahead that faces the robot; None: there is none."""
     near = points[np.hypot(points[:, 0], points[:, 1]) < REACH]
     best: Pose | None = None
     for thing in things_of(near):
@@ -41,7 +41,7 @@ def find_board(points: Points) -> Pose | None:
 
 
 def find_shelf(points: Points) -> tuple[Pose, float] | None:
-    """The middle between four legs ahead with nothing between them, and how far they reach from it to the front."""
+    """Return the middle of the nearest four legs with nothing between, and its distance to the front, m; or None."""
     near = points[np.hypot(points[:, 0], points[:, 1]) < REACH]
     legs = legs_of(near)
     best: tuple[Pose, float] | None = None
@@ -55,7 +55,7 @@ def find_shelf(points: Points) -> tuple[Pose, float] | None:
 
 
 def legs_of(points: Points) -> list[Point]:
-    """The middles of thin things, nearest first."""
+    """Return the middles of thin things, nearest first."""
     legs: list[Point] = []
     for thing in things_of(points):
         if float(np.hypot(*(thing.max(axis=0) - thing.min(axis=0)))) <= LEG_MAX:
@@ -66,7 +66,7 @@ def legs_of(points: Points) -> list[Point]:
 
 
 def _rectangles(left: Point, right: Point, legs: list[Point]) -> list[tuple[Pose, float, float]]:
-    """Return rectangles with these two as front legs: the middle, half the depth, half the width."""
+    """Return rectangles with these two as front legs: middle, half the depth, half the width (m)."""
     width = left.distance_to(right)
     if not SIDE_MIN <= width <= SIDE_MAX:
         return []
@@ -99,7 +99,7 @@ def _empty(points: Points, middle: Pose, half_depth: float, half_width: float) -
 
 
 def between_strips(strips: tuple[ReflectorSeen, ...]) -> Pose:
-    """The middle of strips: square to their line, or straight at the robot for a single one."""
+    """Return the middle of strips, +x square to their line, or towards the robot for a single one."""
     x = sum(strip.place.x for strip in strips) / len(strips)
     y = sum(strip.place.y for strip in strips) / len(strips)
     yaw = math.atan2(-y, -x)

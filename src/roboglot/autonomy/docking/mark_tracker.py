@@ -1,4 +1,4 @@
-"""Keeps an eye on a mark while the robot moves: where it is in the odometry's frame, by whatever sense sees it."""
+"""Tracks a mark while the robot moves, in the odometry's frame, by the sense for this kind of mark."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ SENSES: dict[Mark, type[Vision | Reflectors | Lidar]] = {
 
 
 class MarkWatch:
-    """``place`` is the mark in odom, +x out of its front; ``reach``: m from a shelf's middle to its front."""
+    """Tracked mark. ``place``: pose in odom, +x out of its front; ``reach``: m from a shelf's middle to its front."""
 
     def __init__(self, robot: Robot, goal: MarkGoal) -> None:
         self._robot, self._goal = robot, goal
@@ -45,12 +45,12 @@ class MarkWatch:
 
     @asynccontextmanager
     async def open(self) -> AsyncIterator[None]:
-        """Look while inside."""
+        """Subscribe to the sense while inside the block."""
         with self._viewer():
             yield
 
     async def find(self) -> Pose:
-        """Stand and look; where it is, or NotFound."""
+        """Return the mark's pose in odom, averaged while the robot stands. Raises NotFound."""
         clock = self._robot.clock
         deadline, found = clock.time() + LOOK_SECONDS, list[Pose]()
         self._seen_at = clock.time()
@@ -71,7 +71,7 @@ class MarkWatch:
         return self.place
 
     def glance(self) -> None:
-        """Correct the believed pose while moving by a new sighting, if there is one."""
+        """Correct the mark's pose by a new sighting, if there is one, while moving."""
         seen, place = self._look(), self.place
         if seen is None or place is None or seen.distance_to(place) > LEAP:
             return
@@ -91,7 +91,7 @@ class MarkWatch:
                 return nullcontext()
 
     def _look(self) -> Pose | None:
-        """A new sighting, in odom."""
+        """Return a new sighting, in odom; None: there is none."""
         reading = self._robot[Odometry].reading
         self._trail.append((reading.stamp, reading.pose))
         stamp, seen = self._sighting()
@@ -102,7 +102,7 @@ class MarkWatch:
         return here.compose(seen)
 
     def _sighting(self) -> tuple[float, Pose | None]:
-        """The newest one in base_link as it stood at that stamp."""
+        """Return stamp and pose of the newest sighting, in base_link at that stamp."""
         robot, goal = self._robot, self._goal
         match goal.mark:
             case Mark.PRINTED:

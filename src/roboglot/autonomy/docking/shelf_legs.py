@@ -1,7 +1,7 @@
-"""A shelf on the jack: its legs are in every scan, and nothing of the world; it takes up more room than the hull.
+"""A shelf on the jack: its legs show in every scan and are not part of the world; it needs more room than the hull.
 
-Found when it is lifted, and minded until it is set down: the scans leave its legs out, the planner keeps its corners
-clear of things, and the map's marks of where it stood no longer count.
+From lifting to setting down, scans leave its legs out, the planner keeps its corners clear of obstacles, and the map's
+cells of its former place no longer count.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ SHELVES_MAX = 32  # places of removed shelves that are remembered
 
 @dataclass(slots=True)
 class Load:
-    """Load on the jack, and the former places (map, m) of things taken away that the map still shows."""
+    """Load on the jack, and the former places (map, m) of removed shelves that the map still shows."""
 
     radius: float = 0.0  # m around base_link that the shelf occupies
     gone: list[NDArray[np.float64]] = field(default_factory=list)  # (n, 2): the legs of each removed shelf
@@ -47,14 +47,14 @@ class Load:
 
 
 class CarriedLegs:
-    """Updates the scan filter of the belief, and its load."""
+    """Updates the belief's scan filter and the load when the jack changes."""
 
     def __init__(self, robot: Robot, belief: Belief, load: Load) -> None:
         self._robot, self._belief, self._load = robot, belief, load
         self._stop = robot.events.listen(JackChanged, self._changed)
 
     def close(self) -> None:
-        """Look no more."""
+        """Stop listening."""
         self._stop()
 
     def _changed(self, _: JackChanged) -> None:
@@ -80,7 +80,7 @@ class CarriedLegs:
         load.gone = [*load.gone, _on_map(legs, belief.pose)][-SHELVES_MAX:]
 
     def _set_down(self, legs: NDArray[np.float64]) -> None:
-        """Here things stand again, whatever was taken away before."""
+        """Forget removed shelves near the place of the shelf that was set down."""
         here = _on_map(legs, self._belief.pose)
         if len(here):
             load, radius = self._load, self._load.radius
@@ -88,7 +88,7 @@ class CarriedLegs:
 
 
 def standing_among(legs: list[Point]) -> list[Point]:
-    """The four that the robot stands among, as corners of the smallest rectangle; without one, all within reach."""
+    """Return the four legs of the smallest rectangle around the robot; without one, all legs within reach."""
     near = [leg for leg in legs if math.hypot(leg.x, leg.y) < REACH]
     best: tuple[float, list[Point]] | None = None
     for (a, c), (b, d) in combinations(combinations(near[:NEAREST], 2), 2):
@@ -104,7 +104,7 @@ def standing_among(legs: list[Point]) -> list[Point]:
 
 
 def _around(corners: list[Point]) -> bool:
-    """True if base_link is inside the corners, which are in their order around it."""
+    """True if base_link is inside the corners, which are in order around the rectangle."""
     turns = [a.x * b.y - a.y * b.x for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)]
     return min(turns) > 0.0 or max(turns) < 0.0
 

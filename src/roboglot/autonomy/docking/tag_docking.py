@@ -1,4 +1,4 @@
-"""Docking at marks: to a place with a view of the mark, onto its axis, then along it with further sightings."""
+"""Docking at marks: drive to a place with a view of the mark, onto its axis, then along it with further sightings."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ BLIND = 0.35  # m before the end from where the mark is no longer observed: it i
 
 
 class MarkDocking(TagDocking):
-    """Short ways by odometry, which nothing makes jump."""
+    """Docking at marks; short ways are driven by odometry, which never jumps."""
 
     def __init__(self, robot: Robot, navigation: GridNavigation, driving: OdometryDriving) -> None:
         self._robot, self._navigation, self._driving = robot, navigation, driving
@@ -139,7 +139,7 @@ class MarkDocking(TagDocking):
         return self._robot[Odometry].reading.pose
 
     def _end(self, watch: MarkWatch, goal: MarkGoal) -> Pose:
-        """Return base_link's final pose in odom, looking at the mark."""
+        """Return base_link's final pose in odom, facing the mark."""
         assert watch.place is not None
         radius = self._robot.description.radius
         if goal.mark is Mark.SHELF:
@@ -149,7 +149,7 @@ class MarkDocking(TagDocking):
         return watch.place.compose(Pose(place.x, place.y, math.pi))
 
     async def _follow_axis(self, action: Action, watch: MarkWatch, goal: MarkGoal) -> None:
-        """Along it to the end, with the robot's nose (or back) ahead."""
+        """Drive along the mark's axis to the end, forwards or backwards. Raises Blocked."""
         base, clock, way = self._robot[Base], self._robot.clock, -1.0 if goal.backward else 1.0
         closest, closest_at = math.inf, clock.time()
         while True:
@@ -173,7 +173,7 @@ class MarkDocking(TagDocking):
             await clock.sleep(PERIOD)
 
     async def _leave(self, action: Action, way: float, watch: MarkWatch | None) -> None:
-        """Straight by odometry, along the mark's axis if that is watched."""
+        """Drive straight by ``way`` m (odometry), along the mark's axis if there is a ``watch``. Raises Blocked."""
         base, clock, start = self._robot[Base], self._robot.clock, self._here
         axis = start
         if watch is not None:
@@ -197,7 +197,7 @@ class MarkDocking(TagDocking):
             await clock.sleep(PERIOD)
 
     async def _go(self, action: Action, goal: Pose) -> None:
-        """Drive to a pose in base_link: a turn, a straight way, a turn; backwards if that is behind."""
+        """Drive to a pose in base_link by a turn, a straight way and a turn; backwards to a pose behind."""
         bearing = math.atan2(goal.y, goal.x)
         way = 1.0 if abs(bearing) <= math.pi / 2 else -1.0
         first = bearing if way > 0 else wrap_angle(bearing + math.pi)
@@ -227,4 +227,4 @@ def _within(limit: float, value: float) -> float:
 
 
 def _unheard(_: NavigationFeedback) -> None:
-    """Docking reports its own stages."""
+    """Ignore the feedback of navigation: docking reports its own stages."""

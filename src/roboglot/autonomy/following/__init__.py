@@ -1,1 +1,1 @@
-"""Following people and things around what stands between."""
+"""Following people and things around obstacles."""

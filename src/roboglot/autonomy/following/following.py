@@ -1,4 +1,4 @@
-"""Following a person whom the camera sees or whose tag answers by radio, or a thing, around what stands between."""
+"""Following a person by camera or radio tag, or a thing by lidar, around obstacles."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ GAP, BRAKING = 0.15, 0.8  # m kept in front of the hull; m/s2 of braking
 
 @dataclass(slots=True)
 class _Quarry:
-    """The person or thing followed, and where it was seen last (odom frame, m; robot time)."""
+    """The followed person or thing, with place (odom, m) and time (robot time, s) of the last sighting."""
 
     number: int | None
     place: Point | None = None
@@ -58,7 +58,7 @@ class _Quarry:
     _anchor: Point | None = None
 
     def spot(self, place: Point, stamp: float, seen_from: Pose) -> None:
-        """Note that they are at ``place``."""
+        """Note a sighting at ``place`` (odom), and update the course."""
         if self._anchor is None:
             self._anchor, self.course = place, seen_from.point.bearing_to(place)
         elif self._anchor.distance_to(place) > STRIDE:
@@ -68,7 +68,7 @@ class _Quarry:
 
 
 class SightFollowing(Following):
-    """Keeps facing the person, because the camera does not turn."""
+    """Following that keeps facing the person, as the camera does not turn."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -155,7 +155,7 @@ class SightFollowing(Following):
         return start_on_base(self._robot, "follow thing", run, goal=goal, source=source, on_busy=on_busy)
 
     def _see(self, quarry: _Quarry, scan: LaserScan | None) -> None:
-        """Update the place of the thing followed by a new scan."""
+        """Update the place of the followed thing by a new scan."""
         if scan is None or scan.stamp <= quarry.ranged_at or quarry.place is None:
             return
         quarry.ranged_at = scan.stamp
@@ -195,7 +195,7 @@ class SightFollowing(Following):
                 return
 
     def _range(self, quarry: _Quarry, tag: TagReading) -> None:
-        """Move the estimated place towards a single ranging, which is inaccurate."""
+        """Move the estimated place part of the way to a new ranging, which is inaccurate."""
         here, quarry.ranged_at = self._robot[Odometry].reading.pose, tag.stamp
         heard = here.compose(Pose(tag.distance * math.cos(tag.azimuth), tag.distance * math.sin(tag.azimuth)))
         share = TAG_FRESH if tag.line_of_sight else TAG_FRESH / 3
@@ -204,9 +204,9 @@ class SightFollowing(Following):
         quarry.spot(place, tag.stamp, here)
 
     def _keep(self, quarry: _Quarry, side: FollowSide, distance: float, *, hidden: bool) -> tuple[Twist, bool]:
-        """The velocity to its place near the person, and whether nothing is in the way.
+        """Return the velocity to the robot's place near the person, and whether the way is free.
 
-        Hidden: to where they were last; from there it turns to where they went.
+        ``hidden``: to the last sighting, and there turn to the person's course.
         """
         assert quarry.place is not None
         here = self._robot[Odometry].reading.pose
@@ -234,13 +234,13 @@ class SightFollowing(Following):
         return self._towards(heading, left, bearing if straight else heading, seen)
 
     def _step_back(self, bearing: float, seen: Points) -> Twist:
-        """Face a person who stands too near for the camera, and make room."""
+        """Return the velocity that faces a person too near for the camera and backs away."""
         behind = room(seen, self._robot.description.radius, math.pi)
         turn = _within(TURN_RATE, TURN_GAIN * bearing)
         return Twist(-BACK if behind > GAP + BACK and abs(bearing) < BACK_BEARING else 0.0, 0.0, turn)
 
     def _way(self, quarry: _Quarry, here: Pose, seen: Points, heading: float, left: float) -> tuple[float, float, bool]:
-        """The direction to take (base_link), how far, and whether that is the straight way."""
+        """Return direction (base_link, rad) and distance (m) to drive, and whether it is the straight way."""
         radius = self._robot.description.radius
         if room(seen, radius, heading) > min(left, AHEAD):
             quarry.around = None
@@ -256,7 +256,7 @@ class SightFollowing(Following):
         return free, left, False
 
     def _towards(self, heading: float, left: float, facing: float, seen: Points) -> tuple[Twist, bool]:
-        """Return the velocity that way, as fast as the room allows, turning to ``facing``; and if there is room."""
+        """Return the velocity towards ``heading`` within the free room, turning to ``facing``, and if there is room."""
         turn = _within(TURN_RATE, TURN_GAIN * facing)
         free = room(seen, self._robot.description.radius, heading)
         speed = min(SPEED, GAIN * left, math.sqrt(2.0 * BRAKING * max(0.0, free - GAP)))

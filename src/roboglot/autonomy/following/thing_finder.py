@@ -1,4 +1,4 @@
-"""Detection of single things among the lidar's points, and of where one has moved. Knows no robot.
+"""Detection and tracking of single things among the lidar's points. Knows no robot.
 
 Points are (n, 2) in base_link, m.
 """
@@ -18,7 +18,7 @@ Points = NDArray[np.float64]
 
 
 def thing_at(points: Points, place: Point) -> Point | None:
-    """The middle of what stands there; None if nothing does, or something too wide."""
+    """Return the middle of the thing at ``place``; None: there is none, or it is too wide."""
     cluster = _cluster(points, place, 2.0 * WIDE_MAX)
     if cluster is None or float(np.hypot(*np.ptp(cluster, axis=0))) > WIDE_MAX:
         return None
@@ -26,13 +26,13 @@ def thing_at(points: Points, place: Point) -> Point | None:
 
 
 def moved_thing(points: Points, place: Point) -> Point | None:
-    """The middle of what was at ``place`` one scan ago; what it touches by now, like a wall, is not it."""
+    """Return the middle of the thing that was at ``place`` one scan ago, without a wall near it; None: not found."""
     cluster = _cluster(points, place, REACH + WIDE_MAX / 2)
     return None if cluster is None else _middle(cluster)
 
 
 def _cluster(points: Points, place: Point, within: float) -> Points | None:
-    """Return the cluster of points around the one nearest to ``place``; none is farther away than ``within``."""
+    """Return the cluster around the point nearest to ``place``, up to ``within`` m away; None: nothing is near."""
     away = np.hypot(points[:, 0] - place.x, points[:, 1] - place.y)
     near = points[away <= within]
     if not len(near) or away.min() > REACH:

@@ -1,6 +1,6 @@
-"""The way around what stands between the robot and the person it follows: where they walked, or a gap beside it.
+"""The way around obstacles to the followed person: the person's own trail, or a gap beside the obstacle.
 
-Knows no robot: points and poses are in odom or base_link as said, m and rad.
+Knows no robot: points and poses are in odom or base_link as noted, m and rad.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ Points = NDArray[np.float64]
 
 
 class Trail:
-    """Points where they walked (odom), the oldest first: nothing stands there."""
+    """Points of the person's way (odom), oldest first, which is free of obstacles."""
 
     def __init__(self) -> None:
         self._points: list[Point] = []
 
     def add(self, place: Point) -> None:
-        """Add the place where they are."""
+        """Add the person's present place (odom)."""
         if not self._points or self._points[-1].distance_to(place) > STEP:
             self._points.append(place)
             del self._points[:-STEPS_MAX]
 
     def aim(self, here: Pose, seen: Points, radius: float) -> Point | None:
-        """The newest point of the trail that a straight way leads to; None if none does. ``seen``: in base_link."""
+        """Return the newest point of the trail with a free straight way to it; None: none. ``seen``: in base_link."""
         for index in range(len(self._points) - 1, -1, -1):
             point = self._points[index]
             ahead = Pose(point.x, point.y).relative_to(here)
@@ -47,7 +47,7 @@ class Trail:
 
 
 def room(seen: Points, radius: float, heading: float) -> float:
-    """Metres that a hull can move that way before what the lidar sees (points in base_link)."""
+    """Return the free distance of a hull towards ``heading`` (rad) before the ``seen`` points (base_link), m."""
     along = seen @ np.array([math.cos(heading), math.sin(heading)])
     beside = np.abs(seen @ np.array([-math.sin(heading), math.cos(heading)]))
     ahead = along[(beside < radius + SLACK) & (along > 0.0)]
@@ -55,7 +55,7 @@ def room(seen: Points, radius: float, heading: float) -> float:
 
 
 def gap(seen: Points, radius: float, heading: float, last: float | None) -> float | None:
-    """The direction nearest to ``heading`` (and to the ``last`` one) in which there is room; None if there is none."""
+    """Return the free direction nearest to ``heading`` and to ``last`` (rad, base_link); None: there is none."""
     best, least = None, math.inf
     for step in range(HEADINGS):
         tried = heading + step * math.tau / HEADINGS

@@ -1,1 +1,1 @@
-"""Laser landmarks: finding reflecting strips, keeping them on the map, correcting the pose by them."""
+"""Laser landmarks: finding reflecting strips, storing them on the map, correcting the pose by them."""

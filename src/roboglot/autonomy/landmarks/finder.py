@@ -1,4 +1,4 @@
-"""Pose by landmarks: the one that lays the strips seen by the lidar on known landmarks. Knows no robot; m and rad."""
+"""Pose from landmarks, by matching the lidar's strips to known landmarks. Knows no robot; m and rad."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ STRIPS_MIN = 3  # two strips fit in two ways, so at least three
 
 
 def pose_by_landmarks(seen: Sequence[Point], known: Sequence[Point]) -> Pose | None:
-    """base_link in map, by strips (base_link) that all must be landmarks (map); None if none fits, or several."""
+    """Return base_link in map that matches all strips (base_link) to landmarks (map); None: none, or ambiguous."""
     if len(seen) < STRIPS_MIN:
         return None
     a, b = _widest(seen)
@@ -36,7 +36,7 @@ def _widest(points: Sequence[Point]) -> tuple[Point, Point]:
 
 
 def _pose(a: Point, b: Point, one: Point, other: Point) -> Pose:
-    """The pose that brings ``a`` and ``b`` over the two landmarks, as well as can be."""
+    """Return the pose that best maps ``a`` and ``b`` to the two landmarks."""
     yaw = wrap_angle(one.bearing_to(other) - a.bearing_to(b))
     c, s = math.cos(yaw), math.sin(yaw)
     x, y = (a.x + b.x) / 2, (a.y + b.y) / 2

@@ -1,4 +1,4 @@
-"""Keeps the map's laser landmarks: adds strips seen often at one place, moves moved ones; places the robot by them."""
+"""The map's laser landmarks: adds strips seen often, updates moved ones, and localizes the robot by them."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class _Candidate:
 
 
 class LandmarkKeeper(LaserLandmarks):
-    """Looks with every scan."""
+    """Landmarks that are updated and used at every scan."""
 
     def __init__(self, robot: Robot, belief: Belief) -> None:
         self._robot, self._belief = robot, belief
@@ -56,7 +56,7 @@ class LandmarkKeeper(LaserLandmarks):
         self._stop = robot.events.listen(ScanTaken, self._look)
 
     def close(self) -> None:
-        """Look no more."""
+        """Stop detecting."""
         self._stop()
         self._viewer.close()
         if self._writing is not None:
@@ -89,7 +89,7 @@ class LandmarkKeeper(LaserLandmarks):
                 self._remember([here.compose(Pose(place.x, place.y)).point for place in places])
 
     def _fix(self, places: list[Point], known: list[Point], odometry: Pose) -> None:
-        """Correct the pose at the scan as far as what is known of it leaves room: a bare passage, not a full room."""
+        """Correct the pose at the scan by landmarks, weighted by the belief's covariance."""
         belief = self._belief
         pose, belief.covariance = pose_fixed(belief.map_to_odom.compose(odometry), belief.covariance, places, known)
         belief.move_to(pose, odometry)

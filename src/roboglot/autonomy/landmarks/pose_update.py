@@ -1,4 +1,4 @@
-"""A pose made better by known landmarks that are seen: a step of an extended Kalman filter each. Knows no robot."""
+"""Correction of a pose by seen landmarks, each with a step of an extended Kalman filter. Knows no robot."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ Floats = NDArray[np.float64]
 
 
 def pose_fixed(pose: Pose, covariance: Floats, seen: Sequence[Point], known: Sequence[Point]) -> tuple[Pose, Floats]:
-    """Pose and covariance (x, y, yaw; map) after strips ``seen`` (base_link) that are ``known`` landmarks (map).
+    """Return pose and covariance (x, y, yaw; map), corrected by strips ``seen`` (base_link) at ``known`` ones (map).
 
-    A strip that may be none of them, or one of several, says nothing.
+    A strip that matches no landmark or several is ignored.
     """
     for strip in seen:
         pose, covariance = _step(pose, covariance, strip, known)

@@ -1,4 +1,4 @@
-"""Masks sensors while the robot is inside an area that says so, and unmasks them when it has left."""
+"""Masks sensors while the robot is inside an area that disables them, and unmasks them when it has left."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from roboglot.model.robot import Robot
 
 
 class AreaWatch:
-    """Looks with every lidar scan. Sensors that were masked from elsewhere stay masked."""
+    """Watch over areas at every scan. Sensors masked by others stay masked."""
 
     def __init__(self, robot: Robot, belief: Belief) -> None:
         self._robot, self._belief = robot, belief

@@ -1,4 +1,4 @@
-"""Actions that move the robot over the floor: standing up first, braking last.
+"""Actions that drive the robot: it stands up first and brakes last.
 
 Knows no goal: driving, navigation and docking bring theirs.
 """
@@ -32,9 +32,9 @@ def start_on_base(
     source: str,
     on_busy: OnBusy = OnBusy.REPLACE,
 ) -> Action:
-    """Start ``run(action)`` holding the base; a robot that lies gets up before. Raises Busy as ``on_busy`` has it.
+    """Start ``run(action)`` holding the base; a lying robot stands up first. Raises Busy if ``on_busy`` refuses.
 
-    After an emergency stop nothing starts (EmergencyStopped) until the legs are asked to stand up.
+    Raises EmergencyStopped while the legs are limp.
     """
     if Legs in robot and robot[Legs].posture is Posture.LIMP:
         raise EmergencyStopped("the robot is limp after an emergency stop: it has to stand up first")
@@ -57,7 +57,7 @@ def start_on_base(
 
 @asynccontextmanager
 async def braking_at_the_end(robot: Robot, action: Action) -> AsyncIterator[None]:
-    """However the block ends, the base stands still afterwards; but not when another one goes on from its motion."""
+    """Stop the base at any end of the block, unless another action takes over its motion."""
     try:
         yield
     except asyncio.CancelledError:
@@ -78,7 +78,7 @@ async def braking_at_the_end(robot: Robot, action: Action) -> AsyncIterator[None
 
 
 async def _brake(robot: Robot, action: Action) -> None:
-    """Stand still, also when ``action`` is cancelled while it brakes: what takes over begins from rest."""
+    """Stand still, even if ``action`` is cancelled while it brakes: the next action begins from rest."""
     try:
         await stand_still(robot)
     except asyncio.CancelledError:

@@ -1,6 +1,6 @@
-"""Centring of a hull between what it passes: its offset from the planned path. Knows no robot.
+"""Centring of a hull in gaps: its offset from the planned path. Knows no robot.
 
-Maps have cells; a door that leaves a hull less than a cell's room is met by what the lidar sees of it.
+A door may leave the hull less room than a cell of the map; the lidar's echoes are more exact.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ Points = NDArray[np.float64]
 
 
 def sideways(way: Points, echoes: Points, clearance: float) -> tuple[Points, float]:
-    """By what each point of ``way`` (n, 2; m, dense) is to move, and the width of the narrowest gap on it (m).
+    """Return the offset (n, 2; m) of each point of ``way`` (n, 2; m, dense), and the width of its narrowest gap (m).
 
-    ``clearance``: m that are wanted around each point. Where there is less on both sides, it moves to the middle.
+    ``clearance``: m wanted around each point. A point with less on both sides moves to the middle.
     The width is inf where no gap is narrower than twice that.
     """
     from roboglot.kernels.obstacles import sides  # it needs Numba
@@ -39,7 +39,7 @@ def sideways(way: Points, echoes: Points, clearance: float) -> tuple[Points, flo
 
 
 def _spread(shift: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The same, begun before each gap and kept until behind it, so that the way bends gently."""
+    """Return the shifts, extended before and behind each gap, so that the way bends gently."""
     window = 2 * PLATEAU + 1
     views = np.lib.stride_tricks.sliding_window_view(np.pad(shift, PLATEAU), window)
     widest = views[np.arange(len(shift)), np.abs(views).argmax(axis=1)]

@@ -1,4 +1,4 @@
-"""State shared by all drives of one robot: the planner, once it is loaded, and the calls to it."""
+"""State shared by all drives of one robot: the planner, once loaded, and calls to it."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ READY_MAX = 180.0  # s for which a drive waits for the planner and the first map
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """Goals of a drive and its options; ``straight``: in straight lines between them wherever the hull fits through."""
+    """Goals (map) and options of a drive; ``straight``: straight lines between goals wherever the hull fits."""
 
     points: tuple[Point, ...]
     options: NavigationOptions
@@ -41,7 +41,7 @@ class Goal:
 
 @dataclass(slots=True)
 class Course:
-    """``planner`` is None until the kernels are loaded; ``unavailable`` says why if that takes long or failed."""
+    """``planner`` is None until the kernels are loaded; ``unavailable``: the error if that takes long or failed."""
 
     robot: Robot
     belief: Belief
@@ -52,14 +52,14 @@ class Course:
     tuning: PilotTuning = field(default_factory=PilotTuning)
 
     def check_available(self) -> None:
-        """Raise why there is no navigation: NotReady while kernels compile, Refused where they cannot."""
+        """Raise NotReady while kernels compile, Refused if they cannot be compiled."""
         if self.unavailable is not None:
             raise type(self.unavailable)(str(self.unavailable))
 
     async def ready(self) -> Planner:
         """Return the planner as soon as it is loaded and there is a map.
 
-        Raises NotLocalized when no map comes, NotReady or Refused when there is no navigation (``check_available``).
+        Raises NotLocalized if there is no map in time, NotReady or Refused as ``check_available``.
         """
         clock = self.robot.clock
         deadline = clock.time() + READY_MAX
@@ -76,7 +76,7 @@ class Course:
         return self.robot[MapAnnotations].current if MapAnnotations in self.robot else Annotations()
 
     def top_speed(self, options: NavigationOptions) -> float:
-        """m/s on open floor."""
+        """Return the top speed on open floor, m/s."""
         return min(SPEED_MAX, self.robot[Base].limits.twist.x) * options.speed_ratio
 
     async def plan(
@@ -89,7 +89,7 @@ class Course:
         things: bool = True,
         straight: bool = False,
     ) -> Route:
-        """A route on the map, and around ``obstacles`` seen lately; or Unreachable."""
+        """Return a route (map) around known and, with ``obstacles``, recently seen obstacles. Raises Unreachable."""
         planner = await self.ready()
         limits = self.robot[Base].limits
         task = planner.task(
@@ -111,7 +111,7 @@ class Course:
         return await computed(self.robot.clock, task.solve)
 
     async def waiting_place(self, here: Point, ways: Shunned) -> Point | None:
-        """Return the nearest place that is clear of ``ways`` by their own distances; None if there is none nearby."""
+        """Return the nearest place that keeps the distances to ``ways`` (map); None if there is none nearby."""
         planner = await self.ready()
         task = planner.task(here, (here,), replace(self._slowly(0.0), shunned=ways))
         return await computed(self.robot.clock, task.waiting_place)
@@ -123,12 +123,12 @@ class Course:
         return await computed(self.robot.clock, task.lengths)
 
     async def open_floor(self, around: Point) -> tuple[NDArray[np.bool_], GridFrame]:
-        """Return the known floor that the hull may stand on, by the map, its annotations and recent sightings."""
+        """Return the cells where the hull may stand, by map, annotations and recent sightings, and their frame."""
         planner = await self.ready()
         task = planner.task(around, (around,), self._slowly(0.0))
         return await computed(self.robot.clock, task.floor)
 
     def _slowly(self, tolerance: float) -> Terms:
-        """Terms for questions in which speed does not matter."""
+        """Return terms for questions that do not depend on speed."""
         now = self.robot.clock.time()
         return Terms(now=now, top=1.0, acceleration=1.0, tolerance=tolerance, drawn=self.drawn)

@@ -1,4 +1,4 @@
-"""Driving by hand: velocities that last until replaced, and short moves closed over odometry. Avoids no obstacles."""
+"""Manual driving: velocities that last until replaced, and short moves controlled by odometry. Avoids no obstacles."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class _Command:
 
 @dataclass(slots=True)
 class _Move:
-    """One move in the odom frame; ``turned`` follows odometry's yaw past whole turns."""
+    """One move in the odom frame; ``turned``: the turn so far, including whole turns, rad."""
 
     goal: Pose
     yaw: float  # total turn, not wrapped
@@ -58,13 +58,13 @@ class _Move:
     turn: Ramp
 
     def remaining(self, pose: Pose) -> tuple[float, float]:
-        """Metres and rad (signed) left from ``pose``."""
+        """Return distance (m) and signed turn (rad) left from ``pose``."""
         self.turned += wrap_angle(pose.yaw - self.last_yaw)
         self.last_yaw = pose.yaw
         return pose.distance_to(self.goal), self.yaw - self.turned
 
     def go_on_from(self, before: _Move, pose: Pose, top: float, top_yaw: float) -> None:
-        """Begin with the speeds that ``before`` had, as far as they lead to the new goal; each axis at its own pace."""
+        """Begin with the speeds of ``before``, as far as they lead to the new goal; each axis has its own top speed."""
         self.straight.top, self.turn.top = top, top_yaw
         if pose.point.distance_to(self.goal.point) > 0.0 and pose.point.distance_to(before.goal.point) > 0.0:
             bend = pose.point.bearing_to(self.goal) - pose.point.bearing_to(before.goal)
@@ -73,7 +73,7 @@ class _Move:
             self.turn.speed = before.turn.speed
 
     def command(self, pose: Pose, distance: float, angle: float) -> Twist:
-        """The twist for the next period."""
+        """Return the twist for the next period."""
         yaw_rate = math.copysign(self.turn.step(abs(angle), PERIOD), angle)
         speed = self.straight.step(distance, PERIOD)
         # base_link will have turned further by the middle of the period: aim from there.
@@ -83,7 +83,7 @@ class _Move:
 
 @dataclass(slots=True)
 class _Moving:
-    """The newest short move; ``move`` is what it takes over from until it has begun."""
+    """The newest short move; ``move``: the move to take over from, until this one has begun."""
 
     move: _Move | None
     action: Action = field(init=False)
@@ -153,7 +153,7 @@ class OdometryDriving(Driving):
         return moving.action
 
     async def _mind(self, moving: _Moving) -> None:
-        """Brake in place of a move that was cancelled before it could go on from another's motion."""
+        """Brake for a move that was cancelled before it could take over another's motion."""
         await moving.action.done()
         if not moving.begun:
             self._brake()
@@ -176,7 +176,7 @@ class OdometryDriving(Driving):
         self._robot[Base].set_velocity(STILL)
 
     async def _keep(self, action: Action, command: _Command) -> None:
-        """Hold ``command`` (changed from outside by the next call of drive) until its time is up."""
+        """Repeat ``command``, which later calls of ``drive`` change, until its end. Raises Blocked."""
         clock = self._robot.clock
         while (left := command.until - clock.time()) > 1e-9:
             if action.paused:
@@ -190,7 +190,7 @@ class OdometryDriving(Driving):
             self._action = None  # the robot brakes from now on: later commands start afresh
 
     async def _hold_at_most(self, action: Action, seconds: float) -> None:
-        """A pause outlives no lifetime."""
+        """Pause for at most ``seconds``, the rest of the command's lifetime."""
         if math.isinf(seconds):
             await action.hold(self._brake)
             return
@@ -202,9 +202,9 @@ class OdometryDriving(Driving):
     async def move(
         self, action: Action, offset: Pose, top: float, top_yaw: float, moving: _Moving | None = None
     ) -> None:
-        """The short move, as a part of an action that holds the base already; m/s and rad/s at most.
+        """Make a short move within an action that holds the base; ``top``: m/s, ``top_yaw``: rad/s. Raises Blocked.
 
-        ``moving`` has the move that it takes over from, at the speed that this one had, and from then on this one.
+        ``moving``: holds the move to take over from, with its speed; this move replaces it there.
         """
         base, odometry = self._robot[Base], self._robot[Odometry]
         start = odometry.reading.pose
@@ -243,7 +243,7 @@ class OdometryDriving(Driving):
             raise Blocked(f"something displaced the robot by {sum(event.distance for event in displaced):.2f} m")
 
     async def _approach(self, action: Action, move: _Move) -> None:
-        """Drive until close enough to brake; Blocked without progress."""
+        """Drive until close enough to brake. Raises Blocked without progress."""
         base, odometry, clock = self._robot[Base], self._robot[Odometry], self._robot.clock
         foresight = Foresight(base, clock)
         # A correction after overshooting must be able to move, however slow the plan was.
@@ -273,13 +273,13 @@ class OdometryDriving(Driving):
 
 
 def _way(offset: Pose, speed: float) -> Twist:
-    """The velocity with which a move begins; still when it only turns."""
+    """Return the velocity at the begin of a move; STILL if it only turns."""
     way = math.hypot(offset.x, offset.y)
     return Twist(speed * offset.x / way, speed * offset.y / way, 0.0) if way > 0.0 else STILL
 
 
 def _top_speed(wanted: float | None, limit: float, what: str) -> float:
-    """``wanted`` cut to the base's limit."""
+    """Return ``wanted`` within the base's limit. Raises InvalidGoal."""
     if wanted is None:
         return limit
     if not wanted > 0:
@@ -288,7 +288,7 @@ def _top_speed(wanted: float | None, limit: float, what: str) -> float:
 
 
 def _check_command(command: Twist | WheelSpeeds, lifetime: float | None) -> None:
-    """Finite numbers only: a NaN must not reach the drive."""
+    """Raise InvalidGoal for numbers that are not finite, or a lifetime out of range."""
     if not all(map(math.isfinite, astuple(command))):
         raise InvalidGoal(f"not a velocity: {command}")
     if lifetime is not None and not 0 < lifetime <= LIFETIME_MAX:

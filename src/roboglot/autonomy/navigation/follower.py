@@ -1,4 +1,4 @@
-"""Following a route: where to, how fast, which way to face. A differential base drives where it faces.
+"""Following a route: direction, speed and heading. A differential base drives in its heading.
 
 Knows no obstacle.
 """
@@ -29,7 +29,7 @@ STEP_MAX = 0.15  # m between two driven poses; a larger step is a correction of 
 
 @dataclass(slots=True)
 class Follower:
-    """One drive along one route at a time; the speed carries over to the next route."""
+    """Follower of one route at a time; its speed carries over to the next route."""
 
     limits: BaseLimits
     top: float  # m/s
@@ -45,23 +45,23 @@ class Follower:
     _turning: bool = field(default=False)  # in place
 
     def take(self, route: Route) -> None:
-        """Go on along another route."""
+        """Continue on another route."""
         self.route, self.along, self.beside, self._passed = route, 0.0, 0.0, 0
         self.stop_at = self.slow_at = math.inf
 
     @property
     def left(self) -> float:
-        """Metres to drive."""
+        """Distance left on the route, m."""
         return max(0.0, self.route.length - self.along)
 
     @property
     def passed(self) -> int:
-        """Goals of this route that were reached, the last one not counted."""
+        """Number of goals reached on this route, without the last."""
         return self._passed
 
     @property
     def last(self) -> bool:
-        """True if no goal is left but the last."""
+        """True if only the last goal is left."""
         return self._passed == len(self.route.goals) - 1
 
     @property
@@ -70,7 +70,7 @@ class Follower:
         return self.route.point_at(self.route.length)
 
     def locate(self, pose: Pose) -> None:
-        """Find the place on the route, and count the goals that it came to since it was asked last."""
+        """Update the place on the route, and count the goals reached since the last call."""
         here = pose.point
         driven = self._last is not None and self._last.distance_to(here) <= STEP_MAX
         before = self._last if self._last is not None and driven else here
@@ -81,17 +81,17 @@ class Follower:
         self.along, self.beside = self.route.advance(pose, self._passed)
 
     def pass_goal(self) -> None:
-        """Count the next goal as reached: the robot cannot come nearer than it is."""
+        """Count the next goal as reached: the robot cannot get nearer."""
         self._passed += not self.last
 
     def carrot(self) -> tuple[Point, float]:
-        """The point to aim for, no farther than the next goal; and how far along it lies."""
+        """Return the point to aim for, at most the next goal, and its distance along the route, m."""
         goal_along = self.route.goals_along[self._passed]
         along = min(self.along + LOOKAHEAD + LOOKAHEAD_SECONDS * self.speed, goal_along)
         return self.route.point_at(along), along
 
     def command(self, pose: Pose) -> Twist:
-        """The twist for the next period; call ``locate`` before."""
+        """Return the twist for the next period; call ``locate`` before."""
         carrot, _ = self.carrot()
         bearing = pose.point.bearing_to(carrot)
         braking = 2.0 * BRAKING_SHARE * self.limits.linear_acceleration
@@ -118,16 +118,16 @@ class Follower:
         return Twist(self.speed * math.cos(aim), self.speed * math.sin(aim), self.yaw_rate)
 
     def _turn_on_spot(self, near: float) -> float:
-        """The heading error beyond which it turns before it drives.
+        """Return the heading error (rad) beyond which the robot turns before it drives.
 
-        A base that cannot go sideways aims well at the end, and wherever it has to turn on the spot anyway.
+        A differential base aims more exactly near the end, and while it turns on the spot anyway.
         """
         if self.limits.holonomic:
             return TURN_ON_SPOT
         return TURN_AT_END if near < FINAL or self._turning else TURN_ON_SPOT
 
     def turn(self, error: float) -> float:
-        """The yaw rate for the next period that takes the heading ``error`` (rad) away."""
+        """Return the yaw rate (rad/s) for the next period that reduces the heading ``error`` (rad)."""
         braking = math.sqrt(2.0 * BRAKING_SHARE * self.limits.angular_acceleration * abs(error))
         wanted = min(TURN_RATE, self.limits.twist.yaw, braking, TURN_GAIN * abs(error))
         step = self.limits.angular_acceleration * PERIOD
@@ -135,12 +135,12 @@ class Follower:
         return self.yaw_rate
 
     def halt(self) -> None:
-        """The base was stopped from outside."""
+        """Note that the base was stopped by others."""
         self.speed = self.yaw_rate = 0.0
 
 
 def _nearest(start: Point, end: Point, goal: Point) -> float:
-    """Metres from ``goal`` to the straight line between the two."""
+    """Return the distance from ``goal`` to the line from ``start`` to ``end``, m."""
     dx, dy = end.x - start.x, end.y - start.y
     length = dx * dx + dy * dy
     share = ((goal.x - start.x) * dx + (goal.y - start.y) * dy) / length if length else 0.0
@@ -149,5 +149,5 @@ def _nearest(start: Point, end: Point, goal: Point) -> float:
 
 
 def _towards(now: float, goal: float, by: float) -> float:
-    """Return ``now`` brought closer to ``goal`` by at most ``by``; slowing down is unlimited, the base limits that."""
+    """Return ``now`` moved to ``goal`` by at most ``by``; slowing down is unlimited here, but limited by the base."""
     return goal if abs(goal) < abs(now) else now + max(-by, min(by, goal - now))

@@ -1,4 +1,4 @@
-"""One drive with all its tries: what it has done so far."""
+"""Progress of one drive over all its tries."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ BLOCKED_SECONDS = 180.0  # s of waiting before BaseBlocked is published
 
 @dataclass(slots=True)
 class Journey:
-    """One drive with all its tries: how many goals it has passed, and how long it has stood before something.
+    """Progress of one drive: goals passed, and time spent before obstacles.
 
-    ``obeyed``: what was drawn when there was a way over known floor, once there was one: what closes that later is
-    something that came, and may go again.
+    ``obeyed``: annotations at the time of the last way over known floor, None before the first: an obstacle that closes
+    it later has come, and may go again.
     """
 
     passed: int = 0
@@ -30,7 +30,7 @@ class Journey:
     published: bool = False
 
     def waits(self, robot: Robot, action: Action) -> None:
-        """Note that the robot stands still; publish once when that takes long."""
+        """Note that the robot waits; publish RobotBlocked once after a long time."""
         now = robot.clock.time()
         self.since = min(self.since, now)
         if now - self.since >= BLOCKED_SECONDS and not self.published:

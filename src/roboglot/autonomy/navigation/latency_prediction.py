@@ -1,4 +1,4 @@
-"""Predicts where a robot behind a slow link will be once it has carried out the commands that are under way."""
+"""Predicts the pose of a robot behind a slow link after the commands that are under way."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ COMMANDS_MAX = 256  # commands remembered
 
 
 class Foresight:
-    """Prediction for one move: keeps the commands that odometry cannot show yet."""
+    """Prediction for one move, from the commands that odometry does not show yet."""
 
     def __init__(self, base: Base, clock: Clock) -> None:
         self._base, self._clock = base, clock
         self._commands: deque[tuple[float, Twist]] = deque(maxlen=COMMANDS_MAX)
 
     def sent(self, twist: Twist) -> None:
-        """Note a command that goes to the base now."""
+        """Note a command sent to the base now."""
         if self._base.delay > 0.0:
             self._commands.append((self._clock.time(), twist))
 
     def ahead(self, pose: Pose) -> Pose:
-        """Return the motion from the newest odometry to where the commands under way will bring it (odom)."""
+        """Return ``pose``, the newest odometry (odom), moved by the commands under way."""
         now, known = self._clock.time(), self._clock.time() - self._base.delay
         while len(self._commands) > 1 and self._commands[1][0] <= known:
             self._commands.popleft()

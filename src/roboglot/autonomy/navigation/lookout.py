@@ -25,7 +25,7 @@ ANNOUNCED_MAX = 12.0  # m of the planned way that are announced to others
 
 
 class Lookout:
-    """Examines every scan from now until ``close``; ``follower`` is set when there is a way to look at."""
+    """Lookout on every scan until ``close``; ``follower``: set while there is a route to check."""
 
     def __init__(self, course: Course, planner: Planner, action: Action) -> None:
         self._robot, self._clock, self._belief = course.robot, course.robot.clock, course.belief
@@ -45,11 +45,11 @@ class Lookout:
 
     @property
     def sees(self) -> bool:
-        """True if the newest scan is young enough to drive on."""
+        """True if the newest scan is recent enough to drive."""
         return self._clock.time() - self._scan_at <= self._tuning.scan_age_max
 
     def watches(self, follower: Follower) -> bool:
-        """True if it looks along that way, and lately did: nothing drives along another one."""
+        """True if the lookout checks this route, and has a recent scan."""
         return self.follower is follower and self.sees
 
     @property
@@ -59,7 +59,7 @@ class Lookout:
         return f": a gap is {self.gap:.2f} m wide, {needed:.2f} m are needed" if self.gap < needed else ""
 
     async def first_scan(self) -> None:
-        """Return when there is one. Raises Blocked when none comes."""
+        """Wait for a recent scan. Raises Blocked if there is none in time."""
         deadline = self._clock.time() + self._tuning.patience
         while not self.sees:
             if self._clock.time() > deadline:
@@ -87,7 +87,7 @@ class Lookout:
     def _look_ahead(
         self, follower: Follower, pose: Pose, seen: NDArray[np.float64], remembered: NDArray[np.float64]
     ) -> None:
-        """Find what stands in the way: what is ``seen`` now, and what is ``remembered`` as cells."""
+        """Find obstacles on the route among the points ``seen`` now and ``remembered`` as cells (map)."""
         tuning, planner = self._tuning, self._planner
         path, points = self._path(follower, pose), np.concatenate((seen, remembered)) if len(remembered) else seen
         tight = planner.free_way(path, points, pose, tuning.slow_margin)
@@ -107,7 +107,7 @@ class Lookout:
         self.blocked = blocked
 
     def _mind_others(self, follower: Follower, pose: Pose, path: NDArray[np.float64]) -> None:
-        """Stop for moving objects and for robots that go first, and announce this robot's route."""
+        """Stop for moving objects and robots with right of way, and announce this robot's route."""
         traffic = self._traffic
         free = follower.along + traffic.free(path, pose, follower.speed, self._planner.radius)
         follower.stop_at = min(follower.stop_at, free)
@@ -116,7 +116,7 @@ class Lookout:
 
     @property
     def meets(self) -> bool:
-        """True if another one is about to come into the way, or goes first."""
+        """True if another robot or object is about to cross the route, or has right of way."""
         return self._traffic.meets
 
     def _path(self, follower: Follower, pose: Pose) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""Remembers, cell by cell, what was seen beside the lidar's plane: no scan can say that it has gone.
+"""Memory, cell by cell, of obstacles outside the lidar's plane, whose removal no scan can show.
 
 Needs the kernels.
 """
@@ -24,16 +24,16 @@ Points = NDArray[np.float64]
 
 
 class LowMemory:
-    """Memory of low obstacles, of one map at a time."""
+    """Memory of low obstacles on one map at a time."""
 
     def __init__(self) -> None:
         self._seen = Cells(np.float32)
         self._latest = -math.inf  # s: time of the last sighting of all
 
     def observe(self, grid: EvidenceGrid, view: LowView, echoes: Points, pose: Pose, now: float) -> Points:
-        """Note what stands where neither map nor ``echoes`` (map) have anything; returns it in map (n, 2).
+        """Note obstacles that neither the map nor ``echoes`` (map) show; return them in map (n, 2; m).
 
-        It is forgotten where floor is seen in its place.
+        Obstacles are forgotten where the view shows floor.
         """
         corner = grid.corner
         at, first = np.array((pose.x, pose.y, pose.yaw)), np.array((corner.x, corner.y))
@@ -50,9 +50,9 @@ class LowMemory:
         return self._seen.of(grid)
 
     def around(self, grid: EvidenceGrid, pose: Pose, reach: float, since: float) -> Points:
-        """Return the middles (map, m; n, 2) of cells within ``reach`` m in which something was seen ``since`` then.
+        """Return the middles (map, m; n, 2) of cells within ``reach`` m with an obstacle seen ``since`` then (s).
 
-        Most of these sensors see little: what a robot passes, or stands beside, is out of their sight.
+        Obstacles beside the robot need this memory, as most of these sensors have a small view.
         """
         if self._latest < since - SPARE:
             return NONE  # most robots see nothing low for most of the time

@@ -1,6 +1,6 @@
 """Obstacles below or above the lidar's plane, by depth camera and time-of-flight sensors.
 
-Floors and ramps are no obstacles: only what rises more steeply than a wheel could climb, and higher than a foot steps.
+Floors and ramps are no obstacles: only surfaces too steep for wheels and too high for feet are.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ NONE: Points = np.empty((0, 2))
 
 @dataclass(frozen=True, slots=True)
 class LowView:
-    """One look, x and y in base_link (n, 2; m): what stands there, and where there is floor."""
+    """Points of obstacles and of floor, x and y in base_link (n, 2; m)."""
 
     obstacles: Points
     floor: Points
 
 
 class LowSight:
-    """Looks when asked, at what the sensors measure then."""
+    """Detection of low obstacles from the sensors' present readings."""
 
     def __init__(self, robot: Robot) -> None:
         from roboglot.kernels.depth import sort_out, sort_out_all  # it needs Numba
@@ -45,7 +45,7 @@ class LowSight:
         self._sort_out_all: Sorting = sort_out_all
 
     def look(self) -> LowView:
-        """Return what all sensors see together; nothing without sensors."""
+        """Return the obstacles and floor of all sensors; empty without sensors."""
         robot, views = self._robot, list[tuple[Points, Points]]()
         if DepthCamera in robot and (image := robot[DepthCamera].image) is not None:
             views.append(self._in_image(image))
@@ -68,7 +68,7 @@ class LowSight:
         return self._last[1]
 
     def _in_zones(self, readings: list[ZoneDistances]) -> tuple[Points, Points]:
-        """The same in the zones of all time-of-flight sensors."""
+        """Return obstacle and floor points in the zones of all time-of-flight sensors."""
         eyes: list[tuple[object, object]] = [(reading.rays, reading.eye) for reading in readings]
         if len(eyes) != len(self._eyes) or not all(
             a is c and b is d for (a, b), (c, d) in zip(eyes, self._eyes, strict=True)

@@ -1,4 +1,4 @@
-"""True if the robot drives between two walls with little room: what its lidar sees beside it, in four stretches."""
+"""Detects driving between two walls with little room, by the lidar's points beside the robot in four stretches."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ WIDE_AFTER = 5  # scans without walls before the next corridor is a new one
 
 
 class NarrowWatch:
-    """Examines every scan and reports each corridor once. A doorway is no corridor: it has no length."""
+    """Detector that reports each corridor once. A doorway is too short for a corridor."""
 
     def __init__(self, radius: float) -> None:
         from roboglot.kernels.obstacles import corridor  # it needs Numba
@@ -23,7 +23,7 @@ class NarrowWatch:
         self._wide = WIDE_AFTER
 
     def entered(self, points: NDArray[np.float64]) -> float | None:
-        """The corridor's width (m) when ``points`` (n, 2; base_link, m) show that the robot has come into one."""
+        """Return the corridor's width (m) if ``points`` (n, 2; base_link, m) show that the robot has entered one."""
         width = self._between(points)
         if width is None:
             self._wide += 1

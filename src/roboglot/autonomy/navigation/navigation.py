@@ -1,4 +1,4 @@
-"""Navigation on the map and on what the lidar sees now: the component. One drive is pilot.py's."""
+"""The navigation component: goals, retries, tours. Each drive is a pilot's (pilot.py)."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ NEAR = 0.5  # m from a stop that count as reached, in a tour
 
 
 class GridNavigation(Navigation):
-    """Waits until the estimator and the planner are there."""
+    """Navigation on the grid map; drives wait for estimator and planner."""
 
     def __init__(self, robot: Robot, course: Course) -> None:
         self._robot = robot
@@ -55,9 +55,9 @@ class GridNavigation(Navigation):
         report: Callable[[NavigationFeedback], None],
         journey: Journey | None = None,
     ) -> None:
-        """The drive, with its retries, as a part of an action that holds the base already.
+        """Drive to the goals, with retries, within an action that holds the base. Raises Blocked, Unreachable.
 
-        ``journey`` counts the goals passed, also of a drive that failed.
+        ``journey`` counts the goals passed, even if the drive fails.
         """
         tries_left, journey = goal.options.retries, journey or Journey()
         while True:
@@ -104,14 +104,14 @@ class GridNavigation(Navigation):
         return [number - 1 for number in order[1:]]
 
     async def _lengths(self, stops: Sequence[Point]) -> NDArray[np.float64]:
-        """Metres between each two by the ways that it would drive; inf where there is none."""
+        """Return the lengths of the routes between all pairs of stops, m; inf: unreachable."""
         lengths = np.zeros((len(stops), len(stops)))
         for a, b in combinations(range(len(stops)), 2):
             lengths[a, b] = lengths[b, a] = await self._way_length(stops[a], stops[b])
         return lengths
 
     async def _way_length(self, start: Point, goal: Point) -> float:
-        """Metres; inf where no way leads."""
+        """Return the length of the route to ``goal``, m; inf: unreachable."""
         if start.distance_to(goal) == 0.0:
             return 0.0
         try:
@@ -121,7 +121,7 @@ class GridNavigation(Navigation):
 
 
 def _checked(goals: Sequence[Point], options: NavigationOptions) -> Goal:
-    """The goal, or InvalidGoal."""
+    """Return the goal. Raises InvalidGoal."""
     if not 1 <= len(goals) <= GOALS_MAX:
         raise InvalidGoal(f"1 to {GOALS_MAX} goals, not {len(goals)}")
     for goal in goals:

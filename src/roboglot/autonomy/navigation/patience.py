@@ -1,4 +1,4 @@
-"""Patience of a drive: it gives up without progress, with wheels that turn in vain, or when lost."""
+"""Patience of a drive: gives up without progress, with wheels turning in vain, or when lost."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LOOK = 0.1  # s between two looks at whether the place is certain
 
 
 class Patience:
-    """Gets a look at every step of a drive; ``seconds``: without getting closer that it bears."""
+    """Patience of one drive, updated at every step; ``seconds``: allowed time without getting closer."""
 
     def __init__(self, clock: Clock, belief: Belief, tuning: PilotTuning, seconds: float) -> None:
         self._clock, self._belief, self._tuning = clock, belief, tuning
@@ -23,25 +23,25 @@ class Patience:
         self._free_at, self._lost_at = clock.time(), math.inf
 
     def begin_anew(self) -> None:
-        """Begin anew after a hold: the time until now does not count."""
+        """Restart after a hold: the time until now does not count."""
         self._closest_at = self._free_at = self._clock.time()
 
     def take(self, left: float) -> None:
-        """Another way of ``left`` m is driven from now on; that alone is no progress."""
+        """Note another route with ``left`` m to drive; the change alone is no progress."""
         self._closest = left
 
     @property
     def stood(self) -> float:
-        """Seconds without getting closer."""
+        """Time without getting closer, s."""
         return self._clock.time() - self._closest_at
 
     @property
     def spent(self) -> bool:
-        """True if it got no closer for too long."""
+        """True if the drive got no closer for too long."""
         return self.stood > self.seconds
 
     def check_place(self) -> None:
-        """Raise NotLocalized when it has not known where it is for too long."""
+        """Raise NotLocalized if the robot has been lost for too long."""
         belief, tuning, now = self._belief, self._tuning, self._clock.time()
         lost = belief.localizing and (belief.lost is not None or belief.quality < tuning.lost_quality)
         self._lost_at = min(self._lost_at, now) if lost else math.inf
@@ -50,7 +50,7 @@ class Patience:
             raise NotLocalized(f"{why} (quality {belief.quality:.2f})")
 
     async def be_certain(self) -> None:
-        """Return when nothing speaks against the place any more; the robot stands meanwhile. Raises NotLocalized."""
+        """Wait until the pose is certain, while the robot stands. Raises NotLocalized after a timeout."""
         belief, begun = self._belief, self._clock.time()
         while not belief.is_certain:
             self.check_place()
@@ -60,7 +60,7 @@ class Patience:
             await self._clock.sleep(LOOK)
 
     def look(self, follower: Follower) -> bool:
-        """Note how far it is; True if it came closer. Raises Blocked when wheels turn and nothing moves."""
+        """Note the distance left; return whether it shrank. Raises Blocked if the wheels turn in vain."""
         now, tuning = self._clock.time(), self._tuning
         closer = follower.left < self._closest - tuning.progress
         if closer:

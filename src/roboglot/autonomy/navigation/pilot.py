@@ -1,7 +1,7 @@
-"""One drive to goals: set out, follow the way, turn, and again until it stands where it should; or give up.
+"""One drive to goals: set out, follow the route, turn, and repeat until the goal is reached; or give up.
 
-Knows poses and the base; no world. What scans say is lookout.py's, where to go replanner.py's, when to give up
-patience.py's.
+Knows poses and the base; no world. Scans are evaluated in lookout.py, routes chosen in replanner.py, and giving up is
+decided in patience.py.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ CRUISE_SHARE = 0.7  # of the top speed that a long drive averages
 
 
 class State(Enum):
-    """State of the pilot; each leads to the next, ARRIVING back to FOLLOWING while it stands too far off."""
+    """State of the pilot; each leads to the next, ARRIVING back to FOLLOWING if the robot is too far off."""
 
     FOLLOWING = auto()
     GIVING_WAY = auto()
@@ -46,7 +46,7 @@ class State(Enum):
 
 
 class Pilot:
-    """Made for one action, which holds the base; ``close`` it afterwards."""
+    """Pilot of one action, which holds the base; ``close`` it afterwards."""
 
     def __init__(
         self,
@@ -79,7 +79,7 @@ class Pilot:
         self._replanner.close()
 
     async def drive(self) -> None:
-        """Drive to all goals in turn and to the final yaw; Unreachable, Blocked or NotLocalized if that fails."""
+        """Drive to all goals in turn and to the final yaw. Raises Unreachable, Blocked or NotLocalized."""
         steps = {
             State.FOLLOWING: self._follow,
             State.GIVING_WAY: self._give_way,
@@ -94,14 +94,14 @@ class Pilot:
     # -- the states ----------------------------------------------------------------------------------------------------
 
     async def _set_out(self) -> Follower:
-        """Wait for a scan and a way."""
+        """Wait for a scan and a route. Raises Blocked, Unreachable, NotLocalized."""
         await self._lookout.first_scan()
         follower = Follower(self._base.limits, self._top, await self._first_route())
         self._lookout.follower = follower
         return follower
 
     async def _first_route(self, left: float = math.inf) -> Route:
-        """The route from here; waits while only what stands around closes the way, or the one of ``left`` m."""
+        """Return a route from here; wait while obstacles close every route, or a much shorter one of ``left`` m."""
         begun, published = self._clock.time(), False
         while True:
             await self._action.hold(self._brake)
@@ -121,7 +121,7 @@ class Pilot:
             await self._clock.sleep(FIRST_ROUTE_PERIOD)
 
     async def _follow(self, follower: Follower) -> State:
-        """Drive until close enough to the end to brake, and stand."""
+        """Drive until close enough to the end, and brake."""
         while not await self._is_over(follower):
             pose = self._belief.pose
             if self._replanner.advance(follower):
@@ -141,7 +141,7 @@ class Pilot:
         return State.TURNING
 
     async def _give_way(self, follower: Follower) -> State:
-        """Go aside, wait there, and set out anew."""
+        """Move aside, wait there, and set out anew."""
         self._report("waiting", Path(), 0.0)
         await self._courtesy.give_way(follower)
         self._replanner.begin_again(follower)
@@ -152,7 +152,7 @@ class Pilot:
         return State.FOLLOWING
 
     async def _is_over(self, follower: Follower) -> bool:
-        """True where it should brake. Raises Blocked or NotLocalized where it gives up."""
+        """Return whether to brake at the end of the route. Raises Blocked or NotLocalized to give up."""
         await self._hold(follower)
         pose, patience, tuning = self._belief.pose, self._patience, self._tuning
         follower.locate(pose)
@@ -175,12 +175,12 @@ class Pilot:
         return False
 
     def _is_near(self, follower: Follower, pose: Pose) -> bool:
-        """True within the tolerance of the next goal: near enough where something stands in the goal itself."""
+        """True within the tolerance of the next goal, which is near enough for an occupied goal."""
         goal = self._goal.points[self._replanner.passed(follower)]
         return pose.distance_to(goal) <= self._goal.options.tolerance
 
     async def _turn(self, follower: Follower) -> State:
-        """Turn to the final yaw, keeping the place."""
+        """Turn to the final yaw on the spot. Raises Blocked."""
         yaw, tuning = self._goal.options.yaw, self._tuning
         if yaw is None:
             return State.ARRIVING
@@ -201,7 +201,7 @@ class Pilot:
             await self._clock.sleep(PERIOD)
 
     def _turning(self, follower: Follower, pose: Pose, error: float) -> Twist:
-        """The twist that takes ``error`` (rad) away and, where the base can, leads back to the place."""
+        """Return the twist that reduces ``error`` (rad) and, for a holonomic base, keeps the place."""
         tuning, away = self._tuning, pose.distance_to(follower.end)
         bearing = pose.point.bearing_to(follower.end) - pose.yaw
         keeps = away < 2 * tuning.good and self._base.limits.holonomic
@@ -209,7 +209,7 @@ class Pilot:
         return Twist(speed * math.cos(bearing), speed * math.sin(bearing), follower.turn(error))
 
     async def _arrive(self, follower: Follower) -> State:
-        """Judge the place reached once the pose is certain: accept it, try once more, or raise Blocked."""
+        """Check the final place once the pose is certain: accept it, try again, or raise Blocked."""
         await self._patience.be_certain()
         pose, goal, tolerance = self._belief.pose, self._goal.points[-1], self._goal.options.tolerance
         good = self._tuning.good
@@ -235,7 +235,7 @@ class Pilot:
     # -- feedback ------------------------------------------------------------------------------------------------------
 
     def _report_progress(self, follower: Follower, pose: Pose, stage: str) -> None:
-        """Report now and then, and whenever the stage changes."""
+        """Report progress periodically, and whenever the stage changes."""
         now = self._clock.time()
         if stage == self._stage and now - self._reported_at < self._tuning.report_period:
             return
@@ -243,13 +243,13 @@ class Pilot:
         self._report(stage, *self._left(follower, pose))
 
     def _count(self, follower: Follower, pose: Pose) -> None:
-        """Report every goal that was passed, one by one."""
+        """Report the passed goals one by one."""
         while self._journey.passed < self._replanner.passed(follower):
             self._journey.passed += 1
             self._report(self._stage, *self._left(follower, pose))
 
     def _left(self, follower: Follower, pose: Pose) -> tuple[Path, float]:
-        """The way that is left, and the seconds that it takes, roughly."""
+        """Return the remaining path (map), and its estimated time, s."""
         seconds = follower.left / (CRUISE_SHARE * self._top) + self._top / self._base.limits.linear_acceleration
         return follower.route.remaining(pose, follower.along), seconds
 

@@ -1,4 +1,4 @@
-"""The thresholds of driving to goals: distances in m, angles in rad, times in s of the robot."""
+"""The thresholds of driving to goals: distances in m, angles in rad, robot times in s."""
 
 from __future__ import annotations
 
@@ -64,13 +64,13 @@ class PilotTuning:
     report_period: float = 0.5
 
     def patience_for(self, tracks: Tracks) -> float:
-        """Seconds without getting closer before a drive with these tracks gives up."""
+        """Return the time without getting closer before a drive with these tracks gives up, s."""
         return self.patience_on_tracks if tracks is Tracks.STRICT else self.patience
 
     def there_for(self, tolerance: float, *, holonomic: bool) -> float:
-        """Metres from the end where a base brakes: one that cannot correct sideways does so a little earlier."""
+        """Return the distance from the end at which to brake, m: a little more for a base that is not holonomic."""
         return self.there if holonomic else max(self.there, min(self.there_ahead, 0.6 * tolerance))
 
     def corrections_for(self, *, holonomic: bool) -> int:
-        """Return how often it drives to the end anew: a base that cannot correct sideways tries more often."""
+        """Return the number of tries to settle on the goal: more for a base that is not holonomic."""
         return self.corrections_max if holonomic else self.corrections_ahead_max

@@ -1,4 +1,4 @@
-"""Ways over the map and around what the lidar saw lately. Needs the kernels, hence is imported when they are loaded."""
+"""Routes over the map and around recently seen obstacles. Needs the kernels, so it is imported once they are loaded."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ Window = tuple[NDArray[np.int16], NDArray[np.float32], NDArray[np.uint8], Point]
 
 @dataclass(frozen=True, slots=True)
 class PlanningTask:
-    """Planning task on copies of the arrays, so that a thread can solve it; positions from the grid's corner."""
+    """Planning task on copies of the arrays, for a thread; positions in map, ``corner``: of cell (0, 0)."""
 
     evidence: NDArray[np.int16]
     seen: NDArray[np.float32]
@@ -74,7 +74,7 @@ class PlanningTask:
     shunned: Shunned = ()
 
     def solve(self) -> Route:
-        """The route through all goals, or Unreachable."""
+        """Return the route through all goals. Raises Unreachable."""
         rules = layers(self.drawn, GridFrame(self.corner, self.evidence.shape), self.tracks, self.start, self.goals)
         self._check_near()
         cost = self.cost(rules)
@@ -103,11 +103,11 @@ class PlanningTask:
         return route
 
     def _are_known(self, goals: tuple[Point, ...]) -> bool:
-        """Return whether all of them lie on floor that the map knows."""
+        """Return whether all goals lie on known floor."""
         return all(bool(self.evidence[self._cell(goal)] < 0) for goal in goals)
 
     def _check_near(self) -> None:
-        """Unreachable for goals that lie off the map: so far from all known floor that driving there is no plan."""
+        """Raise Unreachable for goals more than OFF_MAP m beyond the known map."""
         rows, columns = (np.flatnonzero(self.evidence.any(axis=axis)) for axis in (1, 0))
         if not len(rows):
             return
@@ -119,9 +119,9 @@ class PlanningTask:
                 raise Unreachable(f"({goal.x:z.2f}, {goal.y:z.2f}) lies {off:.0f} m off the map")
 
     def lengths(self) -> NDArray[np.float64]:
-        """Metres between each two of start and goals (n + 1, n + 1), roughly; inf where no way leads.
+        """Return rough distances between start and goals (n + 1, n + 1; m); inf: unreachable.
 
-        Several cells count as one, which is open if one of them is: what stands there is thick by the hull's radius.
+        Several cells count as one, which is open if one of them is: obstacles are inflated by the hull's radius.
         """
         frame = GridFrame(self.corner, self.evidence.shape)
         cost = self.cost(layers(self.drawn, frame, self.tracks, self.start, self.goals))
@@ -144,13 +144,13 @@ class PlanningTask:
         return lengths
 
     def floor(self) -> tuple[NDArray[np.bool_], GridFrame]:
-        """The known cells where the hull may stand."""
+        """Return a mask of the known cells where the hull may stand, and its frame."""
         frame = GridFrame(self.corner, self.evidence.shape)
         cost = self.cost(layers(self.drawn, frame, self.tracks, self.start, self.goals))
         return np.isfinite(cost) & (self.evidence < 0), frame
 
     def cost(self, rules: Layers | None) -> NDArray[np.float32]:
-        """Return each cell's cost for the hull, inf where it must not be."""
+        """Return each cell's cost for the hull; inf: closed."""
         if rules:
             self.seen[rules.closed] = np.inf  # a closed area never expires
         cost: NDArray[np.float32] = inflated_cost(
@@ -170,25 +170,25 @@ class PlanningTask:
         return cost
 
     def waiting_place(self) -> Point | None:
-        """The nearest place beside what is shunned."""
+        """Return the nearest place off the shunned ways; None: there is none nearby."""
         frame = GridFrame(self.corner, self.evidence.shape)
         cost = self.cost(layers(self.drawn, frame, self.tracks, self.start, self.goals))
         return waiting_place(cost, self.evidence, frame, self.start, self.shunned)
 
     def _reopen(self, cost: NDArray[np.float32]) -> None:
-        """Open what the robot has trodden as far as the hull fits."""
+        """Open the cells of the robot's own track, as far as the hull fits."""
         reach = (self.radius - SQUEEZE) / RESOLUTION
         reopen(cost, self.evidence, self.seen, self.since, self.trodden, reach, 1.0 + NEAR_COST + UNKNOWN_COST)
 
     def _open_way_out(self, cost: NDArray[np.float32], leg: NDArray[np.float64]) -> None:
-        """Let later legs come back by the way on which the first one leaves a narrow place, such as a dock."""
+        """Open the first leg's way out of a narrow place, such as a dock, for later legs."""
         here, there = Point(*leg[0].tolist()), Point(*leg[min(1, len(leg) - 1)].tolist())
         if here.distance_to(there) <= ESCAPE_MAX:
             _mark_line(self.trodden, self.corner, here, there)
             self._reopen(cost)
 
     def _leg(self, cost: NDArray[np.float32], start: Point, goal: Point, name: str) -> NDArray[np.float64]:
-        """Vertices from ``start`` to ``goal`` in map."""
+        """Return the vertices (n, 2; map, m) from ``start`` to ``goal``. Raises Unreachable."""
         first = self._open_cell(cost, start, ESCAPE_MAX)
         last = self._open_cell(cost, goal, self.tolerance + HALF_DIAGONAL)
         if first is None:
@@ -212,14 +212,14 @@ class PlanningTask:
         return np.concatenate([[[start.x, start.y]], inside, [[end.x, end.y]]])
 
     def _path(self, cost: NDArray[np.float32], first: tuple[int, int], last: tuple[int, int]) -> NDArray[np.int32]:
-        """The cells of the way; none if there is none."""
+        """Return the cells of the way; empty if there is none."""
         if self.straight and math.isfinite(line_cost(cost, *map(float, first), *map(float, last))):
             return np.array([first, last], np.int32)
         path: NDArray[np.int32] = shortest_path(cost, *first, *last)
         return path
 
     def _too_narrow(self, first: tuple[int, int], last: tuple[int, int]) -> str:
-        """Return a message on the gap that stops this hull but not a thinner one; "" if there is none."""
+        """Return a message on a gap too narrow for this hull but not for a thin one; "" if there is none."""
         reach = self.radius + REACH
         cost = inflated_cost(self.evidence, self.seen, self.since, RESOLUTION, THIN, reach, NEAR_COST, UNKNOWN_COST)
         path = shortest_path(cost, *first, *last)
@@ -231,7 +231,7 @@ class PlanningTask:
         return f": a gap on the way is about {width:.2f} m wide, {needed:.2f} m are needed" if width < needed else ""
 
     def _within_tolerance(self, goal: Point, near: Point) -> Point:
-        """``near``, moved so little closer to ``goal`` that it is within the tolerance."""
+        """Return ``near``, moved towards ``goal`` just into the tolerance."""
         away = goal.distance_to(near)
         share = min(1.0, self.tolerance / away)
         return Point(goal.x + share * (near.x - goal.x), goal.y + share * (near.y - goal.y))
@@ -240,7 +240,7 @@ class PlanningTask:
         return int((point.y - self.corner.y) // RESOLUTION), int((point.x - self.corner.x) // RESOLUTION)
 
     def _open_cell(self, cost: NDArray[np.float32], point: Point, reach: float) -> tuple[int, int] | None:
-        """The cell of ``point``, or the open one nearest to it within ``reach`` m; None off the grid."""
+        """Return the cell of ``point`` if open, or the nearest open one within ``reach`` m; None: none, or off grid."""
         row, column = self._cell(point)
         if not (0 <= row < cost.shape[0] and 0 <= column < cost.shape[1]):
             return None
@@ -252,7 +252,7 @@ class PlanningTask:
 
 
 class Planner:
-    """Remembers obstacles that the map does not have, and makes planning tasks, for the hull and what it carries."""
+    """Memory of obstacles that are not on the map, and maker of planning tasks, for the hull and its load."""
 
     def __init__(self, belief: Belief, radius: float, load: Load) -> None:
         self._belief, self._hull, self._load = belief, radius, load
@@ -266,11 +266,11 @@ class Planner:
 
     @property
     def radius(self) -> float:
-        """m around base_link that must stay free: the hull's, or that of what is on the jack."""
+        """Radius around base_link that must stay free, of the hull or the load on the jack, m."""
         return max(self._hull, self._load.radius)
 
     def observe(self, scan: ScanPoints, pose: Pose, now: float) -> NDArray[np.float64]:
-        """Remember what stands around; returns the near echoes in map (n, 2)."""
+        """Remember obstacles of a scan; return its near echoes in map (n, 2; m)."""
         grid = self._belief.map
         gone = self._load.gone_from(grid)
         doubts = now < self._doubted_until and self._doubted.shape == grid.evidence.shape
@@ -287,7 +287,7 @@ class Planner:
             cells[cells > until] = until
 
     def forget(self, places: Sequence[Point]) -> None:
-        """Forget what was seen around ``places``: it will be elsewhere before the robot comes there."""
+        """Forget obstacles around ``places``, which will have moved before the robot gets there."""
         if not places:
             return
         grid = self._belief.map
@@ -296,23 +296,23 @@ class Planner:
             seen[frame.around((place,), MOVING_REACH)] = 0.0
 
     def observe_low(self, view: LowView, echoes: NDArray[np.float64], pose: Pose, now: float) -> NDArray[np.float64]:
-        """Remember what stands beside the lidar's plane and is not among ``echoes`` (map); returns it in map (n, 2)."""
+        """Remember obstacles off the lidar's plane that ``echoes`` (map) do not show; return them in map (n, 2; m)."""
         return self._low.observe(self._belief.map, view, echoes, pose, now)
 
     def low_around(self, pose: Pose, reach: float, now: float) -> NDArray[np.float64]:
-        """Return what stands there within ``reach`` m as far as remembered, in map (n, 2)."""
+        """Return the remembered low obstacles within ``reach`` m, in map (n, 2; m)."""
         return self._low.around(self._belief.map, pose, reach, now - OBSTACLE_SECONDS)
 
     def doubt(self, now: float) -> bool:
-        """Look for a while whether what stands alone on the map is there at all; True if that was done already."""
+        """Doubt single things on the map for a while; return whether they are in doubt already."""
         already = now < self._doubted_until
         self._doubted, self._doubted_until = without_doubtful(self._belief.map), now + DOUBT
         return already
 
     def tread(self, pose: Pose) -> None:
-        """The robot came here: where it got through once, by whomever it was driven, it gets through again.
+        """Mark the robot's track: a place that it passed once, driven by any client, it can pass again.
 
-        The map may say otherwise: it has walls as thick as whole cells.
+        The map may show less room there: its walls are whole cells thick.
         """
         last, self._last = self._last, pose
         if not (self._belief.localizing and self._belief.quality >= TRODDEN_QUALITY):
@@ -329,11 +329,11 @@ class Planner:
         _mark_line(trodden, grid.corner, begin.point, pose.point)
 
     def free_way(self, path: NDArray[np.float64], points: NDArray[np.float64], pose: Pose, margin: float) -> float:
-        """Metres along ``path`` that the hull can go before one of ``points`` is within ``margin`` m; inf: all."""
+        """Return the distance along ``path`` until a point is within ``margin`` m of the hull, m; inf: none is."""
         return float(free_way(path, points, pose.x, pose.y, self.radius + margin))
 
     def task(self, start: Point, goals: Sequence[Point], terms: Terms) -> PlanningTask:
-        """Return the planning task, on copies of the map and of the obstacles seen."""
+        """Return a planning task on copies of the map and of the remembered obstacles. Raises Unreachable."""
         grid = self._belief.map
         shown = grid.evidence if terms.obstacles and terms.things else without_doubtful(grid)
         evidence, seen, trodden, corner = self._window(shown, start, *goals)
@@ -357,7 +357,7 @@ class Planner:
         )
 
     def _window(self, shown: NDArray[np.int16], *points: Point) -> Window:
-        """Copies of what is ``shown`` on the map and of memory, around all ``points`` as far as allowed."""
+        """Return copies of the ``shown`` map and of memory that contain all ``points``. Raises Unreachable."""
         grid = self._belief.map
         known = without_gone(shown, grid.corner, self._load.gone_from(grid))
         height, width = known.shape

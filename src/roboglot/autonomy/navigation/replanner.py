@@ -22,7 +22,7 @@ DISTRUSTED = (PoseJumped, MapReplaced, AnnotationsChanged)  # events after which
 
 
 class Replanner:
-    """Plans beside the driving, one plan at a time; ``close`` it afterwards."""
+    """Planner in the background of a drive, one plan at a time; ``close`` it afterwards."""
 
     def __init__(self, course: Course, planner: Planner, goal: Goal, journey: Journey, lookout: Lookout) -> None:
         self._course, self._planner, self._goal, self._journey = course, planner, goal, journey
@@ -44,7 +44,7 @@ class Replanner:
             self._plan.cancel()
 
     def distrust(self) -> None:
-        """Plan anew as soon as that may be done."""
+        """Plan anew as soon as possible."""
         self._stale = True
 
     def _distrust(self, _: Event) -> None:
@@ -55,16 +55,16 @@ class Replanner:
         return self._first + follower.passed
 
     def begin_again(self, follower: Follower) -> None:
-        """The next ``first`` begins with the goal that the follower is on the way to."""
+        """Let the next ``first`` begin with the follower's present goal."""
         self._first += follower.passed
         self._stale = False
 
     async def first(self) -> Route | None:
-        """Plan from here through all goals that are left; see ``_route``."""
+        """Plan from here through all remaining goals; see ``_route``."""
         return await self._route(self._goal.points[self._first :])
 
     async def _route(self, goals: tuple[Point, ...]) -> Route | None:
-        """The way from here; None while something closes it that may go away; Unreachable if that is hopeless."""
+        """Return a route from here; None while obstacles close it that may go away. Raises Unreachable."""
         try:
             return await self._known_route(goals)
         except Unreachable:
@@ -93,9 +93,9 @@ class Replanner:
         return route
 
     async def _closed_for_now(self, route: Route, start: Point, goals: tuple[Point, ...]) -> bool:
-        """True while ``route`` leads through unknown floor only because something stands on a known or shorter way.
+        """Return whether ``route`` leads through unknown floor only because an obstacle is on a known or shorter way.
 
-        It may be another robot, or a person: for a while it is better to wait for them than to search the building.
+        A robot or a person may leave: for a while, waiting is better than searching the building.
         """
         journey, now = self._journey, self._clock.time()
         if self._is_known(route):
@@ -112,7 +112,7 @@ class Replanner:
         return now - journey.closed_since < self._tuning.search_after
 
     def _would_leave(self, more: float) -> bool:
-        """True if a way that is ``more`` metres shorter may become free: others move around, or had no time to."""
+        """True if a way that is ``more`` m shorter may become free: others are near, or had no time to move yet."""
         course, journey = self._course, self._journey
         if more <= self._tuning.detour:
             return False
@@ -123,7 +123,7 @@ class Replanner:
         return route.unknown <= self._tuning.unknown_seam and route.ends_known
 
     def _bound(self, route: Route) -> None:
-        """Bound the search of a building for a way that may not exist."""
+        """Limit the search through unknown floor for a way that may not exist. Raises Unreachable."""
         journey, tuning = self._journey, self._tuning
         if route.unknown > tuning.unknown_seam and math.isinf(journey.far_max):
             journey.far_max = journey.far + tuning.search_share * route.length + tuning.search_more
@@ -131,7 +131,7 @@ class Replanner:
             raise Unreachable(f"no way was found through unknown floor within {journey.far_max:.0f} m of driving")
 
     def advance(self, follower: Follower) -> bool:
-        """Begin a new plan when one is needed; True if ``follower`` was given another route."""
+        """Begin a new plan if needed; return whether ``follower`` got another route. Raises Blocked, Unreachable."""
         now, tuning, lookout = self._clock.time(), self._tuning, self._lookout
         if self._plan:
             if not self._plan.done():
@@ -149,7 +149,7 @@ class Replanner:
         return False
 
     def _take(self, follower: Follower, plan: asyncio.Task[Route | None]) -> bool:
-        """Change to the planned route if it is better than to go on or wait."""
+        """Change to the planned route if it is better than the present one or waiting; return whether it was."""
         route, lookout, tuning = plan.result(), self._lookout, self._tuning
         if route is None:
             self._planned_at = self._clock.time() + tuning.wait_period - tuning.replan_period
@@ -174,21 +174,21 @@ class Replanner:
         return True
 
     def _bears(self, more: float) -> float:
-        """Seconds that it waits before it takes a way that is ``more`` metres longer."""
+        """Return the time to wait before taking a way that is ``more`` m longer, s."""
         tuning, place = self._tuning, self._lookout.blocked_place
         if not self._course.traffic.is_closed_by_others(place):
             return tuning.detour_after
         return max(tuning.detour_after, min(tuning.others_after, more / tuning.others_pace))
 
     def is_too_long(self, route: Route, left: float, waited: float) -> bool:
-        """True if ``left`` m were left, and others are about to leave the way that was so much shorter."""
+        """True if ``route`` is much longer than the ``left`` m before, and others may still leave the shorter way."""
         more, tuning = route.length - left, self._tuning
         if more <= tuning.detour or not self._course.traffic.is_among_others(self._course.belief.pose):
             return False
         return waited < min(tuning.others_after, more / tuning.others_pace)
 
     def _count(self, detour: bool, *, around: bool) -> None:
-        """Bound how often it goes another way. Raises Blocked."""
+        """Limit the number of route changes. Raises Blocked."""
         self._detours += detour
         self._arounds += around
         if self._detours > self._tuning.detours_max or self._arounds > self._tuning.arounds_max:

@@ -1,6 +1,6 @@
 """Restricted areas: robots count each other by radio, and wait before an area that is full.
 
-An area is the same for two robots if it has the same number and size: that is so where they use the same map.
+Areas with the same number and size are the same area for two robots, as on a common map.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ MANUAL = frozenset({"drive", "move by"})  # manual driving is not held up
 
 
 class RestrictedAreas:
-    """Looks with every scan of the lidar; holds up whatever drives the robot by pausing it."""
+    """Watch over restricted areas at every scan, which pauses the driving action before a full one."""
 
     def __init__(self, robot: Robot, belief: Belief) -> None:
         self._robot, self._belief = robot, belief
@@ -64,14 +64,14 @@ class RestrictedAreas:
             radio.claim(claims)
 
     def _hold(self, name: str) -> None:
-        """Pause what drives, unless that is done by hand or paused anyway."""
+        """Pause the driving action, unless it is manual or paused already."""
         for action in self._robot.actions.running(BASE):
             if action.name not in MANUAL and not action.paused:
                 action.pause()
                 self._held = action, name
 
     def _wait(self, areas: Mapping[str, Area], now: float) -> None:
-        """Continue as soon as there is room, and claim it first."""
+        """Claim the area as soon as there is room, and resume the action."""
         assert self._held is not None
         action, name = self._held
         area = areas.get(name)
@@ -83,7 +83,7 @@ class RestrictedAreas:
             action.resume()
 
     def _ahead(self) -> list[Pose]:
-        """Places that the robot cannot help coming to."""
+        """Return the poses within the stopping distance (map)."""
         velocity, pose = self._robot[Base].velocity, self._belief.pose
         speed = velocity.speed
         if speed < 0.02:

@@ -1,4 +1,4 @@
-"""A planned way as the follower needs it: dense points, how fast each may be passed, where the goals lie on it."""
+"""A planned way for the follower: dense points, their speed limits, and the goals' places on it."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ SEARCH_AHEAD = 40  # points among which the nearest is searched
 
 
 class Route:
-    """``points`` (n, 2; map, m), ``along`` (n): metres from the start, ``speeds`` (n): m/s allowed there.
+    """``points`` (n, 2; map, m), ``along`` (n): m from the start, ``speeds`` (n): limits, m/s.
 
-    ``goals``: where it passes them; ``reaches``: metres from there that count as passed.
+    ``goals``: places where the route passes them; ``reaches``: m from there that count as passed.
     """
 
     def __init__(
         self, legs: Sequence[NDArray[np.float64]], wanted: Sequence[Point] | None = None, tolerance: float = 0.1
     ) -> None:
-        """``legs``: to each goal in turn, the vertices (m, 2), the last one being the goal; at least one vertex.
+        """``legs``: for each goal, the vertices up to it (m, 2), at least one.
 
-        ``wanted``: the goals themselves, where a leg may end a little beside its own because that is occupied. Half of
-        ``tolerance`` (m) is kept for what the robot does not know about where it is.
+        ``wanted``: the goals themselves, as a leg may end a little beside an occupied one. Half of ``tolerance`` (m) is
+        kept for the uncertainty of the pose.
         """
         self.vertices = np.concatenate(legs)
         self.points, self.along, places = _densified(self.vertices)
@@ -61,11 +61,11 @@ class Route:
 
     @property
     def length(self) -> float:
-        """Metres in all."""
+        """Total length, m."""
         return self._marks[-1]
 
     def set_speeds(self, ceilings: NDArray[np.float64], acceleration: float) -> None:
-        """Allow ``ceilings`` (n; m/s), less in bends, and before those and the end what braking can undo."""
+        """Set the speed limits: ``ceilings`` (n; m/s), less in bends, and braking in time for those and the end."""
         bends = np.zeros(len(self.points))
         if len(self.points) > 2 * CORNER_REACH:
             ahead = self.points[2 * CORNER_REACH :] - self.points[CORNER_REACH:-CORNER_REACH]
@@ -84,9 +84,9 @@ class Route:
         self.speeds = np.sqrt(np.maximum(0.0, lowest - 2.0 * BRAKING_SHARE * acceleration * self.along))
 
     def centre(self, echoes: NDArray[np.float64], clearance: float) -> float:
-        """Move the next stretch to the middle of gaps that leave less than ``clearance`` (m) on both sides.
+        """Move the next stretch to the middle of gaps with less than ``clearance`` (m) on both sides.
 
-        ``echoes`` (n, 2; map, m): what is seen now. Goals stay where they are. Returns the narrowest gap's width (m);
+        ``echoes`` (n, 2; map, m): present obstacles. Goals keep their places. Returns the narrowest gap's width (m);
         inf if there is none.
         """
         stretch = slice(self._at, min(self._at + CENTRED, len(self.points)))
@@ -100,16 +100,16 @@ class Route:
         return width
 
     def _bend(self, place: int) -> float:
-        """The turn (rad, >= 0) from the piece before that point to the piece behind it."""
+        """Return the turn (rad, >= 0) at a point of the route."""
         if not 0 < place < len(self.points) - 1:
             return 0.0
         before, here, behind = (Point(*self._spots[k]) for k in (place - 1, place, place + 1))
         return abs(wrap_angle(here.bearing_to(behind) - before.bearing_to(here)))
 
     def advance(self, pose: Pose, goal: int) -> tuple[float, float]:
-        """Move on to the point nearest to ``pose``: metres along the way, metres beside it.
+        """Advance to the point nearest to ``pose``; return the distances along the way and beside it, m.
 
-        Never goes back, and never past ``goal`` (a number): the way behind it may lead back over the way to it.
+        Never goes back, and never past ``goal`` (a number), as the way after it may cross the way to it.
         """
         end = min(self._at + SEARCH_AHEAD, self._goals_at[goal] + 1)
         x, y = self._columns[:, self._at : end]
@@ -120,21 +120,21 @@ class Route:
 
     @property
     def speed_here(self) -> float:
-        """m/s allowed at the point reached."""
+        """Speed limit at the present point, m/s."""
         return float(self.speeds[self._at])
 
     @property
     def ceiling_here(self) -> float:
-        """m/s allowed at the point reached, however near the end is."""
+        """Speed limit at the present point without braking for bends and the end, m/s."""
         return float(self._ceilings[self._at])
 
     def point_at(self, along: float) -> Point:
-        """The dense point at or just behind ``along`` metres."""
+        """Return the first dense point at or after ``along`` m."""
         x, y = self._spots[min(bisect_left(self._marks, along), len(self._marks) - 1)]
         return Point(x, y)
 
     def ahead(self, pose: Pose, carrot: Point, beyond: float, horizon: float) -> NDArray[np.float64]:
-        """The next metres as they will be driven (dense): straight to ``carrot``, then on from ``beyond`` m along."""
+        """Return the way ahead (dense; map): straight to ``carrot``, then ``horizon`` m of route from ``beyond`` m."""
         first = bisect_left(self._marks, beyond)
         last = bisect_left(self._marks, beyond + horizon) + 1
         count = math.ceil(math.hypot(carrot.x - pose.x, carrot.y - pose.y) / SPACING)
@@ -143,7 +143,7 @@ class Route:
         return np.concatenate([straight, self.points[first:last]])
 
     def remaining(self, pose: Pose, along: float) -> Path:
-        """The vertices that are left, from ``pose`` on."""
+        """Return the remaining vertices, beginning with ``pose``."""
         first = min(bisect_right(self._corners_along, along + SPACING), len(self._corners) - 1)
         return Path((pose.point, *self._corners[first:]))
 
@@ -151,7 +151,7 @@ class Route:
 def _densified(
     vertices: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Points every SPACING metres at most along the polyline; the metres to each; which of them the vertices are."""
+    """Return points at most SPACING m apart along the polyline, their distances (m), and the vertices' indices."""
     ahead = np.diff(vertices, axis=0)
     counts, spans, gone, begins, places = [], [], 0.0, [], [0]
     for x, y in ahead.tolist():

@@ -39,13 +39,13 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class GridFrame:
-    """Frame of a grid: ``corner`` of cell (0, 0) in map, rows and columns."""
+    """Frame of a grid: ``corner`` of cell (0, 0) in map; ``shape``: rows and columns."""
 
     corner: Point
     shape: tuple[int, int]
 
     def around(self, points: tuple[Point, ...], reach: float) -> tuple[slice, slice]:
-        """The rows and columns within ``reach`` m of the points' bounding box."""
+        """Return the rows and columns within ``reach`` m of the points' bounding box."""
         rows, columns = (
             slice(
                 *(
@@ -61,13 +61,13 @@ class GridFrame:
         return rows, columns
 
     def centres(self, rows: slice, columns: slice) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """x and y (map, m; broadcastable) of the cells' centres."""
+        """Return x and y (map, m; broadcastable) of the cells' centres."""
         x = self.corner.x + (np.arange(columns.start, columns.stop) + 0.5) * RESOLUTION
         y = self.corner.y + (np.arange(rows.start, rows.stop) + 0.5) * RESOLUTION
         return x[None, :], y[:, None]
 
     def inside(self, area: Area) -> Mask:
-        """The cells whose centre lies in ``area``."""
+        """Return the mask of the cells whose centre lies in ``area``."""
         mask = np.zeros(self.shape, bool)
         rows, columns = self.around(area.corners(), RESOLUTION)
         x, y = self.centres(rows, columns)
@@ -80,7 +80,7 @@ class GridFrame:
         return mask
 
     def beside(self, lines: tuple[Line, ...], reach: float) -> Mask:
-        """The cells whose centre lies within ``reach`` m of one of ``lines``."""
+        """Return the mask of the cells whose centre lies within ``reach`` m of one of ``lines``."""
         mask = np.zeros(self.shape, bool)
         for a, b in _pieces(lines):
             rows, columns = self.around((a, b), reach)
@@ -93,7 +93,7 @@ class GridFrame:
         return mask
 
     def near(self, point: Point, reach: float) -> Mask:
-        """The cells whose centre lies within ``reach`` m of ``point``."""
+        """Return the mask of the cells whose centre lies within ``reach`` m of ``point``."""
         mask = np.zeros(self.shape, bool)
         rows, columns = self.around((point,), reach)
         x, y = self.centres(rows, columns)
@@ -109,7 +109,7 @@ def _pieces(lines: tuple[Line, ...]) -> Iterator[tuple[Point, Point]]:
 
 @dataclass(frozen=True, slots=True)
 class Layers:
-    """Per cell: ``closed`` (to be kept clear of), ``extra`` cost (inf: not to be entered), top ``speed`` (m/s)."""
+    """Layers of cells: ``closed`` (the hull keeps clear), ``extra`` cost (inf: not entered), top ``speed`` (m/s)."""
 
     closed: Mask
     extra: NDArray[np.float32] | None
@@ -119,7 +119,7 @@ class Layers:
 def layers(
     drawn: Annotations, frame: GridFrame, tracks: Tracks, start: Point, goals: tuple[Point, ...]
 ) -> Layers | None:
-    """Return the layers that hold for one drive; None if there are none."""
+    """Return the layers of one drive; None if there are none."""
     lines = drawn.lines_of(LineKind.TRACK) if tracks is not Tracks.FREE else ()
     if not (drawn.areas or drawn.lines_of(LineKind.WALL) or lines):
         return None
@@ -144,7 +144,7 @@ def layers(
 
 
 def _distance(lines: tuple[Line, ...], point: Point) -> float:
-    """Metres from ``point`` to the nearest of ``lines``."""
+    """Return the distance from ``point`` to the nearest of ``lines``, m."""
     nearest = math.inf
     for a, b in _pieces(lines):
         dx, dy = b.x - a.x, b.y - a.y

@@ -1,4 +1,4 @@
-"""Remembers, cell by cell, what the lidar saw that the map does not have. Needs the kernels."""
+"""Memory, cell by cell, of obstacles that the lidar saw and the map does not show. Needs the kernels."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Cells(Generic[Scalar]):
         self._cells: NDArray[Scalar] = np.zeros((0, 0), kind)
 
     def of(self, grid: EvidenceGrid) -> NDArray[Scalar]:
-        """The numbers, to be written to until the map grows or is another one: then the array is another one, too."""
+        """Return the numbers, which may be written to; a map that has grown, or another one, has another array."""
         first, shape, kept = (grid.first_row, grid.first_column), grid.evidence.shape, self._cells
         if grid is self._grid and first == self._first and shape == kept.shape:
             return kept
@@ -41,7 +41,7 @@ class Cells(Generic[Scalar]):
 
 
 class ScanMemory:
-    """Memory of scans, of one map at a time."""
+    """Memory of scans on one map at a time."""
 
     def __init__(self) -> None:
         self._seen = Cells(np.float32)
@@ -55,7 +55,7 @@ class ScanMemory:
     def observe(
         self, grid: EvidenceGrid, shown: NDArray[np.int16], scan: ScanPoints, pose: Pose, now: float
     ) -> NDArray[np.float64]:
-        """Remember what ``scan`` has that is not ``shown`` on the map; returns its near echoes in map (n, 2)."""
+        """Remember obstacles of ``scan`` that are not ``shown`` on the map; return its near echoes in map (n, 2; m)."""
         corner, seen = grid.corner, self._seen.of(grid)
         if seen is not self._listed:
             self._list(seen)

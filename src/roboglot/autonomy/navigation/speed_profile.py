@@ -1,4 +1,4 @@
-"""Trapezoidal speed profiles: how fast one may go with so much way left, and how fast to go to end in time."""
+"""Trapezoidal speed profiles: speed by the distance left, and top speed by the duration."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ APPROACH_GAIN = 6.0  # 1/s; near the goal the speed is this times the remaining 
 
 
 def trapezoid_time(distance: float, speed: float, acceleration: float) -> float:
-    """Seconds to cover ``distance`` from rest to rest."""
+    """Return the time to cover ``distance`` from rest to rest, s."""
     if distance >= speed * speed / acceleration:
         return distance / speed + speed / acceleration
     return 2.0 * math.sqrt(distance / acceleration)
 
 
 def cruise_speed(distance: float, duration: float, acceleration: float) -> float:
-    """The top speed with which ``distance`` takes ``duration`` from rest to rest (the lowest such speed)."""
+    """Return the lowest top speed with which ``distance`` takes ``duration`` from rest to rest."""
     if duration <= 0:
         return 0.0
     root = (acceleration * duration) ** 2 - 4.0 * acceleration * distance
@@ -26,7 +26,7 @@ def cruise_speed(distance: float, duration: float, acceleration: float) -> float
 
 @dataclass(slots=True)
 class Ramp:
-    """The speed along one axis, stepped towards a goal: up by the acceleration, down in time to stop there."""
+    """Speed along one axis towards a goal: rises by the acceleration, falls in time to stop there."""
 
     top: float
     acceleration: float
@@ -34,7 +34,7 @@ class Ramp:
     gain: float = APPROACH_GAIN
 
     def step(self, remaining: float, dt: float) -> float:
-        """The speed to command for the next ``dt`` seconds with ``remaining`` (>= 0) left."""
+        """Return the speed for the next ``dt`` seconds with ``remaining`` (>= 0) left."""
         braking = math.sqrt(2.0 * BRAKING_SHARE * self.acceleration * remaining)
         allowed = min(self.top, braking, self.gain * remaining)
         self.speed = min(allowed, self.speed + self.acceleration * dt)

@@ -16,11 +16,11 @@ Shunned = Sequence[tuple[NDArray[np.float64], float]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Terms:
-    """Terms of a plan: the time, the robot's limits (m/s, m/s2), the goal's tolerance (m), and what is heeded.
+    """Terms of a plan: time (s), the robot's limits (m/s, m/s2), the goal's tolerance (m), and obstacles to consider.
 
-    ``obstacles`` False: the map, and what is ``drawn`` on it, alone. ``things`` False as well: single things on the map
-    do not count either; one may be a person whom a robot that woke up beside them took for a pillar. ``shunned``:
-    points (n, 2; map) and the metres around them where others are about to drive.
+    ``obstacles`` False: only the map and the annotations ``drawn`` on it count. ``things`` False as well: single things
+    on the map do not count either, as one may be a person mapped as a pillar. ``shunned``: points (n, 2; map) and the
+    distance (m) to keep from them, where others are about to drive.
     """
 
     now: float

@@ -1,1 +1,1 @@
-"""Sweeping an area: where the lanes lie, how much of them has been driven, and the component that drives them."""
+"""Sweeping an area: the lanes, their swept share, and the component that drives them."""

@@ -1,4 +1,4 @@
-"""Sweeping on the map: the component. Where the lanes lie is lanes.py's, each drive is navigation's."""
+"""The sweeping component: lanes come from lanes.py, drives are navigation's."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ PASSES = 30  # of improving the order of the parts
 
 
 class LaneSweeping(Sweeping):
-    """Parts in a short order, lanes to and fro; what cannot be reached is left out and reported."""
+    """Sweeping part by part in a short order, lanes to and fro; unreachable lanes are left out and reported."""
 
     def __init__(self, robot: Robot, course: Course, navigation: GridNavigation) -> None:
         self._robot, self._course, self._navigation = robot, course, navigation
@@ -73,7 +73,7 @@ class LaneSweeping(Sweeping):
         return wanted, apart
 
     async def _ways(self, areas: Sequence[Area], width: float) -> list[list[Point]]:
-        """The lanes' ends of every part, the parts in a short order from here."""
+        """Return the ends of the lanes (map) by part, the parts in a short order from here."""
         from roboglot.kernels.touring import visiting_order
 
         here = self._robot[Localization].pose.point
@@ -114,4 +114,4 @@ class LaneSweeping(Sweeping):
 
 
 def _unheard(_: NavigationFeedback) -> None:
-    """The feedback of sweeping has its own words."""
+    """Ignore the feedback of navigation: sweeping reports its own progress."""

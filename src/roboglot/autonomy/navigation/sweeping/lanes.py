@@ -1,4 +1,4 @@
-"""Lanes over the open floor of an area: cut into parts that can be driven to and fro without crossing anything.
+"""Lanes over the open floor of an area, cut into parts that can be driven to and fro without crossing obstacles.
 
 Neighbouring lanes whose open stretches overlap one to one belong to one part; where a stretch splits or two join,
 a part ends and others begin (boustrophedon decomposition). Knows no robot.
@@ -31,7 +31,7 @@ class Stretch:
 
     @property
     def length(self) -> float:
-        """m."""
+        """Length, m."""
         return self.start.distance_to(self.end)
 
 
@@ -39,7 +39,7 @@ SweptPart = tuple[Stretch, ...]  # one stretch of each of its lanes, in order
 
 
 def parts(area: Area, floor: NDArray[np.bool_], frame: GridFrame, width: float) -> list[SweptPart]:
-    """The parts of ``area`` where ``floor`` is open, with lanes at most ``width`` m apart along its centre line."""
+    """Return the parts of ``area`` on open ``floor``, with lanes along its centre line, at most ``width`` m apart."""
     length = area.start.distance_to(area.end)
     if length <= 0.0 or area.half_width <= 0.0:
         return []
@@ -82,7 +82,7 @@ def open_stretches(lane: Stretch, floor: NDArray[np.bool_], frame: GridFrame) ->
 def _sampled(
     floor: NDArray[np.bool_], frame: GridFrame, x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """True if the floor is open at those places."""
+    """Return whether the floor is open, for each place (map, m)."""
     columns = np.floor((x - frame.corner.x) / RESOLUTION).astype(np.int64)
     rows = np.floor((y - frame.corner.y) / RESOLUTION).astype(np.int64)
     inside = (rows >= 0) & (columns >= 0) & (rows < frame.shape[0]) & (columns < frame.shape[1])
@@ -92,13 +92,13 @@ def _sampled(
 
 
 def _runs(is_open: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """The [begin, end) of all runs of True."""
+    """Return [begin, end) of all runs of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], is_open, [False]])))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
 def zigzag(part: SweptPart, start: Point) -> list[Point]:
-    """The ends of the lanes to and fro, beginning at the corner of the part nearest to ``start``."""
+    """Return the ends of the lanes to and fro, from the part's corner nearest to ``start``."""
     ways = [list(_to_and_fro(lanes, flipped)) for lanes in (part, tuple(reversed(part))) for flipped in (False, True)]
     return min(ways, key=lambda way: start.distance_to(way[0]))
 

@@ -1,4 +1,4 @@
-"""Swept share of the lanes: by the path that the robot drove, not by the goals that it set out for."""
+"""Swept share of the lanes, measured by the robot's path, not by goals."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ REPORTS = 100  # progress reports per drive, at most
 
 
 class Swept:
-    """A context: watches where ``action`` drives and reports its ``SweepFeedback``."""
+    """A context that tracks the robot's path and reports the ``SweepFeedback`` of ``action``."""
 
     def __init__(self, robot: Robot, belief: Belief, action: Action, lanes: Sequence[Stretch]) -> None:
         self._robot, self._belief, self._action = robot, belief, action
@@ -50,11 +50,11 @@ class Swept:
 
     @property
     def done(self) -> float:
-        """Metres of lanes driven along."""
+        """Length of the swept lanes, m."""
         return float(self._metres[self._swept].sum())
 
     def left(self) -> list[Stretch]:
-        """Return the stretches not driven along yet, without crumbs."""
+        """Return the stretches not swept yet, without very short ones."""
         found: list[Stretch] = []
         for begin, end in pairwise(self._ends):
             edges = np.flatnonzero(np.diff(np.concatenate([[True], self._swept[begin:end], [True]])))
@@ -64,7 +64,7 @@ class Swept:
         return [stretch for stretch in found if stretch.length >= STRETCH_MIN]
 
     def report(self, *, final: bool = False) -> None:
-        """Publish how far it is; in the end, what was left out."""
+        """Report the progress; ``final``: with the length that was left out."""
         left_out = sum((stretch.length for stretch in self.left()), 0.0) if final else 0.0
         self._reported = self.done
         # Remnants at the ends of lanes are neither driven nor reported.
@@ -85,12 +85,12 @@ class Swept:
 
 
 def _spread(lane: Stretch, count: int) -> NDArray[np.float64]:
-    """``count`` places from end to end (count, 2)."""
+    """Return ``count`` places from end to end (count, 2; map, m)."""
     return np.linspace((lane.start.x, lane.start.y), (lane.end.x, lane.end.y), count)
 
 
 def _beside(places: NDArray[np.float64], start: Pose, end: Pose) -> NDArray[np.float64]:
-    """Metres from each of ``places`` (n, 2) to the straight line between the two."""
+    """Return the distances from ``places`` (n, 2) to the line from ``start`` to ``end``, m."""
     way = np.array([end.x - start.x, end.y - start.y])
     offsets = places - (start.x, start.y)
     share = np.clip(offsets @ way / max(float(way @ way), 1e-12), 0.0, 1.0)
